@@ -1,0 +1,1 @@
+"""The control laws as pure functions: arrays in, arrays out."""

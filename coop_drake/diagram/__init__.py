@@ -1,0 +1,1 @@
+"""Wiring: one robot's controller, the transport station, the closed loop."""

@@ -1,0 +1,40 @@
+"""Every exception that coop_drake raises on purpose; each carries its data and says what is allowed."""
+
+from __future__ import annotations
+
+__all__ = ["CoopDrakeError", "FieldError", "GeometryError", "PlanError", "ScenarioError", "StallError"]
+
+
+class CoopDrakeError(Exception):
+    """Base of all exceptions raised on purpose by coop_drake."""
+
+
+class ScenarioError(CoopDrakeError):
+    """A file is wrong: says in which file, at which key, with which value, and what is allowed.
+
+    Args:
+        file: Path of the offending file as the user wrote it.
+        key: Dotted path of the key inside the file, for example ``workspace.outer[3]``.
+        value: The offending value as it stands in the file.
+        allowed: What may stand there, as a sentence fragment, for example ``a ring that does not cross itself``.
+    """
+
+    def __init__(self, file: str, key: str, value: object, allowed: str) -> None:
+        self.file, self.key, self.value, self.allowed = file, key, value, allowed
+        super().__init__(f"{file}: {key}: {value!r} is not allowed; expected {allowed}")
+
+
+class GeometryError(CoopDrakeError):
+    """A shape cannot be used; the message names the shape and the place."""
+
+
+class PlanError(CoopDrakeError):
+    """A plan or a plan file is not usable, or does not belong to the scenario."""
+
+
+class FieldError(CoopDrakeError):
+    """A harmonic map cannot be built or its certificate failed; the message names the corner or gap."""
+
+
+class StallError(CoopDrakeError):
+    """A transition would take unreasonably long; the message names the passage (rule 9)."""

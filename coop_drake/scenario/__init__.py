@@ -1,0 +1,1 @@
+"""The typed scenario file: dataclasses, loading and validation."""

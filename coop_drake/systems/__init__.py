@@ -1,0 +1,1 @@
+"""Thin LeafSystems over the control laws, the velocity fields and the cell planner."""
