@@ -1,1 +1,5 @@
 """Run a scenario: the simulation, its log, and the invariants checked while it runs."""
+
+from coop_drake.simulation.log import SimulationLog
+
+__all__ = ["SimulationLog"]

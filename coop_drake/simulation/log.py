@@ -1,0 +1,125 @@
+"""What a run leaves behind: named numpy arrays, one row per accepted step; no pydrake."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coop_drake.errors import PlanError
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class SimulationLog:
+    """One run; row t of every array belongs to ``times[t]``, an accepted integration step.
+
+    N robots, n joints of the whole team in the plan's order; axes of funnels and slices are (theta, q...).
+    Planar quantities are ordered (x, y, rotation) in W. Margins are positive where the invariant holds.
+
+    Attributes:
+        times: Simulated time, shape (T,) [s].
+        cell_index: Index of the current cell, shape (T,).
+        transition_start: Time at which the current cell was entered, shape (T,) [s].
+        object_pose: Pose of L in W, theta unwrapped, shape (T, 3) [m, rad].
+        object_twist: Velocity of L's origin and its angular rate, shape (T, 3) [m/s, rad/s].
+        base_poses: Pose of every robot's base frame Bk in W, shape (T, N, 3) [m, rad].
+        joints: Every joint, shape (T, n) [rad or m].
+        joint_rates: Their rates, shape (T, n) [rad/s or m/s].
+        governor_position: p_G as robot 0 keeps it, shape (T, 2) [m].
+        funnel_lower: Lower funnel bound per axis, shape (T, 1 + n) [rad or m].
+        funnel_upper: Upper funnel bound per axis, shape (T, 1 + n) [rad or m].
+        energy_margin: Delta E of (15), smallest over the robots' copies, shape (T,) [m^2/s^2].
+        object_wrench: Total wrench commanded to the object at its centre of mass, shape (T, 3) [N, N m].
+        commanded_wrenches: Share (31) of every robot at its grasp, shape (T, N, 3) [N, N m].
+        measured_wrenches: Wrench that the grasp weld transmits to the object there, shape (T, N, 3) [N, N m].
+        base_wrenches: Actuation of every base at Bk, shape (T, N, 3) [N, N m].
+        joint_torques: Actuation of every joint, shape (T, n) [N m or N].
+        workspace_clearance: Smallest distance of any body to any wall, shape (T,) [m].
+        body_clearance: Smallest distance between bodies that must not touch, shape (T,) [m].
+        cell_clearance: Signed distance of p_WL to the boundary of the cell's safe set, shape (T,) [m].
+        funnel_margin: Smallest distance of an axis to its funnel's bounds, shape (T,) [rad or m].
+        slice_margin: Smallest distance of an axis to its slice's bounds, shape (T,) [rad or m].
+        acceleration_error: Largest component of realised minus desired acceleration of the object,
+            over all robots' copies of the command, shape (T,) [m/s^2 or rad/s^2].
+        wrench_error: Largest component of measured minus commanded wrench, shape (T,) [N or N m].
+        reached: Whether the object came to rest at the goal.
+        violation: Which invariant broke, when and by how much; empty if none did.
+        joint_names: Names of the joints' columns.
+        robot_names: Names of the robots' rows.
+    """
+
+    times: FloatArray
+    cell_index: IntArray
+    transition_start: FloatArray
+    object_pose: FloatArray
+    object_twist: FloatArray
+    base_poses: FloatArray
+    joints: FloatArray
+    joint_rates: FloatArray
+    governor_position: FloatArray
+    funnel_lower: FloatArray
+    funnel_upper: FloatArray
+    energy_margin: FloatArray
+    object_wrench: FloatArray
+    commanded_wrenches: FloatArray
+    measured_wrenches: FloatArray
+    base_wrenches: FloatArray
+    joint_torques: FloatArray
+    workspace_clearance: FloatArray
+    body_clearance: FloatArray
+    cell_clearance: FloatArray
+    funnel_margin: FloatArray
+    slice_margin: FloatArray
+    acceleration_error: FloatArray
+    wrench_error: FloatArray
+    reached: bool
+    violation: str
+    joint_names: tuple[str, ...]
+    robot_names: tuple[str, ...]
+
+    def save(self, path: Path | str) -> None:
+        """Write the log as a compressed ``.npz`` file; an interrupted write leaves no file behind.
+
+        Args:
+            path: Where to write; an existing file is replaced.
+        """
+        path = Path(path)
+        scratch = path.with_name(f".{path.name}.part")
+        try:
+            with scratch.open("wb") as stream:
+                np.savez_compressed(
+                    stream, **{f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
+                )
+            scratch.replace(path)
+        finally:
+            scratch.unlink(missing_ok=True)
+
+    @classmethod
+    def load(cls, path: Path | str) -> SimulationLog:
+        """Read a log written by ``save``.
+
+        Args:
+            path: The ``.npz`` file.
+
+        Raises:
+            PlanError: The file lacks an array; the message names it.
+        """
+        with np.load(Path(path), allow_pickle=False) as archive:
+            missing = [f.name for f in fields(cls) if f.name not in archive]
+            if missing:
+                raise PlanError(f"{path}: not a simulation log; it lacks {', '.join(missing)}")
+            values = {f.name: archive[f.name] for f in fields(cls)}
+        return cls(
+            **{
+                **values,
+                "reached": bool(values["reached"]),
+                "violation": str(values["violation"]),
+                "joint_names": tuple(str(name) for name in values["joint_names"]),
+                "robot_names": tuple(str(name) for name in values["robot_names"]),
+            }
+        )

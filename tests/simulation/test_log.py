@@ -1,0 +1,78 @@
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from coop_drake.errors import PlanError
+from coop_drake.simulation import SimulationLog
+
+ROWS, ROBOTS, JOINTS = 5, 2, 3
+SHAPES = {
+    "times": (), "cell_index": (), "transition_start": (), "object_pose": (3,), "object_twist": (3,),
+    "base_poses": (ROBOTS, 3), "joints": (JOINTS,), "joint_rates": (JOINTS,), "governor_position": (2,),
+    "funnel_lower": (1 + JOINTS,), "funnel_upper": (1 + JOINTS,), "energy_margin": (), "object_wrench": (3,),
+    "commanded_wrenches": (ROBOTS, 3), "measured_wrenches": (ROBOTS, 3), "base_wrenches": (ROBOTS, 3),
+    "joint_torques": (JOINTS,), "workspace_clearance": (), "body_clearance": (), "cell_clearance": (),
+    "funnel_margin": (), "slice_margin": (), "acceleration_error": (), "wrench_error": (),
+}  # fmt: skip
+
+
+@pytest.fixture
+def log():
+    generator = np.random.default_rng(7)
+    arrays = {name: generator.normal(size=(ROWS, *shape)) for name, shape in SHAPES.items()}
+    arrays["cell_index"] = np.arange(ROWS)
+    return SimulationLog(
+        **arrays,
+        reached=True,
+        violation="",
+        joint_names=("a::one", "a::two", "b::one"),
+        robot_names=("a", "b"),
+    )
+
+
+def test_a_log_survives_its_file_bit_by_bit(log, tmp_path):
+    path = tmp_path / "log.npz"
+    log.save(path)
+    again = SimulationLog.load(path)
+    for name in SHAPES:
+        np.testing.assert_array_equal(getattr(again, name), getattr(log, name))
+    assert (again.reached, again.violation) == (True, "")
+    assert again.joint_names == log.joint_names
+    assert again.robot_names == log.robot_names
+
+
+def test_a_violation_survives_its_file(log, tmp_path):
+    path = tmp_path / "log.npz"
+    replace(log, reached=False, violation="workspace clearance -0.01 m at t = 2 s").save(path)
+    again = SimulationLog.load(path)
+    assert again.reached is False
+    assert again.violation == "workspace clearance -0.01 m at t = 2 s"
+
+
+def test_every_array_has_a_documented_shape(log):
+    names = {field.name for field in fields(SimulationLog)}
+    assert names == set(SHAPES) | {"reached", "violation", "joint_names", "robot_names"}
+
+
+def test_an_interrupted_write_leaves_the_old_file(log, tmp_path, monkeypatch):
+    path = tmp_path / "log.npz"
+    log.save(path)
+    before = path.read_bytes()
+
+    def interrupt(stream, **_):
+        stream.write(b"half")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(np, "savez_compressed", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        log.save(path)
+    assert path.read_bytes() == before
+    assert [entry.name for entry in tmp_path.iterdir()] == ["log.npz"]
+
+
+def test_a_file_that_is_no_log_is_refused_by_name(tmp_path):
+    path = tmp_path / "other.npz"
+    np.savez(path, times=np.zeros(3))
+    with pytest.raises(PlanError, match=r"other\.npz: not a simulation log; it lacks cell_index, "):
+        SimulationLog.load(path)
