@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coop_drake.errors import PlanError
+from coop_drake.files import write_atomically
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -88,16 +89,8 @@ class SimulationLog:
         Args:
             path: Where to write; an existing file is replaced.
         """
-        path = Path(path)
-        scratch = path.with_name(f".{path.name}.part")
-        try:
-            with scratch.open("wb") as stream:
-                np.savez_compressed(
-                    stream, **{f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
-                )
-            scratch.replace(path)
-        finally:
-            scratch.unlink(missing_ok=True)
+        arrays = {f.name: np.asarray(getattr(self, f.name)) for f in fields(self)}
+        write_atomically(path, lambda stream: np.savez_compressed(stream, **arrays))
 
     @classmethod
     def load(cls, path: Path | str) -> SimulationLog:

@@ -1,0 +1,163 @@
+"""Exact signed distances of convex footprints to walls and to each other, compiled.
+
+A footprint is the hull of its core's vertices grown by a radius; all the work is done on the core's edges.
+Cores have one vertex (disc), two (capsule) or more (counter-clockwise polygon).
+"""
+
+from __future__ import annotations
+
+from math import hypot, inf
+
+import numpy as np
+from numba import njit
+
+from coop_drake.geometry.pose import FloatArray
+
+__all__ = ["core_distance", "place_vertices", "wall_distance"]
+
+
+@njit(cache=True)
+def place_vertices(local: FloatArray, component: FloatArray, poses: FloatArray) -> FloatArray:
+    """Vertices in W from vertices in their component's frame.
+
+    Args:
+        local: Vertices, shape (v, 2) [m].
+        component: Index of every vertex's component, shape (v,).
+        poses: X_WC of every component as (x, y, angle), shape (c, 3) [m, rad].
+    """
+    placed = np.empty_like(local)
+    cosines, sines = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    for i in range(local.shape[0]):
+        c = component[i]
+        placed[i, 0] = poses[c, 0] + cosines[c] * local[i, 0] - sines[c] * local[i, 1]
+        placed[i, 1] = poses[c, 1] + sines[c] * local[i, 0] + cosines[c] * local[i, 1]
+    return placed
+
+
+@njit(cache=True)
+def wall_distance(core: FloatArray, walls: FloatArray) -> float:
+    """Signed distance of a core to the walls: positive inside the floor, minus the depth outside it.
+
+    Args:
+        core: Vertices in W, shape (v, 2) [m].
+        walls: Every edge of the floor's rings as (x, y, x, y), shape (w, 4) [m].
+    """
+    nearest = inf
+    depth = 0.0
+    count = core.shape[0]
+    for w in range(walls.shape[0]):
+        ax, ay, bx, by = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
+        for i in range(count):
+            j = (i + 1) % count
+            nearest = min(
+                nearest, _segment_distance(core[i, 0], core[i, 1], core[j, 0], core[j, 1], ax, ay, bx, by)
+            )
+        if _core_holds(core, ax, ay):
+            depth = max(depth, _ring_distance(core, ax, ay))
+            nearest = 0.0
+    for i in range(count):
+        if not _floor_holds(walls, core[i, 0], core[i, 1]):
+            depth = max(depth, _walls_to_point(walls, core[i, 0], core[i, 1]))
+            nearest = 0.0
+    return nearest if nearest > 0.0 else -depth
+
+
+@njit(cache=True)
+def core_distance(first: FloatArray, second: FloatArray) -> float:
+    """Signed distance of two cores: minus the depth of the deepest vertex where they overlap.
+
+    Args:
+        first: Vertices in W, shape (v, 2) [m].
+        second: Vertices in W, shape (u, 2) [m].
+    """
+    nearest = inf
+    n, m = first.shape[0], second.shape[0]
+    for i in range(n):
+        k = (i + 1) % n
+        for j in range(m):
+            h = (j + 1) % m
+            nearest = min(
+                nearest,
+                _segment_distance(
+                    first[i, 0], first[i, 1], first[k, 0], first[k, 1],
+                    second[j, 0], second[j, 1], second[h, 0], second[h, 1],
+                ),
+            )  # fmt: skip
+    depth = 0.0
+    for i in range(n):
+        if _core_holds(second, first[i, 0], first[i, 1]):
+            depth = max(depth, _ring_distance(second, first[i, 0], first[i, 1]))
+            nearest = 0.0
+    for j in range(m):
+        if _core_holds(first, second[j, 0], second[j, 1]):
+            depth = max(depth, _ring_distance(first, second[j, 0], second[j, 1]))
+            nearest = 0.0
+    return nearest if nearest > 0.0 else -depth
+
+
+@njit(cache=True)
+def _point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    dx, dy = bx - ax, by - ay
+    length = dx * dx + dy * dy
+    t = 0.0 if length == 0.0 else min(1.0, max(0.0, ((px - ax) * dx + (py - ay) * dy) / length))
+    return hypot(px - ax - t * dx, py - ay - t * dy)
+
+
+@njit(cache=True)
+def _side(ax: float, ay: float, bx: float, by: float, px: float, py: float) -> float:
+    return (bx - ax) * (py - ay) - (by - ay) * (px - ax)
+
+
+@njit(cache=True)
+def _segment_distance(
+    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
+) -> float:
+    if _side(ax, ay, bx, by, cx, cy) * _side(ax, ay, bx, by, dx, dy) < 0.0 and (
+        _side(cx, cy, dx, dy, ax, ay) * _side(cx, cy, dx, dy, bx, by) < 0.0
+    ):
+        return 0.0
+    # Segments that do not cross are nearest at an end of one of them.
+    return min(
+        min(_point_distance(ax, ay, cx, cy, dx, dy), _point_distance(bx, by, cx, cy, dx, dy)),
+        min(_point_distance(cx, cy, ax, ay, bx, by), _point_distance(dx, dy, ax, ay, bx, by)),
+    )
+
+
+@njit(cache=True)
+def _core_holds(core: FloatArray, px: float, py: float) -> bool:
+    count = core.shape[0]
+    if count < 3:
+        return False
+    for i in range(count):
+        j = (i + 1) % count
+        if _side(core[i, 0], core[i, 1], core[j, 0], core[j, 1], px, py) < 0.0:
+            return False
+    return True
+
+
+@njit(cache=True)
+def _ring_distance(core: FloatArray, px: float, py: float) -> float:
+    nearest = inf
+    count = core.shape[0]
+    for i in range(count):
+        j = (i + 1) % count
+        nearest = min(nearest, _point_distance(px, py, core[i, 0], core[i, 1], core[j, 0], core[j, 1]))
+    return nearest
+
+
+@njit(cache=True)
+def _walls_to_point(walls: FloatArray, px: float, py: float) -> float:
+    nearest = inf
+    for w in range(walls.shape[0]):
+        nearest = min(nearest, _point_distance(px, py, walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]))
+    return nearest
+
+
+@njit(cache=True)
+def _floor_holds(walls: FloatArray, px: float, py: float) -> bool:
+    inside = False
+    for w in range(walls.shape[0]):
+        ax, ay, bx, by = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
+        if (ay > py) != (by > py) and px < ax + (py - ay) * (bx - ax) / (by - ay):
+            inside = not inside
+    return inside
