@@ -1,0 +1,47 @@
+"""Footprints of the team on the floor at one configuration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from shapely import MultiPoint, union_all
+from shapely.geometry.base import BaseGeometry
+
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.tree import ComponentTree
+
+__all__ = ["BodyFootprint", "team_footprints"]
+
+
+@dataclass(frozen=True)
+class BodyFootprint:
+    """Where one body stands.
+
+    Attributes:
+        name: Scoped name of the body.
+        robot: Index of its robot, None for the object.
+        shape: Its projection to the floor, in W [m].
+    """
+
+    name: str
+    robot: int | None
+    shape: BaseGeometry
+
+
+def team_footprints(tree: ComponentTree, configuration: FloatArray) -> list[BodyFootprint]:
+    """Return the footprint of every body, the object's first.
+
+    Args:
+        tree: The team.
+        configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
+    """
+    footprints = []
+    for component, X_WC in zip(tree.components, tree.poses(configuration), strict=True):
+        for body in component.bodies:
+            hulls = [
+                MultiPoint(X_WC.apply(np.atleast_2d(shape.vertices))).convex_hull.buffer(shape.radius)
+                for shape in body.shapes
+            ]
+            footprints.append(BodyFootprint(body.name, body.robot, union_all(hulls)))
+    return sorted(footprints, key=lambda footprint: footprint.robot is not None)

@@ -1,0 +1,92 @@
+"""Figures on the floor plan: start and goal (the paper's Figure 4), path and footprints (Figure 5)."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from shapely import Polygon
+
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.tree import ComponentTree
+from coop_drake.planning.plan import Plan
+from coop_drake.simulation import SimulationLog
+from coop_drake.viz.canvas import legend_above, new_figure
+from coop_drake.viz.colours import BLUE, INK, OBJECT, robot_colour
+from coop_drake.viz.floor import draw_team, draw_workspace
+
+__all__ = ["path_figure", "start_and_goal_figure"]
+
+_FOOTPRINTS = 14  # Footprints drawn along the path, start and end included.
+
+
+def _floor_figure(workspace: Polygon, caption: str) -> Figure:
+    x_min, y_min, x_max, y_max = workspace.bounds
+    aspect = (y_max - y_min) / (x_max - x_min)
+    height = min(9.0, max(3.5, 6.0 * aspect))
+    return new_figure(min(9.0, max(5.0, height / aspect + 1.2)), height + 0.8, caption)
+
+
+def start_and_goal_figure(workspace: Polygon, tree: ComponentTree, plan: Plan) -> Figure:
+    """Draw the team at the start and at the goal of a plan.
+
+    Joints without a goal value are drawn in the middle of the last cell's goal interval.
+    """
+    caption = "Figure 4. Start and goal configuration of the robots and the object."
+    figure = _floor_figure(workspace, caption)
+    ax = figure.subplots()
+    draw_workspace(ax, workspace)
+    legend_above(ax, _who_is_who(tree))
+    last = plan.transitions[-1]
+    middle = 0.5 * (last.goal_lower + last.goal_upper)[1:]
+    joints = [
+        value if value is not None else rest for value, rest in zip(plan.goal_joints, middle, strict=True)
+    ]
+    for label, z in (("start", plan.start), ("goal", np.concatenate([plan.goal_pose, joints]))):
+        draw_team(ax, tree, z)
+        ax.plot(z[0], z[1], "o", color=INK, markersize=3, zorder=5)
+        ax.annotate(
+            label, (z[0], z[1]), xytext=(5, 4), textcoords="offset points", zorder=6, fontweight="bold"
+        )
+    return figure
+
+
+def _who_is_who(tree: ComponentTree) -> list[Patch]:
+    names = {
+        body.robot: body.name.split("::")[0] for component in tree.components for body in component.bodies
+    }
+    robots = sorted(robot for robot in names if robot is not None)
+    return [
+        Patch(color=OBJECT, alpha=0.55, label="object"),
+        *(Patch(color=robot_colour(robot), alpha=0.55, label=names[robot]) for robot in robots),
+    ]
+
+
+def path_figure(workspace: Polygon, tree: ComponentTree, log: SimulationLog) -> Figure:
+    """Draw the object's path, and the team's footprint at instants spread evenly along it."""
+    caption = "Figure 5. Path of the object (blue) and footprints of the team along it, coloured by time."
+    figure = _floor_figure(workspace, caption)
+    ax = figure.subplots()
+    draw_workspace(ax, workspace)
+    colours = mpl.colormaps["cividis"]
+    scale = Normalize(float(log.times[0]), float(log.times[-1]))
+    for row in _instants(log):
+        z = np.concatenate([log.object_pose[row], log.joints[row]])
+        draw_team(ax, tree, z, colour=colours(scale(log.times[row])), alpha=0.35)
+    ax.plot(log.object_pose[:, 0], log.object_pose[:, 1], color=BLUE, linewidth=1.8, zorder=5)
+    figure.colorbar(ScalarMappable(scale, colours), ax=ax, label="time [s]", shrink=0.6)
+    return figure
+
+
+def _instants(log: SimulationLog) -> FloatArray:
+    """Return rows of the log that lie evenly along the way, in metres plus radians."""
+    steps = np.abs(np.diff(np.hstack([log.object_pose, log.joints]), axis=0))
+    travelled = np.concatenate(
+        [[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]) + 0.3 * steps[:, 2:].max(axis=1))]
+    )
+    return np.unique(
+        np.searchsorted(travelled, np.linspace(0.0, travelled[-1], _FOOTPRINTS)).clip(0, len(steps))
+    )
