@@ -1,14 +1,15 @@
-"""Gain sets: the paper's fixed gains (Table 2) and gains scheduled by cell; and the gains of one transition."""
+"""Gain sets: fixed gains (the paper's Table 2) or scheduled by cell; and the gains of one transition."""
 
-from __future__ import annotations
-
-from dataclasses import dataclass
+# Field types stay real objects (no postponed annotations): scenario files are read by looking at them.
+from dataclasses import dataclass, fields, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+FunnelShape = Literal["exponential", "smooth"]
+FUNNEL_SHAPES: tuple[FunnelShape, ...] = ("exponential", "smooth")
 
 
 @dataclass(frozen=True)
@@ -32,9 +33,134 @@ class TransitionGains:
     damping: float
     governor_gain: float
     smoothing: float
-    funnel: Literal["exponential", "smooth"]
+    funnel: FunnelShape
     decay_rate: FloatArray
     log_gain: FloatArray
     position_gain: float
     rate_gain: float
     energy_bound: FloatArray
+
+    def select(self, axes: NDArray[np.intp]) -> "TransitionGains":
+        """Return the same gains for some axes only, for instance those that one robot controls."""
+        return replace(
+            self,
+            decay_rate=self.decay_rate[axes],
+            log_gain=self.log_gain[axes],
+            energy_bound=self.energy_bound[axes],
+        )
+
+
+@dataclass(frozen=True)
+class FixedGains:
+    """One set of gains for every transition; the defaults are the paper's Table 2.
+
+    Table 2 names lambda, k1 and k2 for the angle, and lambda alone for the joints: (38) as printed has no
+    gains there, which is k1 = k2 = 1, the angle's values. kappa is 1 because (18) and (38) have no factor.
+
+    Attributes:
+        stiffness: K [1/s^2].
+        damping: zeta [1/s].
+        governor_gain: K_G [-].
+        smoothing: c of the governor's root; 0 is the printed root [m].
+        funnel: ``exponential`` or ``smooth``.
+        angle_decay_rate: lambda of the object's angle [1/s].
+        joint_decay_rate: lambda of every joint [1/s].
+        log_gain: kappa [rad^2/s^2 or m^2/s^2].
+        position_gain: k1 [1/s].
+        rate_gain: k2 [1/s].
+        energy_factor: A transition is entered below this multiple of the energy at rest ...
+        energy_allowance: ... plus this multiple of kappa.
+    """
+
+    stiffness: float = 50.0
+    damping: float = 5.0
+    governor_gain: float = 5.0
+    smoothing: float = 0.0
+    funnel: str = "exponential"
+    angle_decay_rate: float = 2.0
+    joint_decay_rate: float = 2.0
+    log_gain: float = 1.0
+    position_gain: float = 1.0
+    rate_gain: float = 1.0
+    energy_factor: float = 1.2
+    energy_allowance: float = 0.5
+
+    def __post_init__(self) -> None:
+        _check(self)
+
+
+@dataclass(frozen=True)
+class ScheduledGains:
+    """Gains that follow the cell: stiff where it is narrow, gentle where the funnel has little to close.
+
+    Attributes:
+        wall_stiffness: K times the neck's width, K = clamp(wall_stiffness / b) [m/s^2].
+        min_stiffness: Smallest K [1/s^2].
+        max_stiffness: Largest K [1/s^2].
+        damping_factor: zeta over sqrt(K) [-].
+        governor_factor: K_G over sqrt(K) [s].
+        smoothing: c of the governor's root [m].
+        funnel: ``smooth`` or ``exponential``.
+        funnel_acceleration: Wall acceleration aimed at, lambda = clamp(sqrt(. / shrink)) [rad/s^2 or m/s^2].
+        min_decay_rate: Smallest lambda [1/s].
+        max_decay_rate: Largest lambda [1/s].
+        max_log_gain: Largest kappa [rad^2/s^2 or m^2/s^2].
+        log_acceleration: Largest kappa |a s| when a transition is entered at rest [rad/s^2 or m/s^2].
+        position_gain: k1 [1/s].
+        rate_gain: k2 [1/s].
+        energy_factor: A transition is entered below this multiple of the energy at rest ...
+        energy_allowance: ... plus this multiple of kappa.
+    """
+
+    wall_stiffness: float = 2.0
+    min_stiffness: float = 50.0
+    max_stiffness: float = 400.0
+    damping_factor: float = 1.0
+    governor_factor: float = 0.8
+    smoothing: float = 0.001
+    funnel: str = "smooth"
+    funnel_acceleration: float = 20.0
+    min_decay_rate: float = 2.0
+    max_decay_rate: float = 8.0
+    max_log_gain: float = 0.1
+    log_acceleration: float = 20.0
+    position_gain: float = 1.0
+    rate_gain: float = 8.0
+    energy_factor: float = 1.2
+    energy_allowance: float = 0.5
+
+    def __post_init__(self) -> None:
+        _check(self)
+        for low, high in (
+            ("min_stiffness", "max_stiffness"),
+            ("min_decay_rate", "max_decay_rate"),
+        ):
+            if getattr(self, low) > getattr(self, high):
+                raise ValueError(
+                    f"{low} must not exceed {high}, got {getattr(self, low)} > {getattr(self, high)}"
+                )
+
+
+GainSet = FixedGains | ScheduledGains
+
+
+def _check(gains: GainSet) -> None:
+    """Refuse gains with which the loop cannot be stable.
+
+    Raises:
+        ValueError: Names the gain, its value and what is allowed.
+    """
+    for field in fields(gains):
+        value = getattr(gains, field.name)
+        if field.name == "funnel":
+            if value not in FUNNEL_SHAPES:
+                raise ValueError(f"funnel must be one of {', '.join(FUNNEL_SHAPES)}, got {value!r}")
+        elif field.name == "smoothing":
+            if not 0.0 <= value < np.inf:
+                raise ValueError(f"smoothing must be finite and not negative, got {value}")
+        elif not 0.0 < value < np.inf:
+            raise ValueError(f"{field.name} must be finite and positive, got {value}")
+    if gains.energy_factor < 1.0:
+        raise ValueError(
+            f"energy_factor below 1 lets no transition begin; expected 1 or more, got {gains.energy_factor}"
+        )

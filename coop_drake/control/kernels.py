@@ -1,0 +1,144 @@
+"""Compiled inner loops of the per-axis laws; the functions that explain them are in funnels.py and ppc.py.
+
+One file, because a kernel's cache does not notice changes in kernels of other files.
+"""
+
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar, cast
+
+import numba
+import numpy as np
+
+from coop_drake.control.gains import FloatArray
+
+P = ParamSpec("P")
+R = TypeVar("R")
+Walls = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
+
+# Walls closer than this fraction of the funnel's width are treated as this far away: trial steps of an
+# integrator may stand on a wall or beyond it, and must get a finite answer that points back inside.
+SATURATION = 1e-7
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile a function of scalars and arrays, and keep the machine code beside the source."""
+    return cast(Callable[P, R], numba.njit(cache=True, error_model="numpy")(function))
+
+
+@compiled
+def decay(time: float, rate: float, smooth: bool) -> tuple[float, float, float]:
+    """Return the factor by which a wall's offset from its goal decays, and its first two derivatives."""
+    exponential = np.exp(-rate * time)
+    if not smooth:
+        return exponential, -rate * exponential, rate * rate * exponential
+    return (
+        (1.0 + rate * time) * exponential,
+        -rate * rate * time * exponential,
+        rate * rate * (rate * time - 1.0) * exponential,
+    )
+
+
+@compiled
+def track_axis(
+    position: float,
+    rate: float,
+    lower: float,
+    upper: float,
+    lower_rate: float,
+    upper_rate: float,
+    lower_acceleration: float,
+    upper_acceleration: float,
+    log_gain: float,
+    position_gain: float,
+    rate_gain: float,
+) -> tuple[float, float]:
+    """Return the acceleration and the energy of the back-stepping law on one axis; see ``ppc``."""
+    w, w_dot = upper - lower, upper_rate - lower_rate
+    dl = max(position - lower, SATURATION * w)
+    du = max(upper - position, SATURATION * w)
+    dl_dot, du_dot = rate - lower_rate, upper_rate - rate
+    s, s_dot = np.log(dl / du), dl_dot / dl - du_dot / du
+    a = w / (dl * du)
+    v = (lower_rate * du + upper_rate * dl - position_gain * s * dl * du) / w
+    v_dot = (
+        lower_acceleration * du
+        + lower_rate * du_dot
+        + upper_acceleration * dl
+        + upper_rate * dl_dot
+        - position_gain * (s_dot * dl * du + s * (dl_dot * du + dl * du_dot))
+        - v * w_dot
+    ) / w
+    acceleration = -rate_gain * (rate - v) + v_dot - log_gain * a * s
+    return acceleration, 0.5 * log_gain * s * s + 0.5 * (rate - v) * (rate - v)
+
+
+@compiled
+def funnel_walls(
+    time: float,
+    slice_lower: FloatArray,
+    slice_upper: FloatArray,
+    goal_lower: FloatArray,
+    goal_upper: FloatArray,
+    decay_rate: FloatArray,
+    smooth: bool,
+) -> Walls:
+    """Return the walls (lower, upper), their rates and their accelerations, each of shape (m,)."""
+    m = slice_lower.size
+    lower, upper, lower_rate, upper_rate = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
+    lower_acceleration, upper_acceleration = np.empty(m), np.empty(m)
+    for i in range(m):
+        value, first, second = decay(time, decay_rate[i], smooth)
+        below, above = slice_lower[i] - goal_lower[i], slice_upper[i] - goal_upper[i]
+        lower[i], upper[i] = goal_lower[i] + below * value, goal_upper[i] + above * value
+        lower_rate[i], upper_rate[i] = below * first, above * first
+        lower_acceleration[i], upper_acceleration[i] = below * second, above * second
+    return lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration
+
+
+@compiled
+def track_walls(
+    position: FloatArray,
+    rate: FloatArray,
+    walls: Walls,
+    log_gain: FloatArray,
+    position_gain: float,
+    rate_gain: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Return acceleration and energy of every axis, each of shape (m,)."""
+    lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration = walls
+    acceleration, energy = np.empty(position.size), np.empty(position.size)
+    for i in range(position.size):
+        acceleration[i], energy[i] = track_axis(
+            position[i],
+            rate[i],
+            lower[i],
+            upper[i],
+            lower_rate[i],
+            upper_rate[i],
+            lower_acceleration[i],
+            upper_acceleration[i],
+            log_gain[i],
+            position_gain,
+            rate_gain,
+        )
+    return acceleration, energy
+
+
+@compiled
+def track_funnel(
+    time: float,
+    position: FloatArray,
+    rate: FloatArray,
+    slice_lower: FloatArray,
+    slice_upper: FloatArray,
+    goal_lower: FloatArray,
+    goal_upper: FloatArray,
+    decay_rate: FloatArray,
+    smooth: bool,
+    log_gain: FloatArray,
+    position_gain: float,
+    rate_gain: float,
+) -> tuple[FloatArray, FloatArray]:
+    """Return acceleration and energy of every axis, each of shape (m,): both kernels above in one call."""
+    walls = funnel_walls(time, slice_lower, slice_upper, goal_lower, goal_upper, decay_rate, smooth)
+    return track_walls(position, rate, walls, log_gain, position_gain, rate_gain)
