@@ -13,12 +13,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.simulation.log import IntArray
 from coop_drake.viz.colours import GREY
-
-IntArray = NDArray[np.int64]
 
 __all__ = [
     "break_at",
