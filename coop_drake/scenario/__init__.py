@@ -1,1 +1,34 @@
 """The typed scenario file: dataclasses, loading and validation."""
+
+from coop_drake.scenario.assembly import Assembly, RobotAssembly, assemble
+from coop_drake.scenario.load import dump_scenario, load_scenario
+from coop_drake.scenario.model import (
+    Gains,
+    Goal,
+    ObjectPose,
+    Scenario,
+    SimulatorSettings,
+    Start,
+    Tolerances,
+    VisualizationSettings,
+    Workspace,
+)
+from coop_drake.scenario.packages import package_map
+
+__all__ = [
+    "Assembly",
+    "Gains",
+    "Goal",
+    "ObjectPose",
+    "RobotAssembly",
+    "Scenario",
+    "SimulatorSettings",
+    "Start",
+    "Tolerances",
+    "VisualizationSettings",
+    "Workspace",
+    "assemble",
+    "dump_scenario",
+    "load_scenario",
+    "package_map",
+]

@@ -1,0 +1,91 @@
+"""Checks and orders one robot's bodies and joints, from the base outwards."""
+
+from math import inf, isfinite, pi
+
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Joint, RigidBody
+
+from coop_drake.plant.parsing import bodies_of, joints_of, refusal
+from coop_drake.scenario import RobotAssembly, Scenario
+
+MOVABLE = ("revolute", "prismatic")
+
+
+def scoped(plant: MultibodyPlant, element: RigidBody | Joint) -> str:
+    """Name of a body or joint with its model: ``robot_0::link_1``."""
+    return f"{plant.GetModelInstanceName(element.model_instance())}::{element.name()}"
+
+
+def find_base(
+    scenario: Scenario, robot: RobotAssembly, plant: MultibodyPlant
+) -> tuple[RigidBody, tuple[Joint, ...]]:
+    """Find a robot's base body and its joints, and refuse what is no holonomic planar manipulator.
+
+    Args:
+        scenario: For messages.
+        robot: The robot.
+        plant: A plant that holds the robot's models, finalized or not.
+
+    Returns:
+        The base body, and the movable joints in the order of q_k: from the base outwards, a joint before those
+        that it carries.
+
+    Raises:
+        ScenarioError: A joint to the world, a joint that is neither fixed nor revolute nor prismatic, a joint
+            without limits where limits are needed, or bodies that do not hang together.
+    """
+    bodies = bodies_of(plant, robot.models)
+    members = {int(body.index()) for body in bodies}
+    inner: list[Joint] = []
+    for joint in joints_of(plant):
+        ends = {int(joint.parent_body().index()), int(joint.child_body().index())}
+        if ends & members and int(plant.world_body().index()) in ends:
+            raise refusal(
+                scenario,
+                robot,
+                scoped(plant, joint),
+                "a robot that no joint ties to the world; its base moves freely",
+            )
+        if ends <= members:
+            _check_kind(scenario, robot, plant, joint)
+            inner.append(joint)
+    children = {int(joint.child_body().index()) for joint in inner}
+    roots = [body for body in bodies if int(body.index()) not in children]
+    if len(roots) != 1:
+        names = ", ".join(scoped(plant, body) for body in roots) or "none"
+        raise refusal(scenario, robot, names, "one body that no joint leads to: the base")
+    return roots[0], _outwards(roots[0], inner)
+
+
+def limits_of(joint: Joint) -> tuple[float, float]:
+    """Limits of a joint [rad or m]; a revolute joint without limits gets half a turn each way."""
+    lower, upper = float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])
+    if joint.type_name() == "revolute":
+        return (lower if lower > -inf else -pi, upper if upper < inf else pi)
+    return lower, upper
+
+
+def _check_kind(scenario: Scenario, robot: RobotAssembly, plant: MultibodyPlant, joint: Joint) -> None:
+    name, kind = scoped(plant, joint), joint.type_name()
+    if kind == "weld":
+        return
+    if kind not in MOVABLE:
+        raise refusal(scenario, robot, name, f"fixed, revolute or prismatic joints, not {kind}")
+    lower, upper = limits_of(joint)
+    if not (isfinite(lower) and isfinite(upper)):
+        raise refusal(scenario, robot, name, "prismatic joints with two finite limits")
+    if lower >= upper:
+        raise refusal(scenario, robot, name, f"a lower limit below the upper one, not {lower} and {upper}")
+
+
+def _outwards(base: RigidBody, joints: list[Joint]) -> tuple[Joint, ...]:
+    """Depth first from the base; siblings in the order of the file."""
+    ordered: list[Joint] = []
+    stack = [int(base.index())]
+    while stack:
+        body = stack.pop()
+        leading = [joint for joint in joints if int(joint.parent_body().index()) == body]
+        for joint in reversed(leading):
+            stack.append(int(joint.child_body().index()))
+        ordered.extend(joint for joint in joints if int(joint.child_body().index()) == body)
+    return tuple(joint for joint in ordered if joint.type_name() in MOVABLE)

@@ -1,0 +1,44 @@
+"""Configurations z of the team in and out of a plant's context."""
+
+import numpy as np
+from pydrake.systems.framework import Context
+
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.plant.flatness import planar_pose
+from coop_drake.plant.team import TeamPlant
+
+
+def set_configuration(
+    team: TeamPlant, context: Context, z: FloatArray, z_rate: FloatArray | None = None
+) -> None:
+    """Put the team into a configuration.
+
+    Args:
+        team: The team.
+        context: The plant's context.
+        z: (x, y, theta, q...), shape (3 + n,) [m, rad].
+        z_rate: Rates of z, shape (3 + n,); at rest if None.
+    """
+    positions = np.zeros(team.plant.num_positions())
+    velocities = np.zeros(team.plant.num_velocities())
+    positions[team.position_index] = z
+    if z_rate is not None:
+        velocities[team.velocity_index] = z_rate
+    team.plant.SetPositions(context, positions)
+    team.plant.SetVelocities(context, velocities)
+
+
+def get_configuration(team: TeamPlant, context: Context) -> FloatArray:
+    """Read z = (x, y, theta, q...), shape (3 + n,) [m, rad], from the plant's context."""
+    return np.asarray(team.plant.GetPositions(context)[team.position_index])
+
+
+def get_rates(team: TeamPlant, context: Context) -> FloatArray:
+    """Read the rates of z, shape (3 + n,), from the plant's context."""
+    return np.asarray(team.plant.GetVelocities(context)[team.velocity_index])
+
+
+def base_poses(team: TeamPlant, context: Context) -> FloatArray:
+    """Read the pose (x, y, angle) of every base in W, shape (N, 3) [m, rad], angles in (-pi, pi]."""
+    poses = [planar_pose(robot.base_body.EvalPoseInWorld(context)) for robot in team.robots]
+    return np.array([(pose.x, pose.y, pose.angle) for pose in poses])

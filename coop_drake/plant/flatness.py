@@ -1,0 +1,105 @@
+"""Everything moves in the plane of the floor: frames stand upright, revolute axes too, prismatic axes lie flat."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, Joint, RigidBody
+from pydrake.systems.framework import Context
+
+from coop_drake.geometry.pose import FloatArray, PlanarPose
+from coop_drake.plant.chain import scoped
+from coop_drake.plant.parsing import bodies_of, joints_of, refusal
+from coop_drake.scenario import Assembly, Scenario
+
+TILT = 1e-5
+"""Largest sine of a tilt that passes for round-off in a file; pi / 2 written with six digits passes [-]."""
+
+
+def planar_pose(X: RigidTransform) -> PlanarPose:
+    """The planar part of a pose whose rotation is about the vertical axis."""
+    R, p = X.rotation().matrix(), X.translation()
+    return PlanarPose(float(p[0]), float(p[1]), float(np.arctan2(R[1, 0], R[0, 0])))
+
+
+def is_upright(axis: FloatArray) -> bool:
+    """Whether a unit vector points along the vertical, up or down."""
+    return bool(np.hypot(axis[0], axis[1]) <= TILT)
+
+
+def object_frame(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant) -> tuple[Frame, RigidBody]:
+    """Find L: the frame of the object's model, or of its first body where the file format has no model frame.
+
+    Raises:
+        ScenarioError: The object has movable joints, a joint to the world, or several loose bodies.
+    """
+    instance = plant.GetModelInstanceByName(assembly.object_model)
+    bodies = bodies_of(plant, [assembly.object_model])
+    members = {int(body.index()) for body in bodies}
+    children = set()
+    for joint in joints_of(plant):
+        ends = {int(joint.parent_body().index()), int(joint.child_body().index())}
+        if not ends & members:
+            continue
+        if int(plant.world_body().index()) in ends:
+            raise refusal(scenario, None, scoped(plant, joint), "an object that no joint ties to the world")
+        if ends <= members:
+            if joint.type_name() != "weld":
+                raise refusal(
+                    scenario, None, scoped(plant, joint), "an object that is rigid: fixed joints only"
+                )
+            children.add(int(joint.child_body().index()))
+    roots = [body for body in bodies if int(body.index()) not in children]
+    if len(roots) != 1:
+        names = ", ".join(scoped(plant, body) for body in roots) or "none"
+        raise refusal(scenario, None, names, "an object whose bodies hang together")
+    frame = (
+        plant.GetFrameByName("__model__", instance) if plant.HasFrameNamed("__model__", instance) else None
+    )
+    return (frame, frame.body()) if frame else (roots[0].body_frame(), roots[0])
+
+
+def check_flat(
+    scenario: Scenario,
+    assembly: Assembly,
+    plant: MultibodyPlant,
+    context: Context,
+    chains: Sequence[tuple[RigidBody, tuple[Joint, ...]]],
+) -> None:
+    """Refuse bases and joints that would leave the plane.
+
+    Args:
+        scenario: For messages.
+        assembly: The team.
+        plant: Finalized.
+        context: Any configuration; the object's frame is upright in all of them.
+        chains: Base and joints of each robot.
+
+    Raises:
+        ScenarioError: Naming the base or the joint.
+    """
+    for robot, (base, joints) in zip(assembly.robots, chains, strict=True):
+        R_WB = base.body_frame().CalcRotationMatrixInWorld(context).matrix()
+        if not is_upright(R_WB[:, 2]) or R_WB[2, 2] < 0.0:
+            raise refusal(scenario, robot, scoped(plant, base), "a base whose z axis points up when grasped")
+        for joint in joints:
+            axis = axis_in_world(joint, context)
+            name = scoped(plant, joint)
+            if joint.type_name() == "revolute" and not is_upright(axis):
+                raise refusal(scenario, robot, name, f"a vertical axis, not {_text(axis)} in the world")
+            if joint.type_name() == "prismatic" and abs(axis[2]) > TILT:
+                raise refusal(
+                    scenario, robot, name, f"an axis in the floor's plane, not {_text(axis)} in the world"
+                )
+
+
+def axis_in_world(joint: Joint, context: Context) -> FloatArray:
+    """Unit axis of a revolute or prismatic joint in the world, shape (3,)."""
+    R_WF = joint.frame_on_parent().CalcRotationMatrixInWorld(context)
+    axis = joint.revolute_axis() if joint.type_name() == "revolute" else joint.translation_axis()
+    return np.asarray(R_WF.multiply(axis), dtype=float)
+
+
+def _text(axis: FloatArray) -> str:
+    return "(" + ", ".join(f"{value:.4g}" for value in axis) + ")"

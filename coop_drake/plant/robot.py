@@ -1,0 +1,145 @@
+"""One robot alone on the floor: what it knows of its own dynamics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydrake.multibody.parsing import GetScopedFrameByName
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, JacobianWrtVariable, Joint, MultibodyForces, PlanarJoint, RigidBody
+from pydrake.systems.framework import Context
+
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.plant.chain import find_base
+from coop_drake.plant.parsing import add_models, set_actuators
+from coop_drake.scenario import Scenario, assemble
+
+_PLANAR = [3, 4, 2]
+"""Drake's spatial order is rotation first; the plane's is (x, y, rotation)."""
+
+
+@dataclass(frozen=True)
+class RobotPlant:
+    """A robot's own model: z_k = (x, y, yaw, q_k...), its base on a planar joint, nothing in its hand.
+
+    All matrices and vectors are ordered like z_k; wrenches and twists are planar, (x, y, rotation), in W.
+    ``set_state`` first, then ask.
+
+    Attributes:
+        plant: Finalized, continuous time, without gravity or geometry.
+        base_body: Bk.
+        base_joint: Moves Bk against the world.
+        joints: In the order of q_k.
+        gripper_frame: Ek.
+        context: The state that the answers are about.
+        position_index: Where z_k's entries stand in the plant's positions, shape (3 + n_k,), integers.
+        velocity_index: Where their rates stand in the plant's velocities, shape (3 + n_k,), integers.
+    """
+
+    plant: MultibodyPlant
+    base_body: RigidBody
+    base_joint: PlanarJoint
+    joints: tuple[Joint, ...]
+    gripper_frame: Frame
+    context: Context
+    position_index: Any
+    velocity_index: Any
+
+    def set_state(self, z: FloatArray, z_rate: FloatArray) -> None:
+        """Set z_k and its rates, each of shape (3 + n_k,) [m, rad, 1/s]."""
+        state = np.empty(2 * len(z))
+        state[self.position_index] = z
+        state[len(z) + self.velocity_index] = z_rate
+        self.plant.SetPositionsAndVelocities(self.context, state)
+
+    def mass_matrix(self) -> FloatArray:
+        """M of (22), shape (3 + n_k, 3 + n_k) [kg, kg m, kg m^2]."""
+        matrix = self.plant.CalcMassMatrix(self.context)
+        return np.asarray(matrix[np.ix_(self.velocity_index, self.velocity_index)])
+
+    def bias(self) -> FloatArray:
+        """C z' + G of (22) with the joints' damping, shape (3 + n_k,) [N, N m]."""
+        return self._inverse_dynamics(np.zeros(len(self.velocity_index)))
+
+    def inertial_effort(self, acceleration: FloatArray) -> FloatArray:
+        """M z'' + C z' + G with the joints' damping, without any wrench at the grasp.
+
+        Args:
+            acceleration: z'', shape (3 + n_k,).
+
+        Returns:
+            Base wrench in W and joint torques, shape (3 + n_k,) [N, N m].
+        """
+        ordered = np.empty(len(self.velocity_index))
+        ordered[self.velocity_index] = acceleration
+        return self._inverse_dynamics(ordered)
+
+    def _inverse_dynamics(self, ordered_acceleration: FloatArray) -> FloatArray:
+        forces = MultibodyForces(self.plant)
+        self.plant.CalcForceElementsContribution(self.context, forces)
+        effort = self.plant.CalcInverseDynamics(self.context, ordered_acceleration, forces)
+        return np.asarray(effort[self.velocity_index])
+
+    def grasp_jacobian(self) -> FloatArray:
+        """J of E_k: planar twist of the grasp in W per rate of z_k, shape (3, 3 + n_k)."""
+        jacobian = self.plant.CalcJacobianSpatialVelocity(
+            self.context,
+            JacobianWrtVariable.kV,
+            self.gripper_frame,
+            np.zeros(3),
+            self.plant.world_frame(),
+            self.plant.world_frame(),
+        )
+        return np.asarray(jacobian[np.ix_(_PLANAR, self.velocity_index)])
+
+    def grasp_bias(self) -> FloatArray:
+        """J' z' of E_k, planar in W, shape (3,) [m/s^2, rad/s^2]."""
+        bias = self.plant.CalcBiasSpatialAcceleration(
+            self.context,
+            JacobianWrtVariable.kV,
+            self.gripper_frame,
+            np.zeros(3),
+            self.plant.world_frame(),
+            self.plant.world_frame(),
+        )
+        return np.asarray(bias.get_coeffs()[_PLANAR])
+
+    def grasp_pose(self) -> FloatArray:
+        """Pose (x, y, angle) of E_k in W, shape (3,) [m, rad]."""
+        X_WE = self.gripper_frame.CalcPoseInWorld(self.context)
+        R, p = X_WE.rotation().matrix(), X_WE.translation()
+        return np.array([p[0], p[1], np.arctan2(R[1, 0], R[0, 0])])
+
+
+def build_robot_plant(scenario: Scenario, k: int) -> RobotPlant:
+    """Build the model that robot k has of itself.
+
+    Args:
+        scenario: The scenario.
+        k: Index of the robot in the scenario's order.
+
+    Raises:
+        ScenarioError: As for the team's plant.
+    """
+    assembly = assemble(scenario)
+    robot = assembly.robots[k]
+    plant = MultibodyPlant(0.0)
+    add_models(scenario, assembly, assembly.of_robot(k), plant, None)
+    base, joints = find_base(scenario, robot, plant)
+    base_joint = plant.AddJoint(PlanarJoint("base_pose", plant.world_frame(), base.body_frame()))
+    set_actuators(plant, joints)
+    plant.Finalize()
+    positions = [base_joint.position_start() + i for i in range(3)] + [j.position_start() for j in joints]
+    velocities = [base_joint.velocity_start() + i for i in range(3)] + [j.velocity_start() for j in joints]
+    return RobotPlant(
+        plant,
+        base,
+        base_joint,
+        joints,
+        GetScopedFrameByName(plant, robot.gripper_frame),
+        plant.CreateDefaultContext(),
+        np.array(positions),
+        np.array(velocities),
+    )

@@ -1,0 +1,203 @@
+"""The whole team as one tree rooted at the object: the plant that is simulated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import SceneGraph
+from pydrake.multibody.parsing import GetScopedFrameByName, ModelDirectives
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.tree import (
+    Frame,
+    Joint,
+    ModelInstanceIndex,
+    PlanarJoint,
+    RigidBody,
+    WeldJoint,
+)
+from pydrake.systems.framework import Context, DiagramBuilder
+
+from coop_drake.geometry.pose import FloatArray, PlanarPose
+from coop_drake.plant.chain import find_base, scoped
+from coop_drake.plant.flatness import check_flat, object_frame, planar_pose
+from coop_drake.plant.parsing import add_models, bodies_of, joints_of, set_actuators
+from coop_drake.scenario import Assembly, RobotAssembly, Scenario, assemble
+
+
+@dataclass(frozen=True)
+class ObjectInertia:
+    """Mass properties of the object in the plane.
+
+    Attributes:
+        mass: M_L [kg].
+        inertia_about_com: I_L, about the vertical axis through the centre of mass [kg m^2].
+        p_LLcm: Centre of mass in the object's frame, shape (2,) [m].
+    """
+
+    mass: float
+    inertia_about_com: float
+    p_LLcm: FloatArray
+
+
+@dataclass(frozen=True)
+class RobotModel:
+    """One robot inside the team's plant.
+
+    Attributes:
+        index: k, its place in the team.
+        name: Name of the model that its base belongs to.
+        model_instance: Model instance of its base.
+        base_body: Bk, the body that the base wrench acts on.
+        joints: In the order of q_k, from the base outwards.
+        joint_names: Their scoped names.
+        gripper_frame: Ek, fixed on the robot's hand.
+        weld: The joint that grasps the object.
+        weld_index: Place of the weld in the plant's ``reaction_forces`` output.
+        weld_sign: +1 if the object is the weld's parent, so that the reaction on the weld's child is on the robot.
+        X_LE: Pose of the grasp in the object's frame.
+        q_slice: Where q_k stands in q.
+    """
+
+    index: int
+    name: str
+    model_instance: ModelInstanceIndex
+    base_body: RigidBody
+    joints: tuple[Joint, ...]
+    joint_names: tuple[str, ...]
+    gripper_frame: Frame
+    weld: WeldJoint
+    weld_index: int
+    weld_sign: int
+    X_LE: PlanarPose
+    q_slice: slice
+
+
+@dataclass(frozen=True)
+class TeamPlant:
+    """The team's plant, its tree rooted at the object; z = (x, y, theta, q...).
+
+    The actuation input takes the joint torques in q's order. Base wrenches go in as
+    ``ExternallyAppliedSpatialForce`` on each ``base_body``.
+
+    Attributes:
+        plant: Finalized, continuous time, without gravity.
+        scene_graph: The geometry of the same diagram.
+        object_body: The body that the object's planar joint moves.
+        object_frame: L, z upwards.
+        object_joint: Moves L against the world; its coordinates are (x, y, theta).
+        object_inertia: Mass properties of the object.
+        robots: In the scenario's order.
+        assembly: Who is who in the directives.
+    """
+
+    plant: MultibodyPlant
+    scene_graph: SceneGraph
+    object_body: RigidBody
+    object_frame: Frame
+    object_joint: PlanarJoint
+    object_inertia: ObjectInertia
+    robots: tuple[RobotModel, ...]
+    assembly: Assembly
+
+    @cached_property
+    def joints(self) -> tuple[Joint, ...]:
+        """All joints in the order of q."""
+        return tuple(joint for robot in self.robots for joint in robot.joints)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """Scoped names of q's entries."""
+        return tuple(name for robot in self.robots for name in robot.joint_names)
+
+    @cached_property
+    def position_index(self) -> Any:
+        """Where z's entries stand in the plant's positions, shape (3 + n,), integers."""
+        start = self.object_joint.position_start()
+        return np.array([start, start + 1, start + 2, *(j.position_start() for j in self.joints)])
+
+    @cached_property
+    def velocity_index(self) -> Any:
+        """Where the rates of z stand in the plant's velocities, shape (3 + n,), integers."""
+        start = self.object_joint.velocity_start()
+        return np.array([start, start + 1, start + 2, *(j.velocity_start() for j in self.joints)])
+
+
+def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
+    """Add plant and scene graph of the whole team to a diagram.
+
+    Args:
+        scenario: The scenario.
+        builder: Receives the two systems, connected to each other, finalized.
+
+    Returns:
+        The plant with names for its parts; it lives as long as the builder's diagram.
+
+    Raises:
+        ScenarioError: The models do not make a team of holonomic planar manipulators that hold one object.
+    """
+    assembly = assemble(scenario)
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
+    add_models(scenario, assembly, ModelDirectives(directives=list(assembly.directives)), plant, scene_graph)
+    frame, body = object_frame(scenario, assembly, plant)
+    object_joint = plant.AddJoint(PlanarJoint("pose", plant.world_frame(), frame))
+    chains = [find_base(scenario, robot, plant) for robot in assembly.robots]
+    set_actuators(plant, [joint for _, joints in chains for joint in joints])
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    check_flat(scenario, assembly, plant, context, chains)
+    robots: list[RobotModel] = []
+    for robot, (base, joints) in zip(assembly.robots, chains, strict=True):
+        first = robots[-1].q_slice.stop if robots else 0
+        robots.append(_robot_model(scenario, robot, plant, context, frame, base, joints, len(robots), first))
+    inertia = _object_inertia(plant, context, bodies_of(plant, [assembly.object_model]), frame)
+    return TeamPlant(plant, scene_graph, body, frame, object_joint, inertia, tuple(robots), assembly)
+
+
+def _robot_model(
+    scenario: Scenario,
+    robot: RobotAssembly,
+    plant: MultibodyPlant,
+    context: Context,
+    object_frame: Frame,
+    base: RigidBody,
+    joints: tuple[Joint, ...],
+    index: int,
+    first: int,
+) -> RobotModel:
+    gripper = GetScopedFrameByName(plant, robot.gripper_frame)
+    grasped = GetScopedFrameByName(plant, robot.object_frame).body().index()
+    ends = {int(gripper.body().index()), int(grasped)}
+    welds = [
+        (place, joint)
+        for place, joint in enumerate(joints_of(plant))
+        if joint.type_name() == "weld"
+        and {int(joint.parent_body().index()), int(joint.child_body().index())} == ends
+    ]
+    place, weld = welds[0]
+    return RobotModel(
+        index=index,
+        name=robot.name,
+        model_instance=base.model_instance(),
+        base_body=base,
+        joints=joints,
+        joint_names=tuple(scoped(plant, joint) for joint in joints),
+        gripper_frame=gripper,
+        weld=weld,
+        weld_index=place,
+        weld_sign=1 if weld.parent_body().index() == grasped else -1,
+        X_LE=planar_pose(gripper.CalcPose(context, object_frame)),
+        q_slice=slice(first, first + len(joints)),
+    )
+
+
+def _object_inertia(
+    plant: MultibodyPlant, context: Context, bodies: list[RigidBody], frame: Frame
+) -> ObjectInertia:
+    indices = [body.index() for body in bodies]
+    inertia = plant.CalcSpatialInertia(context, frame, indices)
+    p_LLcm = inertia.get_com()
+    about_com = inertia.Shift(p_LLcm).CalcRotationalInertia().get_moments()[2]
+    return ObjectInertia(float(inertia.get_mass()), float(about_com), np.array(p_LLcm[:2]))

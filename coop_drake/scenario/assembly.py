@@ -1,0 +1,218 @@
+"""Who is who in the directives: the object, the robots, and the weld by which each robot grasps the object."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydrake.multibody.parsing import (
+    AddWeld,
+    LoadModelDirectives,
+    ModelDirective,
+    ModelDirectives,
+    PackageMap,
+)
+
+from coop_drake.errors import ScenarioError
+from coop_drake.scenario.model import Scenario
+from coop_drake.scenario.packages import package_map, resolve
+
+
+@dataclass(frozen=True)
+class RobotAssembly:
+    """One robot: one model, or several that are welded together.
+
+    Attributes:
+        name: Name of the model that the base belongs to; the robot goes by this name.
+        models: Names of its models, in the order of the directives.
+        grasp: The weld to the object.
+        object_frame: The weld's frame on the object, scoped.
+        gripper_frame: The weld's frame on the robot, scoped.
+        key: Where the robot's model stands in the scenario file.
+    """
+
+    name: str
+    models: tuple[str, ...]
+    grasp: AddWeld
+    object_frame: str
+    gripper_frame: str
+    key: str
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """The team as the directives describe it.
+
+    Attributes:
+        packages: Where ``package://`` addresses lead.
+        directives: Flat, with resolved file addresses.
+        object_model: Name of the object's model.
+        robots: In the order of their base models in the directives.
+        owners: For each directive the models it speaks of.
+    """
+
+    packages: PackageMap
+    directives: tuple[ModelDirective, ...]
+    object_model: str
+    robots: tuple[RobotAssembly, ...]
+    owners: tuple[frozenset[str], ...]
+
+    def of_robot(self, index: int) -> ModelDirectives:
+        """The directives that make one robot alone, without its grasp."""
+        models = frozenset(self.robots[index].models)
+        pairs = zip(self.directives, self.owners, strict=True)
+        return ModelDirectives(directives=[d for d, owners in pairs if owners and owners <= models])
+
+
+def assemble(scenario: Scenario) -> Assembly:
+    """Read the team's structure from the scenario's directives.
+
+    Raises:
+        ScenarioError: A model or frame is not known, a file is missing, fewer than two robots, a robot that
+            grasps nothing or twice, or anything that is welded to the world.
+    """
+    return _Reader(scenario).assembly()
+
+
+class _Reader:
+    """Walks the directives once; keeps the file and keys at hand for messages."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        self.file = str(scenario.path)
+        self.packages = package_map(scenario.path)
+        entries = list(self._flat(scenario.directives, scenario.path, "directives"))
+        self.keys = [key for key, _ in entries]
+        self.directives = tuple(directive for _, directive in entries)
+        self.models: dict[str, str] = {}
+        self.frames: dict[str, str] = {}
+        self._read_names()
+
+    def _refuse(self, key: str, value: object, allowed: str) -> ScenarioError:
+        return ScenarioError(self.file, key, value, allowed)
+
+    def _flat(
+        self, directives: tuple[ModelDirective, ...], path: Path, key: str
+    ) -> Iterator[tuple[str, ModelDirective]]:
+        """Yield ``(key, directive)`` with nested directive files opened and file addresses resolved."""
+        for index, directive in enumerate(directives):
+            here = f"{key}[{index}]"
+            if directive.add_directives:
+                file_key = f"{here}.add_directives.file"
+                if directive.add_directives.model_namespace:
+                    raise self._refuse(
+                        f"{here}.add_directives.model_namespace",
+                        directive.add_directives.model_namespace,
+                        "no namespace",
+                    )
+                address = resolve(directive.add_directives.file, path, self.packages, file_key)
+                nested = Path(address.removeprefix("file://"))
+                try:
+                    inner = tuple(LoadModelDirectives(nested).directives)
+                except RuntimeError as error:
+                    raise self._refuse(file_key, str(nested), f"model directives ({error})") from error
+                yield from self._flat(inner, nested, f"{here}.add_directives")
+            elif directive.add_model:
+                model = directive.add_model.__copy__()
+                model.file = resolve(model.file, path, self.packages, f"{here}.add_model.file")
+                yield here, ModelDirective(add_model=model)
+            else:
+                yield here, directive
+
+    def _read_names(self) -> None:
+        for key, directive in zip(self.keys, self.directives, strict=True):
+            if directive.add_model:
+                name = directive.add_model.name
+                if name in self.models:
+                    raise self._refuse(f"{key}.add_model.name", name, "a name that no other model has")
+                self.models[name] = key
+            elif directive.add_frame:
+                base = directive.add_frame.X_PF.base_frame or ""
+                self.frames[directive.add_frame.name] = self._owner(base, f"{key}.add_frame.X_PF.base_frame")
+
+    def _owner(self, frame: str, key: str) -> str:
+        """Name of the model that a scoped frame belongs to."""
+        if frame in self.frames:
+            return self.frames[frame]
+        scope = frame
+        while "::" in scope:
+            scope = scope.rpartition("::")[0]
+            if scope in self.models:
+                return scope
+        known = ", ".join(self.models)
+        raise self._refuse(key, frame, f"model::frame with a model added before, one of {known}")
+
+    def _weld_owners(self, weld: AddWeld, key: str) -> tuple[str, str]:
+        return (
+            self._owner(weld.parent, f"{key}.add_weld.parent"),
+            self._owner(weld.child, f"{key}.add_weld.child"),
+        )
+
+    def assembly(self) -> Assembly:
+        """Group the models into robots and find the grasps."""
+        object_model = self.scenario.object
+        if object_model not in self.models:
+            raise self._refuse(
+                "object", object_model, "the name of a model, one of " + ", ".join(self.models)
+            )
+        welds = [
+            (key, d.add_weld, *self._weld_owners(d.add_weld, key))
+            for key, d in zip(self.keys, self.directives, strict=True)
+            if d.add_weld
+        ]
+        groups = self._groups(object_model, [(parent, child) for _, _, parent, child in welds])
+        robots = [self._robot(group, object_model, welds) for group in groups]
+        if len(robots) < 2:
+            raise self._refuse("directives", [r.name for r in robots], "two or more robots beside the object")
+        return Assembly(
+            self.packages, self.directives, object_model, self._in_order(robots), self._all_owners()
+        )
+
+    def _in_order(self, robots: list[RobotAssembly]) -> tuple[RobotAssembly, ...]:
+        order = list(self.models)
+        return tuple(sorted(robots, key=lambda robot: order.index(robot.name)))
+
+    def _groups(self, object_model: str, edges: list[tuple[str, str]]) -> list[tuple[str, ...]]:
+        """Models that hang together without the object."""
+        group = {name: name for name in self.models if name != object_model}
+        for parent, child in edges:
+            if object_model not in (parent, child):
+                old, new = group[child], group[parent]
+                group = {name: new if root == old else root for name, root in group.items()}
+        return [tuple(n for n in group if group[n] == root) for root in dict.fromkeys(group.values())]
+
+    def _robot(
+        self, models: tuple[str, ...], object_model: str, welds: list[tuple[str, AddWeld, str, str]]
+    ) -> RobotAssembly:
+        inner = {child for _, _, parent, child in welds if parent in models and child in models}
+        bases = [name for name in models if name not in inner]
+        name = bases[0] if bases else models[0]
+        if len(bases) != 1:
+            raise self._refuse(
+                self.models[name], list(models), "welds that lead from one base model outwards, parent first"
+            )
+        grasps = [
+            (weld, weld.child, weld.parent) if parent in models else (weld, weld.parent, weld.child)
+            for _, weld, parent, child in welds
+            if {parent, child} & set(models) and object_model in (parent, child)
+        ]
+        if len(grasps) != 1:
+            raise self._refuse(
+                f"{self.models[name]}.add_model.name",
+                name,
+                f"a robot with exactly one add_weld to a frame of {object_model} (found {len(grasps)})",
+            )
+        weld, object_frame, gripper_frame = grasps[0]
+        return RobotAssembly(name, models, weld, object_frame, gripper_frame, self.models[name])
+
+    def _all_owners(self) -> tuple[frozenset[str], ...]:
+        owners = []
+        for key, directive in zip(self.keys, self.directives, strict=True):
+            if directive.add_model:
+                owners.append(frozenset({directive.add_model.name}))
+            elif directive.add_frame:
+                owners.append(frozenset({self.frames[directive.add_frame.name]}))
+            elif directive.add_weld:
+                owners.append(frozenset(self._weld_owners(directive.add_weld, key)))
+            else:
+                owners.append(frozenset())
+        return tuple(owners)

@@ -1,0 +1,192 @@
+"""What a scenario file holds: plain frozen values, one class for each section of the file."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from pydrake.multibody.parsing import ModelDirective
+from shapely import Polygon
+
+from coop_drake.control.gains import FixedGains, GainSet, ScheduledGains
+from coop_drake.geometry.pose import PlanarPose
+from coop_drake.planning.problem import PlannerSettings
+
+# No `from __future__ import annotations` here: Drake's YAML loader reads the types of the fields.
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """The floor W that bodies may use: inside the outer ring and outside every hole.
+
+    Attributes:
+        outer: Corners of the outer ring, each (x, y) in W [m]; the last is joined to the first.
+        holes: Rings of obstacles inside, each like ``outer``.
+    """
+
+    outer: tuple[tuple[float, float], ...]
+    holes: tuple[tuple[tuple[float, float], ...], ...] = ()
+
+    @property
+    def polygon(self) -> Polygon:
+        """The same as a shapely polygon."""
+        return Polygon(self.outer, self.holes)
+
+
+@dataclass(frozen=True)
+class ObjectPose:
+    """Pose X_WL of the object.
+
+    Attributes:
+        x: First coordinate [m].
+        y: Second coordinate [m].
+        theta: Rotation, counter-clockwise [rad].
+    """
+
+    x: float
+    y: float
+    theta: float
+
+    @property
+    def pose(self) -> PlanarPose:
+        """The same as a rigid motion of the plane."""
+        return PlanarPose(self.x, self.y, self.theta)
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where everything stands at the beginning, at rest.
+
+    Attributes:
+        object: The object's pose.
+        joints: For each robot the values of its joints from its base outwards [rad or m].
+    """
+
+    object: ObjectPose
+    joints: dict[str, tuple[float, ...]]
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """How close to the goal counts as arrived.
+
+    Attributes:
+        position: Distance of the object [m].
+        angle: Angle of the object [rad].
+        joint: Error of every joint that has a goal [rad or m].
+    """
+
+    position: float = 0.01
+    angle: float = 0.02
+    joint: float = 0.02
+
+
+@dataclass(frozen=True)
+class Goal:
+    """Where the object shall be at the end, at rest.
+
+    Attributes:
+        object: The object's pose; theta counts modulo 2 pi.
+        joints: For some robots the goal values of their joints, null for a free one; other robots are free.
+        tolerances: How close counts as arrived.
+    """
+
+    object: ObjectPose
+    joints: dict[str, tuple[float | None, ...]] = field(default_factory=dict)
+    tolerances: Tolerances = field(default_factory=Tolerances)
+
+
+def _shipped_gain_sets() -> dict[str, GainSet]:
+    return {"scheduled": ScheduledGains(), "table_2": FixedGains()}
+
+
+@dataclass(frozen=True)
+class Gains:
+    """The gain sets at hand, and which of them the run uses.
+
+    Attributes:
+        selected: Name of the set in use.
+        sets: Sets by name; ``scheduled`` and ``table_2`` (the paper's) are always there.
+    """
+
+    selected: str = "scheduled"
+    sets: dict[str, FixedGains | ScheduledGains] = field(default_factory=_shipped_gain_sets)
+
+
+@dataclass(frozen=True)
+class SimulatorSettings:
+    """How the closed loop is integrated and logged.
+
+    Attributes:
+        max_time: The run fails when the goal is not reached by then [s].
+        integration_scheme: Name of the integrator, as Drake spells it.
+        max_step_size: Longest step [s].
+        accuracy: Relative accuracy of the error-controlled step [-].
+        log_period: Time between two entries of the log [s].
+    """
+
+    max_time: float = 300.0
+    integration_scheme: Literal[
+        "runge_kutta3", "runge_kutta2", "runge_kutta5", "bogacki_shampine3", "explicit_euler"
+    ] = "runge_kutta3"
+    max_step_size: float = 0.02
+    accuracy: float = 1e-4
+    log_period: float = 0.02
+
+
+@dataclass(frozen=True)
+class VisualizationSettings:
+    """How recordings look.
+
+    Attributes:
+        frames_per_second: Pictures a second of simulated time.
+        wall_height: Height of the walls that stand round the workspace [m].
+        show_collision: Whether collision geometry is shown over the pictures of the bodies.
+    """
+
+    frames_per_second: float = 25.0
+    wall_height: float = 0.5
+    show_collision: bool = False
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """One transport: the floor, the team, start, goal and settings.
+
+    Attributes:
+        workspace: The floor.
+        directives: Drake's model directives: the object, two or more robots, a weld for every grasp.
+        start: Pose and joints at the beginning.
+        goal: Pose, and joints if any, at the end.
+        object: Name of the object's model.
+        planner: How hard the planner tries.
+        gains: The gain sets.
+        simulator: How the closed loop is integrated.
+        visualization: How recordings look.
+        path: The file it was read from.
+    """
+
+    workspace: Workspace
+    directives: tuple[ModelDirective, ...]
+    start: Start
+    goal: Goal
+    object: str = "object"
+    planner: PlannerSettings = field(default_factory=PlannerSettings)
+    gains: Gains = field(default_factory=Gains)
+    simulator: SimulatorSettings = field(default_factory=SimulatorSettings)
+    visualization: VisualizationSettings = field(default_factory=VisualizationSettings)
+    path: Path = field(default=Path("scenario.yaml"), metadata={"in_file": False})
+
+    @property
+    def name(self) -> str:
+        """The file's name without ``.scenario.yaml``."""
+        return self.path.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario")
+
+    @property
+    def gain_sets(self) -> dict[str, GainSet]:
+        """The gain sets by name."""
+        return self.gains.sets
+
+    @property
+    def selected_gains(self) -> str:
+        """Name of the gain set in use."""
+        return self.gains.selected

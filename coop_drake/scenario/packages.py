@@ -1,0 +1,80 @@
+"""Where models are found: package.xml files round the scenario file, and paths relative to it."""
+
+from pathlib import Path
+
+from pydrake.multibody.parsing import PackageMap
+
+import coop_drake
+from coop_drake.errors import ScenarioError
+
+_SHIPPED = Path(coop_drake.__file__).resolve().parent.parent / "models"
+
+
+def package_map(scenario_path: Path) -> PackageMap:
+    """Collect the packages that a scenario may name in ``package://`` addresses.
+
+    They are those of every ``package.xml`` beside the scenario file or in a folder above it, the nearest first,
+    then coop_drake's own models, then what Drake knows by itself.
+
+    Args:
+        scenario_path: The scenario file.
+
+    Raises:
+        ScenarioError: A package.xml does not name its package.
+    """
+    packages = PackageMap.MakeEmpty()
+    folders = scenario_path.resolve().parents
+    for file in [folder / "package.xml" for folder in (*folders, _SHIPPED)]:
+        if file.is_file():
+            _add(packages, file)
+    for name in PackageMap().GetPackageNames():
+        if not packages.Contains(name):
+            own = PackageMap()
+            for other in own.GetPackageNames():
+                if other != name:
+                    own.Remove(other)
+            packages.AddMap(own)
+    return packages
+
+
+def _add(packages: PackageMap, file: Path) -> None:
+    single = PackageMap.MakeEmpty()
+    try:
+        single.AddPackageXml(file)
+    except RuntimeError as error:
+        raise ScenarioError(
+            str(file), "package.name", None, "a package.xml that names its package"
+        ) from error
+    if not any(packages.Contains(name) for name in single.GetPackageNames()):
+        packages.AddMap(single)
+
+
+def resolve(file: str, scenario_path: Path, packages: PackageMap, key: str) -> str:
+    """Turn the file of a directive into an address that Drake can open.
+
+    Args:
+        file: ``package://name/path``, ``file:///path``, or a path relative to the scenario file.
+        scenario_path: The scenario file.
+        packages: The packages at hand.
+        key: Where ``file`` stands in the scenario.
+
+    Returns:
+        A ``file://`` address of a file that exists.
+
+    Raises:
+        ScenarioError: The package is not known, or there is no such file.
+    """
+    where = str(scenario_path)
+    if file.startswith("package://"):
+        name, _, inside = file.removeprefix("package://").partition("/")
+        if not packages.Contains(name):
+            known = ", ".join(sorted(packages.GetPackageNames()))
+            raise ScenarioError(where, key, file, f"a package among {known}")
+        path = Path(packages.GetPath(name)) / inside
+    elif file.startswith("file://"):
+        path = Path(file.removeprefix("file://"))
+    else:
+        path = scenario_path.resolve().parent / file
+    if not path.is_file():
+        raise ScenarioError(where, key, file, f"a file that exists (looked for {path})")
+    return f"file://{path.resolve()}"

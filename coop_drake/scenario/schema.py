@@ -1,0 +1,229 @@
+"""Reads frozen dataclasses with Drake's YAML loader, and says at which key a file departs from its schema.
+
+Drake's ``yaml_load_typed`` fills objects by assignment, starting from their defaults. For every frozen class a
+*draft* is made: a class of the same name whose fields can be assigned and all have defaults. Drake fills the
+draft, and the frozen value is made from it.
+"""
+
+import dataclasses
+import math
+import types
+import typing
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+from pydrake.common.yaml import yaml_load_typed
+
+from coop_drake.scenario.document import parse
+
+Check = Iterator[tuple[str, object, str]]
+
+_SCALARS = {bool: "true or false", int: "a whole number", float: "a finite number", str: "a text"}
+
+
+def in_file(cls: type) -> tuple[dataclasses.Field[Any], ...]:
+    """Fields of a dataclass that stand in the file."""
+    return tuple(f for f in dataclasses.fields(cls) if f.metadata.get("in_file", True))
+
+
+def read(cls: type, text: str) -> Any:
+    """Read a frozen dataclass from YAML text that has passed :func:`departures`."""
+    return freeze(yaml_load_typed(schema=draft(cls), data=text), cls)
+
+
+def departures(cls: type, text: str) -> Check:
+    """Yield ``(key, value, allowed)`` for every place where a YAML text departs from the schema ``cls``."""
+    yield from _check(parse(text), cls, "")
+
+
+def _required(cls: type) -> frozenset[str]:
+    return frozenset(
+        f.name
+        for f in in_file(cls)
+        if f.default is dataclasses.MISSING and f.default_factory is dataclasses.MISSING
+    )
+
+
+def _is_union(kind: Any) -> bool:
+    return typing.get_origin(kind) in (typing.Union, types.UnionType)
+
+
+@cache
+def draft(cls: type) -> type:
+    """Make the class that Drake fills: the same fields, assignable, each with a default."""
+    hints = typing.get_type_hints(cls)
+    fields: list[tuple[str, Any, Any]] = []
+    for f in in_file(cls):
+        default: Any = dataclasses.field(default=None)
+        if f.default is not dataclasses.MISSING:
+            default = dataclasses.field(default=f.default)
+        elif f.default_factory is not dataclasses.MISSING:
+            default = dataclasses.field(default_factory=_thawing(f.default_factory))
+        elif dataclasses.is_dataclass(hints[f.name]):
+            default = dataclasses.field(default_factory=draft(typing.cast(type, hints[f.name])))
+        elif typing.get_origin(hints[f.name]) is dict:
+            default = dataclasses.field(default_factory=dict)
+        fields.append((f.name, _draft_kind(hints[f.name]), default))
+    return dataclasses.make_dataclass(cls.__name__, fields)
+
+
+def _thawing(factory: Any) -> Any:
+    return lambda: thaw(factory())
+
+
+def _draft_kind(kind: Any) -> Any:
+    """The type that Drake sees: tuples are lists, literals are texts, frozen classes are drafts."""
+    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    if dataclasses.is_dataclass(kind):
+        return draft(typing.cast(type, kind))
+    if origin is typing.Literal:
+        return str
+    if origin is tuple:
+        return list[_draft_kind(arguments[0])]  # type: ignore[misc]
+    if origin is dict:
+        return dict[str, _draft_kind(arguments[1])]  # type: ignore[misc]
+    if _is_union(kind):
+        return typing.Union[tuple(_draft_kind(a) for a in arguments)]  # noqa: UP007
+    return kind
+
+
+def thaw(value: Any) -> Any:
+    """Turn frozen values into drafts, all the way down; the inverse of :func:`freeze`."""
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        kind = type(value)
+        return draft(kind)(**{f.name: thaw(getattr(value, f.name)) for f in in_file(kind)})
+    if isinstance(value, dict):
+        return {key: thaw(item) for key, item in value.items()}
+    if isinstance(value, tuple):
+        return [thaw(item) for item in value]
+    return value
+
+
+def freeze(value: Any, kind: Any) -> Any:
+    """Turn a draft into the frozen value of type ``kind``, all the way down."""
+    origin, arguments = typing.get_origin(kind), typing.get_args(kind)
+    if dataclasses.is_dataclass(kind):
+        cls = typing.cast(type, kind)
+        hints = typing.get_type_hints(cls)
+        return cls(**{f.name: freeze(getattr(value, f.name), hints[f.name]) for f in in_file(cls)})
+    if origin is tuple:
+        return tuple(freeze(item, arguments[0]) for item in value)
+    if origin is dict:
+        return {key: freeze(item, arguments[1]) for key, item in value.items()}
+    if _is_union(kind):
+        frozen = [a for a in arguments if dataclasses.is_dataclass(a) and draft(a) is type(value)]
+        return freeze(value, frozen[0]) if frozen else value
+    return value
+
+
+def _check(value: object, kind: Any, key: str) -> Check:
+    """Dispatch on the kind of schema."""
+    origin = typing.get_origin(kind)
+    if kind in _SCALARS:
+        yield from _check_scalar(value, kind, key)
+    elif origin is typing.Literal:
+        if value not in typing.get_args(kind):
+            yield key, value, "one of " + ", ".join(typing.get_args(kind))
+    elif origin in (tuple, list):
+        yield from _check_sequence(value, kind, key)
+    elif origin is dict:
+        yield from _check_mapping(value, typing.get_args(kind)[1], key)
+    elif _is_union(kind):
+        yield from _check_union(value, kind, key)
+    elif dataclasses.is_dataclass(kind):
+        cls = typing.cast(type, kind)
+        hints = typing.get_type_hints(cls)
+        schema = {f.name: hints[f.name] for f in in_file(cls)}
+        yield from _check_fields(value, schema, _required(cls), key)
+    else:
+        yield from _finite(value, key)
+
+
+def _check_scalar(value: object, kind: type, key: str) -> Check:
+    if kind is str or kind is bool:
+        fits = type(value) is kind
+    else:
+        number = _as_number(value)
+        fits = number is not None and math.isfinite(number) and (kind is float or number.is_integer())
+    if not fits:
+        yield key, value, _SCALARS[kind]
+
+
+def _as_number(value: object) -> float | None:
+    """A number as Drake would read it; YAML 1.1 takes ``1e-3`` for a text."""
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        return None
+    try:
+        return float(value)
+    except ValueError:
+        return None
+
+
+def _check_sequence(value: object, kind: Any, key: str) -> Check:
+    arguments = typing.get_args(kind)
+    size = len(arguments) if len(arguments) > 1 and arguments[1] is not Ellipsis else None
+    if not isinstance(value, list):
+        yield key, value, "a list"
+    elif size is not None and len(value) != size:
+        yield key, value, f"a list of {size}"
+    else:
+        for index, item in enumerate(value):
+            yield from _check(item, arguments[0], f"{key}[{index}]")
+
+
+def _check_mapping(value: object, kind: Any, key: str) -> Check:
+    if not isinstance(value, dict):
+        yield key, value, "a mapping"
+        return
+    for name, item in value.items():
+        if not isinstance(name, str):
+            yield _below(key, name), name, "a text as the name"
+        else:
+            yield from _check(item, kind, _below(key, name))
+
+
+def _check_union(value: object, kind: Any, key: str) -> Check:
+    arguments = typing.get_args(kind)
+    if value is None and type(None) in arguments:
+        return
+    classes = {a.__name__: a for a in arguments if dataclasses.is_dataclass(a)}
+    tag = value.get("_tag", "")[1:] if isinstance(value, dict) else ""
+    if tag and classes:
+        if tag not in classes:
+            yield key, f"!{tag}", "one of " + ", ".join(f"!{name}" for name in sorted(classes))
+            return
+        value = {name: item for name, item in typing.cast(dict[str, object], value).items() if name != "_tag"}
+        yield from _check(value, classes[tag], key)
+    else:
+        yield from _check(value, arguments[0], key)
+
+
+def _check_fields(value: object, schema: dict[str, Any], required: frozenset[str], key: str) -> Check:
+    if not isinstance(value, dict):
+        yield key or "the file", value, "a mapping with the keys " + ", ".join(schema)
+        return
+    for name in value:
+        if name not in schema:
+            yield _below(key, name), value[name], "one of the keys " + ", ".join(schema)
+    for name, kind in schema.items():
+        if name in value:
+            yield from _check(value[name], kind, _below(key, name))
+        elif name in required:
+            yield _below(key, name), None, "a value; this key is required"
+
+
+def _finite(value: object, key: str) -> Check:
+    """What Drake's own schemas describe is checked elsewhere; here only that its numbers are numbers."""
+    if isinstance(value, dict):
+        for name, item in value.items():
+            yield from _finite(item, _below(key, name))
+    elif isinstance(value, list):
+        for index, item in enumerate(value):
+            yield from _finite(item, f"{key}[{index}]")
+    elif isinstance(value, float) and not math.isfinite(value):
+        yield key, value, "a finite number"
+
+
+def _below(key: str, name: object) -> str:
+    return f"{key}.{name}" if key else str(name)
