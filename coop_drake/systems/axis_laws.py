@@ -1,0 +1,72 @@
+"""The funnels and the gains of some axes, one entry for each cell of the plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from coop_drake.control.funnels import Funnel, FunnelWalls, funnel_walls
+from coop_drake.control.gains import TransitionGains
+from coop_drake.control.ppc import funnel_acceleration
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning.plan import Plan
+
+__all__ = ["AxisLaw", "axis_laws"]
+
+
+@dataclass(frozen=True)
+class AxisLaw:
+    """Prescribed performance control of m axes in one cell.
+
+    Attributes:
+        funnel: Funnels of these axes, from the cell's slice to the transition's goal intervals.
+        gains: Gains of the transition, per-axis arrays of shape (m,).
+    """
+
+    funnel: Funnel
+    gains: TransitionGains
+
+    @property
+    def axes(self) -> int:
+        """Number of axes m."""
+        return int(self.funnel.goal_lower.size)
+
+    def walls(self, time: float) -> FunnelWalls:
+        """Funnel walls ``time`` seconds after the cell was entered."""
+        return funnel_walls(self.funnel, time)
+
+    def acceleration(self, position: FloatArray, rate: FloatArray, time: float) -> FloatArray:
+        """Acceleration of every axis, (18) and (38), shape (m,)."""
+        return funnel_acceleration(
+            position,
+            rate,
+            self.funnel,
+            time,
+            log_gain=self.gains.log_gain,
+            position_gain=self.gains.position_gain,
+            rate_gain=self.gains.rate_gain,
+        )
+
+
+def axis_laws(plan: Plan, axes: Sequence[int]) -> tuple[AxisLaw, ...]:
+    """Laws of some axes in every cell of a plan.
+
+    Args:
+        plan: The plan.
+        axes: Indices into (theta, q...), in the order wanted.
+
+    Raises:
+        ValueError: The plan has no such axis.
+    """
+    count = len(plan.joint_names) + 1
+    if any(not 0 <= axis < count for axis in axes):
+        raise ValueError(f"axes {list(axes)} are not all in 0 to {count - 1}, the axes of the plan")
+    chosen = np.array(axes, dtype=np.intp)
+    laws = []
+    for cell, transition in zip(plan.cells, plan.transitions, strict=True):
+        goal, gains = (transition.goal_lower, transition.goal_upper), transition.gains
+        funnel = Funnel(cell.lower, cell.upper, *goal, gains.decay_rate, gains.funnel)
+        laws.append(AxisLaw(funnel.select(chosen), gains.select(chosen)))
+    return tuple(laws)

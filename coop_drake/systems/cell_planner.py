@@ -1,0 +1,71 @@
+"""The supervisor that walks through the plan's cells when every robot is ready."""
+
+from __future__ import annotations
+
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+
+from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
+
+__all__ = ["CellPlanner"]
+
+
+class CellPlanner(LeafSystem):
+    """Advances to the next cell of the plan when all robots are ready to leave the current one.
+
+    A robot is ready when its report carries the current cell's index and a margin that is not negative.
+    A report about another cell is stale and never counts, so that no report switches twice; a channel that
+    holds samples starts at index -1 for the same reason. All robots read one output and switch together.
+
+    ======= =================== ==== =================================================================
+    input   ``robot_<k>_ready`` 2    cell index that robot k speaks of, signed margin of readiness [-]
+    output  ``current_cell``    2    index of the current cell, time at which it was entered [-, s]
+    output  ``arrived``         1    1 when all robots are ready to leave the last cell, else 0 [-]
+    ======= =================== ==== =================================================================
+
+    State: one discrete group (cell index, entry time). It is updated at the start of every step of the
+    simulator, so that a switch is late by at most one step; or every ``period`` where one is given.
+
+    Args:
+        robots: Number of robots N.
+        cells: Number of cells of the plan.
+        period: Time between updates [s], None for every step.
+
+    Raises:
+        ValueError: A count is not positive, or the period is not.
+    """
+
+    def __init__(self, robots: int, cells: int, *, period: float | None = None) -> None:
+        super().__init__()
+        if robots < 1 or cells < 1:
+            raise ValueError(f"CellPlanner needs at least one robot and one cell, not {robots} and {cells}")
+        if period is not None and not period > 0.0:
+            raise ValueError(f"CellPlanner's period must be positive, not {period}")
+        self._cells = cells
+        self._ready = tuple(
+            self.DeclareVectorInputPort(f"robot_{k}_ready", READY_SIZE) for k in range(robots)
+        )
+        self.DeclareDiscreteState([0.0, 0.0])
+        # Without these tickets the ready reports, which depend on the cell, would close an algebraic loop.
+        self.DeclareVectorOutputPort("current_cell", CURRENT_CELL_SIZE, self._write_cell, {self.xd_ticket()})
+        self.DeclareVectorOutputPort("arrived", 1, self._write_arrived)
+        if period is None:
+            self.DeclarePerStepDiscreteUpdateEvent(self._advance)
+        else:
+            self.DeclarePeriodicDiscreteUpdateEvent(period_sec=period, offset_sec=0.0, update=self._advance)
+
+    def _all_ready(self, context: Context, cell: float) -> bool:
+        reports = (port.Eval(context) for port in self._ready)
+        return all(index == cell and margin >= 0.0 for index, margin in reports)
+
+    def _advance(self, context: Context, discrete_state: DiscreteValues) -> None:
+        cell = context.get_discrete_state_vector().value()[0]
+        if cell < self._cells - 1 and self._all_ready(context, cell):
+            discrete_state.get_mutable_vector().SetFromVector([cell + 1.0, context.get_time()])
+
+    def _write_cell(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(context.get_discrete_state_vector().value())
+
+    def _write_arrived(self, context: Context, output: BasicVector) -> None:
+        cell = context.get_discrete_state_vector().value()[0]
+        last = cell == self._cells - 1
+        output.SetFromVector([1.0 if last and self._all_ready(context, cell) else 0.0])

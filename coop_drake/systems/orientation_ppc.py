@@ -1,0 +1,63 @@
+"""Prescribed performance control of the object's angle as a block."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from coop_drake.systems.axis_laws import AxisLaw
+from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, read_current_cell
+
+__all__ = ["OrientationPpc"]
+
+
+class OrientationPpc(LeafSystem):
+    """Keeps the object's angle in its funnel: the angular acceleration of (17)-(20).
+
+    ======= ======================== ==== ====================================================== =======
+    input   ``object_pose``          3    pose of L in W, angle unwrapped [m, rad]               W
+    input   ``object_twist``         3    velocity of L's origin, angular rate [m/s, rad/s]      W
+    input   ``current_cell``         2    index of the current cell, time of its entry [-, s]
+    output  ``angle_acceleration``   1    desired angular acceleration [rad/s^2]                 W
+    output  ``angle_funnel``         2    lower and upper wall of the funnel now [rad]           W
+    ======= ======================== ==== ====================================================== =======
+
+    No state: the funnels depend on the time since the cell was entered.
+
+    Args:
+        laws: One law of one axis for each cell of the plan.
+
+    Raises:
+        ValueError: There is no law, or a law has not exactly one axis.
+    """
+
+    def __init__(self, laws: Sequence[AxisLaw]) -> None:
+        super().__init__()
+        if not laws or any(law.axes != 1 for law in laws):
+            raise ValueError("OrientationPpc needs one law of one axis for each cell")
+        self._laws = tuple(laws)
+        self._pose = self.DeclareVectorInputPort("object_pose", 3)
+        self._twist = self.DeclareVectorInputPort("object_twist", 3)
+        self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
+        self.DeclareVectorOutputPort("angle_acceleration", 1, self._write_acceleration)
+        self.DeclareVectorOutputPort(
+            "angle_funnel",
+            2,
+            self._write_funnel,
+            {self.time_ticket(), self.input_port_ticket(self._cell.get_index())},
+        )
+
+    def _law(self, context: Context) -> tuple[AxisLaw, float]:
+        cell = read_current_cell(self._cell.Eval(context), len(self._laws))
+        return self._laws[cell.index], context.get_time() - cell.start
+
+    def _write_acceleration(self, context: Context, output: BasicVector) -> None:
+        law, time = self._law(context)
+        angle, rate = self._pose.Eval(context)[2:], self._twist.Eval(context)[2:]
+        output.SetFromVector(law.acceleration(angle, rate, time))
+
+    def _write_funnel(self, context: Context, output: BasicVector) -> None:
+        law, time = self._law(context)
+        walls = law.walls(time)
+        output.SetFromVector([walls.lower[0], walls.upper[0]])

@@ -1,0 +1,123 @@
+"""One robot's report that it is ready for the next cell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from coop_drake.control.ready import arrival_margin, ready_margin
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.systems.axis_laws import AxisLaw
+from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, read_current_cell
+from coop_drake.systems.reference_governor import GovernedCell
+
+__all__ = ["ReadyMonitor"]
+
+
+class ReadyMonitor(LeafSystem):
+    """Judges whether object and own joints may enter the next cell; in the last cell, whether they arrived.
+
+    ======= ====================== ========== ====================================================== =====
+    input   ``object_pose``        3          pose of L in W, angle unwrapped [m, rad]               W
+    input   ``object_twist``       3          velocity of L's origin, angular rate [m/s, rad/s]      W
+    input   ``robot_state``        2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)         W
+    input   ``governor_position``  2          p_G as the robot keeps it [m]                          W
+    input   ``current_cell``       2          index of the current cell, time of its entry [-, s]
+    output  ``ready``              2          index of the current cell, signed margin [-]
+    ======= ====================== ========== ====================================================== =====
+
+    No state. The report is all that a robot ever tells others: one bit's worth, and which cell it is about.
+
+    Args:
+        cells: Governor's data of every cell.
+        laws: Laws of the axes (theta, q_k) in every cell.
+        inradii: R of every transition [m].
+        goal_position: Where the object shall end, shape (2,) [m].
+        position_tolerance: How close to it counts as arrived [m].
+
+    Raises:
+        ValueError: The sequences are empty or differ in length, or the tolerance is not positive.
+    """
+
+    def __init__(
+        self,
+        cells: Sequence[GovernedCell],
+        laws: Sequence[AxisLaw],
+        inradii: Sequence[float],
+        goal_position: FloatArray,
+        position_tolerance: float,
+    ) -> None:
+        super().__init__()
+        if not cells or not len(cells) == len(laws) == len(inradii):
+            raise ValueError(
+                "ReadyMonitor needs one governed cell, one law and one inradius for each cell, not "
+                f"{len(cells)}, {len(laws)} and {len(inradii)}"
+            )
+        if not position_tolerance > 0.0:
+            raise ValueError(f"ReadyMonitor's position tolerance must be positive, not {position_tolerance}")
+        self._cells, self._laws, self._inradii = tuple(cells), tuple(laws), tuple(inradii)
+        self._goal, self._tolerance = np.array(goal_position, dtype=float), position_tolerance
+        self._joints = n = laws[0].axes - 1
+        self._pose = self.DeclareVectorInputPort("object_pose", 3)
+        self._twist = self.DeclareVectorInputPort("object_twist", 3)
+        self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + n))
+        self._governor = self.DeclareVectorInputPort("governor_position", 2)
+        self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
+        self.DeclareVectorOutputPort("ready", READY_SIZE, self._write_ready)
+
+    def _write_ready(self, context: Context, output: BasicVector) -> None:
+        index = read_current_cell(self._current.Eval(context), len(self._cells)).index
+        pose, twist = self._pose.Eval(context), self._twist.Eval(context)
+        state, n = self._state.Eval(context), self._joints
+        axes = np.concatenate([pose[2:], state[3 : 3 + n]])
+        rates = np.concatenate([twist[2:], state[6 + n :]])
+        judge = self._arrival if index == len(self._cells) - 1 else self._readiness
+        margin = judge(index, pose[:2], twist[:2], axes, rates, self._governor.Eval(context))
+        output.SetFromVector([float(index), margin])
+
+    def _readiness(
+        self,
+        index: int,
+        position: FloatArray,
+        velocity: FloatArray,
+        axes: FloatArray,
+        rates: FloatArray,
+        governor_position: FloatArray,
+    ) -> float:
+        law, next_law = self._laws[index], self._laws[index + 1]
+        return ready_margin(
+            position=position,
+            velocity=velocity,
+            governor_position=governor_position,
+            next_clearance=self._cells[index + 1].clearance(governor_position),
+            inradius=self._inradii[index],
+            axis_position=axes,
+            axis_rate=rates,
+            goal_lower=law.funnel.goal_lower,
+            goal_upper=law.funnel.goal_upper,
+            next_funnel=next_law.funnel,
+            next_gains=next_law.gains,
+        )
+
+    def _arrival(
+        self,
+        index: int,
+        position: FloatArray,
+        velocity: FloatArray,
+        axes: FloatArray,
+        rates: FloatArray,
+        _: FloatArray,
+    ) -> float:
+        funnel = self._laws[index].funnel
+        return arrival_margin(
+            position=position,
+            velocity=velocity,
+            target=self._goal,
+            axis_position=axes,
+            axis_rate=rates,
+            goal_lower=funnel.goal_lower,
+            goal_upper=funnel.goal_upper,
+            position_tolerance=self._tolerance,
+        )

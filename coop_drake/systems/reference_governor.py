@@ -1,0 +1,111 @@
+"""The reference governor of the object's position as a block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from coop_drake.control.gains import TransitionGains
+from coop_drake.control.governor import (
+    energy_margin,
+    governed_acceleration,
+    governor_velocity,
+    tracking_energy,
+)
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, read_current_cell
+
+__all__ = ["GovernedCell", "ReferenceGovernor"]
+
+
+@dataclass(frozen=True)
+class GovernedCell:
+    """What the governor needs to know of one cell.
+
+    Attributes:
+        clearance: Signed distance of a point to the boundary of the governed set, (2,) -> float [m].
+        field: Velocity field that leads to the cell's target, (2,) -> (2,) [m/s].
+        gains: Gains of the transition.
+    """
+
+    clearance: Callable[[FloatArray], float]
+    field: Callable[[FloatArray], FloatArray]
+    gains: TransitionGains
+
+    def energy_margin(
+        self, position: FloatArray, velocity: FloatArray, governor_position: FloatArray
+    ) -> float:
+        """Delta E of (15) in this cell [m^2/s^2]."""
+        stiffness = self.gains.stiffness
+        energy = tracking_energy(position, velocity, governor_position, stiffness=stiffness)
+        return energy_margin(energy, self.clearance(governor_position), stiffness=stiffness)
+
+
+class ReferenceGovernor(LeafSystem):
+    """Leads the object to the cell's target no faster than is safe: (13)-(16).
+
+    ======= =========================== ==== ====================================================== =====
+    input   ``object_pose``             3    pose of L in W [m, rad]                                W
+    input   ``object_twist``            3    velocity of L's origin, angular rate [m/s, rad/s]      W
+    input   ``governor_position``       2    p_G, kept by an integrator outside [m]                 W
+    input   ``current_cell``            2    index of the current cell, time of its entry [-, s]
+    output  ``governor_velocity``       2    rate of p_G [m/s]                                      W
+    output  ``position_acceleration``   2    desired acceleration of L's origin [m/s^2]             W
+    output  ``energy_margin``           1    Delta E [m^2/s^2]
+    ======= =========================== ==== ====================================================== =====
+
+    No state of its own: p_G lives in the integrator that ``governor_velocity`` feeds.
+
+    Args:
+        cells: One entry for each cell of the plan.
+
+    Raises:
+        ValueError: There is no cell.
+    """
+
+    def __init__(self, cells: Sequence[GovernedCell]) -> None:
+        super().__init__()
+        if not cells:
+            raise ValueError("ReferenceGovernor needs at least one cell")
+        self._cells = tuple(cells)
+        self._pose = self.DeclareVectorInputPort("object_pose", 3)
+        self._twist = self.DeclareVectorInputPort("object_twist", 3)
+        self._governor = self.DeclareVectorInputPort("governor_position", 2)
+        self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
+        self.DeclareVectorOutputPort("governor_velocity", 2, self._write_velocity)
+        self.DeclareVectorOutputPort("position_acceleration", 2, self._write_acceleration)
+        self._margin = self.DeclareVectorOutputPort("energy_margin", 1, self._write_margin)
+
+    def _cell(self, context: Context) -> GovernedCell:
+        return self._cells[read_current_cell(self._current.Eval(context), len(self._cells)).index]
+
+    def _write_velocity(self, context: Context, output: BasicVector) -> None:
+        cell = self._cell(context)
+        output.SetFromVector(
+            governor_velocity(
+                cell.field(self._governor.Eval(context)),
+                self._margin.Eval(context)[0],
+                stiffness=cell.gains.stiffness,
+                governor_gain=cell.gains.governor_gain,
+                smoothing=cell.gains.smoothing,
+            )
+        )
+
+    def _write_acceleration(self, context: Context, output: BasicVector) -> None:
+        gains = self._cell(context).gains
+        output.SetFromVector(
+            governed_acceleration(
+                self._pose.Eval(context)[:2],
+                self._twist.Eval(context)[:2],
+                self._governor.Eval(context),
+                stiffness=gains.stiffness,
+                damping=gains.damping,
+            )
+        )
+
+    def _write_margin(self, context: Context, output: BasicVector) -> None:
+        cell = self._cell(context)
+        pose, twist = self._pose.Eval(context), self._twist.Eval(context)
+        output.SetFromVector([cell.energy_margin(pose[:2], twist[:2], self._governor.Eval(context))])

@@ -1,0 +1,82 @@
+"""What is measured: the object's pose, and every robot's own state."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialVelocity
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from coop_drake.plant import TeamPlant
+
+__all__ = ["ObjectPoseSensor", "RobotStateSensor"]
+
+
+class ObjectPoseSensor(LeafSystem):
+    """Reads the object's pose.
+
+    ======= ================= ========== ==================================================== =====
+    input   ``team_state``    2 (3 + n)  the plant's positions and velocities, its own order
+    output  ``object_pose``   3          pose of L in W, angle unwrapped [m, rad]             W
+    ======= ================= ========== ==================================================== =====
+
+    No state.
+
+    Args:
+        team: The team whose plant gives the state.
+    """
+
+    def __init__(self, team: TeamPlant) -> None:
+        super().__init__()
+        self._index = team.position_index[:3]
+        self._team = self.DeclareVectorInputPort("team_state", team.plant.num_multibody_states())
+        self.DeclareVectorOutputPort("object_pose", 3, self._write_pose)
+
+    def _write_pose(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._team.Eval(context)[self._index])
+
+
+class RobotStateSensor(LeafSystem):
+    """Reads one robot's own state: where its base is and moves, and its joints.
+
+    ======= ============================ ========== ==================================================== =====
+    input   ``team_state``               2 (3 + n)  the plant's positions and velocities, its own order
+    input   ``body_poses``               abstract   poses of the plant's bodies                          W
+    input   ``body_spatial_velocities``  abstract   spatial velocities of the plant's bodies             W
+    output  ``robot_state``              2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)       W
+    ======= ============================ ========== ==================================================== =====
+
+    No state. The yaw is in (-pi, pi].
+
+    Args:
+        team: The team whose plant gives the state.
+        robot: Index k of the robot.
+
+    Raises:
+        IndexError: The team has no such robot.
+    """
+
+    def __init__(self, team: TeamPlant, robot: int) -> None:
+        super().__init__()
+        if not 0 <= robot < len(team.robots):
+            raise IndexError(f"robot {robot} is not in the team of {len(team.robots)}")
+        model = team.robots[robot]
+        self._body = int(model.base_body.index())
+        in_q = slice(3 + model.q_slice.start, 3 + model.q_slice.stop)
+        self._positions = team.position_index[in_q]
+        self._rates = team.plant.num_positions() + team.velocity_index[in_q]
+        self._team = self.DeclareVectorInputPort("team_state", team.plant.num_multibody_states())
+        self._poses = self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
+        self._velocities = self.DeclareAbstractInputPort(
+            "body_spatial_velocities", Value[list[SpatialVelocity]]()
+        )
+        self.DeclareVectorOutputPort("robot_state", 2 * (3 + len(model.joints)), self._write_state)
+
+    def _write_state(self, context: Context, output: BasicVector) -> None:
+        team = self._team.Eval(context)
+        X_WB, V_WB = self._poses.Eval(context)[self._body], self._velocities.Eval(context)[self._body]
+        R, p = X_WB.rotation().matrix(), X_WB.translation()
+        v, w = V_WB.translational(), V_WB.rotational()
+        base, base_rate = (p[0], p[1], np.arctan2(R[1, 0], R[0, 0])), (v[0], v[1], w[2])
+        output.SetFromVector(np.concatenate([base, team[self._positions], base_rate, team[self._rates]]))

@@ -1,0 +1,57 @@
+"""From every robot's effort to what the team's plant is driven by."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.common.value import AbstractValue, Value
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import ExternallyAppliedSpatialForce
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from coop_drake.plant import TeamPlant
+
+__all__ = ["TeamActuation"]
+
+
+class TeamActuation(LeafSystem):
+    """Applies base wrenches as forces on the bases and joint torques at the joints.
+
+    ======= ====================== ========= ========================================================= =====
+    input   ``robot_<k>_effort``   3 + n_k   base wrench at Bk, joint torques of robot k [N, N m]      W
+    output  ``base_wrenches``      abstract  one externally applied spatial force on every base        W
+    output  ``joint_torques``      n         torques of all joints in the order of q [N m or N]
+    ======= ====================== ========= ========================================================= =====
+
+    No state. A base wrench given as a generalized force would move the team alike, but the grasp's reaction
+    could not be read from the plant.
+
+    Args:
+        team: The team whose plant is driven.
+    """
+
+    def __init__(self, team: TeamPlant) -> None:
+        super().__init__()
+        self._bodies = [robot.base_body.index() for robot in team.robots]
+        self._efforts = [
+            self.DeclareVectorInputPort(f"robot_{robot.index}_effort", 3 + len(robot.joints))
+            for robot in team.robots
+        ]
+        self.DeclareAbstractOutputPort("base_wrenches", self._allocate, self._write_wrenches)
+        self.DeclareVectorOutputPort("joint_torques", len(team.joints), self._write_torques)
+
+    def _allocate(self) -> AbstractValue:
+        return Value[list[ExternallyAppliedSpatialForce]]()
+
+    def _write_wrenches(self, context: Context, output: AbstractValue) -> None:
+        forces = []
+        for body, port in zip(self._bodies, self._efforts, strict=True):
+            fx, fy, torque = port.Eval(context)[:3]
+            force = ExternallyAppliedSpatialForce()
+            force.body_index = body
+            force.p_BoBq_B = np.zeros(3)
+            force.F_Bq_W = SpatialForce(tau=[0.0, 0.0, torque], f=[fx, fy, 0.0])
+            forces.append(force)
+        output.set_value(forces)
+
+    def _write_torques(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(np.concatenate([port.Eval(context)[3:] for port in self._efforts]))

@@ -1,0 +1,92 @@
+"""A transport across an open room with a plan written by hand: three cells, no search, no Drake."""
+
+from __future__ import annotations
+
+import numpy as np
+from shapely import Point, Polygon, box
+
+from coop_drake.control import GainSet, ScheduledGains, transition_gains
+from coop_drake.planning.plan import Cell, Plan, Transition
+
+ROOM = box(0.0, 0.0, 10.0, 7.0)
+START_POSE = (3.0, 3.0, 0.2)
+GOAL_POSE = (5.2, 3.6, 0.7)
+POSITION_TOLERANCE = 0.01
+ANGLE_TOLERANCE = 0.02
+
+# Positions, interval of the angle and of every joint of each cell; neighbours overlap in all of them.
+CELLS = (
+    (box(2.2, 2.2, 4.4, 4.6), (0.0, 0.4), (-0.3, 0.3)),
+    (box(3.2, 2.4, 5.0, 4.8), (0.2, 0.6), (-0.1, 0.5)),
+    (box(4.0, 2.6, 6.2, 4.8), (0.4, 1.0), (0.0, 0.6)),
+)
+
+
+def small_plan(joint_names: tuple[str, ...], gain_set: GainSet | None = None) -> Plan:
+    """The plan for a team with these joints, gains scheduled unless told otherwise."""
+    n = len(joint_names)
+    gain_set = gain_set if gain_set is not None else ScheduledGains()
+    cells = tuple(_cell(polygon, angle, joint, n) for polygon, angle, joint in CELLS)
+    start = np.array([*START_POSE, *[0.0] * n])
+    transitions = []
+    position, resting = start[:2], start[2:]
+    for index in range(len(cells)):
+        transition = _transition(cells, index, position, resting, gain_set)
+        transitions.append(transition)
+        position, resting = transition.target, 0.5 * (transition.goal_lower + transition.goal_upper)
+    return Plan(
+        cells=cells,
+        transitions=tuple(transitions),
+        start=start,
+        goal_pose=np.array(GOAL_POSE),
+        goal_joints=(None,) * n,
+        joint_names=joint_names,
+        margin=0.1,
+        gain_set="by hand",
+    )
+
+
+def _cell(polygon: Polygon, angle: tuple[float, float], joint: tuple[float, float], n: int) -> Cell:
+    lower, upper = np.array([angle[0], *[joint[0]] * n]), np.array([angle[1], *[joint[1]] * n])
+    return Cell(polygon, polygon.buffer(-0.1), polygon, lower, upper)
+
+
+def _transition(
+    cells: tuple[Cell, ...], index: int, position: np.ndarray, resting: np.ndarray, gain_set: GainSet
+) -> Transition:
+    cell, last = cells[index], index == len(cells) - 1
+    if last:
+        target = np.array(GOAL_POSE[:2])
+        region = Point(target).buffer(POSITION_TOLERANCE)
+        inradius = POSITION_TOLERANCE
+        lower, upper = cell.lower.copy(), cell.upper.copy()
+        lower[0], upper[0] = GOAL_POSE[2] - ANGLE_TOLERANCE, GOAL_POSE[2] + ANGLE_TOLERANCE
+    else:
+        region = cell.safe & cells[index + 1].safe
+        target = np.array(region.centroid.coords[0])
+        inradius = region.exterior.distance(Point(target))
+        lower = np.maximum(cell.lower, cells[index + 1].lower)
+        upper = np.minimum(cell.upper, cells[index + 1].upper)
+    neck = min(cell.safe.exterior.distance(Point(p)) for p in (position, target))
+    gains = transition_gains(
+        gain_set,
+        neck=neck,
+        slice_lower=cell.lower,
+        slice_upper=cell.upper,
+        goal_lower=lower,
+        goal_upper=upper,
+        resting=resting,
+    )
+    length = float(np.linalg.norm(target - position))
+    return Transition(
+        target=target,
+        goal_region=region,
+        goal_lower=lower,
+        goal_upper=upper,
+        inradius=inradius,
+        neck=neck,
+        length=length,
+        estimated_time=0.6 + length / (3.0 * neck),
+        only_angles=False,
+        gains=gains,
+    )

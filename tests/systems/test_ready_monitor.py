@@ -1,0 +1,119 @@
+import numpy as np
+import pytest
+
+from coop_drake.control import arrival_margin, ready_margin
+from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.systems import GovernedCell, ReadyMonitor, axis_laws
+from tests.support.small_plan import GOAL_POSE, POSITION_TOLERANCE, small_plan
+from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
+
+PLAN = small_plan(("a", "b", "c"))
+AXES = [0, 2, 3]
+INPUTS = {
+    "object_pose": [3.8, 3.5, 0.3],
+    "object_twist": [0.0, 0.0, 0.0],
+    "robot_state": [1.0, 2.0, 0.3, 0.1, 0.12, *[0.0] * 5],
+    "governor_position": [3.8, 3.5],
+    "current_cell": [0.0, 0.0],
+}
+
+
+@pytest.fixture
+def cells():
+    return [
+        GovernedCell(BoundaryDistance(cell.tidied), lambda point: 0.0 * point, transition.gains)
+        for cell, transition in zip(PLAN.cells, PLAN.transitions, strict=True)
+    ]
+
+
+@pytest.fixture
+def monitor(cells):
+    inradii = [transition.inradius for transition in PLAN.transitions]
+    return ReadyMonitor(cells, axis_laws(PLAN, AXES), inradii, PLAN.goal_pose[:2], POSITION_TOLERANCE)
+
+
+def test_ports(monitor):
+    inputs, outputs = port_sizes(monitor)
+    assert inputs == {
+        "object_pose": 3,
+        "object_twist": 3,
+        "robot_state": 10,
+        "governor_position": 2,
+        "current_cell": 2,
+    }
+    assert outputs == {"ready": 2}
+
+
+@pytest.mark.parametrize("index", [0, 1])
+def test_the_report_is_the_law_with_the_next_cells_energy(monitor, cells, index):
+    laws = axis_laws(PLAN, AXES)
+    inputs = {**INPUTS, "current_cell": [index, 0.0], "object_twist": [0.1, 0.0, 0.05]}
+    governor = np.array(INPUTS["governor_position"])
+    expected = ready_margin(
+        position=np.array([3.8, 3.5]),
+        velocity=np.array([0.1, 0.0]),
+        governor_position=governor,
+        next_clearance=cells[index + 1].clearance(governor),
+        inradius=PLAN.transitions[index].inradius,
+        axis_position=np.array([0.3, 0.1, 0.12]),
+        axis_rate=np.array([0.05, 0.0, 0.0]),
+        goal_lower=laws[index].funnel.goal_lower,
+        goal_upper=laws[index].funnel.goal_upper,
+        next_funnel=laws[index + 1].funnel,
+        next_gains=laws[index + 1].gains,
+    )
+    np.testing.assert_array_equal(evaluate(monitor, inputs, "ready"), [index, expected])
+
+
+def test_ready_at_rest_on_the_target(monitor):
+    target = PLAN.transitions[0].target
+    middle = 0.5 * (PLAN.transitions[0].goal_lower + PLAN.transitions[0].goal_upper)[AXES]
+    inputs = {
+        **INPUTS,
+        "object_pose": [*target, middle[0]],
+        "governor_position": target,
+        "robot_state": [0.0, 0.0, 0.0, *middle[1:], *[0.0] * 5],
+    }
+    assert evaluate(monitor, inputs, "ready")[1] > 0.0
+    assert evaluate(monitor, {**inputs, "object_twist": [9.0, 0.0, 0.0]}, "ready")[1] < 0.0
+    assert evaluate(monitor, {**inputs, "governor_position": [2.5, 2.5]}, "ready")[1] < 0.0
+    moved = [0.0, 0.0, 0.0, middle[1] + 0.3, middle[2], *[0.0] * 5]
+    assert evaluate(monitor, {**inputs, "robot_state": moved}, "ready")[1] < 0.0
+
+
+def test_in_the_last_cell_it_reports_arrival(monitor):
+    laws = axis_laws(PLAN, AXES)[-1]
+    state = [0.0, 0.0, 0.0, 0.3, 0.28, 0.0, 0.0, 0.0, 0.001, 0.002]
+    inputs = {
+        **INPUTS,
+        "current_cell": [2.0, 1.0],
+        "object_pose": [GOAL_POSE[0] + 0.002, GOAL_POSE[1], GOAL_POSE[2] + 0.001],
+        "object_twist": [0.001, 0.0, 0.003],
+        "robot_state": state,
+    }
+    expected = arrival_margin(
+        position=np.array(inputs["object_pose"][:2]),
+        velocity=np.array([0.001, 0.0]),
+        target=np.array(GOAL_POSE[:2]),
+        axis_position=np.array([GOAL_POSE[2] + 0.001, 0.3, 0.28]),
+        axis_rate=np.array([0.003, 0.001, 0.002]),
+        goal_lower=laws.funnel.goal_lower,
+        goal_upper=laws.funnel.goal_upper,
+        position_tolerance=POSITION_TOLERANCE,
+    )
+    assert expected > 0.0
+    np.testing.assert_array_equal(evaluate(monitor, inputs, "ready"), [2.0, expected])
+
+
+def test_inputs_are_required(monitor):
+    assert_every_input_is_required(monitor, INPUTS, {"ready": set(INPUTS)})
+
+
+def test_bad_parameters_are_refused(cells):
+    laws, goal = axis_laws(PLAN, AXES), np.zeros(2)
+    with pytest.raises(ValueError, match="one inradius for each cell, not 3, 3 and 2"):
+        ReadyMonitor(cells, laws, [0.1, 0.1], goal, 0.01)
+    with pytest.raises(ValueError, match="one inradius for each cell, not 0, 0 and 0"):
+        ReadyMonitor([], [], [], goal, 0.01)
+    with pytest.raises(ValueError, match=r"position tolerance must be positive, not 0\.0"):
+        ReadyMonitor(cells, laws, [0.1, 0.1, 0.1], goal, 0.0)

@@ -1,0 +1,114 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from coop_drake.control import governed_acceleration, governor_velocity
+from coop_drake.control.governor import energy_margin, tracking_energy
+from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.systems import GovernedCell, ReferenceGovernor
+from tests.support.small_plan import small_plan
+from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
+
+PLAN = small_plan(("a", "b"))
+INPUTS = {
+    "object_pose": [3.1, 3.2, 0.3],
+    "object_twist": [0.2, -0.1, 0.4],
+    "governor_position": [3.2, 3.15],
+    "current_cell": [1.0, 2.0],
+}
+
+
+def straight_to(target):
+    return lambda point: target - point
+
+
+@pytest.fixture
+def cells():
+    return [
+        GovernedCell(BoundaryDistance(cell.tidied), straight_to(transition.target), transition.gains)
+        for cell, transition in zip(PLAN.cells, PLAN.transitions, strict=True)
+    ]
+
+
+def expected_margin(cell, inputs):
+    pose, twist, governor = (
+        np.array(inputs[k]) for k in ("object_pose", "object_twist", "governor_position")
+    )
+    stiffness = cell.gains.stiffness
+    energy = tracking_energy(pose[:2], twist[:2], governor, stiffness=stiffness)
+    return energy_margin(energy, cell.clearance(governor), stiffness=stiffness)
+
+
+def test_ports(cells):
+    inputs, outputs = port_sizes(ReferenceGovernor(cells))
+    assert inputs == {"object_pose": 3, "object_twist": 3, "governor_position": 2, "current_cell": 2}
+    assert outputs == {"governor_velocity": 2, "position_acceleration": 2, "energy_margin": 1}
+
+
+@pytest.mark.parametrize("index", [0, 1, 2])
+def test_outputs_are_the_law_of_the_current_cell(cells, index):
+    inputs = {**INPUTS, "current_cell": [index, 2.0], "governor_position": [4.1, 3.15]}
+    inputs["object_pose"] = [4.15, 3.2, 0.3]
+    system, cell, gains = ReferenceGovernor(cells), cells[index], cells[index].gains
+    governor = np.array(inputs["governor_position"])
+    margin = expected_margin(cell, inputs)
+    np.testing.assert_allclose(evaluate(system, inputs, "energy_margin"), [margin], rtol=1e-15)
+    np.testing.assert_array_equal(
+        evaluate(system, inputs, "position_acceleration"),
+        governed_acceleration(
+            np.array(inputs["object_pose"][:2]),
+            np.array(inputs["object_twist"][:2]),
+            governor,
+            stiffness=gains.stiffness,
+            damping=gains.damping,
+        ),
+    )
+    velocity = evaluate(system, inputs, "governor_velocity")
+    np.testing.assert_array_equal(
+        velocity,
+        governor_velocity(
+            cell.field(governor),
+            margin,
+            stiffness=gains.stiffness,
+            governor_gain=gains.governor_gain,
+            smoothing=gains.smoothing,
+        ),
+    )
+    assert np.linalg.norm(velocity) > 0.0
+
+
+def test_the_governor_waits_while_the_energy_margin_is_not_positive(cells):
+    inputs = {**INPUTS, "object_twist": [9.0, 0.0, 0.0]}
+    assert evaluate(ReferenceGovernor(cells), inputs, "energy_margin")[0] < 0.0
+    np.testing.assert_array_equal(evaluate(ReferenceGovernor(cells), inputs, "governor_velocity"), [0.0, 0.0])
+
+
+def test_inputs_are_required(cells):
+    assert_every_input_is_required(
+        ReferenceGovernor(cells),
+        INPUTS,
+        {
+            "governor_velocity": set(INPUTS),
+            "position_acceleration": set(INPUTS),
+            "energy_margin": set(INPUTS),
+        },
+    )
+
+
+@pytest.mark.parametrize("index", [-1, 3])
+def test_a_cell_outside_the_plan_is_refused(cells, index):
+    with pytest.raises(IndexError, match=f"current_cell is {index}; the plan has cells 0 to 2"):
+        evaluate(ReferenceGovernor(cells), {**INPUTS, "current_cell": [index, 0.0]}, "energy_margin")
+
+
+def test_no_cells_are_refused():
+    with pytest.raises(ValueError, match="ReferenceGovernor needs at least one cell"):
+        ReferenceGovernor([])
+
+
+def test_a_stiffer_cell_has_another_margin(cells):
+    cell = cells[0]
+    stiffer = replace(cell, gains=replace(cell.gains, stiffness=2.0 * cell.gains.stiffness))
+    arguments = np.array([3.0, 3.0]), np.array([0.1, 0.0]), np.array([3.1, 3.0])
+    assert stiffer.energy_margin(*arguments) > cell.energy_margin(*arguments)

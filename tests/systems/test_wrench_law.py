@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+
+from coop_drake.control import acceleration_at, rotate, wrench_share
+from coop_drake.systems import WrenchLaw
+from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
+
+P_LE, P_LLCM = np.array([0.4, 0.1]), np.array([0.05, -0.02])
+INPUTS = {
+    "object_pose": [3.8, 3.5, 0.7],
+    "object_twist": [0.3, 0.1, 0.9],
+    "position_acceleration": [1.2, -0.4],
+    "angle_acceleration": [2.0],
+}
+DESIRED = np.array([1.2, -0.4, 2.0])
+
+
+@pytest.fixture
+def law():
+    return WrenchLaw(P_LE, p_LLcm=P_LLCM, mass=3.0, inertia=0.7, robots=3)
+
+
+def test_ports(law):
+    inputs, outputs = port_sizes(law)
+    assert inputs == {
+        "object_pose": 3,
+        "object_twist": 3,
+        "position_acceleration": 2,
+        "angle_acceleration": 1,
+    }
+    assert outputs == {"object_acceleration": 3, "grasp_acceleration": 3, "wrench_share": 3}
+
+
+def test_outputs_are_the_laws(law):
+    np.testing.assert_array_equal(evaluate(law, INPUTS, "object_acceleration"), DESIRED)
+    np.testing.assert_array_equal(
+        evaluate(law, INPUTS, "grasp_acceleration"), acceleration_at(DESIRED, 0.9, rotate(0.7, P_LE))
+    )
+    np.testing.assert_array_equal(
+        evaluate(law, INPUTS, "wrench_share"),
+        wrench_share(
+            DESIRED,
+            0.9,
+            rotate(0.7, P_LE),
+            com_offset=rotate(0.7, P_LLCM),
+            mass=3.0,
+            inertia=0.7,
+            robots=3,
+        ),
+    )
+
+
+def test_inputs_are_required(law):
+    command = {"position_acceleration", "angle_acceleration"}
+    assert_every_input_is_required(
+        law,
+        INPUTS,
+        {
+            "object_acceleration": command,
+            "grasp_acceleration": set(INPUTS),
+            "wrench_share": set(INPUTS),
+        },
+    )
+
+
+@pytest.mark.parametrize(
+    ("mass", "inertia", "robots"), [(0.0, 1.0, 2), (1.0, -1.0, 2), (1.0, 1.0, 0), (np.nan, 1.0, 2)]
+)
+def test_bad_parameters_are_refused(mass, inertia, robots):
+    with pytest.raises(ValueError, match="needs positive mass, inertia and robots, not"):
+        WrenchLaw(P_LE, p_LLcm=P_LLCM, mass=mass, inertia=inertia, robots=robots)
