@@ -27,8 +27,8 @@ def find_base(
         plant: A plant that holds the robot's models, finalized or not.
 
     Returns:
-        The base body, and the movable joints in the order of q_k: from the base outwards, a joint before those
-        that it carries.
+        The base body, and the movable joints in the order of q_k: from the base outwards, a joint before
+        those that it carries.
 
     Raises:
         ScenarioError: A joint to the world, a joint that is neither fixed nor revolute nor prismatic, a joint
@@ -85,7 +85,6 @@ def _outwards(base: RigidBody, joints: list[Joint]) -> tuple[Joint, ...]:
     while stack:
         body = stack.pop()
         leading = [joint for joint in joints if int(joint.parent_body().index()) == body]
-        for joint in reversed(leading):
-            stack.append(int(joint.child_body().index()))
+        stack.extend(int(joint.child_body().index()) for joint in reversed(leading))
         ordered.extend(joint for joint in joints if int(joint.child_body().index()) == body)
     return tuple(joint for joint in ordered if joint.type_name() in MOVABLE)

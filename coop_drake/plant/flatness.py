@@ -1,4 +1,4 @@
-"""Everything moves in the plane of the floor: frames stand upright, revolute axes too, prismatic axes lie flat."""
+"""Everything moves in the plane: frames and revolute axes stand upright, prismatic axes lie flat."""
 
 from collections.abc import Sequence
 

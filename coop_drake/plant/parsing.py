@@ -1,4 +1,4 @@
-"""Models from directives into a plant that lies flat on the floor: no gravity, the same actuators everywhere."""
+"""Models from directives into a plant: no gravity, one actuator for each joint of q."""
 
 from collections.abc import Sequence
 

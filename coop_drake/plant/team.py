@@ -39,7 +39,7 @@ class ObjectInertia:
 
     mass: float
     inertia_about_com: float
-    p_LLcm: FloatArray
+    p_LLcm: FloatArray  # noqa: N815
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class RobotModel:
         gripper_frame: Ek, fixed on the robot's hand.
         weld: The joint that grasps the object.
         weld_index: Place of the weld in the plant's ``reaction_forces`` output.
-        weld_sign: +1 if the object is the weld's parent, so that the reaction on the weld's child is on the robot.
+        weld_sign: +1 if the object is the weld's parent, else -1.
         X_LE: Pose of the grasp in the object's frame.
         q_slice: Where q_k stands in q.
     """
@@ -91,6 +91,7 @@ class TeamPlant:
         object_inertia: Mass properties of the object.
         robots: In the scenario's order.
         assembly: Who is who in the directives.
+        scenario: What it was built from.
     """
 
     plant: MultibodyPlant
@@ -101,6 +102,7 @@ class TeamPlant:
     object_inertia: ObjectInertia
     robots: tuple[RobotModel, ...]
     assembly: Assembly
+    scenario: Scenario
 
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
@@ -153,7 +155,9 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
         first = robots[-1].q_slice.stop if robots else 0
         robots.append(_robot_model(scenario, robot, plant, context, frame, base, joints, len(robots), first))
     inertia = _object_inertia(plant, context, bodies_of(plant, [assembly.object_model]), frame)
-    return TeamPlant(plant, scene_graph, body, frame, object_joint, inertia, tuple(robots), assembly)
+    return TeamPlant(
+        plant, scene_graph, body, frame, object_joint, inertia, tuple(robots), assembly, scenario
+    )
 
 
 def _robot_model(

@@ -1,4 +1,4 @@
-"""Who is who in the directives: the object, the robots, and the weld by which each robot grasps the object."""
+"""Who is who in the directives: the object, the robots, and the weld by which each grasps the object."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

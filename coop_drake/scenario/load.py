@@ -15,8 +15,8 @@ from coop_drake.scenario.validation import validate
 def load_scenario(path: Path | str) -> Scenario:
     """Read and check a scenario file.
 
-    Everything that can be judged without bodies is checked here; what needs them (collisions, joint limits) is
-    checked by :func:`coop_drake.plant.planning_problem`.
+    Everything that can be judged without bodies is checked here; what needs them (collisions, joint
+    limits) is checked by :func:`coop_drake.plant.planning_problem`.
 
     Args:
         path: The file, ``NAME.scenario.yaml`` by custom.

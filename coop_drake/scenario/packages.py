@@ -13,8 +13,8 @@ _SHIPPED = Path(coop_drake.__file__).resolve().parent.parent / "models"
 def package_map(scenario_path: Path) -> PackageMap:
     """Collect the packages that a scenario may name in ``package://`` addresses.
 
-    They are those of every ``package.xml`` beside the scenario file or in a folder above it, the nearest first,
-    then coop_drake's own models, then what Drake knows by itself.
+    They are those of every ``package.xml`` beside the scenario file or in a folder above it, the nearest
+    first, then coop_drake's own models, then what Drake knows by itself.
 
     Args:
         scenario_path: The scenario file.

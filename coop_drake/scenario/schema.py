@@ -1,8 +1,8 @@
 """Reads frozen dataclasses with Drake's YAML loader, and says at which key a file departs from its schema.
 
-Drake's ``yaml_load_typed`` fills objects by assignment, starting from their defaults. For every frozen class a
-*draft* is made: a class of the same name whose fields can be assigned and all have defaults. Drake fills the
-draft, and the frozen value is made from it.
+Drake's ``yaml_load_typed`` fills objects by assignment, starting from their defaults. For every frozen class
+a *draft* is made: a class of the same name whose fields can be assigned and all have defaults. Drake fills
+the draft, and the frozen value is made from it.
 """
 
 import dataclasses
@@ -52,7 +52,7 @@ def _is_union(kind: Any) -> bool:
 @cache
 def draft(cls: type) -> type:
     """Make the class that Drake fills: the same fields, assignable, each with a default."""
-    hints = typing.get_type_hints(cls)
+    hints: dict[str, Any] = typing.get_type_hints(cls)
     fields: list[tuple[str, Any, Any]] = []
     for f in in_file(cls):
         default: Any = dataclasses.field(default=None)
@@ -61,7 +61,7 @@ def draft(cls: type) -> type:
         elif f.default_factory is not dataclasses.MISSING:
             default = dataclasses.field(default_factory=_thawing(f.default_factory))
         elif dataclasses.is_dataclass(hints[f.name]):
-            default = dataclasses.field(default_factory=draft(typing.cast(type, hints[f.name])))
+            default = dataclasses.field(default_factory=draft(hints[f.name]))
         elif typing.get_origin(hints[f.name]) is dict:
             default = dataclasses.field(default_factory=dict)
         fields.append((f.name, _draft_kind(hints[f.name]), default))
@@ -88,6 +88,10 @@ def _draft_kind(kind: Any) -> Any:
     return kind
 
 
+def _drafted(kind: type) -> type:
+    return draft(kind) if dataclasses.is_dataclass(kind) else kind
+
+
 def thaw(value: Any) -> Any:
     """Turn frozen values into drafts, all the way down; the inverse of :func:`freeze`."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
@@ -112,7 +116,7 @@ def freeze(value: Any, kind: Any) -> Any:
     if origin is dict:
         return {key: freeze(item, arguments[1]) for key, item in value.items()}
     if _is_union(kind):
-        frozen = [a for a in arguments if dataclasses.is_dataclass(a) and draft(a) is type(value)]
+        frozen = [a for a in arguments if isinstance(a, type) and _drafted(a) is type(value)]
         return freeze(value, frozen[0]) if frozen else value
     return value
 
@@ -187,7 +191,7 @@ def _check_union(value: object, kind: Any, key: str) -> Check:
     arguments = typing.get_args(kind)
     if value is None and type(None) in arguments:
         return
-    classes = {a.__name__: a for a in arguments if dataclasses.is_dataclass(a)}
+    classes = {a.__name__: a for a in arguments if isinstance(a, type) and dataclasses.is_dataclass(a)}
     tag = value.get("_tag", "")[1:] if isinstance(value, dict) else ""
     if tag and classes:
         if tag not in classes:

@@ -1,0 +1,68 @@
+"""Where bodies are on the floor at one configuration, exactly: clearances to walls and to each other."""
+
+from collections.abc import Iterator
+
+from shapely import LineString, Point, Polygon, get_coordinates
+from shapely.geometry.base import BaseGeometry
+
+from coop_drake.geometry.pose import FloatArray, PlanarPose
+from coop_drake.geometry.tree import Body, ComponentTree, ConvexShape
+
+
+def core(shape: ConvexShape, X_WC: PlanarPose) -> BaseGeometry:
+    """The hull of a shape without its radius, in W: a point, a segment or a polygon."""
+    points = X_WC.apply(shape.vertices)
+    if len(points) == 1:
+        return Point(points[0])
+    return LineString(points) if len(points) == 2 else Polygon(points)
+
+
+def wall_clearance(body: Body, X_WC: PlanarPose, workspace: Polygon) -> float:
+    """Signed distance of a body to the walls [m]: negative or zero where it leaves the workspace."""
+    clearances = [float("inf")]
+    for shape in body.shapes:
+        solid = core(shape, X_WC)
+        inside = workspace.contains(solid)
+        gap = (
+            workspace.boundary.distance(solid) if inside else -_excess(solid.difference(workspace), workspace)
+        )
+        clearances.append(float(gap) - shape.radius)
+    return min(clearances)
+
+
+def _excess(outside: BaseGeometry, workspace: Polygon) -> float:
+    """How far the corners of what is outside lie from the workspace [m]."""
+    return max((float(Point(p).distance(workspace)) for p in get_coordinates(outside)), default=0.0)
+
+
+def body_clearance(first: Body, X_WC: PlanarPose, second: Body, X_WD: PlanarPose) -> float:
+    """Distance between two bodies [m]; zero or negative where they touch or overlap."""
+    return min(
+        (
+            float(core(a, X_WC).distance(core(b, X_WD))) - a.radius - b.radius
+            for a in first.shapes
+            for b in second.shapes
+        ),
+        default=float("inf"),
+    )
+
+
+def collisions(tree: ComponentTree, z: FloatArray, workspace: Polygon) -> Iterator[tuple[str, str, float]]:
+    """Yield ``(body, what it hits, clearance)`` for every body that leaves the floor or touches another.
+
+    Args:
+        tree: The team.
+        z: (x, y, theta, q...), shape (3 + n,).
+        workspace: W.
+    """
+    poses = tree.poses(z)
+    for X_WC, component in zip(poses, tree.components, strict=True):
+        for body in component.bodies:
+            clearance = wall_clearance(body, X_WC, workspace)
+            if clearance <= 0.0:
+                yield body.name, "the walls", clearance
+    for (i, j), (k, m) in tree.collision_pairs:
+        first, second = tree.components[i].bodies[j], tree.components[k].bodies[m]
+        clearance = body_clearance(first, poses[i], second, poses[k])
+        if clearance <= 0.0:
+            yield first.name, second.name, clearance

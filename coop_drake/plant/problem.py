@@ -1,0 +1,48 @@
+"""From scenario and plant to the question that the planner answers."""
+
+import numpy as np
+
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning.problem import PlanningProblem
+from coop_drake.plant.component_tree import read_component_tree
+from coop_drake.plant.team import TeamPlant
+from coop_drake.plant.validation import check_joints, check_places
+from coop_drake.scenario import Scenario
+
+
+def planning_problem(scenario: Scenario, team: TeamPlant) -> PlanningProblem:
+    """Put start, goal, walls and bodies together, and refuse what cannot be meant.
+
+    Args:
+        scenario: The scenario.
+        team: The plant that was built from it.
+
+    Raises:
+        ScenarioError: Joints that do not fit the robots or their limits, a start in collision, a goal where
+            the object leaves the floor, or bodies whose footprint cannot be read.
+    """
+    check_joints(scenario, team)
+    problem = PlanningProblem(
+        workspace=scenario.workspace.polygon,
+        tree=read_component_tree(team),
+        start=start_configuration(scenario, team),
+        goal_pose=np.array([scenario.goal.object.x, scenario.goal.object.y, scenario.goal.object.theta]),
+        goal_joints=tuple(
+            value
+            for robot in team.robots
+            for value in scenario.goal.joints.get(robot.name, (None,) * len(robot.joints))
+        ),
+        position_tolerance=scenario.goal.tolerances.position,
+        angle_tolerance=scenario.goal.tolerances.angle,
+        joint_tolerance=scenario.goal.tolerances.joint,
+        settings=scenario.planner,
+    )
+    check_places(scenario, problem)
+    return problem
+
+
+def start_configuration(scenario: Scenario, team: TeamPlant) -> FloatArray:
+    """The start as z = (x, y, theta, q...), shape (3 + n,) [m, rad]; joints must have been checked."""
+    start = scenario.start.object
+    joints = [value for robot in team.robots for value in scenario.start.joints.get(robot.name, ())]
+    return np.array([start.x, start.y, start.theta, *joints])

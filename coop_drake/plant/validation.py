@@ -1,0 +1,79 @@
+"""What a scenario must satisfy once its bodies and joints are known."""
+
+from collections.abc import Mapping, Sequence
+
+from coop_drake.errors import ScenarioError
+from coop_drake.planning.problem import PlanningProblem
+from coop_drake.plant.chain import limits_of
+from coop_drake.plant.placement import collisions, wall_clearance
+from coop_drake.plant.team import TeamPlant
+from coop_drake.scenario import Scenario
+
+
+def check_joints(scenario: Scenario, team: TeamPlant) -> None:
+    """Refuse joint values that do not fit the robots.
+
+    Raises:
+        ScenarioError: An unknown robot, a wrong number of values, a value outside its joint's limits.
+    """
+    _check_section(scenario, team, "start.joints", scenario.start.joints)
+    _check_section(scenario, team, "goal.joints", scenario.goal.joints)
+    for robot in team.robots:
+        if robot.joints and robot.name not in scenario.start.joints:
+            raise ScenarioError(
+                str(scenario.path),
+                f"start.joints.{robot.name}",
+                None,
+                f"a list of {len(robot.joints)}, the values of {', '.join(robot.joint_names)}",
+            )
+
+
+def _check_section(
+    scenario: Scenario, team: TeamPlant, key: str, section: Mapping[str, Sequence[float | None]]
+) -> None:
+    file = str(scenario.path)
+    robots = {robot.name: robot for robot in team.robots}
+    for name, values in section.items():
+        if name not in robots:
+            raise ScenarioError(file, f"{key}.{name}", name, "a robot, one of " + ", ".join(robots))
+        robot = robots[name]
+        if len(values) != len(robot.joints):
+            names = ", ".join(robot.joint_names) or "no joints"
+            raise ScenarioError(
+                file, f"{key}.{name}", list(values), f"a list of {len(robot.joints)}, the values of {names}"
+            )
+        for place, (value, joint) in enumerate(zip(values, robot.joints, strict=True)):
+            lower, upper = limits_of(joint)
+            if value is not None and not lower <= value <= upper:
+                raise ScenarioError(
+                    file,
+                    f"{key}.{name}[{place}]",
+                    value,
+                    f"a value of {robot.joint_names[place]} between its limits {lower:g} and {upper:g}",
+                )
+
+
+def check_places(scenario: Scenario, problem: PlanningProblem) -> None:
+    """Refuse a start in collision, and a goal where the object alone leaves the floor.
+
+    Raises:
+        ScenarioError: Naming the bodies and how deep they are.
+    """
+    file = str(scenario.path)
+    for first, second, clearance in collisions(problem.tree, problem.start, problem.workspace):
+        raise ScenarioError(
+            file,
+            "start",
+            [float(value) for value in problem.start],
+            f"a configuration without collision ({first} touches {second}, clearance {clearance:.4f} m)",
+        )
+    goal = scenario.goal.object.pose
+    for body in problem.tree.components[0].bodies:
+        clearance = wall_clearance(body, goal, problem.workspace)
+        if body.robot is None and clearance <= 0.0:
+            raise ScenarioError(
+                file,
+                "goal.object",
+                [goal.x, goal.y, goal.angle],
+                f"a pose inside the workspace ({body.name} touches the walls, clearance {clearance:.4f} m)",
+            )
