@@ -14,6 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from coop_drake.files import write_atomically
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.simulation.log import IntArray
 from coop_drake.viz.colours import GREY
@@ -104,5 +105,5 @@ def break_at(times: FloatArray, values: FloatArray, cell_index: IntArray) -> tup
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG."""
-    figure.savefig(path, dpi=150, format="png")
+    """Write a figure as PNG; an interrupted write leaves no file behind."""
+    write_atomically(path, lambda file: figure.savefig(file, dpi=150, format="png"))

@@ -1,0 +1,5 @@
+"""The command line: one command for each stretch of the chain, for people and for machines."""
+
+from coop_drake.cli.app import app, main
+
+__all__ = ["app", "main"]

@@ -1,0 +1,156 @@
+"""The chain, link by link: scenario, plan, maps, simulation, pictures; each shows progress and notes its facts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter, process_time
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder
+
+from coop_drake.cli.measures import (
+    map_measures,
+    peak_memory_mb,
+    plan_measures,
+    planning_measures,
+    simulation_measures,
+)
+from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.results import ResultFolder
+from coop_drake.errors import PlanError, ScenarioError
+from coop_drake.files import write_atomically
+from coop_drake.planning import (
+    Found,
+    Plan,
+    PlanningProblem,
+    PlanningResult,
+    load_plan,
+    reschedule,
+    save_plan,
+)
+from coop_drake.planning.planner import plan
+from coop_drake.plant import build_team_plant, planning_problem
+from coop_drake.scenario import Scenario, load_scenario
+from coop_drake.simulation import SimulationLog, build_maps, simulate
+from coop_drake.viz import table_1, write_figures, write_recording
+
+__all__ = ["Task", "load_task", "plan_task", "read_plan", "simulate_task", "write_pictures"]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A scenario that was read and found sound.
+
+    Attributes:
+        scenario: As in the file.
+        problem: What the planner is asked.
+        gains: Name of the gain set in use.
+    """
+
+    scenario: Scenario
+    problem: PlanningProblem
+    gains: str
+
+
+def load_task(path: Path, gains: str | None) -> Task:
+    """Read a scenario and its models.
+
+    Args:
+        path: The scenario file.
+        gains: Name of the gain set to use, None for the one the file selects.
+
+    Raises:
+        ScenarioError: The file, a model or the name of the gain set is wrong.
+    """
+    scenario = load_scenario(path)
+    name = scenario.selected_gains if gains is None else gains
+    if name not in scenario.gain_sets:
+        allowed = "one of " + ", ".join(sorted(scenario.gain_sets))
+        raise ScenarioError(str(path), "--gains", name, allowed)
+    team = build_team_plant(scenario, DiagramBuilder())
+    return Task(scenario, planning_problem(scenario, team), name)
+
+
+def plan_task(task: Task, folder: ResultFolder, reporter: Reporter) -> PlanningResult:
+    """Plan, note what it took, and write the plan if there is one."""
+    with reporter.stage("planning") as progress, _stopwatch(reporter, "planning", cpu=True):
+        gain_set = task.scenario.gain_sets[task.gains]
+        result = plan(task.problem, gain_set, gain_set_name=task.gains, progress=progress)
+    reporter.facts.update(planning_measures(result), peak_memory_mb=peak_memory_mb())
+    folder.make()
+    folder.forget_plan()
+    if isinstance(result, Found):
+        save_plan(result.plan, folder.plan)
+        write_atomically(folder.table, table_1(result.plan).encode())
+    return result
+
+
+def read_plan(task: Task, path: Path, reporter: Reporter, *, gains_given: bool) -> Plan:
+    """Read a plan that was made for this scenario.
+
+    Args:
+        task: The scenario.
+        path: The plan file.
+        reporter: Takes note of the plan's size.
+        gains_given: Whether the gain set was asked for; else the plan's own gains stay.
+
+    Raises:
+        PlanError: The file is no plan, or belongs to another scenario.
+    """
+    found = load_plan(path)
+    names = tuple(joint.name for joint in task.problem.tree.joints)
+    if found.joint_names != names:
+        raise PlanError(
+            f"{path}: the plan moves {_listed(found.joint_names)}; the scenario has {_listed(names)}"
+        )
+    if not np.array_equal(found.start, task.problem.start):
+        raise PlanError(
+            f"{path}: the plan starts at {found.start}; the scenario starts at {task.problem.start}"
+        )
+    if gains_given and task.gains != found.gain_set:
+        found = reschedule(found, task.scenario.gain_sets[task.gains], task.gains)
+    reporter.facts.update(answer="found", slices=0, planning_cpu_seconds=0.0, **plan_measures(found))
+    return found
+
+
+def simulate_task(task: Task, found: Plan, folder: ResultFolder, reporter: Reporter) -> SimulationLog:
+    """Map every cell, run the closed loop, note how it went and write the log."""
+    with reporter.stage("mapping") as progress, _stopwatch(reporter, "mapping"):
+        maps = build_maps(found, progress=progress)
+    reporter.facts.update(map_measures(maps))
+    with reporter.stage("simulating") as progress, _stopwatch(reporter, "simulation"):
+        log = simulate(task.scenario, found, maps, progress=progress)
+    reporter.facts.update(simulation_measures(found, log), peak_memory_mb=peak_memory_mb())
+    folder.make()
+    folder.forget_simulation()
+    log.save(folder.log)
+    return log
+
+
+def write_pictures(
+    task: Task, found: Plan, log: SimulationLog, folder: ResultFolder, reporter: Reporter
+) -> None:
+    """Draw the figures and write the recording."""
+    with reporter.stage("drawing"):
+        write_figures(task.problem.workspace, task.problem.tree, found, log, folder.path)
+    with reporter.stage("recording") as progress, _stopwatch(reporter, "recording"):
+        write_recording(task.scenario, found, log, folder.recording, progress=progress)
+
+
+@contextmanager
+def _stopwatch(reporter: Reporter, name: str, *, cpu: bool = False) -> Iterator[None]:
+    """Note how long a stage took, even if it fails [s]."""
+    wall, processor = perf_counter(), process_time()
+    try:
+        yield
+    finally:
+        reporter.facts[f"{name}_wall_seconds"] = round(perf_counter() - wall, 4)
+        if cpu:
+            reporter.facts[f"{name}_cpu_seconds"] = round(process_time() - processor, 4)
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(names) or "no joint"

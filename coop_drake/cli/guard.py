@@ -1,0 +1,52 @@
+"""Turns what can go wrong into a sentence and an exit code; no traceback for a user's mistake."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import typer
+
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.reporter import Reporter
+from coop_drake.errors import CoopDrakeError, FieldError, ScenarioError, StallError
+
+__all__ = ["run_guarded"]
+
+
+def run_guarded(reporter: Reporter, command: Callable[[], ExitCode]) -> None:
+    """Run a command to its end and leave with its exit code.
+
+    Args:
+        reporter: Where errors go; it is closed in any case.
+        command: The command; returns its exit code.
+
+    Raises:
+        typer.Exit: Always, with the exit code.
+    """
+    try:
+        code = _attempt(reporter, command)
+    finally:
+        reporter.close()
+    raise typer.Exit(int(code))
+
+
+def _attempt(reporter: Reporter, command: Callable[[], ExitCode]) -> ExitCode:
+    try:
+        return command()
+    except KeyboardInterrupt:
+        reporter.complain("interrupted; files already written are whole")
+        return ExitCode.INTERRUPTED
+    except ScenarioError as error:
+        details = {"file": error.file, "key": error.key, "value": repr(error.value), "allowed": error.allowed}
+        reporter.complain(str(error), **details)
+        return ExitCode.BAD_INPUT
+    except (FieldError, StallError) as error:
+        reporter.complain(str(error))
+        return ExitCode.FAILED_RUN
+    except (CoopDrakeError, OSError) as error:
+        reporter.complain(str(error))
+        return ExitCode.BAD_INPUT
+    except Exception as error:
+        # A bug, not a mistake of the user's: machines get their object, people the traceback.
+        reporter.complain(f"{type(error).__name__}: {error}")
+        raise

@@ -1,0 +1,92 @@
+"""Talks to people through rich and to machines through one JSON object."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+__all__ = ["ProgressCallback", "Reporter"]
+
+ProgressCallback = Callable[[str, float], None]
+
+_SMALLEST_STEP = 0.002  # Progress that is worth drawing.
+
+
+class Reporter:
+    """Collects the facts of a command and shows them as they come.
+
+    Args:
+        machine: Whether standard output is for one JSON object, and everything else goes to standard error.
+        quiet: Whether people want to see errors only.
+    """
+
+    def __init__(self, *, machine: bool, quiet: bool) -> None:
+        self.facts: dict[str, Any] = {}
+        self._machine = machine
+        self._console = Console(stderr=machine, quiet=quiet, highlight=False)
+        self._errors = Console(stderr=True, highlight=False)
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[ProgressCallback]:
+        """Show a progress bar while a stage runs; yields the callback that moves it."""
+        columns = (
+            TextColumn("{task.description:<11}"),
+            BarColumn(),
+            TaskProgressColumn(),
+            TimeElapsedColumn(),
+            TextColumn("[dim]{task.fields[doing]}"),
+        )
+        with Progress(*columns, console=self._console, disable=self._console.quiet) as bars:
+            bar = bars.add_task(name, total=1.0, doing="")
+            drawn = ("", 0.0)
+
+            def advance(doing: str, fraction: float) -> None:
+                nonlocal drawn
+                if doing != drawn[0] or fraction - drawn[1] >= _SMALLEST_STEP:
+                    drawn = (doing, fraction)
+                    bars.update(bar, completed=fraction, doing=escape(doing))
+
+            yield advance
+            bars.update(bar, completed=1.0, doing="")
+
+    def say(self, text: str) -> None:
+        """Show a line of text, with rich's markup."""
+        self._console.print(text, soft_wrap=True)
+
+    def table(self, title: str, rows: list[tuple[str, str]]) -> None:
+        """Show the closing table."""
+        table = Table(title=title, title_justify="left", show_header=False)
+        table.add_column(style="bold")
+        table.add_column(justify="right")
+        for row in rows:
+            table.add_row(*row)
+        self._console.print(table)
+
+    def complain(self, text: str, **details: Any) -> None:
+        """Show an error on standard error, and remember it and its details for the JSON object."""
+        self.facts.update(error=text, **details)
+        self._errors.print(f"[bold red]Error:[/] {escape(text)}", soft_wrap=True)
+
+    def close(self) -> None:
+        """Write the facts as one JSON object, if a machine asked for it."""
+        if self._machine:
+            sys.stdout.write(json.dumps({key: _plain(value) for key, value in self.facts.items()}) + "\n")
+            sys.stdout.flush()
+
+
+def _plain(value: Any) -> Any:
+    """JSON knows neither infinities nor numpy's numbers."""
+    if hasattr(value, "item"):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

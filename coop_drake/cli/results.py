@@ -1,0 +1,60 @@
+"""The folder that a command leaves behind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["ResultFolder"]
+
+_AFTER_PLANNING = ("plan.json", "table_1.md")
+_AFTER_SIMULATING = ("log.npz", "transport.html", "fig[01][0-9]_*.png", "summary.png")
+
+
+@dataclass(frozen=True)
+class ResultFolder:
+    """Where results go; every file in it is written under another name first and renamed when whole.
+
+    Attributes:
+        path: The folder; it is made when the first result is there.
+    """
+
+    path: Path
+
+    @property
+    def plan(self) -> Path:
+        """The plan."""
+        return self.path / "plan.json"
+
+    @property
+    def table(self) -> Path:
+        """The cells' intervals, the paper's Table 1."""
+        return self.path / "table_1.md"
+
+    @property
+    def log(self) -> Path:
+        """The simulation log."""
+        return self.path / "log.npz"
+
+    @property
+    def recording(self) -> Path:
+        """The Meshcat recording."""
+        return self.path / "transport.html"
+
+    def make(self) -> None:
+        """Make the folder."""
+        self.path.mkdir(parents=True, exist_ok=True)
+
+    def forget_plan(self) -> None:
+        """Remove an older plan and all that came of it, so that the folder never mixes two runs."""
+        self._remove(_AFTER_PLANNING)
+        self.forget_simulation()
+
+    def forget_simulation(self) -> None:
+        """Remove an older simulation's log, recording and figures."""
+        self._remove(_AFTER_SIMULATING)
+
+    def _remove(self, patterns: tuple[str, ...]) -> None:
+        for pattern in patterns:
+            for path in self.path.glob(pattern):
+                path.unlink()

@@ -1,0 +1,36 @@
+"""The closing table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+__all__ = ["summary_rows"]
+
+_ROWS: tuple[tuple[str, str, str], ...] = (
+    ("answer", "answer", "{}"),
+    ("cells", "cells", "{}"),
+    ("slices made", "slices", "{}"),
+    ("margin kept", "margin_m", "{:.3f} m"),
+    ("narrowest neck", "narrowest_neck_m", "{:.3f} m"),
+    ("gains", "gains", "{}"),
+    ("planning", "planning_wall_seconds", "{:.2f} s"),
+    ("mapping", "mapping_wall_seconds", "{:.2f} s"),
+    ("largest map residual", "max_map_residual", "{:.1e}"),
+    ("simulated", "simulated_seconds", "{:.2f} s"),
+    ("simulating took", "simulation_wall_seconds", "{:.2f} s"),
+    ("smallest clearance", "min_clearance_m", "{:.4f} m"),
+    ("smallest energy margin", "min_delta_e", "{:.2e} m²/s²"),
+    ("largest acceleration error", "max_acceleration_error", "{:.1e} m/s²"),
+    ("largest wrench error", "max_wrench_error_n", "{:.1e} N"),
+    ("peak base force", "peak_base_wrench_n", "{:.1f} N"),
+    ("peak joint torque", "peak_joint_torque_nm", "{:.1f} N m"),
+    ("final position error", "final_position_error_m", "{:.4f} m"),
+    ("final angle error", "final_angle_error_rad", "{:.4f} rad"),
+    ("peak memory", "peak_memory_mb", "{:.0f} MB"),
+)
+
+
+def summary_rows(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return label and value of every fact that is known, in the table's order."""
+    return [(label, form.format(facts[key])) for label, key, form in _ROWS if key in facts]

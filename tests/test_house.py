@@ -1,0 +1,56 @@
+"""The house: captions, sorted names, file sizes, and a planning side that knows nothing of Drake."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+HOUSE = Path(__file__).parents[1] / "coop_drake"
+ROOMS = sorted(path.parent for path in HOUSE.glob("*/__init__.py"))
+FILES = sorted(HOUSE.rglob("*.py"))
+WITHOUT_DRAKE = ["errors", "geometry", "fields", "control", "planning"]
+
+
+def test_the_rooms_are_all_there():
+    names = {room.name for room in ROOMS}
+    assert names >= {"geometry", "planning", "fields", "control", "scenario", "plant", "systems", "diagram"}
+    assert names >= {"simulation", "viz", "cli"}
+
+
+@pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.name)
+def test_a_room_opens_with_a_caption_and_a_sorted_list_of_names(room):
+    tree = ast.parse((room / "__init__.py").read_text())
+    caption = ast.get_docstring(tree)
+    assert caption
+    assert "\n" not in caption
+    assert caption.endswith(".")
+    (names,) = [
+        ast.literal_eval(node.value)
+        for node in tree.body
+        if isinstance(node, ast.Assign)
+        and any(isinstance(target, ast.Name) and target.id == "__all__" for target in node.targets)
+    ]
+    assert names
+    assert names == sorted(set(names))
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(HOUSE)))
+def test_a_file_holds_one_idea_on_at_most_300_lines(path):
+    text = path.read_text()
+    assert ast.get_docstring(ast.parse(text))
+    assert len(text.splitlines()) <= 300
+
+
+@pytest.mark.parametrize("room", WITHOUT_DRAKE)
+def test_the_planning_side_imports_without_drake(room):
+    code = f"import coop_drake.{room}, sys; sys.exit(any(name.split('.')[0] == 'pydrake' for name in sys.modules))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_the_laws_import_without_shapes_and_graphs():
+    code = "import coop_drake.control, sys; sys.exit(bool({'shapely', 'networkx'} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -1,0 +1,100 @@
+"""The figures of a run: which files, and what is drawn in them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from coop_drake.viz import write_figures
+from coop_drake.viz.canvas import break_at, switch_times
+from coop_drake.viz.place_figures import path_figure, start_and_goal_figure
+from coop_drake.viz.state_figures import angle_figure, joints_figure
+from tests.support.cases import case
+from tests.support.synthetic_log import synthetic_log, synthetic_plan
+
+COMMON = [
+    "fig04_start_and_goal",
+    "fig05_path",
+    "fig06_position",
+    "fig07_angle",
+    "fig08_velocity",
+    "fig09_angular_velocity",
+    "fig12_force",
+    "fig13_torque",
+    "summary",
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "robots"),
+    [
+        ("elbow", ["fig10_joints_robot_0", "fig11_joints_robot_1"]),
+        ("three", ["fig10_joints_robot_0", "fig11_joints_robot_1", "fig11_joints_robot_2"]),
+    ],
+)
+def test_a_run_gets_figures_4_to_13_and_a_summary_as_png(tmp_path, name, robots):
+    problem = case(name)
+    written = write_figures(
+        problem.workspace, problem.tree, synthetic_plan(problem), synthetic_log(problem), tmp_path
+    )
+    assert sorted(path.name for path in written) == sorted(f"{stem}.png" for stem in COMMON + robots)
+    assert sorted(tmp_path.iterdir()) == sorted(written)
+    for path in written:
+        with Image.open(path) as image:
+            grey = np.asarray(image.convert("L"))
+        assert min(grey.shape) > 300
+        assert np.ptp(grey) > 100
+
+
+def test_the_same_run_gives_the_same_picture(tmp_path):
+    problem = case("base")
+    plan, log = synthetic_plan(problem), synthetic_log(problem)
+    for folder in (tmp_path / "a", tmp_path / "b"):
+        folder.mkdir()
+        write_figures(problem.workspace, problem.tree, plan, log, folder)
+    for path in (tmp_path / "a").iterdir():
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
+
+
+def test_figure_4_labels_start_and_goal_on_equal_axes_in_metres():
+    problem = case("base")
+    (axes,) = start_and_goal_figure(problem.workspace, problem.tree, synthetic_plan(problem)).axes
+    assert axes.get_aspect() == 1.0
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")
+    labels = {text.get_text(): text.xy for text in axes.texts}
+    assert labels["start"] == pytest.approx((0.9, 2.0))
+    assert labels["goal"] == pytest.approx((5.0, 8.0))
+
+
+def test_figure_5_draws_the_path_that_was_logged():
+    problem = case("base")
+    log = synthetic_log(problem)
+    axes = path_figure(problem.workspace, problem.tree, log).axes[0]
+    (line,) = axes.lines
+    np.testing.assert_array_equal(line.get_xydata(), log.object_pose[:, :2])
+
+
+def test_figure_7_shows_the_angle_its_funnel_and_a_dashed_line_at_every_switch():
+    problem = case("base")
+    log = synthetic_log(problem)
+    (axes,) = angle_figure(log).axes
+    drawn = [np.asarray(line.get_ydata(), dtype=float) for line in axes.lines]
+    assert any(np.array_equal(values, log.object_pose[:, 2]) for values in drawn)
+    switches = switch_times(log.times, log.cell_index)
+    assert len(switches) == log.cell_index.max()
+    vertical = {float(line.get_xdata()[0]) for line in axes.lines if len(set(line.get_xdata())) == 1}
+    assert vertical == set(switches.tolist())
+
+
+def test_every_joint_of_a_robot_has_its_own_axes():
+    problem = case("elbow")
+    figure = joints_figure(problem.tree, synthetic_log(problem), 1)
+    assert figure is not None
+    assert [axes.get_ylabel() for axes in figure.axes] == ["joint_1 [rad]", "joint_2 [rad]"]
+
+
+def test_a_jump_at_a_switch_is_broken_not_sloped():
+    times, values = break_at(np.array([0.0, 1.0, 2.0]), np.array([1.0, 1.0, 5.0]), np.array([0, 0, 1]))
+    np.testing.assert_array_equal(times, [0.0, 1.0, 2.0, 2.0])
+    np.testing.assert_array_equal(values, [1.0, 1.0, np.nan, 5.0])

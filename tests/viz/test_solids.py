@@ -1,0 +1,36 @@
+"""Meshes keep the area of what they stand for."""
+
+import numpy as np
+import pytest
+from shapely import Polygon, box
+
+from coop_drake.viz.solids import flat_mesh, ring_lines, wall_mesh, wall_polygons
+
+FLOOR = Polygon([(0, 0), (4, 0), (4, 3), (2, 1), (0, 3)], [[(1, 0.5), (2, 0.5), (2, 0.8)]])
+
+
+def area(mesh):
+    a, b, c = (mesh.vertices[:, mesh.faces[k]].T for k in range(3))
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
+
+
+def test_a_flat_mesh_has_the_polygons_area_and_height():
+    mesh = flat_mesh([FLOOR], 0.3)
+    assert area(mesh) == pytest.approx(FLOOR.area)
+    assert set(mesh.vertices[2]) == {0.3}
+
+
+def test_a_wall_has_its_top_and_all_its_sides():
+    assert area(wall_mesh([FLOOR], 0.5)) == pytest.approx(FLOOR.area + 0.5 * FLOOR.length)
+
+
+def test_walls_stand_beside_the_floor_never_on_it():
+    walls = wall_polygons(FLOOR, 0.1)
+    assert sum(wall.intersection(FLOOR).area for wall in walls) == pytest.approx(0.0, abs=1e-12)
+    assert sum(wall.area for wall in walls) > FLOOR.exterior.length * 0.1
+
+
+def test_ring_lines_run_once_round_every_ring():
+    start, end = ring_lines([FLOOR, box(0, 0, 1, 1)], 0.2)
+    assert start.shape == end.shape == (3, 5 + 3 + 4)
+    assert np.linalg.norm(end - start, axis=0).sum() == pytest.approx(FLOOR.length + 4.0)
