@@ -1,1 +1,7 @@
 """Harmonic maps of planar cells to the unit disk, and the velocity fields they induce."""
+
+from coop_drake.fields.certificate import MapCertificate
+from coop_drake.fields.harmonic_map import HarmonicMap
+from coop_drake.fields.velocity_field import VelocityField
+
+__all__ = ["HarmonicMap", "MapCertificate", "VelocityField"]

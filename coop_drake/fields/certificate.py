@@ -1,0 +1,116 @@
+"""What a map is worth: its boundary residual, sampled where it was not solved, and the bound that follows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coop_drake.fields.evaluation import evaluate_many
+from coop_drake.fields.layers import MapArrays
+from coop_drake.fields.outline import ComplexArray, IntArray, Outline
+from coop_drake.fields.panels import Panels
+from coop_drake.fields.quadrature import FloatArray
+
+__all__ = ["MapCertificate", "certify", "describe_place"]
+
+# Chebyshev points of two degrees: denser than the nodes, and other points than they are.
+_ON_PANEL = np.sort(np.cos(np.pi * (np.arange(17) + 0.5) / 17))
+_ON_RING = np.cos(np.pi * (np.arange(7) + 0.5) / 7)
+_RINGS = np.array([0, 1, 2, 3, 4, 6, 8, 11, 15, 20, 26, 33])
+
+
+@dataclass(frozen=True)
+class MapCertificate:
+    """How far a computed map can be from the true one.
+
+    The difference of two maps is harmonic, constant on every hole and without flux round it, so with M holes it
+    is nowhere larger than (2 M + 1) times the largest boundary residual.
+
+    Attributes:
+        residual: Largest distance of the image of a boundary sample from where it belongs.
+        error_bound: (2 M + 1) times that.
+        samples: Number of boundary samples.
+        unknowns: Size of the linear system.
+        condition: Estimate of its condition in the 1-norm.
+        worst_place: Where the residual is largest, in W [m], shape (2,).
+        worst_place_description: The corner or gap there, in words.
+    """
+
+    residual: float
+    error_bound: float
+    samples: int
+    unknowns: int
+    condition: float
+    worst_place: FloatArray
+    worst_place_description: str
+
+
+def certify(
+    outline: Outline,
+    panels: Panels,
+    arrays: MapArrays,
+    hole_images: FloatArray,
+    condition: float,
+    tolerance: float,
+) -> MapCertificate:
+    """Sample the residual on every panel and far down every corner.
+
+    Args:
+        outline: The rings.
+        panels: Where they are cut.
+        arrays: The map, evaluated as its users evaluate it.
+        hole_images: c_k, shape (holes, 2).
+        condition: Condition estimate to report.
+        tolerance: Rounding of coordinates [m].
+    """
+    position, expected, edge = _samples(outline, panels, hole_images)
+    images, _ = evaluate_many(arrays, np.column_stack((position.real, position.imag)), tolerance)
+    residuals = np.abs(images[:, 0] + 1j * images[:, 1] - expected)
+    residuals = np.where(np.isfinite(residuals), residuals, np.inf)
+    worst = int(np.argmax(residuals))
+    place = position[worst] + outline.centre
+    return MapCertificate(
+        residual=float(residuals[worst]),
+        error_bound=float((2 * outline.holes + 1) * residuals[worst]),
+        samples=len(position),
+        unknowns=arrays.sources.shape[1] + outline.holes,
+        condition=condition,
+        worst_place=np.array([place.real, place.imag]),
+        worst_place_description=describe_place(outline, panels, position[worst], int(edge[worst])),
+    )
+
+
+def _samples(
+    outline: Outline, panels: Panels, hole_images: FloatArray
+) -> tuple[ComplexArray, ComplexArray, IntArray]:
+    """Positions, where the map should send them, and their edges."""
+    length = np.abs(outline.ends - outline.vertices)
+    half = 0.5 * (panels.end - panels.start)[:, None]
+    on_panels = (0.5 * (panels.end + panels.start)[:, None] + half * _ON_PANEL).ravel()
+    depth = ((0.75 + 0.25 * _ON_RING) * 0.5 ** _RINGS[:, None]).ravel()
+    legs = (panels.legs[:, None] * depth).ravel()
+    corners = np.repeat(np.arange(len(length)), depth.size)
+    before = outline.preceding[corners]
+    edge = np.concatenate((np.repeat(panels.edge, _ON_PANEL.size), corners, before)).astype(np.int64)
+    s = np.concatenate((on_panels, legs, length[before] - legs))
+    part = s / length[edge]
+    angle = outline.angle_start[edge] + (outline.angle_end - outline.angle_start)[edge] * part
+    ring = outline.ring[edge]
+    constants = np.concatenate(([0.0], hole_images @ np.array([1.0, 1.0j])))
+    expected = np.where(ring == 0, np.exp(1j * angle), constants[ring])
+    return outline.vertices[edge] + (outline.ends - outline.vertices)[edge] * part, expected, edge
+
+
+def describe_place(outline: Outline, panels: Panels, place: complex, edge: int) -> str:
+    """Name the corner or the gap at a place of the boundary, in words."""
+    for vertex in (edge, int(outline.following[edge])):
+        if abs(place - outline.vertices[vertex]) <= 1.5 * panels.legs[vertex]:
+            where = outline.vertices[vertex] + outline.centre
+            angle = np.rad2deg(outline.corner_angles[vertex])
+            return f"the corner at ({where.real:.6g}, {where.imag:.6g}) m with interior angle {angle:.4g} degrees"
+    along = abs(place - outline.vertices[edge])
+    own = np.flatnonzero(panels.edge == edge)
+    nearest = own[np.argmin(np.abs(0.5 * (panels.start + panels.end)[own] - along))]
+    where = place + outline.centre
+    return f"the gap of {panels.gap[nearest]:.3g} m at ({where.real:.6g}, {where.imag:.6g}) m"

@@ -1,0 +1,264 @@
+"""The map and its Jacobian at a point, in machine code.
+
+Far panels are summed directly, near ones through Legendre functions of the second kind, which are exact for the
+panel's polynomial density up to the wall itself: with zeta the point in the panel's own coordinate,
+integral of P_k(x) / (x - zeta) over [-1, 1] is -2 Q_k(zeta). Near a corner the dyadic rings take turns.
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+
+from coop_drake.fields.compiled import compiled
+from coop_drake.fields.layers import LEVELS, MapArrays
+from coop_drake.fields.quadrature import FloatArray, gauss_nodes
+
+__all__ = ["evaluate_many", "evaluate_one", "is_inside", "nearest_on_edges"]
+
+_FAR = 2.2**2  # |zeta|^2 beyond which the solved nodes do
+_NEAR = 2.9  # |zeta - 1| + |zeta + 1| below which the Legendre functions are needed
+_JUNCTION = 1e-6  # the Jacobian is taken no closer than this to where two panels meet, in half panels
+_GAUSS_X, _GAUSS_W = gauss_nodes(16)
+
+Sums = tuple[float, float, float, float, float, float]
+
+
+@compiled
+def _direct(s: FloatArray, first: int, last: int, x: float, y: float) -> Sums:
+    """Sum over the solved nodes ``first`` to ``last``."""
+    tu, tv, xu, yu, xv, yv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(first, last):
+        rx, ry = s[0, j] - x, s[1, j] - y
+        inverse = 1.0 / (rx * rx + ry * ry)
+        rx, ry = rx * inverse, ry * inverse
+        re, im = s[2, j] * rx + s[3, j] * ry, s[3, j] * rx - s[2, j] * ry
+        re2, im2 = re * rx + im * ry, im * rx - re * ry
+        tu += s[4, j] * im
+        tv += s[5, j] * im
+        xu += s[4, j] * im2
+        yu += s[4, j] * re2
+        xv += s[5, j] * im2
+        yv += s[5, j] * re2
+    return tu, tv, xu, yu, xv, yv
+
+
+@compiled
+def _panel(density: FloatArray, zx: float, zy: float, hx: float, hy: float) -> Sums:
+    """One panel with density (2, 16, 2) seen from zeta = zx + i zy, half vector h."""
+    tu, tv, xu, yu, xv, yv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    plus, minus = (zx + 1.0) ** 2 + zy * zy, (zx - 1.0) ** 2 + zy * zy
+    if np.sqrt(plus) + np.sqrt(minus) > _NEAR:
+        for j in range(16):
+            rx = _GAUSS_X[j] - zx
+            inverse = 1.0 / (rx * rx + zy * zy)
+            re, im = rx * inverse, zy * inverse
+            u, v = _GAUSS_W[j] * density[0, j, 0], _GAUSS_W[j] * density[0, j, 1]
+            re2, im2 = re * re - im * im, 2.0 * re * im
+            tu += u * im
+            tv += v * im
+            xu += u * re2
+            yu += u * im2
+            xv += v * re2
+            yv += v * im2
+        return _turned(tu, tv, xu, yu, xv, yv, hx, hy)
+    plus, minus = max(plus, 1e-26), max(minus, 1e-26)
+    zeta = complex(zx, zy)
+    # Principal values: the cut is the panel itself, approached from the domain's side.
+    q0 = complex(0.25 * np.log(plus / minus), 0.5 * (np.arctan2(zy, zx + 1.0) - np.arctan2(zy, zx - 1.0)))
+    d0 = 1.0 / (1.0 - zeta * zeta + (1e-26 if minus * plus < 1e-25 else 0.0))
+    q1, d1 = zeta * q0 - 1.0, q0 + zeta * d0
+    c = density[1]
+    tu = c[0, 0] * q0.imag + c[1, 0] * q1.imag
+    tv = c[0, 1] * q0.imag + c[1, 1] * q1.imag
+    xu = c[0, 0] * d0.real + c[1, 0] * d1.real
+    yu = c[0, 0] * d0.imag + c[1, 0] * d1.imag
+    xv = c[0, 1] * d0.real + c[1, 1] * d1.real
+    yv = c[0, 1] * d0.imag + c[1, 1] * d1.imag
+    for k in range(1, 15):
+        q2 = ((2 * k + 1) * zeta * q1 - k * q0) / (k + 1)
+        d2 = d0 + (2 * k + 1) * q1
+        q0, q1, d0, d1 = q1, q2, d1, d2
+        u, v = c[k + 1, 0], c[k + 1, 1]
+        tu += u * q2.imag
+        tv += v * q2.imag
+        xu += u * d2.real
+        yu += u * d2.imag
+        xv += v * d2.real
+        yv += v * d2.imag
+    return _turned(-2.0 * tu, -2.0 * tv, -2.0 * xu, -2.0 * yu, -2.0 * xv, -2.0 * yv, hx, hy)
+
+
+@compiled
+def _turned(tu: float, tv: float, ru: float, iu: float, rv: float, iv: float, hx: float, hy: float) -> Sums:
+    """Divide the derivatives with respect to zeta, given by real and imaginary part, by h."""
+    inverse = 1.0 / (hx * hx + hy * hy)
+    hx, hy = hx * inverse, hy * inverse
+    return tu, tv, iu * hx - ru * hy, ru * hx + iu * hy, iv * hx - rv * hy, rv * hx + iv * hy
+
+
+@compiled
+def _add(a: Sums, b: Sums) -> Sums:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
+
+
+@compiled
+def _local(rx: float, ry: float, hx: float, hy: float, tolerance: float) -> tuple[float, float]:
+    """Point r seen from a panel's centre in its own coordinate; a hair behind the wall counts as on it."""
+    inverse = 1.0 / (hx * hx + hy * hy)
+    zx, zy = (rx * hx + ry * hy) * inverse, (ry * hx - rx * hy) * inverse
+    if zy <= 0.0 and zy * np.sqrt(hx * hx + hy * hy) > -tolerance:
+        zy = 0.0  # also where it is -0.0, which would be the other side of the cut
+    return zx, zy
+
+
+@compiled
+def _tail(m: MapArrays, k: int, level: int, rx: float, ry: float) -> Sums:
+    """The corner's legs at one level, seen from afar, through their compressed density."""
+    total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    n, grid, first = m.corner_index[k, 2], m.corner_index[k, 3], m.corner_index[k, 6]
+    scale = m.corners[k, 8] * 0.5**level
+    for leg in range(2):
+        dx, dy = scale * m.corners[k, 2 + 2 * leg], scale * m.corners[k, 3 + 2 * leg]
+        sign = 2.0 * leg - 1.0
+        tu, tv, xu, yu, xv, yv = total
+        for j in range(n):
+            s, w = m.grid[grid + j, 0], sign * m.grid[grid + j, 1]
+            px, py = s * dx - rx, s * dy - ry
+            inverse = 1.0 / (px * px + py * py)
+            px, py = px * inverse, py * inverse
+            re, im = w * (dx * px + dy * py), w * (dy * px - dx * py)
+            re2, im2 = re * px + im * py, im * px - re * py
+            u = m.tails[first + (2 * level + leg) * n + j, 0]
+            v = m.tails[first + (2 * level + leg) * n + j, 1]
+            tu += u * im
+            tv += v * im
+            xu += u * im2
+            yu += u * re2
+            xv += v * im2
+            yv += v * re2
+        total = (tu, tv, xu, yu, xv, yv)
+    return total
+
+
+@compiled
+def _corner(m: MapArrays, k: int, rx: float, ry: float, tolerance: float) -> tuple[Sums, complex]:
+    """One corner seen from r relative to its vertex, not far from it; and a step away from a junction."""
+    total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    step = 0j
+    panels, first_break, first = m.corner_index[k, 1], m.corner_index[k, 4], m.corner_index[k, 5]
+    distance = np.hypot(rx, ry)
+    scale = m.corners[k, 8]
+    level = 0
+    while level < LEVELS and distance < 2.0 * scale:
+        for leg in range(2):
+            dx, dy = scale * m.corners[k, 2 + 2 * leg], scale * m.corners[k, 3 + 2 * leg]
+            sign = 2.0 * leg - 1.0
+            for j in range(panels):
+                a, b = m.breaks[first_break + j], m.breaks[first_break + j + 1]
+                middle, half = 0.5 * (a + b), 0.5 * sign * (b - a)
+                hx, hy = half * dx, half * dy
+                zx, zy = _local(rx - middle * dx, ry - middle * dy, hx, hy, tolerance)
+                if (abs(zx) - 1.0) ** 2 + zy * zy < _JUNCTION * _JUNCTION:
+                    step = complex(-hy, hx) * (2.0 * _JUNCTION)
+                ring = m.rings[first + (2 * level + leg) * panels + j]
+                total = _add(total, _panel(ring, zx, zy, hx, hy))
+        scale *= 0.5
+        level += 1
+    return _add(total, _tail(m, k, level, rx, ry)), step
+
+
+@compiled
+def _sums(m: MapArrays, x: float, y: float, tolerance: float) -> tuple[Sums, complex]:
+    """Sum over the whole boundary; and a step that leads away from a junction of panels, if one is at hand."""
+    total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    step = 0j
+    corners = len(m.corners)
+    for k in range(corners):
+        rx, ry, leg = x - m.corners[k, 0], y - m.corners[k, 1], m.corners[k, 8]
+        if rx * rx + ry * ry >= 4.0 * leg * leg:
+            part = _direct(m.sources, m.corner_index[k, 0], m.corner_index[k + 1, 0], x, y)
+        else:
+            floor = leg * 2.0 * 0.5**LEVELS
+            if rx * rx + ry * ry < floor * floor:
+                rx, ry = floor * m.corners[k, 6], floor * m.corners[k, 7]
+            part, away = _corner(m, k, rx, ry, tolerance)
+            step = away if away != 0j else step
+        total = _add(total, part)
+    first = m.corner_index[corners, 0]
+    nodes = (m.sources.shape[1] - first) // max(len(m.panels), 1)
+    for k in range(len(m.panels)):
+        hx, hy = m.panels[k, 2], m.panels[k, 3]
+        rx, ry = x - m.panels[k, 0], y - m.panels[k, 1]
+        if rx * rx + ry * ry >= _FAR * (hx * hx + hy * hy):
+            part = _direct(m.sources, first + k * nodes, first + (k + 1) * nodes, x, y)
+        else:
+            zx, zy = _local(rx, ry, hx, hy, tolerance)
+            if (abs(zx) - 1.0) ** 2 + zy * zy < _JUNCTION * _JUNCTION:
+                step = complex(-hy, hx) * (2.0 * _JUNCTION)
+            part = _panel(m.panel_density[k], zx, zy, hx, hy)
+        total = _add(total, part)
+    return total, step
+
+
+@compiled
+def is_inside(edges: FloatArray, x: float, y: float) -> bool:
+    """Whether a point is inside by the crossing number of all rings."""
+    inside = False
+    for e in range(len(edges)):
+        y0, y1 = edges[e, 1], edges[e, 3]
+        if (y0 > y) != (y1 > y):
+            side = (edges[e, 2] - edges[e, 0]) * (y - y0) - (x - edges[e, 0]) * (y1 - y0)
+            if (side > 0.0) == (y1 > y0):
+                inside = not inside
+    return inside
+
+
+@compiled
+def nearest_on_edges(edges: FloatArray, x: float, y: float) -> tuple[float, float]:
+    """The nearest point of the boundary."""
+    best, bx, by = np.inf, x, y
+    for e in range(len(edges)):
+        dx, dy = edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1]
+        squared = dx * dx + dy * dy
+        t = ((x - edges[e, 0]) * dx + (y - edges[e, 1]) * dy) / squared if squared > 0.0 else 0.0
+        t = min(1.0, max(0.0, t))
+        px, py = edges[e, 0] + t * dx, edges[e, 1] + t * dy
+        distance = (px - x) ** 2 + (py - y) ** 2
+        if distance < best:
+            best, bx, by = distance, px, py
+    return bx, by
+
+
+@compiled
+def evaluate_one(m: MapArrays, x: float, y: float, tolerance: float) -> Sums:
+    """u, v, u_x, u_y, v_x, v_y at a point; outside the domain: at the nearest point of its boundary.
+
+    Args:
+        m: The map's arrays.
+        x: First coordinate relative to the map's centre [m].
+        y: Second coordinate [m].
+        tolerance: Rounding of the coordinates [m]; closer than this a point counts as on the wall.
+    """
+    if not is_inside(m.edges, x, y):
+        x, y = nearest_on_edges(m.edges, x, y)
+    total, step = _sums(m, x, y, tolerance)
+    tu, tv, xu, yu, xv, yv = total
+    if step != 0j:
+        moved, _ = _sums(m, x + step.real, y + step.imag, tolerance)
+        _, _, xu, yu, xv, yv = moved
+    c = 0.5 / pi
+    return c * tu, c * tv, c * xu, c * yu, c * xv, c * yv
+
+
+@compiled
+def evaluate_many(m: MapArrays, points: FloatArray, tolerance: float) -> tuple[FloatArray, FloatArray]:
+    """Images (n, 2) and Jacobians (n, 2, 2) of points (n, 2) relative to the map's centre."""
+    images, jacobians = np.empty((len(points), 2)), np.empty((len(points), 2, 2))
+    for i in range(len(points)):
+        u, v, u_x, u_y, v_x, v_y = evaluate_one(m, points[i, 0], points[i, 1], tolerance)
+        images[i, 0], images[i, 1] = u, v
+        jacobians[i, 0, 0], jacobians[i, 0, 1] = u_x, u_y
+        jacobians[i, 1, 0], jacobians[i, 1, 1] = v_x, v_y
+    return images, jacobians

@@ -1,0 +1,142 @@
+"""Panels on an outline: equal legs at every corner, graded panels between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coop_drake.fields.compiled import compiled
+from coop_drake.fields.outline import Outline
+from coop_drake.fields.quadrature import FloatArray
+
+__all__ = ["Panels", "lay_panels", "segment_distance"]
+
+_MAX_ANGLE = np.pi / 3  # span of the boundary angle that one panel resolves
+_MAX_PANELS = 100_000  # stop of a subdivision that cannot end
+
+
+@dataclass(frozen=True)
+class Panels:
+    """Where the boundary is cut.
+
+    Attributes:
+        legs: Length of the two legs of each corner [m], shape (corners,).
+        edge: Edge of each regular panel, shape (panels,).
+        start: Distance of its start from the start of the edge [m], shape (panels,).
+        end: Distance of its end, shape (panels,).
+        gap: Distance of each panel to the nearest other edge [m], shape (panels,).
+    """
+
+    legs: FloatArray
+    edge: np.ndarray
+    start: FloatArray
+    end: FloatArray
+    gap: FloatArray
+
+
+def lay_panels(outline: Outline, closeness: float) -> Panels:
+    """Cut the boundary so that no panel is longer than ``closeness`` times its distance to the other edges."""
+    starts, ends = outline.vertices, outline.ends
+    edges = np.column_stack((starts.real, starts.imag, ends.real, ends.imag))
+    total = np.abs(ends - starts)[outline.ring == 0].sum()
+    spans = outline.angle_end - outline.angle_start
+    # Length of boundary that spans the largest angle allowed; holes and collapsed arcs span none.
+    longest = np.where(spans > 0.0, _MAX_ANGLE * np.abs(ends - starts) / np.maximum(spans, 1e-300), total)
+    legs = _corner_legs(edges, outline.preceding, longest, closeness)
+    pieces = _edge_panels(edges, outline.following, legs, longest, closeness)
+    return Panels(legs, pieces[:, 0].astype(np.int64), pieces[:, 1], pieces[:, 2], pieces[:, 3])
+
+
+@compiled
+def _point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    dx, dy = bx - ax, by - ay
+    t = ((px - ax) * dx + (py - ay) * dy) / (dx * dx + dy * dy)
+    t = min(1.0, max(0.0, t))
+    return float(np.hypot(px - ax - t * dx, py - ay - t * dy))
+
+
+@compiled
+def segment_distance(p: FloatArray, q: FloatArray) -> float:
+    """Distance of two segments (x0, y0, x1, y1) that do not cross [m]."""
+    return min(
+        min(
+            _point_distance(p[0], p[1], q[0], q[1], q[2], q[3]),
+            _point_distance(p[2], p[3], q[0], q[1], q[2], q[3]),
+        ),
+        min(
+            _point_distance(q[0], q[1], p[0], p[1], p[2], p[3]),
+            _point_distance(q[2], q[3], p[0], p[1], p[2], p[3]),
+        ),
+    )
+
+
+@compiled
+def _corner_legs(
+    edges: FloatArray, preceding: np.ndarray, longest: FloatArray, closeness: float
+) -> FloatArray:
+    """Leg length of each corner: half the shorter edge, shortened until the other edges are far enough."""
+    n = len(edges)
+    legs = np.empty(n)
+    leg = np.empty(4)
+    for v in range(n):
+        b = preceding[v]
+        length = 1e300
+        for e in (b, v):
+            length = min(length, 0.5 * np.hypot(edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1]))
+            length = min(length, longest[e])
+        leg[0], leg[1] = edges[v, 0], edges[v, 1]
+        for _ in range(200):
+            gap = 1e300
+            for e in (b, v):
+                far_x = edges[e, 0] + edges[e, 2] - leg[0]
+                far_y = edges[e, 1] + edges[e, 3] - leg[1]
+                part = length / np.hypot(far_x - leg[0], far_y - leg[1])
+                leg[2], leg[3] = leg[0] + part * (far_x - leg[0]), leg[1] + part * (far_y - leg[1])
+                for other in range(n):
+                    if other not in (b, v):
+                        gap = min(gap, segment_distance(leg, edges[other]))
+            if length <= closeness * gap:
+                break
+            length = max(0.5 * length, closeness * gap)
+        legs[v] = length
+    return legs
+
+
+@compiled
+def _edge_panels(
+    edges: FloatArray, following: np.ndarray, legs: FloatArray, longest: FloatArray, closeness: float
+) -> FloatArray:
+    """Rows (edge, start, end, gap) of the regular panels, in order along every edge."""
+    rows = []
+    piece = np.empty(4)
+    stack = np.empty((256, 2))
+    for e in range(len(edges)):
+        dx, dy = edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1]
+        length = np.hypot(dx, dy)
+        dx, dy = dx / length, dy / length
+        first, last = legs[e], length - legs[following[e]]
+        if last - first <= 1e-12 * length:
+            continue
+        stack[0, 0], stack[0, 1] = first, last
+        depth = 1
+        while depth > 0 and len(rows) < _MAX_PANELS:
+            depth -= 1
+            a, b = stack[depth, 0], stack[depth, 1]
+            piece[0], piece[1] = edges[e, 0] + a * dx, edges[e, 1] + a * dy
+            piece[2], piece[3] = edges[e, 0] + b * dx, edges[e, 1] + b * dy
+            gap = 1e300
+            for other in range(len(edges)):
+                if other != e:
+                    gap = min(gap, segment_distance(piece, edges[other]))
+            if b - a <= min(closeness * gap, longest[e]) or depth > 250 or b - a < 1e-9 * length:
+                rows.append((float(e), a, b, gap))
+            else:
+                middle = 0.5 * (a + b)
+                stack[depth, 0], stack[depth, 1] = middle, b
+                stack[depth + 1, 0], stack[depth + 1, 1] = a, middle
+                depth += 2
+    out = np.empty((len(rows), 4))
+    for k in range(len(rows)):
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = rows[k]
+    return out

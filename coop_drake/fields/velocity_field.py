@@ -1,0 +1,93 @@
+"""The velocity field that a harmonic map induces, eq. (13)."""
+
+from __future__ import annotations
+
+from math import hypot, pi, sqrt
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike
+from shapely import Point
+
+from coop_drake.fields.compiled import compiled
+from coop_drake.fields.evaluation import evaluate_one, is_inside, nearest_on_edges
+from coop_drake.fields.harmonic_map import HarmonicMap
+from coop_drake.fields.layers import MapArrays
+from coop_drake.fields.quadrature import FloatArray
+
+__all__ = ["VelocityField"]
+
+_STRAIGHT = 1e-6  # part of the slowdown radius within which the line to a point goal is straight
+
+
+class VelocityField:
+    """Where to go, and how fast at most: the pulled-back straight line to the goal's image, eq. (13).
+
+    The direction is that of J^-1 (q_d - T), computed as adj(J) (q_d - T) so that crowded places do no harm.
+    The speed is ``max_speed`` and within ``slowdown_radius`` of the goal proportional to the remaining distance:
+    max_speed * min(1, distance / slowdown_radius). It is zero in a goal region.
+    Points outside the map's region get the direction of the nearest boundary point, never NaN.
+
+    Args:
+        harmonic_map: The map.
+        max_speed: Largest magnitude [m/s].
+        slowdown_radius: Where slowing down begins [m]; by default half the distance of a point goal to the
+            boundary, or half the radius of the disc that is as large as a goal region.
+    """
+
+    def __init__(
+        self, harmonic_map: HarmonicMap, max_speed: float = 1.0, *, slowdown_radius: float | None = None
+    ) -> None:
+        self.max_speed = float(max_speed)
+        goal = harmonic_map.goal
+        self._arrays, centre, self._rounding = harmonic_map.kernel_arguments
+        if isinstance(goal, Point):
+            corners = np.array(goal.coords) - centre
+            default = 0.5 * harmonic_map.region.boundary.distance(goal)
+            self._goal = np.hstack((corners, corners))
+        else:
+            corners = np.asarray(shapely.orient_polygons(goal).exterior.coords) - centre
+            default = 0.5 * sqrt(goal.area / pi)
+            self._goal = np.hstack((corners[:-1], corners[1:]))
+        self.slowdown_radius = default if slowdown_radius is None else float(slowdown_radius)
+        self._x, self._y = float(centre[0]), float(centre[1])
+        self._image = harmonic_map.goal_image
+
+    def __call__(self, point: ArrayLike) -> FloatArray:
+        """Velocity at one point.
+
+        Args:
+            point: p in W, shape (2,) [m].
+
+        Returns:
+            Velocity in W, shape (2,) [m/s].
+        """
+        x, y = point  # type: ignore[misc]
+        return _velocity(
+            self._arrays, float(x) - self._x, float(y) - self._y, self._rounding,
+            self._goal, self._image, self.slowdown_radius, self.max_speed,
+        )  # fmt: skip
+
+
+@compiled
+def _velocity(
+    arrays: MapArrays, x: float, y: float, rounding: float,
+    goal: FloatArray, image: FloatArray, radius: float, max_speed: float,
+) -> FloatArray:  # fmt: skip
+    """Direction times speed at a point relative to the map's centre."""
+    velocity = np.zeros(2)
+    gx, gy = nearest_on_edges(goal, x, y)
+    remaining = hypot(gx - x, gy - y)
+    if remaining == 0.0 or is_inside(goal, x, y):
+        return velocity
+    if len(goal) == 1 and remaining < _STRAIGHT * radius:
+        dx, dy = gx - x, gy - y
+    else:
+        u, v, u_x, u_y, v_x, v_y = evaluate_one(arrays, x, y, rounding)
+        du, dv = image[0] - u, image[1] - v
+        dx, dy = v_y * du - u_y * dv, u_x * dv - v_x * du
+    norm = hypot(dx, dy)
+    if norm > 0.0:
+        speed = max_speed * min(1.0, remaining / radius)
+        velocity[0], velocity[1] = speed * dx / norm, speed * dy / norm
+    return velocity
