@@ -1,7 +1,13 @@
-PYTHON ?= python3
+# Any Python from 3.11 on will do; `make PYTHON=/path/to/python3.12 demo` names one.
+NEW_ENOUGH := import sys; sys.exit(sys.version_info < (3, 11))
+PYTHON ?= $(shell for python in python3 python3.11 python3.12 python3.13; do \
+	$$python -c '$(NEW_ENOUGH)' 2>/dev/null && echo $$python && break; done)
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+CODE := coop_drake tests benchmarks notebooks
+# The kernels are small; threads of BLAS would only get into each other's way.
+export OMP_NUM_THREADS ?= 1
 
 .PHONY: demo test lint bench notebooks clean
 
@@ -12,19 +18,19 @@ test: $(READY)  ## run every test
 	$(BIN)/python -m pytest -n 2
 
 lint: $(READY)  ## formatting, lint, types, direction of imports
-	$(BIN)/ruff format --check coop_drake tests notebooks
-	$(BIN)/ruff check coop_drake tests notebooks
+	$(BIN)/ruff format --check $(CODE)
+	$(BIN)/ruff check $(CODE)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
 bench: $(READY)  ## measure speed and accuracy as ratios, into out/bench.json
 	$(BIN)/python -m benchmarks
 
-notebooks: $(READY)  ## execute every notebook in place under out/notebooks
+notebooks: $(READY)  ## execute every notebook into out/notebooks
 	$(BIN)/python -m notebooks out/notebooks
 
 $(READY): pyproject.toml constraints.txt
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "coop_drake needs Python 3.11 or newer; set PYTHON=python3.11")'
+	@test -n "$(PYTHON)" || { echo "coop_drake needs Python 3.11 or newer; name one with make PYTHON=..." >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,bench]'
 	touch $@

@@ -1,0 +1,1 @@
+"""Notebooks, committed without output; ``python -m notebooks DIR`` executes them all."""
