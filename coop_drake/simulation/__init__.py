@@ -1,6 +1,18 @@
 """Run a scenario: the simulation, its log, and the invariants checked while it runs."""
 
 from coop_drake.simulation.clearance import Clearance, TeamClearance
+from coop_drake.simulation.invariants import ACCELERATION_TOLERANCE, WRENCH_TOLERANCE, Invariants, Margins
 from coop_drake.simulation.log import SimulationLog
+from coop_drake.simulation.run import build_maps, simulate
 
-__all__ = ["Clearance", "SimulationLog", "TeamClearance"]
+__all__ = [
+    "ACCELERATION_TOLERANCE",
+    "WRENCH_TOLERANCE",
+    "Clearance",
+    "Invariants",
+    "Margins",
+    "SimulationLog",
+    "TeamClearance",
+    "build_maps",
+    "simulate",
+]

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from shapely import LinearRing, Polygon
+from shapely import Polygon
 
 from coop_drake.errors import GeometryError
+from coop_drake.geometry.boundary import edges_of
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import ComponentTree
 from coop_drake.simulation.convex_distance import core_distance, place_vertices, wall_distance
@@ -43,7 +44,7 @@ class TeamClearance:
 
     def __init__(self, workspace: Polygon, tree: ComponentTree) -> None:
         self._tree = tree
-        self._walls = np.vstack([_ring_edges(ring) for ring in (workspace.exterior, *workspace.interiors)])
+        self._walls = np.ascontiguousarray(edges_of(workspace))
         self._names: list[str] = []
         self._radii: list[float] = []
         self._bounds: list[tuple[int, int]] = []
@@ -101,8 +102,3 @@ class TeamClearance:
 
 def _argmin(values: Iterable[float]) -> int:
     return min(enumerate(values), key=lambda entry: entry[1])[0]
-
-
-def _ring_edges(ring: LinearRing) -> FloatArray:
-    points = np.asarray(ring.coords, dtype=float)[:, :2]
-    return np.hstack([points[:-1], points[1:]])

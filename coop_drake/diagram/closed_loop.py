@@ -1,0 +1,125 @@
+"""The closed loop: station, cell planner, and one controller for each robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pydrake.geometry import Meshcat, MeshcatVisualizer
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+
+from coop_drake.diagram.robot_controller import RobotKnowledge, build_robot_controller
+from coop_drake.diagram.station import TransportStation, build_station
+from coop_drake.errors import PlanError
+from coop_drake.fields import HarmonicMap, VelocityField
+from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.planning.plan import Plan
+from coop_drake.plant import TeamPlant, build_robot_plant, set_configuration
+from coop_drake.scenario import Scenario
+from coop_drake.systems import CellPlanner, GovernedCell
+
+__all__ = ["ClosedLoop", "build_closed_loop"]
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """The wired loop and handles on its parts.
+
+    Attributes:
+        diagram: The whole.
+        station: The simulated team.
+        cell_planner: The supervisor.
+        controllers: One sub-Diagram for each robot.
+        plan: The plan that they follow.
+    """
+
+    diagram: Diagram
+    station: TransportStation
+    cell_planner: CellPlanner
+    controllers: tuple[Diagram, ...]
+    plan: Plan
+
+    @property
+    def team(self) -> TeamPlant:
+        """The simulated team."""
+        return self.station.team
+
+    def create_context(self) -> Context:
+        """A context at the plan's start: at rest, in the first cell, every governor on the object."""
+        context = self.diagram.CreateDefaultContext()
+        team = self.team
+        set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.plan.start)
+        return context
+
+
+def build_closed_loop(
+    scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], meshcat: Meshcat | None = None
+) -> ClosedLoop:
+    """Wire the loop; nothing but ready reports crosses between robots.
+
+    Args:
+        scenario: The scenario.
+        plan: A plan for it.
+        maps: The harmonic map of every transition.
+        meshcat: Shows the run while it is simulated, if given.
+
+    Raises:
+        PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
+        ScenarioError: The models do not make a team.
+    """
+    builder = DiagramBuilder()
+    station = build_station(scenario)
+    team = station.team
+    _check(plan, maps, team)
+    builder.AddNamedSystem("transport_station", station.diagram)
+    planner = builder.AddNamedSystem("cell_planner", CellPlanner(len(team.robots), len(plan.cells)))
+    controllers = []
+    for k, knowledge in enumerate(_knowledge(scenario, plan, maps, team)):
+        controller = builder.AddNamedSystem(f"robot_{k}_controller", build_robot_controller(knowledge))
+        _connect(builder, station.diagram, planner, controller, k)
+        controllers.append(controller)
+    if meshcat is not None:
+        MeshcatVisualizer.AddToBuilder(builder, station.diagram.GetOutputPort("query_object"), meshcat)
+    return ClosedLoop(builder.Build(), station, planner, tuple(controllers), plan)
+
+
+def _connect(
+    builder: DiagramBuilder, station: Diagram, planner: CellPlanner, controller: Diagram, k: int
+) -> None:
+    builder.Connect(station.GetOutputPort("object_pose"), controller.GetInputPort("object_pose"))
+    builder.Connect(station.GetOutputPort(f"robot_{k}_state"), controller.GetInputPort("robot_state"))
+    builder.Connect(planner.GetOutputPort("current_cell"), controller.GetInputPort("current_cell"))
+    builder.Connect(controller.GetOutputPort("ready"), planner.GetInputPort(f"robot_{k}_ready"))
+    builder.Connect(controller.GetOutputPort("robot_effort"), station.GetInputPort(f"robot_{k}_effort"))
+
+
+def _knowledge(
+    scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], team: TeamPlant
+) -> list[RobotKnowledge]:
+    cells = [
+        GovernedCell(BoundaryDistance(cell.tidied), VelocityField(field_map), transition.gains)
+        for cell, transition, field_map in zip(plan.cells, plan.transitions, maps, strict=True)
+    ]
+    return [
+        RobotKnowledge(
+            robot=build_robot_plant(scenario, robot.index),
+            X_LE=robot.X_LE,
+            joints=robot.q_slice,
+            object_inertia=team.object_inertia,
+            robots=len(team.robots),
+            plan=plan,
+            cells=cells,
+            position_tolerance=scenario.goal.tolerances.position,
+        )
+        for robot in team.robots
+    ]
+
+
+def _check(plan: Plan, maps: Sequence[HarmonicMap], team: TeamPlant) -> None:
+    if plan.joint_names != team.joint_names:
+        raise PlanError(
+            f"the plan moves the joints {', '.join(plan.joint_names)}; the scenario's team has "
+            f"{', '.join(team.joint_names)}"
+        )
+    if len(maps) != len(plan.cells):
+        raise PlanError(f"a plan of {len(plan.cells)} cells needs as many maps, not {len(maps)}")

@@ -1,0 +1,99 @@
+"""What must hold at every accepted step, as margins that are positive where it holds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning.plan import Plan
+from coop_drake.simulation.clearance import TeamClearance
+from coop_drake.simulation.telemetry import Sample
+
+__all__ = ["ACCELERATION_TOLERANCE", "WRENCH_TOLERANCE", "Invariants", "Margins"]
+
+#: Largest difference between realised and commanded acceleration of the object [m/s^2, rad/s^2].
+ACCELERATION_TOLERANCE = 1e-9
+#: Largest difference between a grasp's measured and commanded wrench [N, N m].
+WRENCH_TOLERANCE = 1e-8
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Margins of one instant; names and units as in ``SimulationLog``.
+
+    Attributes:
+        workspace_clearance: Distance of the nearest body to the walls [m].
+        body_clearance: Smallest distance between bodies that must not touch [m].
+        cell_clearance: Signed distance of the object's position to the boundary of its cell [m].
+        funnel_margin: Smallest distance of an axis to its funnel [rad or m].
+        slice_margin: Smallest distance of an axis to its slice [rad or m].
+        energy_margin: Delta E [m^2/s^2].
+        acceleration_error: Realised less commanded acceleration [m/s^2 or rad/s^2].
+        wrench_error: Measured less commanded wrench [N or N m].
+        violation: Which invariant is broken, when and by how much; empty if none is.
+    """
+
+    workspace_clearance: float
+    body_clearance: float
+    cell_clearance: float
+    funnel_margin: float
+    slice_margin: float
+    energy_margin: float
+    acceleration_error: float
+    wrench_error: float
+    violation: str
+
+
+class Invariants:
+    """Checks samples of a run against the floor, the team and the plan.
+
+    Args:
+        clearance: Distances of the team's bodies.
+        plan: The plan that is followed.
+    """
+
+    def __init__(self, clearance: TeamClearance, plan: Plan) -> None:
+        self._clearance, self._plan = clearance, plan
+        self._cells = [BoundaryDistance(cell.safe) for cell in plan.cells]
+        self._axes = ("object angle", *plan.joint_names)
+
+    def check(self, sample: Sample) -> Margins:
+        """Measure every margin, and say which invariant is broken if one is."""
+        walls, bodies = self._clearance(sample.z)
+        cell, axes = self._plan.cells[sample.cell], sample.z[2:]
+        in_funnel = np.minimum(axes - sample.funnel_lower, sample.funnel_upper - axes)
+        in_slice = np.minimum(axes - cell.lower, cell.upper - axes)
+        wrench_error = float(np.abs(sample.measured_wrenches - sample.commanded_wrenches).max())
+        in_cell = self._cells[sample.cell](sample.z[:2])
+        strict = (
+            (f"clearance between {walls.place}", walls.distance, "m"),
+            (f"clearance between {bodies.place}", bodies.distance, "m"),
+            (f"distance of the object to the boundary of cell {sample.cell}", in_cell, "m"),
+            (f"distance of {self._worst(in_funnel)} to its funnel", float(in_funnel.min()), "rad or m"),
+            (f"distance of {self._worst(in_slice)} to its slice", float(in_slice.min()), "rad or m"),
+        )
+        broken = [f"{name} is {value:.3g} {unit}" for name, value, unit in strict if not value > 0.0]
+        if not sample.energy_margin >= 0.0:
+            broken.append(f"Delta E is {sample.energy_margin:.3g} m^2/s^2")
+        if not sample.acceleration_error <= ACCELERATION_TOLERANCE:
+            broken.append(f"realised less commanded acceleration is {sample.acceleration_error:.3g} m/s^2")
+        if not wrench_error <= WRENCH_TOLERANCE:
+            broken.append(f"measured less commanded grasp wrench is {wrench_error:.3g} N")
+        where = f"at t = {sample.time:.6g} s in cell {sample.cell}: "
+        return Margins(
+            workspace_clearance=walls.distance,
+            body_clearance=bodies.distance,
+            cell_clearance=in_cell,
+            funnel_margin=float(in_funnel.min()),
+            slice_margin=float(in_slice.min()),
+            energy_margin=sample.energy_margin,
+            acceleration_error=sample.acceleration_error,
+            wrench_error=wrench_error,
+            violation=where + "; ".join(broken) if broken else "",
+        )
+
+    def _worst(self, margins: FloatArray) -> str:
+        return self._axes[int(np.argmin(margins))]

@@ -1,0 +1,111 @@
+"""From a plan to a finished run: maps, closed loop, simulation, log."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from pydrake.geometry import Meshcat
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from shapely import Point
+
+from coop_drake.diagram import build_closed_loop
+from coop_drake.errors import FieldError
+from coop_drake.fields import HarmonicMap
+from coop_drake.planning.plan import Plan
+from coop_drake.plant import read_component_tree
+from coop_drake.scenario import Scenario, SimulatorSettings
+from coop_drake.simulation.clearance import TeamClearance
+from coop_drake.simulation.invariants import Invariants
+from coop_drake.simulation.log import SimulationLog
+from coop_drake.simulation.watch import Watch
+
+__all__ = ["build_maps", "simulate"]
+
+Progress = Callable[[str, float], None]
+
+
+def build_maps(
+    plan: Plan, *, tolerance: float = 1e-4, progress: Progress | None = None
+) -> tuple[HarmonicMap, ...]:
+    """Map every cell of a plan to the disk.
+
+    Args:
+        plan: The plan.
+        tolerance: Largest certified residual accepted [-].
+        progress: Told the stage and the fraction done, if given.
+
+    Raises:
+        FieldError: A map cannot be built or its certificate fails; the message names the cell.
+    """
+    maps = []
+    for index, (cell, transition) in enumerate(zip(plan.cells, plan.transitions, strict=True)):
+        try:
+            maps.append(HarmonicMap(cell.tidied, Point(transition.target), tolerance=tolerance))
+        except FieldError as error:
+            raise FieldError(f"cell {index} of {len(plan.cells)}: {error}") from error
+        if progress is not None:
+            progress("mapping", (index + 1) / len(plan.cells))
+    return tuple(maps)
+
+
+def simulate(
+    scenario: Scenario,
+    plan: Plan,
+    maps: Sequence[HarmonicMap],
+    *,
+    progress: Progress | None = None,
+    meshcat: Meshcat | None = None,
+) -> SimulationLog:
+    """Run the closed loop from the plan's start until the object rests at the goal, or the run fails.
+
+    Every accepted step is checked against the invariants and logged. A broken invariant ends the run, as do
+    a stall and the scenario's ``max_time``; the log says why.
+
+    Args:
+        scenario: The scenario.
+        plan: A plan for it.
+        maps: The harmonic map of every transition.
+        progress: Told the stage and the fraction done, if given.
+        meshcat: Shows the run while it is simulated, if given.
+
+    Raises:
+        PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
+        ScenarioError: The models do not make a team.
+    """
+    loop = build_closed_loop(scenario, plan, maps, meshcat)
+    clearance = TeamClearance(scenario.workspace.polygon, read_component_tree(loop.team))
+    watch = Watch(loop, Invariants(clearance, plan), scenario.goal.tolerances.position, progress)
+    simulator = Simulator(loop.diagram, loop.create_context())
+    _configure(simulator, scenario.simulator)
+    simulator.set_monitor(watch)
+    simulator.Initialize()
+    if not watch.ended:
+        _advance(simulator, watch, scenario.simulator.max_time)
+    return watch.recorder.to_log(
+        reached=watch.reached,
+        violation=watch.violation,
+        joint_names=plan.joint_names,
+        robot_names=tuple(robot.name for robot in loop.team.robots),
+    )
+
+
+def _configure(simulator: Simulator, settings: SimulatorSettings) -> None:
+    # Schemes without an error estimate take the longest step always; Drake ignores the accuracy for them.
+    config = SimulatorConfig(
+        integration_scheme=settings.integration_scheme,
+        max_step_size=settings.max_step_size,
+        accuracy=settings.accuracy,
+        use_error_control=True,
+    )
+    ApplySimulatorConfig(config, simulator)
+
+
+def _advance(simulator: Simulator, watch: Watch, max_time: float) -> None:
+    try:
+        simulator.AdvanceTo(max_time)
+    except RuntimeError as error:
+        # Drake's own failures, such as a step that shrinks to nothing; errors of Python keep their type.
+        watch.give_up(f"the integrator failed ({error})")
+        return
+    if not watch.ended:
+        watch.give_up(f"no arrival within max_time = {max_time:g} s")

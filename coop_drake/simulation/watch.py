@@ -1,0 +1,86 @@
+"""Looks at every accepted step of a run, records it, and decides when the run ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pydrake.systems.framework import Context, EventStatus
+
+from coop_drake.diagram import ClosedLoop
+from coop_drake.simulation.invariants import Invariants
+from coop_drake.simulation.recorder import Recorder
+from coop_drake.simulation.stall import blocking_margin, patience
+from coop_drake.simulation.telemetry import Sample, Telemetry
+
+__all__ = ["Watch"]
+
+
+class Watch:
+    """The simulator's monitor: called on every accepted step, it ends the run on arrival, violation or stall.
+
+    Args:
+        loop: The closed loop that runs.
+        invariants: What must hold.
+        position_tolerance: How close to the goal counts as arrived [m].
+        progress: Told the stage and the fraction done, if given.
+    """
+
+    def __init__(
+        self,
+        loop: ClosedLoop,
+        invariants: Invariants,
+        position_tolerance: float,
+        progress: Callable[[str, float], None] | None,
+    ) -> None:
+        self.recorder = Recorder()
+        self.reached = False
+        self.violation = ""
+        self._loop, self._invariants, self._progress = loop, invariants, progress
+        self._telemetry = Telemetry(loop)
+        self._tolerance = position_tolerance
+        self._last: Sample | None = None
+
+    @property
+    def ended(self) -> bool:
+        """Whether there is nothing left to simulate."""
+        return self.reached or bool(self.violation)
+
+    def __call__(self, root: Context) -> EventStatus | None:
+        """Look at one accepted step."""
+        sample = self._telemetry.read(root)
+        margins = self._invariants.check(sample)
+        self.recorder.add(sample, margins)
+        self._last = sample
+        self._report(sample)
+        if margins.violation:
+            self.violation = margins.violation
+        elif sample.arrived:
+            self.reached = True
+        elif sample.time - sample.entry > patience(self._loop.plan, sample.cell):
+            self.give_up("stalled")
+        if not self.ended:
+            return None
+        return EventStatus.ReachedTermination(self._loop.diagram, self.violation or "arrived")
+
+    def give_up(self, why: str) -> None:
+        """End the run without arrival; the message names what it was waiting for.
+
+        Args:
+            why: What happened, for example ``stalled``.
+        """
+        if self._last is None:
+            self.violation = why
+            return
+        sample, plan = self._last, self._loop.plan
+        self.violation = (
+            f"{why} at t = {sample.time:.6g} s in cell {sample.cell} of {len(plan.cells)}, entered at "
+            f"{sample.entry:.6g} s with {plan.transitions[sample.cell].estimated_time:.3g} s estimated; it "
+            f"waits until {blocking_margin(plan, sample, self._tolerance)}"
+        )
+
+    def _report(self, sample: Sample) -> None:
+        if self._progress is None:
+            return
+        estimate = self._loop.plan.transitions[sample.cell].estimated_time
+        within = 1.0 if sample.arrived else min(0.99, (sample.time - sample.entry) / max(estimate, 1e-9))
+        self._progress("simulating", (sample.cell + within) / len(self._loop.plan.cells))
