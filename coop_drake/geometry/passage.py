@@ -1,0 +1,146 @@
+"""Widest passages through a polygon: the clearance that a path can keep, its length, its narrowest place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from numpy.typing import ArrayLike
+from shapely import LineString, Polygon
+
+from coop_drake.errors import GeometryError
+from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.medial import Graph, medial_graph, widest_path
+from coop_drake.geometry.pose import FloatArray
+
+__all__ = ["Passage", "PassageFinder", "pole"]
+
+LINKS = 24
+"""An end is linked to this many nearest nodes of the medial graph, besides those whose disc holds it."""
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A path between two points of a polygon that keeps as much clearance as any path found.
+
+    Attributes:
+        path: From the one point to the other [m].
+        neck: Smallest distance of the path to the boundary, exact for this path [m].
+        narrowest: Point of the path where that is, shape (2,) [m].
+    """
+
+    path: LineString
+    neck: float
+    narrowest: FloatArray
+
+    @property
+    def length(self) -> float:
+        """Length of the path [m]."""
+        return float(self.path.length)
+
+
+class PassageFinder:
+    """Answers for one polygon, on its medial graph, how widely two points are joined.
+
+    Args:
+        polygon: The region, with holes or without [m].
+    """
+
+    def __init__(self, polygon: Polygon) -> None:
+        self._polygon = polygon
+        self._distance = BoundaryDistance(polygon)
+        self._graph, self._room = medial_graph(polygon, self._distance)
+
+    def find(self, start: ArrayLike, end: ArrayLike) -> Passage:
+        """Widest passage between two points, the shortest one among equally wide.
+
+        Args:
+            start: Point inside the polygon, shape (2,) [m].
+            end: Point inside the polygon, shape (2,) [m].
+
+        Raises:
+            GeometryError: If an end lies outside, or no passage joins them.
+        """
+        ends = np.array([start, end], dtype=float)
+        room = min(self._distance(ends[0]), self._distance(ends[1]))
+        if room <= 0.0:
+            raise GeometryError(
+                f"the ends {_text(ends[0])} and {_text(ends[1])} of a passage must lie inside"
+            )
+        straight = self._measure(ends)
+        if straight.neck >= room:
+            return straight
+        graph = self._linked(ends)
+        chain = widest_path(graph, len(graph.nodes) - 2, len(graph.nodes) - 1)
+        best = straight
+        if chain is not None:
+            best = max(straight, self._measure(self._shorten(graph.nodes[chain])), key=lambda way: way.neck)
+        if best.neck <= 0.0:
+            raise GeometryError(f"no passage joins {_text(ends[0])} and {_text(ends[1])}")
+        return best
+
+    def _linked(self, ends: FloatArray) -> Graph:
+        """The medial graph with the ends as its last two nodes."""
+        graph = replace(self._graph, nodes=np.vstack([self._graph.nodes, ends]))
+        for k, end in enumerate(ends):
+            away = np.linalg.norm(self._graph.nodes - end, axis=1)
+            away[self._room <= 0.0] = np.inf
+            near = np.argsort(away, kind="stable")[:LINKS]
+            nodes = np.union1d(near[np.isfinite(away[near])], np.flatnonzero(away <= self._room))
+            clearance = np.array([self._distance.along(end, graph.nodes[node]) for node in nodes])
+            seen = clearance > 0.0
+            graph = replace(
+                graph,
+                pairs=np.vstack(
+                    [graph.pairs, np.stack([nodes, np.full_like(nodes, len(self._room) + k)], axis=1)[seen]]
+                ),
+                clearance=np.append(graph.clearance, clearance[seen]),
+                length=np.append(graph.length, away[nodes][seen]),
+            )
+        return graph
+
+    def _shorten(self, points: FloatArray) -> FloatArray:
+        """Leave out points as long as the straight way keeps the clearance of the whole path."""
+        neck = min(self._distance.along(a, b) for a, b in pairwise(points))
+        kept, here = [0], 0
+        while here < len(points) - 1:
+            there = here + 1
+            while there + 1 < len(points) and self._distance.along(points[here], points[there + 1]) >= neck:
+                there += 1
+            kept.append(there)
+            here = there
+        return points[kept]
+
+    def _measure(self, points: FloatArray) -> Passage:
+        necks = [self._distance.along(a, b) for a, b in pairwise(points)]
+        worst = int(np.argmin(necks))
+        segment = LineString(points[worst : worst + 2])
+        narrowest = shapely.get_coordinates(shapely.shortest_line(segment, self._polygon.boundary))[0]
+        return Passage(LineString(points), float(necks[worst]), narrowest)
+
+
+def pole(polygon: Polygon, tolerance: float = 1e-3) -> tuple[FloatArray, float]:
+    """Pole of inaccessibility: the point of a polygon farthest from its boundary.
+
+    Args:
+        polygon: The region, with holes or without [m].
+        tolerance: How much more clearance another point may have [m]; less where the polygon is thin.
+
+    Returns:
+        The point, shape (2,) [m], and its clearance [m].
+
+    Raises:
+        GeometryError: If the polygon has no interior.
+    """
+    if polygon.is_empty or polygon.area <= 0.0:
+        raise GeometryError("a polygon without area has no pole of inaccessibility")
+    half_width = polygon.area / polygon.length
+    radius = shapely.maximum_inscribed_circle(polygon, tolerance=min(tolerance, 0.1 * half_width))
+    centre = shapely.get_coordinates(radius)[0]
+    return centre, BoundaryDistance(polygon)(centre)
+
+
+def _text(point: FloatArray) -> str:
+    return f"({point[0]:.4f}, {point[1]:.4f})"

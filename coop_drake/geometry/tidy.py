@@ -1,0 +1,115 @@
+"""Tidy cells: inside a safe region, simply connected, without cusps, slivers and idle vertices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from shapely import LineString, Point, Polygon
+
+from coop_drake.errors import GeometryError
+from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.passage import PassageFinder
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.simplify import simplify_inward
+from coop_drake.geometry.slits import component_at, cut_holes
+
+__all__ = ["tidy_cell"]
+
+GUARD = 1e-6
+"""A tidy cell keeps this distance from the safe region's boundary, so that rounding never leaves it [m]."""
+
+SLACK = 1e-7
+"""How far vertices may stand out of the rest when they are left out, well within the guard [m]."""
+
+DEEPEST_CUT = 0.02
+"""Simplification never cuts deeper than this [m]."""
+
+CUT_PER_NECK = 0.2
+"""Nor deeper than this share of the neck [-]."""
+
+NECK_KEPT = 0.8
+"""Share of the neck that a tidied cell must keep, or a gentler tidying is tried [-]."""
+
+MITRE_LIMIT = 1.9
+"""Corners sharper than about 63 degrees are cut off; below 2, so that opposite corners keep a neck open."""
+
+STRENGTHS = (1.0, 0.5, 0.2, 0.0)
+"""Shares of the full opening and simplification, tried in this order."""
+
+
+@dataclass(frozen=True)
+class _Route:
+    """The way through a cell that tidying must keep."""
+
+    points: tuple[Point, ...]
+    path: LineString
+    neck: float
+
+
+def tidy_cell(safe: Polygon, points: Sequence[FloatArray]) -> Polygon:
+    """Make a map-worthy cell Q of a safe region S: Q = opening(S, b/2) within S, cut open, simplified inward.
+
+    The neck b is the clearance of the widest passage through the given points. Where the full treatment would
+    lose a point or a fifth of the neck, gentler ones are tried; the last one only cuts the holes open.
+
+    Args:
+        safe: S, with holes or without [m].
+        points: Points that Q must hold, in the order in which they are passed: entry, target; each (2,) [m].
+
+    Returns:
+        Q, inside S (checked exactly), simply connected where straight slits can make it so.
+
+    Raises:
+        GeometryError: If S does not join the points.
+    """
+    region = component_at(safe.buffer(-GUARD, join_style="mitre"), Point(points[0]))
+    if region.is_empty:
+        raise GeometryError(f"the safe region leaves no room at {Point(points[0]).wkt}")
+    route = _route(region, points)
+    opened = region
+    for _ in region.interiors:
+        if not opened.interiors:
+            break
+        opened = cut_holes(opened, route.path, route.neck) or region
+    for strength in STRENGTHS:
+        cell = _tidied(opened, route, strength)
+        if _serves(cell, safe, points, NECK_KEPT * route.neck):
+            return cell
+    return opened
+
+
+def _route(region: Polygon, points: Sequence[FloatArray]) -> _Route:
+    finder = PassageFinder(region)
+    ways = [finder.find(start, end) for start, end in pairwise(points)] if len(points) > 1 else []
+    if not ways:
+        here = Point(points[0])
+        return _Route((here,), LineString([here, here]), BoundaryDistance(region)(points[0]))
+    coordinates = [point for way in ways for point in way.path.coords]
+    return _Route(tuple(Point(p) for p in points), LineString(coordinates), min(way.neck for way in ways))
+
+
+def _tidied(region: Polygon, route: _Route, strength: float) -> Polygon:
+    """Opening, then simplification, both with mitred corners so that straight walls stay as they are."""
+    radius = 0.5 * strength * route.neck
+    shape = region
+    if radius > 0.0:
+        eroded = region.buffer(-radius, join_style="mitre", mitre_limit=MITRE_LIMIT)
+        dilated = eroded.buffer(radius, join_style="mitre", mitre_limit=MITRE_LIMIT)
+        shape = component_at(dilated.intersection(region), route.points[0])
+    if not region.interiors:
+        # What the opening leaves out in the middle of a region without holes is safe all the same.
+        shape = Polygon(shape.exterior)
+    depth = strength * min(DEEPEST_CUT, CUT_PER_NECK * route.neck)
+    return simplify_inward(shape, max(depth, SLACK), SLACK) if not shape.is_empty else shape
+
+
+def _serves(cell: Polygon, safe: Polygon, points: Sequence[FloatArray], neck: float) -> bool:
+    """Whether a cell lies inside the safe region and still joins all points widely enough."""
+    if cell.is_empty or not cell.is_valid or not safe.covers(cell):
+        return False
+    if not all(cell.contains(Point(point)) for point in points):
+        return False
+    finder = PassageFinder(cell)
+    return all(finder.find(start, end).neck >= neck for start, end in pairwise(points))

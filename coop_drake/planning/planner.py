@@ -1,0 +1,61 @@
+"""The planner: search a channel, make it a plan; three answers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from coop_drake.control import GainSet
+from coop_drake.errors import PlanError, StallError
+from coop_drake.planning.channel import Channel, SearchReport
+from coop_drake.planning.plan import Found, Infeasible, PlanningResult, Undecided
+from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.search import find_channel
+from coop_drake.planning.transitions import Progress, make_plan
+
+__all__ = ["plan"]
+
+FINER_ATTEMPTS = 2
+"""How often a channel that cannot be executed is searched again, each time with half the margin."""
+
+
+def plan(
+    problem: PlanningProblem, gain_set: GainSet, *, gain_set_name: str, progress: Progress | None = None
+) -> PlanningResult:
+    """Find a plan, or prove that none exists.
+
+    A channel that is found but cannot be executed (a passage of less than a millimetre, or of minutes)
+    proves nothing: the search begins again at a smaller margin, which gives other cells; if that does not
+    help the answer is Undecided.
+
+    Args:
+        problem: What is asked.
+        gain_set: Gains, fixed or to be scheduled.
+        gain_set_name: Name under which the scenario knows them.
+        progress: Called with a stage and the share of it that is done.
+
+    Returns:
+        Found with the plan, Infeasible with the reason, or Undecided with what stood in the way.
+    """
+    question, report, stall = problem, SearchReport(0, 0, 0, ()), ""
+    for _ in range(1 + FINER_ATTEMPTS):
+        answer, latest = find_channel(question, progress)
+        report = _added(report, latest)
+        if not isinstance(answer, Channel):
+            if answer.proved:
+                return Infeasible(answer.reason, report)
+            return Undecided(stall or answer.reason, report)
+        try:
+            made = make_plan(question, answer, gain_set, gain_set_name=gain_set_name, progress=progress)
+        except (StallError, PlanError) as error:
+            stall = f"a channel exists but cannot be executed: {error}"
+            if answer.margin == 0.0:
+                break
+            question = replace(question, settings=replace(question.settings, margin=0.5 * answer.margin))
+        else:
+            return Found(made, report)
+    return Undecided(stall, report)
+
+
+def _added(before: SearchReport, latest: SearchReport) -> SearchReport:
+    """The latest report with the work of the earlier attempts added."""
+    return replace(latest, slices=before.slices + latest.slices, margins=before.margins + latest.margins)

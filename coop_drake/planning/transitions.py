@@ -1,0 +1,234 @@
+"""From a channel of free boxes to a plan: tidied cells, targets, goal intervals and gains, (10)-(12)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import cos, pi, sin, tau
+
+import numpy as np
+from shapely import Point, Polygon
+
+from coop_drake.control import GainSet, TransitionGains, transition_gains
+from coop_drake.errors import GeometryError, PlanError, StallError
+from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.passage import Passage, PassageFinder
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.slits import component_at
+from coop_drake.geometry.tidy import tidy_cell
+from coop_drake.planning.channel import Channel, FreeBox
+from coop_drake.planning.estimate import SETTLING_TIME, travel_time
+from coop_drake.planning.plan import Cell, Plan, Transition
+from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.targets import choose_targets
+
+__all__ = ["make_plan", "reschedule"]
+
+NARROWEST = 1e-3
+"""Necks and goal regions below this clearance are refused: the governor would crawl [m]."""
+
+GOAL_SHARE = 0.9
+"""Share of a tolerance that a goal interval takes: arriving in it is arriving within tolerance [-]."""
+
+DISC_VERTICES = 32
+"""Vertices of the last goal region, inscribed in the disc of the position tolerance."""
+
+SAME_PLACE = 1e-9
+"""Targets closer than this to where a cell is entered leave only angles to move [m]."""
+
+Progress = Callable[[str, float], None]
+Intervals = tuple[FloatArray, FloatArray]
+
+
+def make_plan(
+    problem: PlanningProblem,
+    channel: Channel,
+    gain_set: GainSet,
+    *,
+    gain_set_name: str,
+    progress: Progress | None = None,
+) -> Plan:
+    """Make a channel ready to be executed.
+
+    Args:
+        problem: What was asked.
+        channel: The boxes that a search found.
+        gain_set: Gains, fixed or to be scheduled.
+        gain_set_name: Name under which the scenario knows them.
+        progress: Called with a stage and the share of it that is done.
+
+    Raises:
+        PlanError: If the channel does not join the start to the goal.
+        StallError: If a passage is too narrow or too slow to be executed; names it.
+    """
+    channel = _turned_to_start(channel, problem.start[2])
+    _check_ends(problem, channel)
+    start, goal = problem.start[:2], problem.goal_pose[:2]
+    targets = choose_targets(channel, start, goal)
+    entries = (start, *targets[:-1])
+    cells = []
+    for index, (box, entry, target) in enumerate(zip(channel.boxes, entries, targets, strict=True)):
+        cells.append(_cell(box, entry, target, index))
+        if progress is not None:
+            progress("tidying", (index + 1) / len(targets))
+    transitions = []
+    resting = problem.start[2:]
+    for index, (entry, target) in enumerate(zip(entries, targets, strict=True)):
+        goal_lower, goal_upper = _goal_intervals(problem, channel, index)
+        way = _way(problem, cells[index : index + 2], entry, target, index)
+        gains = _gains(gain_set, cells[index], way.neck, (goal_lower, goal_upper), resting)
+        transitions.append(Transition(**vars(way), goal_lower=goal_lower, goal_upper=goal_upper, gains=gains))
+        resting = 0.5 * (goal_lower + goal_upper)
+    return Plan(
+        cells=tuple(cells),
+        transitions=tuple(transitions),
+        start=problem.start.copy(),
+        goal_pose=np.array([*goal, channel.goal_angle]),
+        goal_joints=problem.goal_joints,
+        joint_names=tuple(joint.name for joint in problem.tree.joints),
+        margin=channel.margin,
+        gain_set=gain_set_name,
+    )
+
+
+def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
+    """Give a plan the gains of another gain set.
+
+    Args:
+        plan: The plan.
+        gain_set: Gains, fixed or to be scheduled.
+        name: Name under which the scenario knows them.
+    """
+    resting = plan.start[2:]
+    transitions = []
+    for cell, transition in zip(plan.cells, plan.transitions, strict=True):
+        goal = (transition.goal_lower, transition.goal_upper)
+        gains = _gains(gain_set, cell, transition.neck, goal, resting)
+        transitions.append(replace(transition, gains=gains))
+        resting = 0.5 * (transition.goal_lower + transition.goal_upper)
+    return replace(plan, transitions=tuple(transitions), gain_set=name)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """What a transition knows about positions; named as in ``Transition``."""
+
+    target: FloatArray
+    goal_region: Polygon
+    inradius: float
+    neck: float
+    length: float
+    estimated_time: float
+    only_angles: bool
+
+
+def _way(
+    problem: PlanningProblem, cells: Sequence[Cell], entry: FloatArray, target: FloatArray, index: int
+) -> _Way:
+    """The way from entry to target in the first cell; the second one, if any, is entered there."""
+    here = cells[0].tidied
+    if len(cells) > 1:
+        region = component_at(here.intersection(cells[1].tidied), Point(target))
+    else:
+        region = component_at(_disc(target, problem.position_tolerance).intersection(here), Point(target))
+    inradius = 0.0 if region.is_empty else BoundaryDistance(region)(target)
+    passage = PassageFinder(here).find(entry, target)
+    time = travel_time(passage.length, passage.neck)
+    if min(inradius, passage.neck) < NARROWEST or time > problem.settings.max_transition_time:
+        raise StallError(_stall(problem, index, passage, target, inradius))
+    only_angles = bool(passage.length <= SAME_PLACE)
+    return _Way(target, region, inradius, passage.neck, passage.length, SETTLING_TIME + time, only_angles)
+
+
+def _stall(
+    problem: PlanningProblem, index: int, passage: Passage, target: FloatArray, inradius: float
+) -> str:
+    x, y = passage.narrowest
+    seconds = travel_time(passage.length, passage.neck)
+    return (
+        f"cell {index}: the object's passage through ({x:.3f}, {y:.3f}) is {2e3 * passage.neck:.1f} mm "
+        f"wide and {passage.length:.2f} m long, about {seconds:.0f} s, and its target "
+        f"({target[0]:.3f}, {target[1]:.3f}) has {1e3 * inradius:.1f} mm around it; expected at least "
+        f"{2e3 * NARROWEST:.0f} mm and {1e3 * NARROWEST:.0f} mm, and at most "
+        f"{problem.settings.max_transition_time:.0f} s"
+    )
+
+
+def _cell(box: FreeBox, entry: FloatArray, target: FloatArray, index: int) -> Cell:
+    try:
+        tidied = tidy_cell(box.polygon, (entry, target))
+    except GeometryError as error:
+        raise StallError(f"cell {index}: {error}") from error
+    return Cell(box.polygon, box.core, tidied, box.lower, box.upper)
+
+
+def _gains(
+    gain_set: GainSet, cell: Cell, neck: float, goal: Intervals, resting: FloatArray
+) -> TransitionGains:
+    return transition_gains(
+        gain_set,
+        neck=neck,
+        slice_lower=cell.lower,
+        slice_upper=cell.upper,
+        goal_lower=goal[0],
+        goal_upper=goal[1],
+        resting=resting,
+    )
+
+
+def _goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Intervals:
+    """Intervals of (theta, q...) that must be reached in a box: those of the next box too, or the goal's."""
+    lower, upper = channel.boxes[index].lower.copy(), channel.boxes[index].upper.copy()
+    if index + 1 < len(channel.boxes):
+        following = channel.boxes[index + 1]
+        lower, upper = np.maximum(lower, following.lower), np.minimum(upper, following.upper)
+    else:
+        goals: list[tuple[float | None, float]] = [(channel.goal_angle, problem.angle_tolerance)]
+        goals += [(goal, problem.joint_tolerance) for goal in problem.goal_joints]
+        for axis, (goal, tolerance) in enumerate(goals):
+            if goal is not None:
+                lower[axis] = max(lower[axis], goal - GOAL_SHARE * tolerance)
+                upper[axis] = min(upper[axis], goal + GOAL_SHARE * tolerance)
+    if not (lower < upper).all():
+        axis = int(np.argmin(lower < upper))
+        raise PlanError(
+            f"cell {index}: axis {axis} has no interval to leave in: [{lower[axis]}, {upper[axis]}]"
+        )
+    return lower, upper
+
+
+def _turned_to_start(channel: Channel, start_angle: float) -> Channel:
+    """Shift theta of all boxes by full turns so that the first one holds the start's angle."""
+    first = channel.boxes[0]
+    turns = round((start_angle - 0.5 * (first.lower[0] + first.upper[0])) / tau)
+    shift = np.zeros_like(first.lower)
+    shift[0] = turns * tau
+    boxes = tuple(replace(box, lower=box.lower + shift, upper=box.upper + shift) for box in channel.boxes)
+    return replace(channel, boxes=boxes, goal_angle=channel.goal_angle + shift[0])
+
+
+def _check_ends(problem: PlanningProblem, channel: Channel) -> None:
+    """Refuse a channel whose first box does not hold the start, or whose last one does not hold the goal.
+
+    Raises:
+        PlanError: Names the end and the box.
+    """
+    first, last = channel.boxes[0], channel.boxes[-1]
+    start, goal = problem.start[2:], channel.goal_angle
+    if not first.polygon.contains(Point(problem.start[:2])):
+        raise PlanError("the start's position lies outside the first cell")
+    if not ((first.lower < start) & (start < first.upper)).all():
+        raise PlanError(
+            f"the start's angles {start} lie outside the first cell's [{first.lower}, {first.upper}]"
+        )
+    if not last.polygon.contains(Point(problem.goal_pose[:2])):
+        raise PlanError("the goal's position lies outside the last cell")
+    if not last.lower[0] <= goal <= last.upper[0]:
+        raise PlanError(
+            f"the goal's angle {goal} lies outside the last cell's [{last.lower[0]}, {last.upper[0]}]"
+        )
+
+
+def _disc(centre: FloatArray, radius: float) -> Polygon:
+    angles = [2.0 * pi * k / DISC_VERTICES for k in range(DISC_VERTICES)]
+    return Polygon([(centre[0] + radius * cos(angle), centre[1] + radius * sin(angle)) for angle in angles])
