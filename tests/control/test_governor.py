@@ -1,0 +1,57 @@
+import numpy as np
+import pytest
+
+from coop_drake.control import energy_margin, governed_acceleration, governor_velocity, tracking_energy
+
+GAINS = {"stiffness": 50.0, "governor_gain": 5.0}
+
+
+def test_acceleration_pulls_to_the_governor_and_brakes():
+    acceleration = governed_acceleration(
+        np.array([1.0, 2.0]), np.array([0.5, -1.0]), np.array([1.5, 2.0]), stiffness=50.0, damping=5.0
+    )
+    assert acceleration.tolist() == [22.5, 5.0]
+
+
+def test_energy_is_kinetic_plus_elastic():
+    energy = tracking_energy(np.array([1.0, 2.0]), np.array([3.0, 4.0]), np.array([1.0, 2.2]), stiffness=50.0)
+    assert energy == pytest.approx(0.5 * 25.0 + 0.5 * 50.0 * 0.04)
+
+
+def test_margin_is_what_the_spring_may_still_store():
+    assert energy_margin(1.0, 0.4, stiffness=50.0) == pytest.approx(3.0)
+    assert energy_margin(0.0, 0.0, stiffness=50.0) == 0.0
+    assert energy_margin(0.0, -0.4, stiffness=50.0) == pytest.approx(-4.0)
+
+
+def test_the_field_leads_while_the_margin_is_large():
+    velocity = governor_velocity(np.array([0.3, -0.4]), 100.0, smoothing=0.0, **GAINS)
+    assert velocity == pytest.approx([1.5, -2.0])
+
+
+@pytest.mark.parametrize("smoothing", [0.0, 0.001, 0.1])
+def test_the_root_leads_while_the_margin_is_small(smoothing):
+    velocity = governor_velocity(np.array([0.6, -0.8]), 0.02, smoothing=smoothing, **GAINS)
+    root = np.sqrt(0.02 / 50.0 + smoothing**2) - smoothing
+    assert velocity == pytest.approx(5.0 * root * np.array([0.6, -0.8]))
+
+
+@pytest.mark.parametrize("smoothing", [0.0, 0.001])
+@pytest.mark.parametrize("margin", [0.0, -1e-12, -3.0])
+def test_the_governor_waits_without_margin(margin, smoothing):
+    assert governor_velocity(np.array([0.6, -0.8]), margin, smoothing=smoothing, **GAINS).tolist() == [
+        0.0,
+        0.0,
+    ]
+
+
+def test_the_governor_rests_where_the_field_vanishes():
+    assert governor_velocity(np.zeros(2), 1.0, smoothing=0.0, **GAINS).tolist() == [0.0, 0.0]
+
+
+def test_the_smoothed_root_is_lipschitz_and_the_printed_one_is_not():
+    def slope(smoothing, margin):
+        return governor_velocity(np.array([1.0, 0.0]), margin, smoothing=smoothing, **GAINS)[0] / margin
+
+    assert slope(0.0, 1e-12) > 1e3 * slope(0.0, 1e-4)
+    assert slope(0.001, 1e-12) <= 5.0 / (2.0 * 0.001 * 50.0)

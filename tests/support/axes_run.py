@@ -1,0 +1,78 @@
+"""Plays a chain of funnels on double integrators: the angles and joints, with the position frozen."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coop_drake.control import Funnel, funnel_acceleration, funnel_walls, transition_gains
+from coop_drake.control.ready import funnel_margin, interval_margin
+
+
+@dataclass(frozen=True)
+class AxesRun:
+    """What was seen: per transition its duration [s], per axis its peak, over all steps the narrowest gap."""
+
+    durations: np.ndarray
+    peak_acceleration: np.ndarray
+    wall_margin: float
+    position: np.ndarray
+    rate: np.ndarray
+
+
+def play(transitions, gain_set, *, start, step=1e-3, time_limit=30.0, gated=True, neck=0.2):
+    """Integrate with RK4 and advance once the ready margin is not negative; raise if a cell is never left.
+
+    Args:
+        transitions: Dictionaries as ``table_1.table_transitions`` makes them.
+        gain_set: FixedGains or ScheduledGains.
+        start: Initial axes, at rest.
+        step: Step of the integration [s].
+        time_limit: Longest time in one cell [s].
+        gated: Whether the energy gate of the next funnel must open too.
+        neck: Passed to the schedule, of no influence on the axes.
+    """
+    gains = [transition_gains(gain_set, neck=neck, **t) for t in transitions]
+    funnels = [
+        Funnel(t["slice_lower"], t["slice_upper"], t["goal_lower"], t["goal_upper"], g.decay_rate, g.funnel)
+        for t, g in zip(transitions, gains, strict=True)
+    ]
+    x, v = np.array(start, dtype=float), np.zeros(len(start))
+    durations, peak, wall_margin = [], np.zeros(len(x)), np.inf
+    for i, (transition, gain, funnel) in enumerate(zip(transitions, gains, funnels, strict=True)):
+
+        def law(x, v, t, funnel=funnel, gain=gain):
+            return funnel_acceleration(
+                x,
+                v,
+                funnel,
+                t,
+                log_gain=gain.log_gain,
+                position_gain=gain.position_gain,
+                rate_gain=gain.rate_gain,
+            )
+
+        last = i + 1 == len(transitions)
+        for k in range(round(time_limit / step)):
+            t = k * step
+            a1 = law(x, v, t)
+            peak = np.maximum(peak, np.abs(a1))
+            a2 = law(x + 0.5 * step * v, v + 0.5 * step * a1, t + 0.5 * step)
+            a3 = law(x + 0.5 * step * v + 0.25 * step**2 * a1, v + 0.5 * step * a2, t + 0.5 * step)
+            a4 = law(x + step * v + 0.5 * step**2 * a2, v + step * a3, t + step)
+            x, v = (
+                x + step * v + step**2 / 6 * (a1 + a2 + a3),
+                v + step / 6 * (a1 + 2 * a2 + 2 * a3 + a4),
+            )
+            walls = funnel_walls(funnel, t + step)
+            wall_margin = min(wall_margin, (x - walls.lower).min(), (walls.upper - x).min())
+            margin = interval_margin(x, transition["goal_lower"], transition["goal_upper"])
+            if last:
+                margin = min(margin, 1.0 - np.abs(v).max() / 0.02)
+            elif gated and margin >= 0.0:
+                margin = min(margin, funnel_margin(x, v, funnel=funnels[i + 1], gains=gains[i + 1]))
+            if margin >= 0.0:
+                durations.append(t + step)
+                break
+        else:
+            raise AssertionError(f"transition {i} was not left within {time_limit} s, margin {margin}")
+    return AxesRun(np.array(durations), peak, float(wall_margin), x, v)
