@@ -1,0 +1,204 @@
+"""The command line: answers, exit codes, files, JSON, and no traceback for a user's mistake."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from coop_drake.cli import app, chain
+from coop_drake.cli.reporter import Reporter
+from coop_drake.planning import load_plan
+from coop_drake.simulation import SimulationLog
+from tests.support.scenarios import MODELS, ROOM, write_scenario
+
+PLAN_KEYS = {"answer", "cells", "slices", "planning_cpu_seconds", "peak_memory_mb"}
+RUN_KEYS = PLAN_KEYS | {
+    "reached",
+    "violations",
+    "final_position_error_m",
+    "final_angle_error_rad",
+    "min_clearance_m",
+    "min_delta_e",
+    "max_acceleration_error",
+    "max_wrench_error_n",
+    "max_map_residual",
+    "mapping_wall_seconds",
+    "simulated_seconds",
+    "simulation_wall_seconds",
+}
+RESULTS = ["log.npz", "plan.json", "summary.png", "table_1.md", "transport.html"]
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory):
+    return write_scenario(tmp_path_factory.mktemp("scenario") / "room.scenario.yaml")
+
+
+@pytest.fixture(scope="module")
+def finished(room, tmp_path_factory):
+    out = tmp_path_factory.mktemp("finished")
+    return out, invoke("run", room, "--out", out, "--json")
+
+
+def test_a_run_answers_with_one_json_object_and_exit_code_0(finished):
+    _, result = finished
+    assert result.exit_code == 0, result.stderr
+    facts = json.loads(result.stdout)
+    assert facts.keys() >= RUN_KEYS
+    assert facts["answer"] == "found"
+    assert facts["reached"] is True
+    assert facts["violations"] == 0
+    assert facts["final_position_error_m"] <= 0.01
+    assert facts["min_clearance_m"] > 0.0
+    assert len(result.stdout.splitlines()) == 1
+
+
+def test_a_run_leaves_plan_log_table_recording_and_figures(finished):
+    out, result = finished
+    names = sorted(path.name for path in out.iterdir())
+    assert [name for name in names if not name.startswith("fig")] == RESULTS
+    assert {name[:5] for name in names if name.startswith("fig")} == {f"fig{k:02d}" for k in range(4, 14)}
+    facts, log = json.loads(result.stdout), SimulationLog.load(out / "log.npz")
+    assert facts["cells"] == len(load_plan(out / "plan.json").cells)
+    assert facts["simulated_seconds"] == pytest.approx(log.times[-1])
+    assert facts["min_clearance_m"] == min(log.workspace_clearance.min(), log.body_clearance.min())
+
+
+def test_people_see_bars_and_a_table_and_quiet_shows_nothing(room, tmp_path):
+    shown = invoke("plan", room, "--out", tmp_path)
+    assert shown.exit_code == 0
+    assert "planning" in shown.stdout
+    assert "narrowest neck" in shown.stdout
+    assert invoke("plan", room, "--out", tmp_path, "--quiet").output == ""
+
+
+def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_path):
+    out, _ = finished
+    result = invoke(
+        "simulate", room, "--plan", out / "plan.json", "--out", tmp_path, "--gains", "table_2", "--json"
+    )
+    assert result.exit_code == 0, result.stderr
+    facts = json.loads(result.stdout)
+    assert facts.keys() >= RUN_KEYS
+    assert facts["gains"] == "table_2"
+    assert not (tmp_path / "plan.json").exists()
+    assert (tmp_path / "transport.html").exists()
+
+
+def test_closed_is_infeasible_and_says_why(tmp_path):
+    (tmp_path / "plan.json").write_text("of an older run")
+    result = invoke("plan", MODELS / "closed.scenario.yaml", "--out", tmp_path, "--json")
+    assert result.exit_code == 3, result.stderr
+    facts = json.loads(result.stdout)
+    assert facts.keys() >= PLAN_KEYS
+    assert (facts["answer"], facts["cells"]) == ("infeasible", 0)
+    assert facts["reason"] in " ".join(result.stderr.split())
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_budget_that_ends_is_undecided(tmp_path):
+    text = (MODELS / "base.scenario.yaml").read_text() + "\nplanner: {max_slices: 5}\n"
+    path = tmp_path / "short.scenario.yaml"
+    path.write_text(text)
+    result = invoke("plan", path, "--out", tmp_path / "out", "--json")
+    assert result.exit_code == 4, result.stderr
+    assert json.loads(result.stdout)["answer"] == "undecided"
+
+
+def test_a_violation_ends_in_exit_code_1_and_says_which(finished, room, tmp_path, monkeypatch):
+    out, _ = finished
+    log = SimulationLog.load(out / "log.npz")
+    broken = replace(log, reached=False, violation="robot_0::base left the workspace at t = 1.5 s by 2 mm")
+    monkeypatch.setattr(chain, "simulate", lambda *_, **__: broken)
+    result = invoke("simulate", room, "--plan", out / "plan.json", "--out", tmp_path, "--json")
+    assert result.exit_code == 1
+    facts = json.loads(result.stdout)
+    assert (facts["violations"], facts["reached"]) == (1, False)
+    assert facts["violation"] == facts["error"] == broken.violation
+    assert broken.violation in result.stderr
+    assert (tmp_path / "log.npz").exists()
+
+
+MISTAKES = {
+    "a key that does not exist": ({"work_space": {}}, "work_space", "one of the keys"),
+    "a wrong type": ({"planner": {"margin": "wide"}}, "planner.margin", "'wide'"),
+    "a start outside": (
+        {"start": {"object": {"x": 0.1, "y": 2.0, "theta": 0.0}, "joints": ROOM["start"]["joints"]}},
+        "start",
+        "0.1",
+    ),
+    "an unknown model": (
+        {"directives": [{"add_model": {"name": "object", "file": "package://coop_drake_models/none.sdf"}}]},
+        "directives",
+        "none.sdf",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_bad_input_is_answered_with_file_key_value_and_what_is_allowed(mistake, tmp_path):
+    sections, key, value = MISTAKES[mistake]
+    path = write_scenario(tmp_path / "wrong.scenario.yaml", **sections)
+    result = invoke("run", path, "--out", tmp_path / "out", "--json")
+    assert result.exit_code == 2
+    facts = json.loads(result.stdout)
+    assert facts["file"] == str(path)
+    assert key in facts["key"]
+    assert value in facts["error"]
+    assert facts["allowed"]
+    assert "Traceback" not in result.stderr
+    assert str(path) in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_file_and_an_unknown_gain_set_are_bad_input(room, tmp_path):
+    missing = invoke("plan", tmp_path / "nowhere.yaml", "--json")
+    assert missing.exit_code == 2
+    assert "nowhere.yaml" in json.loads(missing.stdout)["error"]
+    gains = invoke("plan", room, "--gains", "tabel_2", "--json")
+    assert gains.exit_code == 2
+    facts = json.loads(gains.stdout)
+    assert (facts["key"], facts["value"]) == ("--gains", "'tabel_2'")
+    assert facts["allowed"] == "one of scheduled, table_2"
+
+
+def test_a_plan_of_another_scenario_and_a_file_that_is_no_plan_are_bad_input(finished, room, tmp_path):
+    out, _ = finished
+    other = write_scenario(
+        tmp_path / "other.scenario.yaml",
+        start={"object": {"x": 2.6, "y": 2.0, "theta": 0.0}, "joints": ROOM["start"]["joints"]},
+    )
+    result = invoke("simulate", other, "--plan", out / "plan.json", "--json")
+    assert result.exit_code == 2
+    assert "the plan starts at" in json.loads(result.stdout)["error"]
+    for content in ("{}", "not json"):
+        (tmp_path / "plan.json").write_text(content)
+        result = invoke("simulate", room, "--plan", tmp_path / "plan.json", "--json")
+        assert result.exit_code == 2
+        assert "plan.json" in json.loads(result.stdout)["error"]
+
+
+def test_wrong_usage_is_bad_input_for_people_and_machines():
+    command = [sys.executable, "-c", "from coop_drake.cli import main; main()", "plan", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "SCENARIO" in json.loads(done.stdout)["error"]
+    assert "SCENARIO" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_machines_get_no_infinities_and_no_numpy(capsys):
+    reporter = Reporter(machine=True, quiet=True)
+    reporter.facts.update(a=float("inf"), b=np.float64(1.5), c=np.int64(2), d=np.bool_(True))
+    reporter.close()
+    assert json.loads(capsys.readouterr().out) == {"a": None, "b": 1.5, "c": 2, "d": True}

@@ -1,0 +1,27 @@
+"""Ctrl-C ends a run at once, with exit code 130 and whole files only."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+import time
+
+from coop_drake.planning import load_plan
+from tests.support.scenarios import MODELS
+
+
+def test_ctrl_c_after_planning_leaves_the_plan_whole_and_nothing_half_written(tmp_path):
+    command = [sys.executable, "-c", "from coop_drake.cli import main; main()"]
+    command += ["run", str(MODELS / "base.scenario.yaml"), "--out", str(tmp_path), "--json"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while process.poll() is None and not (tmp_path / "table_1.md").exists():
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    stdout, stderr = process.communicate()
+    assert process.returncode == 130, stderr
+    assert "interrupted" in json.loads(stdout)["error"]
+    assert "Traceback" not in stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["plan.json", "table_1.md"]
+    assert load_plan(tmp_path / "plan.json").cells
