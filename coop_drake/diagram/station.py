@@ -57,10 +57,6 @@ def build_station(scenario: Scenario) -> TransportStation:
     for robot in team.robots:
         sensor = builder.AddNamedSystem(f"robot_{robot.index}_sensor", RobotStateSensor(team, robot.index))
         builder.Connect(plant.get_state_output_port(), sensor.GetInputPort("team_state"))
-        builder.Connect(plant.get_body_poses_output_port(), sensor.GetInputPort("body_poses"))
-        builder.Connect(
-            plant.get_body_spatial_velocities_output_port(), sensor.GetInputPort("body_spatial_velocities")
-        )
         builder.ExportOutput(sensor.GetOutputPort("robot_state"), f"robot_{robot.index}_state")
         effort = f"robot_{robot.index}_effort"
         builder.ExportInput(actuation.GetInputPort(effort), effort)

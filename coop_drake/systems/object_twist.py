@@ -38,7 +38,7 @@ class ObjectTwist(LeafSystem):
 
     def _write_twist(self, context: Context, output: BasicVector) -> None:
         state, theta = self._state.Eval(context), self._pose.Eval(context)[2]
-        z, z_rate = state[: self._size], state[self._size :]
-        self._robot.set_state(z, z_rate)
-        grasp_twist = self._robot.grasp_jacobian() @ z_rate
-        output.SetFromVector(object_twist(rotate(theta, self._p_LE), grasp_twist))
+        self._robot.set_state(state[: self._size], state[self._size :])
+        V_WE = self._robot.gripper_frame.CalcSpatialVelocityInWorld(self._robot.context)
+        (vx, vy, _), (_, _, w) = V_WE.translational(), V_WE.rotational()
+        output.SetFromVector(object_twist(rotate(theta, self._p_LE), (vx, vy, w)))

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from coop_drake.control.robot_effort import robot_acceleration, robot_torque
+from coop_drake.control.robot_effort import robot_acceleration
 from coop_drake.plant import RobotPlant
 
 __all__ = ["RobotEffort"]
 
 
 class RobotEffort(LeafSystem):
-    """Actuation of one robot from its own model, state and commands: (22)-(34).
+    """Actuation M z'' + C z' + G + J^T tau_e of one robot from its own model, state and commands: (22)-(34).
 
     ======= ======================== ========== ======================================================= =====
     input   ``robot_state``          2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)          W
@@ -47,12 +47,4 @@ class RobotEffort(LeafSystem):
         acceleration = robot_acceleration(
             grasp, joints, jacobian=jacobian, jacobian_rate_term=robot.grasp_bias()
         )
-        output.SetFromVector(
-            robot_torque(
-                acceleration,
-                wrench,
-                mass_matrix=robot.mass_matrix(),
-                bias=robot.bias(),
-                jacobian=jacobian,
-            )
-        )
+        output.SetFromVector(robot.inertial_effort(acceleration) + wrench @ jacobian)

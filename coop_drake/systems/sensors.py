@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+from math import atan2
+
 import numpy as np
-from pydrake.common.value import Value
-from pydrake.math import RigidTransform
-from pydrake.multibody.math import SpatialVelocity
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from coop_drake.plant import TeamPlant
@@ -42,8 +41,6 @@ class RobotStateSensor(LeafSystem):
 
     ======= ============================ ========== ==================================================== =====
     input   ``team_state``               2 (3 + n)  the plant's positions and velocities, its own order
-    input   ``body_poses``               abstract   poses of the plant's bodies                          W
-    input   ``body_spatial_velocities``  abstract   spatial velocities of the plant's bodies             W
     output  ``robot_state``              2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)       W
     ======= ============================ ========== ==================================================== =====
 
@@ -62,21 +59,21 @@ class RobotStateSensor(LeafSystem):
         if not 0 <= robot < len(team.robots):
             raise IndexError(f"robot {robot} is not in the team of {len(team.robots)}")
         model = team.robots[robot]
-        self._body = int(model.base_body.index())
+        self._plant, self._base = team.plant, model.base_body
+        # Kinematics of this context cost a tenth of reading the plant's poses of all bodies as a list.
+        self._scratch = team.plant.CreateDefaultContext()
         in_q = slice(3 + model.q_slice.start, 3 + model.q_slice.stop)
         self._positions = team.position_index[in_q]
         self._rates = team.plant.num_positions() + team.velocity_index[in_q]
         self._team = self.DeclareVectorInputPort("team_state", team.plant.num_multibody_states())
-        self._poses = self.DeclareAbstractInputPort("body_poses", Value[list[RigidTransform]]())
-        self._velocities = self.DeclareAbstractInputPort(
-            "body_spatial_velocities", Value[list[SpatialVelocity]]()
-        )
         self.DeclareVectorOutputPort("robot_state", 2 * (3 + len(model.joints)), self._write_state)
 
     def _write_state(self, context: Context, output: BasicVector) -> None:
         team = self._team.Eval(context)
-        X_WB, V_WB = self._poses.Eval(context)[self._body], self._velocities.Eval(context)[self._body]
+        self._plant.SetPositionsAndVelocities(self._scratch, team)
+        X_WB = self._base.EvalPoseInWorld(self._scratch)
+        V_WB = self._base.EvalSpatialVelocityInWorld(self._scratch)
         R, p = X_WB.rotation().matrix(), X_WB.translation()
         v, w = V_WB.translational(), V_WB.rotational()
-        base, base_rate = (p[0], p[1], np.arctan2(R[1, 0], R[0, 0])), (v[0], v[1], w[2])
+        base, base_rate = (p[0], p[1], atan2(R[1, 0], R[0, 0])), (v[0], v[1], w[2])
         output.SetFromVector(np.concatenate([base, team[self._positions], base_rate, team[self._rates]]))

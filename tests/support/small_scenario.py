@@ -24,8 +24,6 @@ def small_scenario(team: str = "base", workspace: Polygon = ROOM) -> Scenario:
             ObjectPose(*START_POSE),
             {name: tuple(0.0 for _ in values) for name, values in shipped.start.joints.items()},
         ),
-        goal=Goal(
-            ObjectPose(*GOAL_POSE), {}, Tolerances(position=POSITION_TOLERANCE, angle=ANGLE_TOLERANCE)
-        ),
+        goal=Goal(ObjectPose(*GOAL_POSE), {}, Tolerances(position=POSITION_TOLERANCE, angle=ANGLE_TOLERANCE)),
         simulator=replace(shipped.simulator, max_time=30.0),
     )

@@ -1,0 +1,149 @@
+import numpy as np
+import pytest
+
+from coop_drake.diagram import build_closed_loop
+from coop_drake.diagram.robot_controller import TELEMETRY
+from coop_drake.errors import PlanError
+from coop_drake.plant import get_configuration, get_rates
+from tests.support.small_loop import TEAMS, small_loop, small_maps, small_problem
+from tests.support.small_plan import small_plan
+from tests.support.system_checks import port_sizes
+
+
+@pytest.fixture(scope="module", params=TEAMS)
+def loop(request):
+    return small_loop(request.param)
+
+
+def links(loop):
+    """Every connection of the whole, as (system, output) -> (system, input) by name."""
+    return [
+        (
+            (source.get_name(), source.get_output_port(output).get_name()),
+            (sink.get_name(), sink.get_input_port(entry).get_name()),
+        )
+        for (sink, entry), (source, output) in loop.diagram.connection_map().items()
+    ]
+
+
+def test_between_robots_only_ready_reports_cross(loop):
+    names = [controller.get_name() for controller in loop.controllers]
+    for k, name in enumerate(names):
+        into = {entry: source for source, (sink, entry) in links(loop) if sink == name}
+        assert into == {
+            "robot_state": ("transport_station", f"robot_{k}_state"),
+            "object_pose": ("transport_station", "object_pose"),
+            "current_cell": ("cell_planner", "current_cell"),
+        }
+        out_of = {(source[1], sink) for source, sink in links(loop) if source[0] == name}
+        assert out_of == {
+            ("ready", ("cell_planner", f"robot_{k}_ready")),
+            ("robot_effort", ("transport_station", f"robot_{k}_effort")),
+        }
+        assert loop.controllers[k].GetOutputPort("ready").size() == 2
+    told = {source[0] for source, (sink, _) in links(loop) if sink == "cell_planner"}
+    assert told == set(names)
+    assert loop.cell_planner.GetOutputPort("current_cell").size() == 2
+
+
+def test_no_robot_is_told_anothers_state(loop):
+    heard = [(source, sink) for source, (sink, entry) in links(loop) if source[1].endswith("_state")]
+    for (_, port), sink in heard:
+        assert port.split("_")[1] == sink.split("_")[1]
+    assert len(heard) == len(loop.controllers)
+
+
+def test_a_controller_hears_three_things_and_no_more(loop):
+    for robot, controller in zip(loop.team.robots, loop.controllers, strict=True):
+        n = len(robot.joints)
+        inputs, outputs = port_sizes(controller)
+        assert inputs == {"robot_state": 2 * (3 + n), "object_pose": 3, "current_cell": 2}
+        assert outputs == {
+            "robot_effort": 3 + n,
+            "ready": 2,
+            "object_twist": 3,
+            "governor_position": 2,
+            "energy_margin": 1,
+            "angle_funnel": 2,
+            "joint_funnels": 2 * n,
+            "object_acceleration": 3,
+            "wrench_share": 3,
+        }
+        assert set(TELEMETRY) == set(outputs) - {"robot_effort", "ready"}
+
+
+def test_every_robot_runs_every_block_of_the_law(loop):
+    for controller in loop.controllers:
+        assert {system.get_name() for system in controller.GetSystems()} == {
+            "object_twist",
+            "reference_governor",
+            "governor_state",
+            "orientation_ppc",
+            "joint_ppc",
+            "wrench_law",
+            "robot_effort",
+            "ready_monitor",
+        }
+
+
+def test_station_ports(loop):
+    n, joints = len(loop.team.joints), [len(robot.joints) for robot in loop.team.robots]
+    inputs, outputs = port_sizes(loop.station.diagram)
+    assert inputs == {f"robot_{k}_effort": 3 + n_k for k, n_k in enumerate(joints)}
+    assert outputs == {
+        "object_pose": 3,
+        **{f"robot_{k}_state": 2 * (3 + n_k) for k, n_k in enumerate(joints)},
+        "team_state": 2 * (3 + n),
+        "generalized_acceleration": 3 + n,
+        "reaction_forces": "abstract",
+        "query_object": "abstract",
+    }
+
+
+def test_a_run_starts_at_rest_in_the_first_cell_with_every_governor_on_the_object(loop):
+    context = loop.create_context()
+    plant_context = loop.team.plant.GetMyContextFromRoot(context)
+    np.testing.assert_allclose(get_configuration(loop.team, plant_context), loop.plan.start, atol=1e-15)
+    np.testing.assert_array_equal(get_rates(loop.team, plant_context), np.zeros(3 + len(loop.team.joints)))
+    planner = loop.cell_planner
+    np.testing.assert_array_equal(
+        planner.GetOutputPort("current_cell").Eval(planner.GetMyContextFromRoot(context)), [0.0, 0.0]
+    )
+    for controller in loop.controllers:
+        governor = controller.GetOutputPort("governor_position").Eval(
+            controller.GetMyContextFromRoot(context)
+        )
+        np.testing.assert_array_equal(governor, loop.plan.start[:2])
+
+
+def test_the_state_is_the_teams_the_governors_and_the_cell(loop):
+    context = loop.create_context()
+    expected = 2 * (3 + len(loop.team.joints)) + 2 * len(loop.controllers)
+    assert context.num_continuous_states() == expected
+    assert context.get_discrete_state().num_groups() == 1
+
+
+def test_robots_agree_on_the_objects_twist_and_command(loop):
+    context = loop.create_context()
+    state = context.get_continuous_state_vector().CopyToVector()
+    context.SetContinuousState(state + 0.01 * np.sin(np.arange(len(state))))
+    for controller in loop.controllers:
+        # The governors' copies are alike in a run: put them on one point.
+        integrator = controller.GetSubsystemByName("governor_state")
+        integrator.set_integral_value(integrator.GetMyMutableContextFromRoot(context), [3.0, 3.0])
+    for output in ("object_twist", "object_acceleration"):
+        values = [
+            controller.GetOutputPort(output).Eval(controller.GetMyContextFromRoot(context))
+            for controller in loop.controllers
+        ]
+        for other in values[1:]:
+            np.testing.assert_allclose(other, values[0], atol=1e-12)
+
+
+def test_a_plan_for_another_team_is_refused():
+    scenario, plan = small_problem("base")
+    other = small_plan(("robot_0::elbow",))
+    with pytest.raises(PlanError, match="the plan moves the joints robot_0::elbow; the scenario's team has"):
+        build_closed_loop(scenario, other, small_maps())
+    with pytest.raises(PlanError, match="a plan of 3 cells needs as many maps, not 2"):
+        build_closed_loop(scenario, plan, small_maps()[:2])

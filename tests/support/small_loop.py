@@ -1,0 +1,38 @@
+"""The open-room transport as a closed loop, for every team that ships."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from pydrake.systems.framework import DiagramBuilder
+
+from coop_drake.control import GainSet
+from coop_drake.diagram import ClosedLoop, build_closed_loop
+from coop_drake.fields import HarmonicMap
+from coop_drake.planning.plan import Plan
+from coop_drake.plant import build_team_plant
+from coop_drake.scenario import Scenario
+from coop_drake.simulation import build_maps
+from tests.support.small_plan import small_plan
+from tests.support.small_scenario import small_scenario
+
+TEAMS = ("base", "elbow", "three")
+
+
+@cache
+def small_maps() -> tuple[HarmonicMap, ...]:
+    """Maps of the plan's cells; they are the same for every team and every gain set."""
+    return build_maps(small_plan(()))
+
+
+def small_problem(team: str = "base", gain_set: GainSet | None = None) -> tuple[Scenario, Plan]:
+    """Scenario and hand-written plan of a team."""
+    scenario = small_scenario(team)
+    names = build_team_plant(scenario, DiagramBuilder()).joint_names
+    return scenario, small_plan(names, gain_set)
+
+
+def small_loop(team: str = "base", gain_set: GainSet | None = None) -> ClosedLoop:
+    """The closed loop of a team."""
+    scenario, plan = small_problem(team, gain_set)
+    return build_closed_loop(scenario, plan, small_maps())

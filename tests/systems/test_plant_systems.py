@@ -1,0 +1,151 @@
+import numpy as np
+import pytest
+from pydrake.systems.framework import DiagramBuilder
+
+from coop_drake.control import robot_acceleration, robot_torque
+from coop_drake.plant import base_poses, build_robot_plant, build_team_plant, set_configuration
+from coop_drake.systems import ObjectPoseSensor, ObjectTwist, RobotEffort, RobotStateSensor, TeamActuation
+from tests.support.small_scenario import small_scenario
+from tests.support.system_checks import (
+    SIZE_OF_ABSTRACT,
+    assert_every_input_is_required,
+    context_with,
+    evaluate,
+    port_sizes,
+)
+
+TEAMS = ("base", "elbow", "three")
+
+
+class Rig:
+    """A shipped team in a configuration where nothing is symmetric, moving."""
+
+    def __init__(self, team):
+        self.scenario = small_scenario(team)
+        self.team = build_team_plant(self.scenario, DiagramBuilder())
+        generator = np.random.default_rng(3)
+        n = len(self.team.joints)
+        self.z = np.array([3.0, 3.0, 0.4, *generator.uniform(-0.8, 0.8, n)])
+        self.rates = generator.uniform(-0.5, 0.5, 3 + n)
+        self.context = self.team.plant.CreateDefaultContext()
+        set_configuration(self.team, self.context, self.z, self.rates)
+        self.team_state = self.team.plant.GetPositionsAndVelocities(self.context)
+
+    def robot_state(self, k):
+        return evaluate(RobotStateSensor(self.team, k), {"team_state": self.team_state}, "robot_state")
+
+    def grasp(self, k):
+        X_LE = self.team.robots[k].X_LE
+        return np.array([X_LE.x, X_LE.y])
+
+
+@pytest.fixture(scope="module", params=TEAMS)
+def rig(request):
+    return Rig(request.param)
+
+
+def test_the_object_pose_sensor_reads_the_pose(rig):
+    sensor = ObjectPoseSensor(rig.team)
+    states = rig.team.plant.num_multibody_states()
+    assert port_sizes(sensor) == ({"team_state": states}, {"object_pose": 3})
+    np.testing.assert_array_equal(evaluate(sensor, {"team_state": rig.team_state}, "object_pose"), rig.z[:3])
+    assert_every_input_is_required(sensor, {"team_state": rig.team_state}, {"object_pose": {"team_state"}})
+
+
+def test_the_robot_state_sensor_reads_base_and_joints(rig):
+    states = rig.team.plant.num_multibody_states()
+    ahead, step = rig.team.plant.CreateDefaultContext(), 1e-6
+    set_configuration(rig.team, ahead, rig.z + step * rig.rates)
+    behind = rig.team.plant.CreateDefaultContext()
+    set_configuration(rig.team, behind, rig.z - step * rig.rates)
+    base_rates = (base_poses(rig.team, ahead) - base_poses(rig.team, behind)) / (2.0 * step)
+    for robot in rig.team.robots:
+        sensor, n = RobotStateSensor(rig.team, robot.index), len(robot.joints)
+        assert port_sizes(sensor) == ({"team_state": states}, {"robot_state": 2 * (3 + n)})
+        state = rig.robot_state(robot.index)
+        np.testing.assert_allclose(state[:3], base_poses(rig.team, rig.context)[robot.index], atol=1e-14)
+        np.testing.assert_array_equal(state[3 : 3 + n], rig.z[3:][robot.q_slice])
+        np.testing.assert_allclose(state[3 + n : 6 + n], base_rates[robot.index], atol=1e-8)
+        np.testing.assert_array_equal(state[6 + n :], rig.rates[3:][robot.q_slice])
+        assert_every_input_is_required(
+            sensor, {"team_state": rig.team_state}, {"robot_state": {"team_state"}}
+        )
+
+
+def test_every_robot_finds_the_objects_twist_from_its_own_motion(rig):
+    for robot in rig.team.robots:
+        k, n = robot.index, len(robot.joints)
+        system = ObjectTwist(build_robot_plant(rig.scenario, k), rig.grasp(k))
+        assert port_sizes(system) == ({"robot_state": 2 * (3 + n), "object_pose": 3}, {"object_twist": 3})
+        inputs = {"robot_state": rig.robot_state(k), "object_pose": rig.z[:3]}
+        np.testing.assert_allclose(evaluate(system, inputs, "object_twist"), rig.rates[:3], atol=1e-13)
+        assert_every_input_is_required(system, inputs, {"object_twist": set(inputs)})
+
+
+def test_the_effort_is_the_law_with_the_robots_own_dynamics(rig):
+    generator = np.random.default_rng(5)
+    for robot in rig.team.robots:
+        k, n = robot.index, len(robot.joints)
+        model = build_robot_plant(rig.scenario, k)
+        system = RobotEffort(model)
+        inputs = {
+            "robot_state": rig.robot_state(k),
+            "grasp_acceleration": generator.normal(size=3),
+            "joint_acceleration": generator.normal(size=n),
+            "wrench_share": generator.normal(size=3),
+        }
+        assert port_sizes(system) == (
+            {name: len(value) for name, value in inputs.items()},
+            {"robot_effort": 3 + n},
+        )
+        model.set_state(*np.split(inputs["robot_state"], 2))
+        acceleration = robot_acceleration(
+            inputs["grasp_acceleration"],
+            inputs["joint_acceleration"],
+            jacobian=model.grasp_jacobian(),
+            jacobian_rate_term=model.grasp_bias(),
+        )
+        expected = robot_torque(
+            acceleration,
+            inputs["wrench_share"],
+            mass_matrix=model.mass_matrix(),
+            bias=model.bias(),
+            jacobian=model.grasp_jacobian(),
+        )
+        np.testing.assert_allclose(evaluate(system, inputs, "robot_effort"), expected, rtol=1e-12, atol=1e-12)
+        assert_every_input_is_required(system, inputs, {"robot_effort": set(inputs)})
+
+
+def test_actuation_puts_base_wrenches_on_bases_and_torques_on_joints(rig):
+    system, generator = TeamActuation(rig.team), np.random.default_rng(7)
+    efforts = {
+        f"robot_{robot.index}_effort": generator.normal(size=3 + len(robot.joints))
+        for robot in rig.team.robots
+    }
+    assert port_sizes(system) == (
+        {name: len(value) for name, value in efforts.items()},
+        {"base_wrenches": SIZE_OF_ABSTRACT, "joint_torques": len(rig.team.joints)},
+    )
+    np.testing.assert_array_equal(
+        evaluate(system, efforts, "joint_torques"), np.concatenate([e[3:] for e in efforts.values()])
+    )
+    wrenches = evaluate(system, efforts, "base_wrenches")
+    for robot, wrench, effort in zip(rig.team.robots, wrenches, efforts.values(), strict=True):
+        assert wrench.body_index == robot.base_body.index()
+        np.testing.assert_array_equal(wrench.p_BoBq_B, np.zeros(3))
+        np.testing.assert_array_equal(wrench.F_Bq_W.translational(), [*effort[:2], 0.0])
+        np.testing.assert_array_equal(wrench.F_Bq_W.rotational(), [0.0, 0.0, effort[2]])
+
+
+def test_actuation_needs_every_robots_effort(rig):
+    system = TeamActuation(rig.team)
+    context = context_with(system, {"robot_0_effort": np.zeros(3 + len(rig.team.robots[0].joints))})
+    for output in ("base_wrenches", "joint_torques"):
+        with pytest.raises(RuntimeError, match="robot_1_effort"):
+            system.GetOutputPort(output).Eval(context)
+
+
+@pytest.mark.parametrize("k", [-1, 7])
+def test_a_sensor_for_a_robot_outside_the_team_is_refused(rig, k):
+    with pytest.raises(IndexError, match=f"robot {k} is not in the team of {len(rig.team.robots)}"):
+        RobotStateSensor(rig.team, k)
