@@ -1,0 +1,97 @@
+"""Collisions among the object, the arms and the bases: pairs of bodies over a slice, which eq. (4) leaves out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from coop_drake.geometry.convex import separated
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
+
+_TOUCH = 1e-6
+
+
+@dataclass(frozen=True)
+class BodyPair:
+    """Two bodies that must never overlap.
+
+    Attributes:
+        first: Pieces of the first body, indices into ``SweptTree.pieces``.
+        second: Pieces of the second.
+        first_stages: Joints between the first body and the component that both hang from.
+        second_stages: The same for the second.
+        axes: Axes of the slice that move one against the other; theta is never among them.
+    """
+
+    first: tuple[int, ...]
+    second: tuple[int, ...]
+    first_stages: int
+    second_stages: int
+    axes: tuple[int, ...]
+
+
+class BodyPairs:
+    """Conservative answers about every pair of ``ComponentTree.collision_pairs``, cached by the joints between.
+
+    Args:
+        swept: Sweeps of the tree's pieces.
+    """
+
+    def __init__(self, swept: SweptTree) -> None:
+        self._swept = swept
+        self.pairs = tuple(self._pair(a, b) for a, b in swept.tree.collision_pairs)
+        self._touch: dict[tuple[object, ...], bool] = {}
+        self._overlap: dict[tuple[object, ...], bool] = {}
+
+    def touching(self, intervals: Intervals) -> BodyPair | None:
+        """First pair that may touch somewhere in the slice; None proves the whole slice free of contact."""
+        for number, pair in enumerate(self.pairs):
+            key = (number, *[intervals[axis] for axis in pair.axes])
+            touch = self._touch.get(key)
+            if touch is None:
+                touch = self._touch[key] = self._may_touch(pair, intervals)
+            if touch:
+                return pair
+        return None
+
+    def overlapping(self, intervals: Intervals) -> BodyPair | None:
+        """First pair that overlaps all over the slice: proves that no configuration in it is free."""
+        for number, pair in enumerate(self.pairs):
+            key = (number, *[intervals[axis] for axis in pair.axes])
+            overlap = self._overlap.get(key)
+            if overlap is None:
+                overlap = self._overlap[key] = self._must_overlap(pair, intervals)
+            if overlap:
+                return pair
+        return None
+
+    def _may_touch(self, pair: BodyPair, intervals: Intervals) -> bool:
+        others = [self._swept.over(j, intervals, pair.second_stages) for j in pair.second]
+        return any(
+            not separated(self._swept.over(i, intervals, pair.first_stages), other, _TOUCH)
+            for i in pair.first
+            for other in others
+        )
+
+    def _must_overlap(self, pair: BodyPair, intervals: Intervals) -> bool:
+        others = [self._swept.under(j, intervals, pair.second_stages) for j in pair.second]
+        for i in pair.first:
+            piece = self._swept.under(i, intervals, pair.first_stages)
+            if piece is not None and any(o is not None and not separated(piece, o, -_TOUCH) for o in others):
+                return True
+        return False
+
+    def _pair(self, first: tuple[int, int], second: tuple[int, int]) -> BodyPair:
+        chains = [self._swept.tree.ancestors[component] for component, _ in (first, second)]
+        common = next(i for i in chains[0] if i in chains[1])
+        stages = [chain.index(common) for chain in chains]
+        members = [
+            tuple(n for n, piece in enumerate(self._swept.pieces) if (piece.component, piece.body) == body)
+            for body in (first, second)
+        ]
+        axes = [
+            1 + joint.index
+            for chain, count in zip(chains, stages, strict=True)
+            for joint in (self._swept.tree.components[i].joint for i in chain[:count])
+            if joint is not None
+        ]
+        return BodyPair(members[0], members[1], stages[0], stages[1], tuple(sorted(axes)))

@@ -1,0 +1,162 @@
+"""Over- and under-footprints of the team over a compound slice, eq. (6), cached by the ancestors' slices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.sweeps import (
+    common_disc,
+    disc_turn,
+    grown,
+    inscribed,
+    over_prismatic,
+    over_revolute,
+    under_prismatic,
+    under_revolute,
+)
+from coop_drake.geometry.tree import ComponentTree, ConvexShape, TreeJoint
+
+Interval = tuple[float, float]
+Intervals = tuple[Interval, ...]
+
+
+@dataclass(frozen=True)
+class Piece:
+    """One convex piece of one body of one component.
+
+    Attributes:
+        component: Index of the component.
+        body: Index of the body in the component.
+        shape: The piece in the component's frame.
+        chain: Components from its own to the object's.
+        axes: Axes of the slice that move it, its own joint first, theta (axis 0) last.
+    """
+
+    component: int
+    body: int
+    shape: ConvexShape
+    chain: tuple[int, ...]
+    axes: tuple[int, ...]
+
+
+class SweptTree:
+    """Sweeps of every convex piece of a tree over the intervals of a slice.
+
+    A slice is a tuple of intervals (lower, upper) of the axes (theta, q...) [rad, m].
+
+    Args:
+        tree: The team as seen from the object outwards.
+    """
+
+    def __init__(self, tree: ComponentTree) -> None:
+        self.tree = tree
+        pieces = []
+        for index, component in enumerate(tree.components):
+            chain = tree.ancestors[index]
+            joints = [tree.components[i].joint for i in chain]
+            axes = (*[1 + joint.index for joint in joints if joint is not None], 0)
+            pieces += [
+                Piece(index, number, shape, chain, axes)
+                for number, body in enumerate(component.bodies)
+                for shape in body.shapes
+            ]
+        self.pieces: tuple[Piece, ...] = tuple(pieces)
+        self._over: dict[tuple[object, ...], FloatArray] = {}
+        self._under: dict[tuple[object, ...], FloatArray | None] = {}
+
+    def forget(self) -> None:
+        """Drop all cached sweeps."""
+        self._over.clear()
+        self._under.clear()
+
+    def over(self, index: int, intervals: Intervals, stages: int | None = None) -> FloatArray:
+        """Polygon that encloses a piece at every configuration of a slice, the object's origin at p_WL = 0.
+
+        Args:
+            index: Index into ``pieces``.
+            intervals: The slice.
+            stages: Number of joints to sweep, from the piece's own; None for all and theta, which gives
+                directions of W; fewer leave the piece in the frame of the component ``chain[stages]``.
+
+        Returns:
+            Vertices, counter-clockwise, shape (n, 2) [m].
+        """
+        piece = self.pieces[index]
+        count = len(piece.axes) if stages is None else stages
+        vertices = self._over_stage(index, intervals, count)
+        if piece.shape.radius == 0.0:
+            return vertices
+        return grown(vertices, piece.shape.radius, self._turn(piece, intervals, count))
+
+    def under(self, index: int, intervals: Intervals, stages: int | None = None) -> FloatArray | None:
+        """Polygon that a piece covers at every configuration of a slice, or None; see ``over``."""
+        piece = self.pieces[index]
+        count = len(piece.axes) if stages is None else stages
+        if len(piece.shape.vertices) == 1:
+            centres = self._over_stage(index, intervals, count)
+            return common_disc(centres, piece.shape.radius, self._turn(piece, intervals, count))
+        return self._under_stage(index, intervals, count)
+
+    @staticmethod
+    def _turn(piece: Piece, intervals: Intervals, stages: int) -> float:
+        widths = [intervals[axis][1] - intervals[axis][0] for axis in piece.axes[:stages]]
+        return disc_turn(0.5 * max(widths, default=0.0))
+
+    def _over_stage(self, index: int, intervals: Intervals, count: int) -> FloatArray:
+        piece = self.pieces[index]
+        if count == 0:
+            return piece.shape.vertices
+        key = (index, count, *[intervals[axis] for axis in piece.axes[:count]])
+        found = self._over.get(key)
+        if found is None:
+            inner = self._over_stage(index, intervals, count - 1)
+            found = self._over_joint(inner, piece, count - 1, intervals[piece.axes[count - 1]])
+            self._over[key] = found
+        return found
+
+    def _over_joint(self, vertices: FloatArray, piece: Piece, stage: int, interval: Interval) -> FloatArray:
+        joint = self.tree.components[piece.chain[stage]].joint
+        if joint is None or joint.kind == "revolute":
+            swept = over_revolute(vertices, *_turning(joint, interval))
+        else:
+            swept = over_prismatic(vertices, *_sliding(joint, interval))
+        return swept if joint is None else joint.X_PJ.apply(swept)
+
+    def _under_stage(self, index: int, intervals: Intervals, count: int) -> FloatArray | None:
+        piece = self.pieces[index]
+        key = (index, count, *[intervals[axis] for axis in piece.axes[:count]])
+        if key not in self._under:
+            self._under[key] = self._make_under(piece, index, intervals, count)
+        return self._under[key]
+
+    def _make_under(self, piece: Piece, index: int, intervals: Intervals, count: int) -> FloatArray | None:
+        if count == 0:
+            shape = piece.shape
+            if shape.radius == 0.0:
+                return shape.vertices if len(shape.vertices) > 2 else None
+            return inscribed(shape.vertices, shape.radius, self._turn(piece, intervals, len(piece.axes)))
+        inner = self._under_stage(index, intervals, count - 1)
+        if inner is None:
+            return None
+        joint = self.tree.components[piece.chain[count - 1]].joint
+        interval = intervals[piece.axes[count - 1]]
+        if joint is None or joint.kind == "revolute":
+            swept = under_revolute(inner, *_turning(joint, interval))
+        else:
+            swept = under_prismatic(inner, *_sliding(joint, interval))
+        return swept if joint is None or swept is None else joint.X_PJ.apply(swept)
+
+
+def _turning(joint: TreeJoint | None, interval: Interval) -> tuple[float, float]:
+    """Centre and half-width of the turn that an interval of a revolute joint (or of theta) stands for."""
+    sign = 1.0 if joint is None else joint.sign
+    return sign * 0.5 * (interval[0] + interval[1]), 0.5 * (interval[1] - interval[0])
+
+
+def _sliding(joint: TreeJoint, interval: Interval) -> tuple[FloatArray, FloatArray]:
+    """Displacements in J at both ends of an interval of a prismatic joint."""
+    axis = np.array(joint.axis)
+    return axis * interval[0], axis * interval[1]

@@ -1,0 +1,161 @@
+"""Cells of one compound slice, eqs. (5), (8): what is free for sure, and what may be free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from manifold3d import CrossSection
+from shapely import MultiPolygon, Polygon
+
+from coop_drake.geometry.body_pairs import BodyPair, BodyPairs
+from coop_drake.geometry.convex import following
+from coop_drake.geometry.minkowski import FreeSpace
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
+
+_NEGLIGIBLE_AREA = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """One connected set of positions p_WL.
+
+    Attributes:
+        section: The set itself, with holes.
+        bounds: (x_min, y_min, x_max, y_max) [m].
+        area: Its area [m^2].
+    """
+
+    section: CrossSection
+    bounds: tuple[float, float, float, float]
+    area: float
+
+    @classmethod
+    def of(cls, section: CrossSection) -> Region:
+        """Measure a connected section."""
+        return cls(section, section.bounds(), section.area())
+
+    @cached_property
+    def rings(self) -> list[FloatArray]:
+        """Boundary rings, shape (n, 2) each [m]."""
+        return [np.asarray(ring, dtype=float) for ring in self.section.to_polygons()]
+
+    @cached_property
+    def breadth(self) -> float:
+        """Area over perimeter [m]: half the width of a strip."""
+        perimeter = sum(float(np.hypot(*(following(ring) - ring).T).sum()) for ring in self.rings)
+        return self.area / perimeter
+
+    def holds(self, point: FloatArray) -> bool:
+        """Whether the point lies inside (even-odd rule over all rings)."""
+        x, y = float(point[0]), float(point[1])
+        inside = False
+        for ring in self.rings:
+            tail = following(ring)
+            spans = (ring[:, 1] > y) != (tail[:, 1] > y)
+            a, b = ring[spans], tail[spans]
+            crossings = a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1]) > x
+            inside ^= bool(crossings.sum() % 2)
+        return inside
+
+    def meets(self, other: Region) -> bool:
+        """Whether both sets share more than their boundary."""
+        a, b = self.bounds, other.bounds
+        if a[0] > b[2] or b[0] > a[2] or a[1] > b[3] or b[1] > a[3]:
+            return False
+        return not (self.section ^ other.section).is_empty()
+
+
+class CellMaker:
+    """Builds the cells of slices; footprints and their differences are cached by the ancestors' slices.
+
+    Args:
+        swept: Sweeps of the team's pieces.
+        pairs: Self-collision of the team.
+        workspace: Where the team may be; the margin is already taken off [m].
+    """
+
+    def __init__(self, swept: SweptTree, pairs: BodyPairs, workspace: Polygon | MultiPolygon) -> None:
+        self._swept, self._pairs = swept, pairs
+        self._under_space, self._over_space = FreeSpace.under(workspace), FreeSpace.over(workspace)
+        self._everywhere = self._positions(workspace)
+        self._members = [
+            [n for n, piece in enumerate(swept.pieces) if piece.component == c]
+            for c in range(len(swept.tree.components))
+        ]
+        self._axes = [swept.pieces[members[0]].axes if members else () for members in self._members]
+        self._under: dict[tuple[object, ...], CrossSection] = {}
+        self._over: dict[tuple[object, ...], CrossSection] = {}
+
+    def _positions(self, workspace: Polygon | MultiPolygon) -> CrossSection:
+        """A box that holds every position worth asking about."""
+        x_min, y_min, x_max, y_max = workspace.bounds
+        reach = self._swept.tree.reach + 1.0
+        size = (x_max - x_min + 2.0 * reach, y_max - y_min + 2.0 * reach)
+        return CrossSection.square(size).translate((x_min - reach, y_min - reach))
+
+    def over_cells(self, intervals: Intervals) -> list[Region]:
+        """Regions outside which no configuration of the nominal slice is free."""
+        if self._pairs.overlapping(intervals) is not None:
+            return []
+        region = self._everywhere
+        for component in range(len(self._members)):
+            region = region ^ self._over_component(component, intervals)
+            if region.is_empty():
+                return []
+        return _regions(region, 0.0)
+
+    def under_cells(self, expanded: Intervals) -> list[Region]:
+        """Regions in which every configuration of the expanded slice is free."""
+        if self._pairs.touching(expanded) is not None:
+            return []
+        return _regions(self.under_region(expanded), _NEGLIGIBLE_AREA)
+
+    def guide_cells(self, intervals: Intervals) -> list[Region]:
+        """Free regions of the slice's middle configuration: a hint for the search, never a proof."""
+        middle = tuple((0.5 * (lower + upper), 0.5 * (lower + upper)) for lower, upper in intervals)
+        return self.under_cells(middle)
+
+    def blocked_pair(self, expanded: Intervals) -> BodyPair | None:
+        """A pair of bodies that may touch somewhere in the expanded slice, None if there is none."""
+        return self._pairs.touching(expanded)
+
+    def under_region(self, expanded: Intervals) -> CrossSection:
+        """Positions at which the over-footprint fits, self-collision aside."""
+        region = self._everywhere
+        for component in reversed(range(len(self._members))):
+            region = region ^ self._under_component(component, expanded)
+            if region.is_empty():
+                return region
+        return region
+
+    def _under_component(self, component: int, expanded: Intervals) -> CrossSection:
+        key = (component, *[expanded[axis] for axis in self._axes[component]])
+        found = self._under.get(key)
+        if found is None:
+            found = self._everywhere
+            for index in self._members[component]:
+                found = found ^ self._under_space.minus(self._swept.over(index, expanded))
+                if found.is_empty():
+                    break
+            self._under[key] = found
+        return found
+
+    def _over_component(self, component: int, intervals: Intervals) -> CrossSection:
+        key = (component, *[intervals[axis] for axis in self._axes[component]])
+        found = self._over.get(key)
+        if found is None:
+            found = self._everywhere
+            for index in self._members[component]:
+                footprint = self._swept.under(index, intervals)
+                if footprint is not None:
+                    found = found ^ self._over_space.minus(footprint)
+            self._over[key] = found
+        return found
+
+
+def _regions(section: CrossSection, smallest: float) -> list[Region]:
+    regions = [Region.of(part) for part in section.decompose()]
+    return sorted((r for r in regions if r.area > smallest), key=lambda r: r.bounds)

@@ -1,0 +1,154 @@
+"""One exploration of the free configuration space at one margin: Algorithm 1 with blame for its heuristic."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from shapely import MultiPolygon, Polygon
+
+from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.planning.cell_graph import Cell, CellGraph, Kind
+from coop_drake.planning.cells import CellMaker, Region
+from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.refine import Blame
+from coop_drake.planning.slices import Slices
+
+_FREE_TIME = 0.6
+_NARROW_TIME = 0.03
+_NARROWEST = 1e-3
+_GUIDE_WEIGHT = 10.0
+_MIXED_WEIGHT = 100.0
+_UNSPLITTABLE_WEIGHT = 1e4
+
+
+class Verdict(Enum):
+    """How an exploration ended."""
+
+    FOUND = "found"
+    INFEASIBLE = "infeasible"
+    RESOLUTION = "below resolution"
+    BUDGET = "budget spent"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Result of one exploration.
+
+    Attributes:
+        verdict: How it ended.
+        path: Cells of the last channel; all FREE if found, empty if infeasible.
+        slices: Compound slices made.
+    """
+
+    verdict: Verdict
+    path: tuple[Cell, ...]
+    slices: int
+
+
+class Exploration:
+    """Slices, cells and graph of one attempt.
+
+    Args:
+        problem: The question.
+        workspace: Floor with the margin taken off [m].
+        swept: Sweeps of the problem's tree, shared among attempts.
+        pairs: Self-collision of the problem's tree, shared among attempts.
+    """
+
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        workspace: Polygon | MultiPolygon,
+        swept: SweptTree,
+        pairs: BodyPairs,
+    ) -> None:
+        self._problem = problem
+        self.slices = Slices(problem.tree, problem.settings.slice_overlap)
+        self.maker = CellMaker(swept, pairs, workspace)
+        self.graph = CellGraph(self.slices)
+        self.blame = Blame(problem.tree, self.maker, self.slices, problem.settings)
+        for index in self.slices.leaves():
+            self._add(index)
+
+    def run(self, budget: int, progress: Callable[[int], None] | None = None) -> Outcome:
+        """Search and split until there is an answer or the budget of slices is spent.
+
+        The cheapest channel of FREE and undecided cells is searched; every slice on it that is not FREE is
+        halved along the axis to blame. No channel at all is a proof that none exists.
+        """
+        while True:
+            path = self.graph.cheapest(self._starts(), self._goals())
+            if path is None:
+                return Outcome(Verdict.INFEASIBLE, (), len(self.slices.all))
+            open_cells = {cell.slice: cell for cell in path if cell.kind is not Kind.FREE}
+            if not open_cells:
+                return Outcome(Verdict.FOUND, tuple(path), len(self.slices.all))
+            if len(self.slices.all) >= budget:
+                return Outcome(Verdict.BUDGET, tuple(path), len(self.slices.all))
+            if not any([self._split(cell) for cell in open_cells.values()]):
+                return Outcome(Verdict.RESOLUTION, tuple(path), len(self.slices.all))
+            if progress is not None:
+                progress(len(self.slices.all))
+
+    def counts(self) -> tuple[int, int]:
+        """Numbers of FREE and of MIXED cells of the leaves."""
+        kinds = [cell.kind for cells in self.graph.by_slice.values() for cell in cells]
+        return kinds.count(Kind.FREE), kinds.count(Kind.MIXED)
+
+    def widest(self, path: Sequence[Cell]) -> float:
+        """Widest interval left undecided on a channel, as a fraction of its axis."""
+        whole = self.slices.axis_widths
+        return max(
+            (upper - lower) / width
+            for cell in path
+            if cell.kind is not Kind.FREE
+            for (lower, upper), width in zip(self.slices.all[cell.slice].intervals, whole, strict=True)
+        )
+
+    def _split(self, cell: Cell) -> bool:
+        intervals = self.slices.all[cell.slice].intervals
+        if not self.blame.splittable(intervals):
+            return False
+        axis = self.blame.axis(intervals, cell.region)
+        self.graph.remove(cell.slice)
+        for half in self.slices.split(cell.slice, axis):
+            self._add(half)
+        return True
+
+    def _add(self, index: int) -> None:
+        intervals = self.slices.all[index].intervals
+        mixed = self.maker.over_cells(intervals)
+        free = self.maker.under_cells(self.slices.expanded(intervals)) if mixed else []
+        guide = self.maker.guide_cells(intervals) if mixed else []
+        final = not self.blame.splittable(intervals)
+        members = [(Kind.FREE, region, _free_weight(region)) for region in free]
+        members += [(Kind.GUIDE, region, _GUIDE_WEIGHT) for region in guide if not final]
+        weight = _UNSPLITTABLE_WEIGHT if final else _MIXED_WEIGHT
+        members += [(Kind.MIXED, region, weight) for region in mixed]
+        self.graph.add(index, members)
+
+    def _starts(self) -> list[Cell]:
+        start = self._problem.start
+        return [
+            cell
+            for index in self.slices.holding([float(angle) for angle in start[2:]])
+            for cell in self.graph.by_slice[index]
+            if cell.region.holds(start[:2])
+        ]
+
+    def _goals(self) -> set[int]:
+        goal = self._problem.goal_pose
+        return {
+            cell.index
+            for index in self.slices.holding([float(goal[2]), *self._problem.goal_joints])
+            for cell in self.graph.by_slice[index]
+            if cell.region.holds(goal[:2])
+        }
+
+
+def _free_weight(region: Region) -> float:
+    """Time to pass a free cell: a share for its angles and one for its narrowness [s]."""
+    return _FREE_TIME + _NARROW_TIME / max(region.breadth, _NARROWEST)

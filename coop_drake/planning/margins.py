@@ -1,0 +1,97 @@
+"""Workspaces shrunk by a margin, with room left at the start and at the goal (rule 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import pi
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+
+from coop_drake.geometry.convex import normals
+from coop_drake.geometry.minkowski import FreeSpace, polygon_rings, to_polygon
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.tree import Component, ComponentTree
+from coop_drake.planning.problem import PlanningProblem
+
+SMALLEST_MARGIN = 0.005
+"""Below this a margin is not worth an attempt of its own [m]."""
+
+_OCTAGON = normals(np.arange(8) * pi / 4.0 + pi / 8.0) / np.cos(pi / 8.0)
+_SHARE = 0.5
+
+
+def margins(first: float) -> Iterator[float]:
+    """The margins to try: the first, halved while worth it, then 0 [m]."""
+    margin = first
+    while margin >= SMALLEST_MARGIN:
+        yield margin
+        margin *= 0.5
+    yield 0.0
+
+
+def shrunk(workspace: Polygon, margin: float) -> MultiPolygon:
+    """Workspace without its points nearer than the margin to a wall, corners by an octagon about the disc."""
+    if margin <= 0.0:
+        return MultiPolygon([workspace])
+    section = FreeSpace(polygon_rings(workspace)).minus(margin * _OCTAGON)
+    return MultiPolygon([to_polygon(part) for part in section.decompose()])
+
+
+def marginal_workspace(problem: PlanningProblem, margin: float) -> MultiPolygon:
+    """Workspace shrunk by the margin except where start or goal themselves stand closer to a wall.
+
+    There a patch around the footprint is shrunk by half of the footprint's own clearance only, so that a
+    start near a wall does not forbid a margin everywhere else.
+    """
+    result = shrunk(problem.workspace, margin)
+    for footprint in (_start_footprint(problem), _goal_footprint(problem)):
+        clearance = float(problem.workspace.exterior.distance(footprint))
+        clearance = min(
+            [clearance, *[float(ring.distance(footprint)) for ring in problem.workspace.interiors]]
+        )
+        if clearance < 1.1 * margin and problem.workspace.contains(footprint):
+            own = shrunk(problem.workspace, _SHARE * clearance)
+            patch = own.intersection(footprint.buffer(2.0 * margin, quad_segs=2))
+            result = _areas(shapely.union(result, patch))
+    return result
+
+
+def _areas(shape: shapely.Geometry) -> MultiPolygon:
+    parts = [part for part in shapely.get_parts(shape) if isinstance(part, Polygon)]
+    return MultiPolygon(parts)
+
+
+def _start_footprint(problem: PlanningProblem) -> shapely.Geometry:
+    return exact_footprint(problem.tree, problem.start)
+
+
+def _goal_footprint(problem: PlanningProblem) -> shapely.Geometry:
+    """Footprint at the goal of what is known there: everything if all joints have a goal, else the object's."""
+    joints = [0.0 if value is None else value for value in problem.goal_joints]
+    configuration = np.array([*problem.goal_pose, *joints])
+    if any(value is None for value in problem.goal_joints):
+        return exact_footprint(problem.tree, configuration, components=1)
+    return exact_footprint(problem.tree, configuration)
+
+
+def exact_footprint(
+    tree: ComponentTree, configuration: FloatArray, components: int | None = None
+) -> shapely.Geometry:
+    """Footprint of the first components at a configuration, eq. (3), discs by fine polygons.
+
+    Args:
+        tree: The team.
+        configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
+        components: How many components to take; None for all.
+    """
+    poses = tree.poses(configuration)
+    chosen: list[Component] = list(tree.components[:components])
+    shapes = [
+        shapely.MultiPoint(X_WC.apply(shape.vertices)).convex_hull.buffer(shape.radius, quad_segs=32)
+        for component, X_WC in zip(chosen, poses, strict=False)
+        for body in component.bodies
+        for shape in body.shapes
+    ]
+    return shapely.union_all(shapes)

@@ -1,0 +1,108 @@
+"""Which axis of a slice to halve: the one to blame for what is neither free nor blocked."""
+
+from __future__ import annotations
+
+from coop_drake.geometry.swept_tree import Intervals
+from coop_drake.geometry.tree import ComponentTree
+from coop_drake.planning.cells import CellMaker, Region
+from coop_drake.planning.problem import PlannerSettings
+from coop_drake.planning.slices import Slices
+
+_DECIDED = 1e-3
+_MOSTLY_FREE = 0.5
+
+
+class Blame:
+    """Chooses axes for one exploration.
+
+    Args:
+        tree: The team.
+        maker: Cells of slices.
+        slices: The subdivision.
+        settings: Resolutions below which no axis is halved.
+    """
+
+    def __init__(
+        self, tree: ComponentTree, maker: CellMaker, slices: Slices, settings: PlannerSettings
+    ) -> None:
+        self._maker, self._slices = maker, slices
+        self._levers = axis_levers(tree)
+        self._finest = (
+            settings.angle_resolution,
+            *(
+                settings.angle_resolution if joint.kind == "revolute" else settings.length_resolution
+                for joint in tree.joints
+            ),
+        )
+
+    def splittable(self, intervals: Intervals) -> list[int]:
+        """Axes that are still wider than the resolution."""
+        return [
+            axis
+            for axis, ((lower, upper), finest) in enumerate(zip(intervals, self._finest, strict=True))
+            if upper - lower > finest
+        ]
+
+    def axis(self, intervals: Intervals, region: Region) -> int:
+        """Axis whose halving frees most of a region.
+
+        Where no halving frees anything yet, it is the axis along which the team sweeps furthest. A contact
+        among bodies in a slice that the walls leave free is charged to the joints involved alone.
+
+        Args:
+            intervals: A slice with at least one splittable axis.
+            region: The undecided cell of that slice.
+        """
+        axes = self.splittable(intervals)
+        expanded = self._slices.expanded(intervals)
+        pair = self._maker.blocked_pair(expanded)
+        if pair is not None:
+            free = (self._maker.under_region(expanded) ^ region.section).area()
+            involved = [axis for axis in pair.axes if axis in axes]
+            if involved and free > _MOSTLY_FREE * region.area:
+                return self._widest(intervals, involved)
+        freed = [self._freed(intervals, axis, region) for axis in axes]
+        if max(freed) <= _DECIDED * region.area:
+            return self._widest(intervals, axes)
+        return axes[freed.index(max(freed))]
+
+    def _widest(self, intervals: Intervals, axes: list[int]) -> int:
+        sweep = [(intervals[axis][1] - intervals[axis][0]) * self._levers[axis] for axis in axes]
+        return axes[sweep.index(max(sweep))]
+
+    def _freed(self, intervals: Intervals, axis: int, region: Region) -> float:
+        lower, upper = intervals[axis]
+        middle = 0.5 * (lower + upper)
+        total = 0.0
+        for part in ((lower, middle), (middle, upper)):
+            half = self._slices.expanded((*intervals[:axis], part, *intervals[axis + 1 :]))
+            total += (self._maker.under_region(half) ^ region.section).area()
+        return round(total, 9)
+
+
+def axis_levers(tree: ComponentTree) -> tuple[float, ...]:
+    """How far a unit of each axis (theta, q...) moves the furthest point it carries [m/rad or 1]."""
+    reaches = [0.0] * len(tree.components)
+    levers = [0.0] * (1 + len(tree.joints))
+    for index in range(len(tree.components) - 1, -1, -1):
+        component = tree.components[index]
+        own = max(
+            (
+                float((shape.vertices**2).sum(axis=1).max() ** 0.5) + shape.radius
+                for body in component.bodies
+                for shape in body.shapes
+            ),
+            default=0.0,
+        )
+        reaches[index] = max(reaches[index], own)
+        joint = component.joint
+        if joint is None or component.parent is None:
+            levers[0] = reaches[index]
+            continue
+        length = (joint.axis[0] ** 2 + joint.axis[1] ** 2) ** 0.5
+        revolute = joint.kind == "revolute"
+        levers[1 + joint.index] = reaches[index] if revolute else length
+        slide = 0.0 if revolute else length * max(abs(joint.lower), abs(joint.upper))
+        offset = (joint.X_PJ.x**2 + joint.X_PJ.y**2) ** 0.5
+        reaches[component.parent] = max(reaches[component.parent], offset + slide + reaches[index])
+    return tuple(levers)
