@@ -63,7 +63,7 @@ def run_governor(
 
     start = np.concatenate([position, velocity, governor])
     solution = solve_ivp(
-        derivative, (0.0, seconds), start, method="DOP853", rtol=tolerance, atol=tolerance, max_step=0.02
+        derivative, (0.0, seconds), start, method="DOP853", rtol=tolerance, atol=tolerance, max_step=0.05
     )
     states = solution.y.T
     margins = np.array([margin_of(state) for state in states])
