@@ -11,7 +11,7 @@ K the double layer, g = exp(i angle) on the outer ring and 0 on holes; hole k co
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from math import pi
 
 import numpy as np
@@ -23,10 +23,11 @@ from coop_drake.fields.corners import corner_operator
 from coop_drake.fields.nodes import Nodes, place_nodes
 from coop_drake.fields.outline import ComplexArray, Outline
 from coop_drake.fields.panels import Panels
-from coop_drake.fields.quadrature import FloatArray
+from coop_drake.fields.quadrature import FloatArray, legendre_transform
 
 __all__ = ["REFINED_NODES", "Density", "solve_density"]
 
+_NEAR = 4.3  # |zeta - 1| + |zeta + 1| below which panels are integrated exactly
 REFINED_NODES = 16  # nodes on a panel after the Nystrom interpolation
 
 
@@ -60,7 +61,10 @@ def solve_density(
     n, holes = len(grid.position), outline.holes
     ring = outline.ring[grid.edge]
     matrix = np.zeros((n + holes, n + holes), order="F")
+    first, transform = int(grid.corner_start[-1]), legendre_transform(nodes)
+    segments = _segments(outline, panels)
     _fill_double_layer(grid.position, grid.element, grid.edge, grid.corner, matrix)
+    _fill_near(grid.position, grid.edge, segments, panels.edge, transform, first, matrix)
     matrix[n + ring[ring > 0] - 1, np.flatnonzero(ring > 0)] = np.abs(grid.element[ring > 0])
     for k in range(holes):
         matrix[n + k, :n] /= matrix[n + k, :n].sum()
@@ -84,15 +88,25 @@ def solve_density(
     incoming = 2.0 * (_as_real(refined.boundary_value) + constants[outline.ring[refined.edge]])
     _subtract_double_layer(
         grid.position, grid.element, grid.edge, grid.corner, weighted,
-        refined.position, refined.edge, refined.corner, incoming,
+        refined.position, refined.edge, refined.corner, segments, transform, first, incoming,
     )  # fmt: skip
     return Density(grid, weighted, refined, incoming, images, condition)
+
+
+def _segments(outline: Outline, panels: Panels) -> ComplexArray:
+    """Centre and half vector of each regular panel, shape (panels, 2)."""
+    start = outline.vertices[panels.edge]
+    tangent = (outline.ends - outline.vertices)[panels.edge]
+    tangent = tangent / np.abs(tangent)
+    middle, half = 0.5 * (panels.end + panels.start), 0.5 * (panels.end - panels.start)
+    return np.column_stack((start + middle * tangent, half * tangent))
 
 
 def _as_real(z: ComplexArray) -> FloatArray:
     return np.column_stack((z.real, z.imag))
 
 
+@lru_cache(maxsize=4096)
 def _corner_block(angle: float, nodes: int, closeness: float) -> FloatArray:
     """R of one corner on its incoming and outgoing leg together."""
     even, odd = corner_operator(angle, nodes, closeness).compressed
@@ -119,7 +133,7 @@ def _factorise_and_solve(matrix: FloatArray, right: FloatArray) -> tuple[FloatAr
 def _fill_double_layer(
     position: ComplexArray, element: ComplexArray, edge: np.ndarray, corner: np.ndarray, matrix: FloatArray
 ) -> None:
-    """2 K between all nodes but those of one edge (exactly zero) and those of one corner (compressed apart)."""
+    """2 K between all nodes but those of one edge (exactly zero) and of one corner (compressed apart)."""
     n = len(position)
     x, y = position.real.copy(), position.imag.copy()
     for j in range(n):
@@ -132,22 +146,76 @@ def _fill_double_layer(
 
 
 @compiled
+def _fill_near(
+    target: ComplexArray, target_edge: np.ndarray, segments: ComplexArray, edge: np.ndarray,
+    transform: FloatArray, first: int, matrix: FloatArray,
+) -> None:  # fmt: skip
+    """Overwrite the columns of regular panels where a target is near: exact for polynomial densities."""
+    p = len(transform)
+    moments = np.empty(p)
+    for k in range(len(segments)):
+        centre, half = segments[k, 0], segments[k, 1]
+        for i in range(len(target)):
+            if target_edge[i] == edge[k]:
+                continue
+            zeta = (target[i] - centre) / half
+            if abs(zeta - 1.0) + abs(zeta + 1.0) < _NEAR:
+                _legendre_moments(zeta, moments)
+                for j in range(p):
+                    weight = 0.0
+                    for degree in range(p):
+                        weight += moments[degree] * transform[degree, j]
+                    matrix[i, first + k * p + j] = weight
+
+
+@compiled
+def _legendre_moments(zeta: complex, out: FloatArray) -> None:
+    """1/pi times the imaginary part of the integral of P_k(x) / (x - zeta) over [-1, 1], k from 0."""
+    q0 = 0.5 * (np.log(zeta + 1.0) - np.log(zeta - 1.0))
+    q1 = zeta * q0 - 1.0
+    out[0], out[1] = -2.0 / pi * q0.imag, -2.0 / pi * q1.imag
+    for k in range(1, len(out) - 1):
+        q0, q1 = q1, ((2 * k + 1) * zeta * q1 - k * q0) / (k + 1)
+        out[k + 1] = -2.0 / pi * q1.imag
+
+
+@compiled
 def _subtract_double_layer(
     position: ComplexArray, element: ComplexArray, edge: np.ndarray, corner: np.ndarray, density: FloatArray,
-    target: ComplexArray, target_edge: np.ndarray, target_corner: np.ndarray, out: FloatArray,
+    target: ComplexArray, target_edge: np.ndarray, target_corner: np.ndarray,
+    segments: ComplexArray, transform: FloatArray, first: int, out: FloatArray,
 ) -> None:  # fmt: skip
-    """Subtract 2 K density at other points of the boundary, with the same exceptions."""
+    """Subtract 2 K density at other points of the boundary, by the same rules."""
     x, y = position.real.copy(), position.imag.copy()
     dx, dy = element.real / pi, element.imag / pi
-    u, v = density[:, 0].copy(), density[:, 1].copy()
+    p = len(transform)
+    moments = np.empty(p)
     for i in range(len(target)):
         px, py, e, c = target[i].real, target[i].imag, target_edge[i], target_corner[i]
         su, sv = 0.0, 0.0
-        for j in range(len(x)):
+        for j in range(first):
             rx, ry = x[j] - px, y[j] - py
             value = (dy[j] * rx - dx[j] * ry) / (rx * rx + ry * ry)
             value = 0.0 if edge[j] == e or (corner[j] == c and c >= 0) else value
-            su += value * u[j]
-            sv += value * v[j]
+            su += value * density[j, 0]
+            sv += value * density[j, 1]
+        for k in range(len(segments)):
+            start = first + k * p
+            if edge[start] == e:
+                continue
+            zeta = (target[i] - segments[k, 0]) / segments[k, 1]
+            if abs(zeta - 1.0) + abs(zeta + 1.0) < _NEAR:
+                _legendre_moments(zeta, moments)
+                for degree in range(p):
+                    for j in range(p):
+                        weight = moments[degree] * transform[degree, j]
+                        su += weight * density[start + j, 0]
+                        sv += weight * density[start + j, 1]
+            else:
+                for j in range(start, start + p):
+                    rx, ry = x[j] - px, y[j] - py
+                    value = (dy[j] * rx - dx[j] * ry) / (rx * rx + ry * ry)
+                    su += value * density[j, 0]
+                    sv += value * density[j, 1]
         out[i, 0] -= su
         out[i, 1] -= sv

@@ -45,7 +45,7 @@ def _direct(s: FloatArray, first: int, last: int, x: float, y: float) -> Sums:
 
 
 @compiled
-def _panel(density: FloatArray, zx: float, zy: float, hx: float, hy: float) -> Sums:
+def _panel(density: FloatArray, zx: float, zy: float, hx: float, hy: float, tolerance: float) -> Sums:
     """One panel with density (2, 16, 2) seen from zeta = zx + i zy, half vector h."""
     tu, tv, xu, yu, xv, yv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     plus, minus = (zx + 1.0) ** 2 + zy * zy, (zx - 1.0) ** 2 + zy * zy
@@ -65,8 +65,11 @@ def _panel(density: FloatArray, zx: float, zy: float, hx: float, hy: float) -> S
         return _turned(tu, tv, xu, yu, xv, yv, hx, hy)
     plus, minus = max(plus, 1e-26), max(minus, 1e-26)
     zeta = complex(zx, zy)
-    # Principal values: the cut is the panel itself, approached from the domain's side.
-    q0 = complex(0.25 * np.log(plus / minus), 0.5 * (np.arctan2(zy, zx + 1.0) - np.arctan2(zy, zx - 1.0)))
+    start, end = np.arctan2(zy, zx + 1.0), np.arctan2(zy, zx - 1.0)
+    # The cut is the panel itself; a point that rounding put behind it still sees it from the domain's side.
+    if end < -0.5 * pi < start and -zy * np.sqrt(hx * hx + hy * hy) < tolerance:
+        end += 2.0 * pi
+    q0 = complex(0.25 * np.log(plus / minus), 0.5 * (start - end))
     d0 = 1.0 / (1.0 - zeta * zeta + (1e-26 if minus * plus < 1e-25 else 0.0))
     q1, d1 = zeta * q0 - 1.0, q0 + zeta * d0
     c = density[1]
@@ -104,13 +107,10 @@ def _add(a: Sums, b: Sums) -> Sums:
 
 
 @compiled
-def _local(rx: float, ry: float, hx: float, hy: float, tolerance: float) -> tuple[float, float]:
-    """Point r seen from a panel's centre in its own coordinate; a hair behind the wall counts as on it."""
+def _local(rx: float, ry: float, hx: float, hy: float) -> tuple[float, float]:
+    """Point r seen from a panel's centre in the panel's own coordinate."""
     inverse = 1.0 / (hx * hx + hy * hy)
-    zx, zy = (rx * hx + ry * hy) * inverse, (ry * hx - rx * hy) * inverse
-    if zy <= 0.0 and zy * np.sqrt(hx * hx + hy * hy) > -tolerance:
-        zy = 0.0  # also where it is -0.0, which would be the other side of the cut
-    return zx, zy
+    return (rx * hx + ry * hy) * inverse, (ry * hx - rx * hy) * inverse
 
 
 @compiled
@@ -159,11 +159,11 @@ def _corner(m: MapArrays, k: int, rx: float, ry: float, tolerance: float) -> tup
                 a, b = m.breaks[first_break + j], m.breaks[first_break + j + 1]
                 middle, half = 0.5 * (a + b), 0.5 * sign * (b - a)
                 hx, hy = half * dx, half * dy
-                zx, zy = _local(rx - middle * dx, ry - middle * dy, hx, hy, tolerance)
+                zx, zy = _local(rx - middle * dx, ry - middle * dy, hx, hy)
                 if (abs(zx) - 1.0) ** 2 + zy * zy < _JUNCTION * _JUNCTION:
                     step = complex(-hy, hx) * (2.0 * _JUNCTION)
                 ring = m.rings[first + (2 * level + leg) * panels + j]
-                total = _add(total, _panel(ring, zx, zy, hx, hy))
+                total = _add(total, _panel(ring, zx, zy, hx, hy, tolerance))
         scale *= 0.5
         level += 1
     return _add(total, _tail(m, k, level, rx, ry)), step
@@ -194,10 +194,10 @@ def _sums(m: MapArrays, x: float, y: float, tolerance: float) -> tuple[Sums, com
         if rx * rx + ry * ry >= _FAR * (hx * hx + hy * hy):
             part = _direct(m.sources, first + k * nodes, first + (k + 1) * nodes, x, y)
         else:
-            zx, zy = _local(rx, ry, hx, hy, tolerance)
+            zx, zy = _local(rx, ry, hx, hy)
             if (abs(zx) - 1.0) ** 2 + zy * zy < _JUNCTION * _JUNCTION:
                 step = complex(-hy, hx) * (2.0 * _JUNCTION)
-            part = _panel(m.panel_density[k], zx, zy, hx, hy)
+            part = _panel(m.panel_density[k], zx, zy, hx, hy, tolerance)
         total = _add(total, part)
     return total, step
 

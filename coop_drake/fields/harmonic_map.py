@@ -18,7 +18,7 @@ from coop_drake.fields.quadrature import FloatArray
 
 __all__ = ["HarmonicMap"]
 
-_ATTEMPTS = ((12, 1.5), (16, 1.0), (16, 0.5))  # nodes a panel, longest panel per unit of distance
+_ATTEMPTS = ((10, 1.5), (16, 1.0), (16, 0.5))  # nodes a panel, longest panel per unit of distance
 _MAX_UNKNOWNS = 9_000  # 0.7 GB and some ten seconds
 
 

@@ -126,19 +126,19 @@ def _descend(angle: float, closeness: float, incoming: FloatArray) -> tuple[Floa
     operator = corner_operator(angle, REFINED_NODES, closeness)
     n = len(incoming) // 2
     back, out = incoming[:n], incoming[n:]
-    field = np.stack((0.5 * (out + back), 0.5 * (out - back)))
-    fields = [field]
-    for _ in range(LEVELS):
-        fields.append(operator.inward @ fields[-1])
-    stack = np.stack(fields)
-    ring = _legs(operator.ring @ stack[:-1])
-    tail = _legs(operator.compressed @ stack)
-    ring = ring.reshape(LEVELS, 2, -1, REFINED_NODES, 2)
+    fields = np.empty((LEVELS + 1, 2, n, 2))
+    fields[0, 0], fields[0, 1] = 0.5 * (out + back), 0.5 * (out - back)
+    for level in range(LEVELS):
+        np.matmul(operator.inward, fields[level], out=fields[level + 1])
+    ring = _legs(operator.ring @ fields[:-1]).reshape(LEVELS, 2, -1, REFINED_NODES, 2)
     ring[:, 0] = ring[:, 0, :, ::-1]  # the boundary runs towards the corner on the incoming leg
+    tail = _legs(operator.compressed @ fields)
     return ring.reshape(-1, REFINED_NODES, 2), tail.reshape(-1, 2)
 
 
 def _legs(parts: FloatArray) -> FloatArray:
     """Even and odd parts (levels, 2, k, 2) to the incoming and the outgoing leg."""
-    even, odd = parts[:, 0], parts[:, 1]
-    return np.ascontiguousarray(np.stack((even - odd, even + odd), axis=1))
+    legs = np.empty_like(parts)
+    np.subtract(parts[:, 0], parts[:, 1], out=legs[:, 0])
+    np.add(parts[:, 0], parts[:, 1], out=legs[:, 1])
+    return legs

@@ -36,7 +36,12 @@ class Panels:
 
 
 def lay_panels(outline: Outline, closeness: float) -> Panels:
-    """Cut the boundary so that no panel is longer than ``closeness`` times its distance to the other edges."""
+    """Cut the boundary so that every panel resolves the density on it.
+
+    Legs are not longer than ``closeness`` times their distance to the other edges. Regular panels may lie along
+    a wall at any distance, for near panels are integrated exactly: they are not longer than ``closeness`` times
+    their distance to the other edges or to the nearest vertex, whichever is more.
+    """
     starts, ends = outline.vertices, outline.ends
     edges = np.column_stack((starts.real, starts.imag, ends.real, ends.imag))
     total = np.abs(ends - starts)[outline.ring == 0].sum()
@@ -108,7 +113,7 @@ def _edge_panels(
     edges: FloatArray, following: np.ndarray, legs: FloatArray, longest: FloatArray, closeness: float
 ) -> FloatArray:
     """Rows (edge, start, end, gap) of the regular panels, in order along every edge."""
-    rows = []
+    rows = [(0.0, 0.0, 0.0, 0.0) for _ in range(0)]
     piece = np.empty(4)
     stack = np.empty((256, 2))
     for e in range(len(edges)):
@@ -125,11 +130,13 @@ def _edge_panels(
             a, b = stack[depth, 0], stack[depth, 1]
             piece[0], piece[1] = edges[e, 0] + a * dx, edges[e, 1] + a * dy
             piece[2], piece[3] = edges[e, 0] + b * dx, edges[e, 1] + b * dy
-            gap = 1e300
+            gap, vertex = 1e300, 1e300
             for other in range(len(edges)):
                 if other != e:
                     gap = min(gap, segment_distance(piece, edges[other]))
-            if b - a <= min(closeness * gap, longest[e]) or depth > 250 or b - a < 1e-9 * length:
+                x, y = edges[other, 0], edges[other, 1]
+                vertex = min(vertex, _point_distance(x, y, piece[0], piece[1], piece[2], piece[3]))
+            if b - a <= min(closeness * max(gap, vertex), longest[e]) or depth > 250 or b - a < 1e-9 * length:
                 rows.append((float(e), a, b, gap))
             else:
                 middle = 0.5 * (a + b)
