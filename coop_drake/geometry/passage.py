@@ -137,7 +137,9 @@ def pole(polygon: Polygon, tolerance: float = 1e-3) -> tuple[FloatArray, float]:
     if polygon.is_empty or polygon.area <= 0.0:
         raise GeometryError("a polygon without area has no pole of inaccessibility")
     half_width = polygon.area / polygon.length
-    radius = shapely.maximum_inscribed_circle(polygon, tolerance=min(tolerance, 0.1 * half_width))
+    # Edges that are shorter than floating point can tell divide by zero inside GEOS, without harm.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        radius = shapely.maximum_inscribed_circle(polygon, tolerance=min(tolerance, 0.1 * half_width))
     centre = shapely.get_coordinates(radius)[0]
     return centre, BoundaryDistance(polygon)(centre)
 

@@ -78,7 +78,8 @@ def _candidates(polygon: Polygon, path: LineString) -> list[_Slit]:
     inside = polygon.buffer(1e-7)
     slits = []
     for k, hole in enumerate(rings[1:], start=1):
-        points = shapely.points(shapely.get_coordinates(shapely.segmentize(hole, SPACING))[:-1])
+        corners = shapely.get_coordinates(shapely.segmentize(hole, SPACING))
+        points = shapely.points(0.5 * (corners[:-1] + corners[1:]))
         for m, other in enumerate(rings):
             if m == k:
                 continue

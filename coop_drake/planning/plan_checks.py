@@ -24,10 +24,11 @@ def check_plan(plan: Plan, file: str) -> None:
     Raises:
         PlanError: Names the file, the key and what is allowed.
     """
-    _check_ends(plan, file)
-    for k, (cell, transition) in enumerate(zip(plan.cells, plan.transitions, strict=True)):
+    for k, cell in enumerate(plan.cells):
         _require_inside(cell.core, cell.safe, f"{file}: cells[{k}].core", f"cells[{k}].safe")
         _require_inside(cell.tidied, cell.safe, f"{file}: cells[{k}].tidied", f"cells[{k}].safe")
+    _check_ends(plan, file)
+    for k, (cell, transition) in enumerate(zip(plan.cells, plan.transitions, strict=True)):
         _require_inside(
             transition.goal_region, cell.tidied, f"{file}: transitions[{k}].goal_region", f"cells[{k}].tidied"
         )

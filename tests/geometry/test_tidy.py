@@ -1,0 +1,67 @@
+"""Tidy cells: inside the safe region, without holes, fit for a map, with the passage kept."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from shapely import Point, box
+
+from coop_drake.errors import GeometryError
+from coop_drake.geometry import BoundaryDistance, PassageFinder, sharpest_angle, tidy_cell
+from tests.support.channels import untidy_cell
+from tests.support.shapes import floors_with_ends
+
+ENDS = [np.array([0.5, 0.4]), np.array([3.9, 0.4])]
+
+
+def edge_lengths(polygon):
+    return np.linalg.norm(np.diff(shapely.get_coordinates(polygon.exterior), axis=0), axis=1)
+
+
+def test_cusps_slivers_idle_vertices_and_pillars_go_and_the_neck_stays():
+    safe = untidy_cell()
+    tidied = tidy_cell(safe, ENDS)
+    assert not tidied.interiors
+    assert len(edge_lengths(tidied)) < 25
+    assert edge_lengths(tidied).min() > 0.005
+    assert np.degrees(sharpest_angle(safe)) < 5.0
+    assert np.degrees(sharpest_angle(tidied)) > 45.0
+    neck = PassageFinder(safe).find(*ENDS).neck
+    assert PassageFinder(tidied).find(*ENDS).neck >= 0.8 * neck
+
+
+@given(floors_with_ends())
+@settings(max_examples=60, deadline=None)
+def test_a_tidy_cell_is_inside_whole_and_joins_the_ends(floor_with_ends):
+    safe, ends = floor_with_ends
+    tidied = tidy_cell(safe, ends)
+    assert safe.covers(tidied)
+    assert tidied.is_valid
+    assert not tidied.interiors
+    for end in ends:
+        assert BoundaryDistance(tidied)(end) > 0.0
+    assert PassageFinder(tidied).find(*ends).neck >= 0.4 * PassageFinder(safe).find(*ends).neck
+
+
+@given(floors_with_ends())
+@settings(max_examples=20, deadline=None)
+def test_the_same_cell_gives_the_same_bits(floor_with_ends):
+    safe, ends = floor_with_ends
+    assert tidy_cell(safe, ends).wkb == tidy_cell(safe, ends).wkb
+
+
+def test_a_clean_convex_room_is_kept_but_for_the_guard():
+    tidied = tidy_cell(box(0, 0, 4, 3), [np.array([1.0, 1.0]), np.array([3.0, 2.0])])
+    assert tidied.area == pytest.approx(12.0, rel=1e-5)
+    assert len(edge_lengths(tidied)) == 4
+
+
+def test_a_point_outside_the_safe_region_is_refused():
+    with pytest.raises(GeometryError, match="leaves no room"):
+        tidy_cell(box(0, 0, 1, 1), [np.array([2.0, 2.0])])
+
+
+def test_points_in_different_rooms_are_refused():
+    rooms = box(0, 0, 2, 1).difference(box(0.9, -1, 1.1, 2).difference(Point(1, 0.5).buffer(1e-7)))
+    with pytest.raises(GeometryError):
+        tidy_cell(max(rooms.geoms, key=lambda part: part.area), [np.array([0.5, 0.5]), np.array([1.5, 0.5])])
