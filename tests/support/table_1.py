@@ -38,9 +38,10 @@ PRINTED = np.array(
     ]
 )
 
-# Row 3 says 0.367 where -0.367 is meant: any other width is a dyadic part of the joint's range plus overlap.
+# Two signs are misprinted: any other width is the joint's range halved some times, plus the overlap.
 CORRECTED = PRINTED.copy()
 CORRECTED[2, 5] = -0.367
+CORRECTED[23, 5] = 0.050
 
 START = np.array([1.57, 0.0, 0.0])
 GOAL_ANGLE = 4.663

@@ -1,0 +1,82 @@
+"""ET1: Table 1 itself, and its thirty cells played with both gain sets while the position stands still."""
+
+import numpy as np
+import pytest
+
+from coop_drake.control import FixedGains, ScheduledGains, transition_gains
+from tests.support.axes_run import play
+from tests.support.table_1 import ANGLE_TOLERANCE, CORRECTED, GOAL_ANGLE, PRINTED, START, table_transitions
+
+JOINT_RANGE = 3.74
+OVERLAPS = np.array([0.1, 0.15, 0.2])
+
+
+def is_dyadic(width):
+    """Whether a width is the joint's range halved some times, plus an overlap that the table uses."""
+    return bool(np.any(np.abs(width - OVERLAPS[:, None] - JOINT_RANGE / 2.0 ** np.arange(8)) < 0.003))
+
+
+def joint_widths(table):
+    return np.hstack([table[:, 3] - table[:, 2], table[:, 5] - table[:, 4]])
+
+
+def test_et1_only_rows_3_and_24_as_printed_are_no_parts_of_the_joints_range():
+    odd = [i for i, width in enumerate(joint_widths(PRINTED)) if not is_dyadic(width)]
+    assert odd == [len(PRINTED) + 2, len(PRINTED) + 23]
+    assert all(is_dyadic(width) for width in joint_widths(CORRECTED))
+
+
+def test_e39_the_columns_with_an_overbar_are_the_lower_ends():
+    assert np.all(PRINTED[:, 2] < PRINTED[:, 3])
+    assert np.all(PRINTED[:, 4] < PRINTED[:, 5])
+
+
+def test_consecutive_rows_overlap_and_the_start_lies_in_the_first():
+    transitions = table_transitions(CORRECTED)
+    for transition in transitions:
+        assert np.all(transition["goal_lower"] < transition["goal_upper"])
+    assert np.all(transitions[0]["slice_lower"] < START)
+    assert np.all(transitions[0]["slice_upper"] > START)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    transitions = table_transitions(CORRECTED)
+    return {type(g).__name__: play(transitions, g, start=START) for g in (FixedGains(), ScheduledGains())}
+
+
+@pytest.mark.parametrize("gain_set", ["FixedGains", "ScheduledGains"])
+def test_every_cell_is_passed_inside_its_funnels(runs, gain_set):
+    run = runs[gain_set]
+    assert len(run.durations) == 30
+    assert run.wall_margin > 0.0
+    assert abs(run.position[0] - GOAL_ANGLE) < ANGLE_TOLERANCE
+
+
+def test_scheduled_gains_are_gentler(runs):
+    """The log term and the walls take at most 20 rad/s^2 each at the start of a transition."""
+    fixed, scheduled = runs["FixedGains"].peak_acceleration, runs["ScheduledGains"].peak_acceleration
+    assert np.all(scheduled < 40.0)
+    assert np.all(fixed > 2.0 * scheduled)
+
+
+def test_the_energy_gate_tames_the_gains_of_table_2():
+    """Without the gate the next funnel begins while the last one still rings."""
+    transitions = table_transitions(CORRECTED)
+    rushed = play(transitions, FixedGains(), start=START, gated=False)
+    gated = play(transitions, FixedGains(), start=START)
+    assert np.all(rushed.peak_acceleration > 2.0 * gated.peak_acceleration)
+    assert rushed.wall_margin < gated.wall_margin
+
+
+def test_one_bound_on_the_energy_for_all_transitions_would_stop_at_the_worst():
+    """The energies at rest differ by a large factor, so a bound that fits one switch blocks another."""
+    gain_set = ScheduledGains()
+    at_rest = []
+    for transition in table_transitions(CORRECTED)[1:]:
+        gains = transition_gains(gain_set, neck=0.2, **transition)
+        at_rest.append(
+            (gains.energy_bound - gain_set.energy_allowance * gains.log_gain) / gain_set.energy_factor
+        )
+    largest = np.max(at_rest, axis=1)
+    assert largest.max() > 2.0 * np.median(largest)
