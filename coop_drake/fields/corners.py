@@ -1,8 +1,8 @@
 """Corner operators: the double layer near a corner, compressed to a few nodes for each angle.
 
-The kernel of two straight legs depends on the ratio of distances alone, so the density near a corner obeys the
-same equation at every scale. Recursive compression turns that into a fixed point R = Z + U R (I - X R)^-1 V,
-which doubling reaches in a handful of steps (each step squares the number of dyadic levels behind it).
+The kernel of two straight legs depends on the ratio of distances alone, so the density near a corner obeys
+the same equation at every scale. Recursive compression (Helsing and Ojala, 2008) turns that into a fixed
+point R = Z + U R (I - X R)^-1 V, which doubling reaches in a few steps: each composes the map with itself.
 By mirror symmetry of the legs everything splits into an even and an odd part.
 """
 
@@ -25,7 +25,7 @@ _DOUBLINGS = 8  # 2^8 dyadic levels: below rounding for every angle that a polyg
 class CornerOperator:
     """What a corner does to the field that comes in from the rest of the boundary; index 0 even, 1 odd.
 
-    The incoming field lives on the grid of one leg (``n`` nodes, see `leg_panels`), the ring is its outer half.
+    The incoming field lives on the grid of one leg (n nodes, see `leg_panels`); the ring is its outer half.
 
     Attributes:
         compressed: R: incoming field -> weight-corrected density on the leg, shape (2, n, n).
@@ -41,8 +41,8 @@ class CornerOperator:
 def leg_panels(angle: float, closeness: float) -> tuple[FloatArray, FloatArray]:
     """Breakpoints of one leg scaled to [0, 1]: of the grid, and of its ring [1/2, 1].
 
-    A corner that is neither sharp nor nearly a slit has one panel a leg and one in its ring; otherwise the ring
-    is split geometrically so that no panel is longer than ``closeness`` times its distance to the other leg.
+    A corner that is neither sharp nor nearly a slit has one panel a leg and one in its ring; otherwise the
+    ring is split so that no panel is longer than ``closeness`` times its distance to the other leg.
 
     Args:
         angle: Interior angle [rad], in (0, 2 pi).
@@ -93,12 +93,13 @@ def corner_operator(angle: float, nodes: int, closeness: float) -> CornerOperato
     Z = W_ring @ A @ P_ring
     X = K_in_ring @ A @ K_ring_in
     R = _fixed_point(Z, U, V, X)
-    inward = np.linalg.solve(np.eye(n) - X @ R, V)
-    return CornerOperator(R, A @ (P_ring - K_ring_in @ R @ inward), inward)
+    inward: FloatArray = np.asarray(np.linalg.solve(np.eye(n) - X @ R, V), dtype=float)
+    ring_density: FloatArray = A @ (P_ring - K_ring_in @ R @ inward)
+    return CornerOperator(R, ring_density, inward)
 
 
 def _prolongation(breaks: FloatArray, nodes: int, points: FloatArray) -> FloatArray:
-    """Interpolation from the nodes of consecutive panels to points in (0, 1), shape (points, panels * nodes)."""
+    """Interpolation from nodes of consecutive panels to points in (0, 1), (points, panels * nodes)."""
     panel = np.clip(np.searchsorted(breaks, points) - 1, 0, len(breaks) - 2)
     matrix = np.zeros((len(points), (len(breaks) - 1) * nodes))
     for k in range(len(breaks) - 1):

@@ -1,7 +1,10 @@
 """The boundary integral equation of one map: assembled, factorised once, its density refined.
 
-With the complex density mu and the domain on the left of every ring, T(z) = Re (1 / 2 pi i) oint mu dt / (t - z),
-real and imaginary part of mu apart, is harmonic, single-valued, and has no flux round any hole. On the boundary
+With the complex density mu and the domain on the left of every ring,
+
+    T(z) = Re (1 / 2 pi i) oint mu dt / (t - z),  real and imaginary part of mu apart,
+
+is harmonic, single-valued, and has no flux round any hole. On the boundary
 
     mu + 2 K mu - 2 c_k [on hole k] = 2 g,    oint over hole k of mu |dt| = 0,
 
@@ -16,7 +19,7 @@ from math import pi
 
 import numpy as np
 import scipy.linalg
-from threadpoolctl import ThreadpoolController
+from threadpoolctl import ThreadpoolController  # type: ignore[import-untyped]
 
 from coop_drake.fields.compiled import compiled
 from coop_drake.fields.corners import corner_operator

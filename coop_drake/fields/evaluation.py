@@ -1,8 +1,8 @@
 """The map and its Jacobian at a point, in machine code.
 
-Far panels are summed directly, near ones through Legendre functions of the second kind, which are exact for the
-panel's polynomial density up to the wall itself: with zeta the point in the panel's own coordinate,
-integral of P_k(x) / (x - zeta) over [-1, 1] is -2 Q_k(zeta). Near a corner the dyadic rings take turns.
+Far panels are summed directly, near ones through Legendre functions of the second kind, which are exact for
+the panel's polynomial density up to the wall itself: with zeta the point in the panel's own coordinate, the
+integral of P_k(x) / (x - zeta) over [-1, 1] is -2 Q_k(zeta). Near a corner its dyadic rings are the panels.
 """
 
 from __future__ import annotations
@@ -171,7 +171,7 @@ def _corner(m: MapArrays, k: int, rx: float, ry: float, tolerance: float) -> tup
 
 @compiled
 def _sums(m: MapArrays, x: float, y: float, tolerance: float) -> tuple[Sums, complex]:
-    """Sum over the whole boundary; and a step that leads away from a junction of panels, if one is at hand."""
+    """Sum over the whole boundary; and a step away from a junction of panels, if one is at hand."""
     total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     step = 0j
     corners = len(m.corners)
@@ -180,7 +180,7 @@ def _sums(m: MapArrays, x: float, y: float, tolerance: float) -> tuple[Sums, com
         if rx * rx + ry * ry >= 4.0 * leg * leg:
             part = _direct(m.sources, m.corner_index[k, 0], m.corner_index[k + 1, 0], x, y)
         else:
-            floor = leg * 2.0 * 0.5**LEVELS
+            floor = max(2.0 * leg * 0.5**LEVELS, 4.0 * tolerance)
             if rx * rx + ry * ry < floor * floor:
                 rx, ry = floor * m.corners[k, 6], floor * m.corners[k, 7]
             part, away = _corner(m, k, rx, ry, tolerance)

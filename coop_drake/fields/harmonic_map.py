@@ -25,10 +25,10 @@ _MAX_UNKNOWNS = 9_000  # 0.7 GB and some ten seconds
 class HarmonicMap:
     """T = (u, v), both harmonic, from a polygonal domain F to the unit disk.
 
-    The outer ring goes to the unit circle, its angle linear in arc length; every hole collapses to one interior
-    point with no net flux. A goal region collapses too: in the interior as a hole of F, on the outer ring to a
-    point of the circle. T is a diffeomorphism of the interior of F, so the straight line from T(p) to the goal's
-    image, pulled back, is a path from p to the goal for almost every p.
+    The outer ring goes to the unit circle, its angle linear in arc length; every hole collapses to one
+    interior point with no net flux. A goal region collapses too: in the interior as a hole of F, on the outer
+    ring to a point of the circle. T is a diffeomorphism of the interior of F, so the straight line from T(p)
+    to the goal's image, pulled back, is a path from p to the goal for almost every p.
 
     Example:
         ```
@@ -110,8 +110,9 @@ class HarmonicMap:
         if outline.goal_angle is not None:
             return np.array([np.cos(outline.goal_angle), np.sin(outline.goal_angle)])
         if outline.goal_ring is not None:
-            return hole_images[outline.goal_ring - 1].copy()
-        image, _ = self(self._goal.coords[0])
+            image: FloatArray = hole_images[outline.goal_ring - 1].copy()
+        else:
+            image, _ = self(self._goal.coords[0])
         return image
 
 

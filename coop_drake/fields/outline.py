@@ -1,4 +1,4 @@
-"""The outline of what is mapped: rings of vertices, the angle each vertex gets on the circle, where the goal is."""
+"""The outline of what is mapped: rings of vertices, their angles on the circle, where the goal is."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Outline:
         angle_start: Boundary angle at the start of each outer edge, 0 on holes [rad], shape (n,).
         angle_end: Boundary angle at its end, shape (n,).
         centre: Origin of the coordinates in W.
-        goal_ring: The ring that a goal region collapses with, None for a point goal or a goal on the outer ring.
-        goal_angle: Angle of the outer arc that a goal region collapses to, None without such an arc [rad].
+        goal_ring: The hole that a goal region is, None for a point goal or a goal on the outer ring.
+        goal_angle: Angle that the arc of a goal on the outer ring collapses to, otherwise None [rad].
     """
 
     vertices: ComplexArray
@@ -82,7 +82,7 @@ def region_to_map(domain: Polygon, goal: Point | Polygon, inside: Point | None) 
         inside: A point of the piece to keep where the goal splits the domain.
 
     Raises:
-        FieldError: If the domain is not a valid polygon, the goal is not in it, or the piece is not determined.
+        FieldError: If the domain is no valid polygon, the goal is not in it, or the piece is undetermined.
     """
     if not isinstance(domain, Polygon) or domain.is_empty or not domain.is_valid:
         raise FieldError(f"the domain must be one valid polygon, got {shapely.is_valid_reason(domain)}")
@@ -155,8 +155,7 @@ def _goal_edges(points: FloatArray, goal: BaseGeometry, scale: float) -> NDArray
     if isinstance(goal, Point):
         return np.zeros(len(points), dtype=bool)
     middles = shapely.points(0.5 * (points + np.roll(points, -1, axis=0)))
-    near: NDArray[np.bool_] = shapely.distance(goal.boundary, middles) < 1e-9 * scale
-    return near
+    return np.asarray(shapely.distance(goal.boundary, middles) < 1e-9 * scale, dtype=np.bool_)
 
 
 def _clean(
@@ -169,7 +168,7 @@ def _clean(
         height = np.abs(np.imag(np.conj(chord) * (z - before))) / np.maximum(np.abs(chord), 1e-300)
         forward = np.real(np.conj(z - before) * (after - z)) > 0.0
         same = on_goal == np.roll(on_goal, 1)
-        drop = np.abs(after - z) <= _STRAIGHT * scale
+        drop: NDArray[np.bool_] = np.asarray(np.abs(after - z) <= _STRAIGHT * scale)
         drop |= (height <= _STRAIGHT * scale) & forward & same
         if not drop.any():
             break

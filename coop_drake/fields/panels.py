@@ -38,9 +38,9 @@ class Panels:
 def lay_panels(outline: Outline, closeness: float) -> Panels:
     """Cut the boundary so that every panel resolves the density on it.
 
-    Legs are not longer than ``closeness`` times their distance to the other edges. Regular panels may lie along
-    a wall at any distance, for near panels are integrated exactly: they are not longer than ``closeness`` times
-    their distance to the other edges or to the nearest vertex, whichever is more.
+    Legs are not longer than ``closeness`` times their distance to the other edges. Regular panels may lie
+    along a wall at any distance, for near panels are integrated exactly: they are not longer than
+    ``closeness`` times their distance to the other edges or to the nearest vertex, whichever is more.
     """
     starts, ends = outline.vertices, outline.ends
     edges = np.column_stack((starts.real, starts.imag, ends.real, ends.imag))

@@ -24,8 +24,8 @@ class VelocityField:
     """Where to go, and how fast at most: the pulled-back straight line to the goal's image, eq. (13).
 
     The direction is that of J^-1 (q_d - T), computed as adj(J) (q_d - T) so that crowded places do no harm.
-    The speed is ``max_speed`` and within ``slowdown_radius`` of the goal proportional to the remaining distance:
-    max_speed * min(1, distance / slowdown_radius). It is zero in a goal region.
+    The speed is max_speed * min(1, distance / slowdown_radius): near the goal proportional to the remaining
+    distance. It is zero in a goal region.
     Points outside the map's region get the direction of the nearest boundary point, never NaN.
 
     Args:
@@ -62,9 +62,9 @@ class VelocityField:
         Returns:
             Velocity in W, shape (2,) [m/s].
         """
-        x, y = point  # type: ignore[misc]
+        x, y = np.asarray(point, dtype=float).tolist()
         return _velocity(
-            self._arrays, float(x) - self._x, float(y) - self._y, self._rounding,
+            self._arrays, x - self._x, y - self._y, self._rounding,
             self._goal, self._image, self.slowdown_radius, self.max_speed,
         )  # fmt: skip
 
