@@ -49,6 +49,7 @@ def find_base(
         if ends <= members:
             _check_kind(scenario, robot, plant, joint)
             inner.append(joint)
+    _check_tree(scenario, robot, plant, inner)
     children = {int(joint.child_body().index()) for joint in inner}
     roots = [body for body in bodies if int(body.index()) not in children]
     if len(roots) != 1:
@@ -63,6 +64,18 @@ def limits_of(joint: Joint) -> tuple[float, float]:
     if joint.type_name() == "revolute":
         return (lower if lower > -inf else -pi, upper if upper < inf else pi)
     return lower, upper
+
+
+def _check_tree(scenario: Scenario, robot: RobotAssembly, plant: MultibodyPlant, joints: list[Joint]) -> None:
+    seen: set[int] = set()
+    for joint in joints:
+        child = joint.child_body()
+        if int(child.index()) in seen:
+            name = scoped(plant, child)
+            raise refusal(
+                scenario, robot, scoped(plant, joint), f"one joint towards {name}; loops have no tree"
+            )
+        seen.add(int(child.index()))
 
 
 def _check_kind(scenario: Scenario, robot: RobotAssembly, plant: MultibodyPlant, joint: Joint) -> None:

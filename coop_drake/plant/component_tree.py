@@ -24,7 +24,8 @@ def read_component_tree(team: TeamPlant) -> ComponentTree:
 
     Bodies that are welded together make one component; the object's comes first. The frame C of a component
     stands at its joint, parallel to L when every joint is zero. A joint is seen from the object outwards, so
-    a joint whose file leads from base to hand turns the other way, sign = -1.
+    a joint whose file leads from base to hand turns the other way, sign = -1. Bodies that can neither be
+    seen nor collide are left out.
 
     Args:
         team: The team's plant.
@@ -117,7 +118,7 @@ class _TreeReader:
             index=index,
             X_PJ=PlanarPose(round(float(offset[0]), DIGITS), round(float(offset[1]), DIGITS), 0.0),
             sign=float(np.sign(axis[2])) if revolute else 1.0,
-            axis=(0.0, 0.0) if revolute else (float(axis[0]), float(axis[1])),
+            axis=(0.0, 0.0) if revolute else (round(float(axis[0]), DIGITS), round(float(axis[1]), DIGITS)),
             lower=lower,
             upper=upper,
         )
@@ -130,7 +131,8 @@ class _TreeReader:
             Body(scoped(self.plant, body), self.robot_of.get(int(body.index())), self._shapes(body, X_CW))
             for body in bodies
         )
-        return Component(footprints[0].name, parent, joint, footprints)
+        solid = tuple(body for body in footprints if body.shapes)
+        return Component(footprints[0].name, parent, joint, solid)
 
     def _shapes(self, body: RigidBody, X_CW: RigidTransform) -> tuple[ConvexShape, ...]:
         X_CB = X_CW @ body.EvalPoseInWorld(self.context)

@@ -94,6 +94,24 @@ def check_flat(
                 )
 
 
+def check_masses(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant, context: Context) -> None:
+    """Refuse masses with which some motion would cost no effort, and joints tied to each other.
+
+    Raises:
+        ScenarioError: The mass matrix is singular, the object has no mass, or a file adds constraints.
+    """
+    if plant.num_constraints() > 0:
+        raise refusal(scenario, None, "constraints in the models", "joints that move on their own")
+    values = np.linalg.eigvalsh(plant.CalcMassMatrix(context))
+    if values[0] <= 1e-12 * values[-1]:
+        raise refusal(
+            scenario, None, f"least inertia {values[0]:.3g}", "masses and inertias that resist every motion"
+        )
+    bodies = bodies_of(plant, [assembly.object_model])
+    if sum(body.get_mass(context) for body in bodies) <= 0.0:
+        raise refusal(scenario, None, assembly.object_model, "an object with a positive mass")
+
+
 def axis_in_world(joint: Joint, context: Context) -> FloatArray:
     """Unit axis of a revolute or prismatic joint in the world, shape (3,)."""
     R_WF = joint.frame_on_parent().CalcRotationMatrixInWorld(context)

@@ -1,6 +1,9 @@
 """Models from directives into a plant: no gravity, one actuator for each joint of q."""
 
-from collections.abc import Sequence
+import logging
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.parsing import ModelDirectives, PackageMap, Parser, ProcessModelDirectives
@@ -10,37 +13,116 @@ from pydrake.multibody.tree import Joint, JointActuator, ModelInstanceIndex, Rig
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario import Assembly, RobotAssembly, Scenario
 
+_REPLACED = re.compile(r"invalid inertia|inertia matrix|central inertia|Using default value")
+"""Warnings by which Drake says that it went on with a mass or a size other than the file's."""
+
 
 def add_models(
     scenario: Scenario,
     assembly: Assembly,
-    directives: ModelDirectives,
+    indices: Sequence[int],
     plant: MultibodyPlant,
     scene_graph: SceneGraph | None,
 ) -> None:
     """Process directives into a plant that is not finalized yet, and switch gravity off.
 
+    Args:
+        scenario: For messages.
+        assembly: The directives.
+        indices: Which of them.
+        plant: Receives the models.
+        scene_graph: Receives the geometry, if any is wanted.
+
     Raises:
-        ScenarioError: Drake refuses a model or a directive.
+        ScenarioError: Drake refuses a model or a directive, or would replace a mass or size by its own.
     """
+    complaint = _process(assembly, indices, plant, scene_graph)
+    if complaint:
+        at = _culprit(assembly, indices)
+        raise ScenarioError(
+            str(scenario.path),
+            assembly.keys[at],
+            _subject(assembly, at),
+            f"what Drake can read ({complaint})",
+        )
+    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
+
+
+def _process(
+    assembly: Assembly, indices: Sequence[int], plant: MultibodyPlant, scene_graph: SceneGraph | None
+) -> str:
+    """Process directives; what Drake complained about, or nothing."""
     parser = Parser(plant, scene_graph) if scene_graph else Parser(plant)
     parser.package_map().AddMap(_missing(assembly, parser))
     try:
-        ProcessModelDirectives(directives, parser)
+        with _warnings() as said:
+            ProcessModelDirectives(
+                ModelDirectives(directives=[assembly.directives[index] for index in indices]), parser
+            )
     except (RuntimeError, ValueError) as error:
-        raise ScenarioError(
-            str(scenario.path), "directives", str(error), "models and directives that Drake can read"
-        ) from error
-    plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
+        return " ".join(str(error).split())
+    return "; ".join(" ".join(message.split()) for message in said if _REPLACED.search(message))
 
 
 def _missing(assembly: Assembly, parser: Parser) -> PackageMap:
     """The scenario's packages without those that the parser has already."""
-    packages = assembly.packages.__copy__()
+    packages = PackageMap(assembly.packages)
     for name in packages.GetPackageNames():
         if parser.package_map().Contains(name):
             packages.Remove(name)
     return packages
+
+
+def _culprit(assembly: Assembly, indices: Sequence[int]) -> int:
+    """Index of the first directive that Drake refuses when they are added one after the other."""
+    for count in range(1, len(indices)):
+        plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
+        plant.RegisterAsSourceForSceneGraph(scene_graph)
+        if _process(assembly, indices[:count], plant, scene_graph):
+            return indices[count - 1]
+    return indices[-1]
+
+
+def _subject(assembly: Assembly, index: int) -> str:
+    """What a directive is about, in a few words."""
+    directive = assembly.directives[index]
+    if directive.add_model:
+        return str(directive.add_model.file.removeprefix("file://"))
+    if directive.add_weld:
+        return f"{directive.add_weld.parent}, {directive.add_weld.child}"
+    named = directive.add_frame or directive.add_model_instance or directive.add_collision_filter_group
+    return str(named.name)
+
+
+@contextmanager
+def _warnings() -> Iterator[list[str]]:
+    """Collect what Drake warns about meanwhile."""
+    said: list[str] = []
+
+    class Collector(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            said.append(record.getMessage())
+
+    logger, collector = logging.getLogger("drake"), Collector(logging.WARNING)
+    logger.addHandler(collector)
+    try:
+        yield said
+    finally:
+        logger.removeHandler(collector)
+
+
+def finalize(scenario: Scenario, plant: MultibodyPlant) -> None:
+    """Finalize a plant.
+
+    Raises:
+        ScenarioError: The joints close a loop, or Drake cannot model them otherwise.
+    """
+    try:
+        plant.Finalize()
+    except RuntimeError as error:
+        raise ScenarioError(
+            str(scenario.path), "directives", "the joints of all models", f"a tree of bodies ({error})"
+        ) from error
 
 
 def bodies_of(plant: MultibodyPlant, models: Sequence[str]) -> list[RigidBody]:
@@ -79,15 +161,12 @@ def set_actuators(plant: MultibodyPlant, joints: Sequence[Joint]) -> None:
         plant: Not finalized yet.
         joints: All joints of q, in q's order.
     """
-    stated: dict[int, JointActuator] = {}
-    for index in plant.GetJointActuatorIndices():
-        actuator = plant.get_joint_actuator(index)
-        stated[int(actuator.joint().index())] = actuator
+    stated: list[JointActuator] = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices()]
     kept = {
-        joint: (a.effort_limit(), a.default_rotor_inertia(), a.default_gear_ratio())
-        for joint, a in stated.items()
+        int(a.joint().index()): (a.effort_limit(), a.default_rotor_inertia(), a.default_gear_ratio())
+        for a in stated
     }
-    for actuator in stated.values():
+    for actuator in stated:
         plant.RemoveJointActuator(actuator)
     for joint in joints:
         effort, inertia, ratio = kept.get(int(joint.index()), (float("inf"), 0.0, 1.0))

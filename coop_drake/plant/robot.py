@@ -13,7 +13,7 @@ from pydrake.systems.framework import Context
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant.chain import find_base
-from coop_drake.plant.parsing import add_models, set_actuators
+from coop_drake.plant.parsing import add_models, finalize, set_actuators
 from coop_drake.scenario import Scenario, assemble
 
 _PLANAR = [3, 4, 2]
@@ -130,7 +130,7 @@ def build_robot_plant(scenario: Scenario, k: int) -> RobotPlant:
     base, joints = find_base(scenario, robot, plant)
     base_joint = plant.AddJoint(PlanarJoint("base_pose", plant.world_frame(), base.body_frame()))
     set_actuators(plant, joints)
-    plant.Finalize()
+    finalize(scenario, plant)
     positions = [base_joint.position_start() + i for i in range(3)] + [j.position_start() for j in joints]
     velocities = [base_joint.velocity_start() + i for i in range(3)] + [j.velocity_start() for j in joints]
     return RobotPlant(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.geometry import SceneGraph
-from pydrake.multibody.parsing import GetScopedFrameByName, ModelDirectives
+from pydrake.multibody.parsing import GetScopedFrameByName
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import (
     Frame,
@@ -22,8 +22,8 @@ from pydrake.systems.framework import Context, DiagramBuilder
 
 from coop_drake.geometry.pose import FloatArray, PlanarPose
 from coop_drake.plant.chain import find_base, scoped
-from coop_drake.plant.flatness import check_flat, object_frame, planar_pose
-from coop_drake.plant.parsing import add_models, bodies_of, joints_of, set_actuators
+from coop_drake.plant.flatness import check_flat, check_masses, object_frame, planar_pose
+from coop_drake.plant.parsing import add_models, bodies_of, finalize, joints_of, set_actuators
 from coop_drake.scenario import Assembly, RobotAssembly, Scenario, assemble
 
 
@@ -142,14 +142,15 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
     """
     assembly = assemble(scenario)
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
-    add_models(scenario, assembly, ModelDirectives(directives=list(assembly.directives)), plant, scene_graph)
+    add_models(scenario, assembly, range(len(assembly.directives)), plant, scene_graph)
     frame, body = object_frame(scenario, assembly, plant)
     object_joint = plant.AddJoint(PlanarJoint("pose", plant.world_frame(), frame))
     chains = [find_base(scenario, robot, plant) for robot in assembly.robots]
     set_actuators(plant, [joint for _, joints in chains for joint in joints])
-    plant.Finalize()
+    finalize(scenario, plant)
     context = plant.CreateDefaultContext()
     check_flat(scenario, assembly, plant, context, chains)
+    check_masses(scenario, assembly, plant, context)
     robots: list[RobotModel] = []
     for robot, (base, joints) in zip(assembly.robots, chains, strict=True):
         first = robots[-1].q_slice.stop if robots else 0

@@ -1,20 +1,13 @@
 """Who is who in the directives: the object, the robots, and the weld by which each grasps the object."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
-from pydrake.multibody.parsing import (
-    AddWeld,
-    LoadModelDirectives,
-    ModelDirective,
-    ModelDirectives,
-    PackageMap,
-)
+from pydrake.multibody.parsing import AddWeld, ModelDirective, PackageMap
 
 from coop_drake.errors import ScenarioError
+from coop_drake.scenario.directives import flat
 from coop_drake.scenario.model import Scenario
-from coop_drake.scenario.packages import package_map, resolve
+from coop_drake.scenario.packages import package_map
 
 
 @dataclass(frozen=True)
@@ -45,6 +38,7 @@ class Assembly:
     Attributes:
         packages: Where ``package://`` addresses lead.
         directives: Flat, with resolved file addresses.
+        keys: Where each of them stands in the scenario file.
         object_model: Name of the object's model.
         robots: In the order of their base models in the directives.
         owners: For each directive the models it speaks of.
@@ -52,15 +46,15 @@ class Assembly:
 
     packages: PackageMap
     directives: tuple[ModelDirective, ...]
+    keys: tuple[str, ...]
     object_model: str
     robots: tuple[RobotAssembly, ...]
     owners: tuple[frozenset[str], ...]
 
-    def of_robot(self, index: int) -> ModelDirectives:
-        """The directives that make one robot alone, without its grasp."""
+    def of_robot(self, index: int) -> tuple[int, ...]:
+        """Indices of the directives that make one robot alone, without its grasp."""
         models = frozenset(self.robots[index].models)
-        pairs = zip(self.directives, self.owners, strict=True)
-        return ModelDirectives(directives=[d for d, owners in pairs if owners and owners <= models])
+        return tuple(place for place, owners in enumerate(self.owners) if owners and owners <= models)
 
 
 def assemble(scenario: Scenario) -> Assembly:
@@ -80,8 +74,8 @@ class _Reader:
         self.scenario = scenario
         self.file = str(scenario.path)
         self.packages = package_map(scenario.path)
-        entries = list(self._flat(scenario.directives, scenario.path, "directives"))
-        self.keys = [key for key, _ in entries]
+        entries = list(flat(scenario.directives, scenario.path, self.packages, self.file, "directives"))
+        self.keys = tuple(key for key, _ in entries)
         self.directives = tuple(directive for _, directive in entries)
         self.models: dict[str, str] = {}
         self.frames: dict[str, str] = {}
@@ -89,34 +83,6 @@ class _Reader:
 
     def _refuse(self, key: str, value: object, allowed: str) -> ScenarioError:
         return ScenarioError(self.file, key, value, allowed)
-
-    def _flat(
-        self, directives: tuple[ModelDirective, ...], path: Path, key: str
-    ) -> Iterator[tuple[str, ModelDirective]]:
-        """Yield ``(key, directive)`` with nested directive files opened and file addresses resolved."""
-        for index, directive in enumerate(directives):
-            here = f"{key}[{index}]"
-            if directive.add_directives:
-                file_key = f"{here}.add_directives.file"
-                if directive.add_directives.model_namespace:
-                    raise self._refuse(
-                        f"{here}.add_directives.model_namespace",
-                        directive.add_directives.model_namespace,
-                        "no namespace",
-                    )
-                address = resolve(directive.add_directives.file, path, self.packages, file_key)
-                nested = Path(address.removeprefix("file://"))
-                try:
-                    inner = tuple(LoadModelDirectives(nested).directives)
-                except RuntimeError as error:
-                    raise self._refuse(file_key, str(nested), f"model directives ({error})") from error
-                yield from self._flat(inner, nested, f"{here}.add_directives")
-            elif directive.add_model:
-                model = directive.add_model.__copy__()
-                model.file = resolve(model.file, path, self.packages, f"{here}.add_model.file")
-                yield here, ModelDirective(add_model=model)
-            else:
-                yield here, directive
 
     def _read_names(self) -> None:
         for key, directive in zip(self.keys, self.directives, strict=True):
@@ -142,10 +108,11 @@ class _Reader:
         raise self._refuse(key, frame, f"model::frame with a model added before, one of {known}")
 
     def _weld_owners(self, weld: AddWeld, key: str) -> tuple[str, str]:
-        return (
-            self._owner(weld.parent, f"{key}.add_weld.parent"),
-            self._owner(weld.child, f"{key}.add_weld.child"),
-        )
+        parent = self._owner(weld.parent, f"{key}.add_weld.parent")
+        child = self._owner(weld.child, f"{key}.add_weld.child")
+        if parent == child:
+            raise self._refuse(f"{key}.add_weld.child", weld.child, f"a frame of another model than {parent}")
+        return parent, child
 
     def assembly(self) -> Assembly:
         """Group the models into robots and find the grasps."""
@@ -164,7 +131,12 @@ class _Reader:
         if len(robots) < 2:
             raise self._refuse("directives", [r.name for r in robots], "two or more robots beside the object")
         return Assembly(
-            self.packages, self.directives, object_model, self._in_order(robots), self._all_owners()
+            self.packages,
+            self.directives,
+            self.keys,
+            object_model,
+            self._in_order(robots),
+            self._all_owners(),
         )
 
     def _in_order(self, robots: list[RobotAssembly]) -> tuple[RobotAssembly, ...]:

@@ -5,10 +5,9 @@ from pathlib import Path
 
 from pydrake.common.yaml import yaml_dump_typed
 
-from coop_drake.errors import ScenarioError
-from coop_drake.scenario.document import DocumentError
 from coop_drake.scenario.model import Scenario
-from coop_drake.scenario.schema import departures, draft, read, thaw
+from coop_drake.scenario.reading import read_file
+from coop_drake.scenario.schema import draft, thaw
 from coop_drake.scenario.validation import validate
 
 
@@ -24,20 +23,7 @@ def load_scenario(path: Path | str) -> Scenario:
     Raises:
         ScenarioError: With file, key, value and what is allowed there.
     """
-    path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(str(path), "the file", str(error), "a readable scenario file") from error
-    try:
-        for key, value, allowed in departures(Scenario, text):
-            raise ScenarioError(str(path), key, value, allowed)
-    except DocumentError as error:
-        raise ScenarioError(str(path), error.place, error.problem, error.allowed) from error
-    try:
-        scenario = dataclasses.replace(read(Scenario, text), path=path)
-    except (RuntimeError, TypeError, ValueError) as error:
-        raise ScenarioError(str(path), "the file", str(error), "values that fit the schema") from error
+    scenario = dataclasses.replace(read_file(Scenario, Path(path)), path=Path(path))
     validate(scenario)
     return scenario
 

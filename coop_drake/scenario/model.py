@@ -114,14 +114,13 @@ class Gains:
 
 @dataclass(frozen=True)
 class SimulatorSettings:
-    """How the closed loop is integrated and logged.
+    """How the closed loop is integrated.
 
     Attributes:
         max_time: The run fails when the goal is not reached by then [s].
         integration_scheme: Name of the integrator, as Drake spells it.
         max_step_size: Longest step [s].
         accuracy: Relative accuracy of the error-controlled step [-].
-        log_period: Time between two entries of the log [s].
     """
 
     max_time: float = 300.0
@@ -130,7 +129,6 @@ class SimulatorSettings:
     ] = "runge_kutta3"
     max_step_size: float = 0.02
     accuracy: float = 1e-4
-    log_period: float = 0.02
 
 
 @dataclass(frozen=True)

@@ -49,13 +49,14 @@ def _add(packages: PackageMap, file: Path) -> None:
         packages.AddMap(single)
 
 
-def resolve(file: str, scenario_path: Path, packages: PackageMap, key: str) -> str:
+def resolve(file: str, beside: Path, packages: PackageMap, scenario_file: str, key: str) -> str:
     """Turn the file of a directive into an address that Drake can open.
 
     Args:
-        file: ``package://name/path``, ``file:///path``, or a path relative to the scenario file.
-        scenario_path: The scenario file.
+        file: ``package://name/path``, ``file:///path``, or a path relative to the file it stands in.
+        beside: The file it stands in.
         packages: The packages at hand.
+        scenario_file: The scenario, for messages.
         key: Where ``file`` stands in the scenario.
 
     Returns:
@@ -64,17 +65,16 @@ def resolve(file: str, scenario_path: Path, packages: PackageMap, key: str) -> s
     Raises:
         ScenarioError: The package is not known, or there is no such file.
     """
-    where = str(scenario_path)
     if file.startswith("package://"):
         name, _, inside = file.removeprefix("package://").partition("/")
         if not packages.Contains(name):
             known = ", ".join(sorted(packages.GetPackageNames()))
-            raise ScenarioError(where, key, file, f"a package among {known}")
+            raise ScenarioError(scenario_file, key, file, f"a package among {known}")
         path = Path(packages.GetPath(name)) / inside
     elif file.startswith("file://"):
         path = Path(file.removeprefix("file://"))
     else:
-        path = scenario_path.resolve().parent / file
+        path = beside.resolve().parent / file
     if not path.is_file():
-        raise ScenarioError(where, key, file, f"a file that exists (looked for {path})")
+        raise ScenarioError(scenario_file, key, file, f"a file that exists (looked for {path})")
     return f"file://{path.resolve()}"

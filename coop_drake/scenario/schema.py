@@ -13,11 +13,26 @@ from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
-from pydrake.common.yaml import yaml_load_typed
+from pydrake.common.yaml import yaml_dump, yaml_load_typed
 
 from coop_drake.scenario.document import parse
 
-Check = Iterator[tuple[str, object, str]]
+
+class SchemaError(ValueError):
+    """A place where a file departs from its schema.
+
+    Args:
+        key: Dotted path of the key.
+        value: What stands there.
+        allowed: What may stand there.
+    """
+
+    def __init__(self, key: str, value: object, allowed: str) -> None:
+        self.key, self.value, self.allowed = key, value, allowed
+        super().__init__(f"{key}: {value!r}; expected {allowed}")
+
+
+Check = Iterator[SchemaError]
 
 _SCALARS = {bool: "true or false", int: "a whole number", float: "a finite number", str: "a text"}
 
@@ -28,12 +43,16 @@ def in_file(cls: type) -> tuple[dataclasses.Field[Any], ...]:
 
 
 def read(cls: type, text: str) -> Any:
-    """Read a frozen dataclass from YAML text that has passed :func:`departures`."""
+    """Read a frozen dataclass from YAML text that has passed :func:`departures`.
+
+    Raises:
+        SchemaError: A class refused its values.
+    """
     return freeze(yaml_load_typed(schema=draft(cls), data=text), cls)
 
 
 def departures(cls: type, text: str) -> Check:
-    """Yield ``(key, value, allowed)`` for every place where a YAML text departs from the schema ``cls``."""
+    """Yield every place where a YAML text departs from the schema ``cls``."""
     yield from _check(parse(text), cls, "")
 
 
@@ -84,7 +103,12 @@ def _draft_kind(kind: Any) -> Any:
     if origin is dict:
         return dict[str, _draft_kind(arguments[1])]  # type: ignore[misc]
     if _is_union(kind):
-        return typing.Union[tuple(_draft_kind(a) for a in arguments)]  # noqa: UP007
+        drafts = [_draft_kind(a) for a in arguments]
+        if all(dataclasses.is_dataclass(a) for a in arguments):
+            drafts.insert(
+                0, str
+            )  # Drake leaves the tag of the first kind away; here every class wants its tag
+        return typing.Union[tuple(drafts)]  # noqa: UP007
     return kind
 
 
@@ -104,21 +128,37 @@ def thaw(value: Any) -> Any:
     return value
 
 
-def freeze(value: Any, kind: Any) -> Any:
-    """Turn a draft into the frozen value of type ``kind``, all the way down."""
+def freeze(value: Any, kind: Any, key: str = "") -> Any:
+    """Turn a draft into the frozen value of type ``kind``, all the way down.
+
+    Raises:
+        SchemaError: A class refused its values.
+    """
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
     if dataclasses.is_dataclass(kind):
-        cls = typing.cast(type, kind)
-        hints = typing.get_type_hints(cls)
-        return cls(**{f.name: freeze(getattr(value, f.name), hints[f.name]) for f in in_file(cls)})
+        return _freeze_fields(value, typing.cast(type, kind), key)
     if origin is tuple:
-        return tuple(freeze(item, arguments[0]) for item in value)
+        return tuple(freeze(item, arguments[0], f"{key}[{index}]") for index, item in enumerate(value))
     if origin is dict:
-        return {key: freeze(item, arguments[1]) for key, item in value.items()}
+        return {name: freeze(item, arguments[1], _below(key, name)) for name, item in value.items()}
     if _is_union(kind):
         frozen = [a for a in arguments if isinstance(a, type) and _drafted(a) is type(value)]
-        return freeze(value, frozen[0]) if frozen else value
+        return freeze(value, frozen[0], key) if frozen and _drafted(frozen[0]) is not frozen[0] else value
     return value
+
+
+def _freeze_fields(value: Any, cls: type, key: str) -> Any:
+    hints = typing.get_type_hints(cls)
+    fields = {
+        f.name: freeze(getattr(value, f.name), hints[f.name], _below(key, f.name)) for f in in_file(cls)
+    }
+    try:
+        return cls(**fields)
+    except ValueError as error:  # by custom the message begins with the field's name
+        name = str(error).partition(" ")[0]
+        raise SchemaError(
+            _below(key, name) if name in fields else key, fields.get(name), str(error)
+        ) from error
 
 
 def _check(value: object, kind: Any, key: str) -> Check:
@@ -128,7 +168,7 @@ def _check(value: object, kind: Any, key: str) -> Check:
         yield from _check_scalar(value, kind, key)
     elif origin is typing.Literal:
         if value not in typing.get_args(kind):
-            yield key, value, "one of " + ", ".join(typing.get_args(kind))
+            yield SchemaError(key, value, "one of " + ", ".join(typing.get_args(kind)))
     elif origin in (tuple, list):
         yield from _check_sequence(value, kind, key)
     elif origin is dict:
@@ -141,7 +181,7 @@ def _check(value: object, kind: Any, key: str) -> Check:
         schema = {f.name: hints[f.name] for f in in_file(cls)}
         yield from _check_fields(value, schema, _required(cls), key)
     else:
-        yield from _finite(value, key)
+        yield from _check_foreign(value, kind, key)
 
 
 def _check_scalar(value: object, kind: type, key: str) -> Check:
@@ -151,7 +191,7 @@ def _check_scalar(value: object, kind: type, key: str) -> Check:
         number = _as_number(value)
         fits = number is not None and math.isfinite(number) and (kind is float or number.is_integer())
     if not fits:
-        yield key, value, _SCALARS[kind]
+        yield SchemaError(key, value, _SCALARS[kind])
 
 
 def _as_number(value: object) -> float | None:
@@ -168,9 +208,9 @@ def _check_sequence(value: object, kind: Any, key: str) -> Check:
     arguments = typing.get_args(kind)
     size = len(arguments) if len(arguments) > 1 and arguments[1] is not Ellipsis else None
     if not isinstance(value, list):
-        yield key, value, "a list"
+        yield SchemaError(key, value, "a list")
     elif size is not None and len(value) != size:
-        yield key, value, f"a list of {size}"
+        yield SchemaError(key, value, f"a list of {size}")
     else:
         for index, item in enumerate(value):
             yield from _check(item, arguments[0], f"{key}[{index}]")
@@ -178,11 +218,11 @@ def _check_sequence(value: object, kind: Any, key: str) -> Check:
 
 def _check_mapping(value: object, kind: Any, key: str) -> Check:
     if not isinstance(value, dict):
-        yield key, value, "a mapping"
+        yield SchemaError(key, value, "a mapping")
         return
     for name, item in value.items():
         if not isinstance(name, str):
-            yield _below(key, name), name, "a text as the name"
+            yield SchemaError(_below(key, name), name, "a text as the name")
         else:
             yield from _check(item, kind, _below(key, name))
 
@@ -192,41 +232,55 @@ def _check_union(value: object, kind: Any, key: str) -> Check:
     if value is None and type(None) in arguments:
         return
     classes = {a.__name__: a for a in arguments if isinstance(a, type) and dataclasses.is_dataclass(a)}
-    tag = value.get("_tag", "")[1:] if isinstance(value, dict) else ""
-    if tag and classes:
-        if tag not in classes:
-            yield key, f"!{tag}", "one of " + ", ".join(f"!{name}" for name in sorted(classes))
-            return
-        value = {name: item for name, item in typing.cast(dict[str, object], value).items() if name != "_tag"}
-        yield from _check(value, classes[tag], key)
-    else:
+    if not classes:
         yield from _check(value, arguments[0], key)
+        return
+    content = dict(value) if isinstance(value, dict) else {}
+    tag = str(content.pop("_tag", ""))
+    if tag.removeprefix("!") not in classes:
+        yield SchemaError(
+            key, tag or value, "a mapping with a tag, one of " + ", ".join(f"!{n}" for n in classes)
+        )
+    else:
+        yield from _check(content, classes[tag.removeprefix("!")], key)
 
 
 def _check_fields(value: object, schema: dict[str, Any], required: frozenset[str], key: str) -> Check:
     if not isinstance(value, dict):
-        yield key or "the file", value, "a mapping with the keys " + ", ".join(schema)
+        yield SchemaError(key or "the file", value, "a mapping with the keys " + ", ".join(schema))
         return
     for name in value:
         if name not in schema:
-            yield _below(key, name), value[name], "one of the keys " + ", ".join(schema)
+            yield SchemaError(_below(key, name), value[name], "one of the keys " + ", ".join(schema))
     for name, kind in schema.items():
         if name in value:
             yield from _check(value[name], kind, _below(key, name))
         elif name in required:
-            yield _below(key, name), None, "a value; this key is required"
+            yield SchemaError(_below(key, name), None, "a value; this key is required")
 
 
-def _finite(value: object, key: str) -> Check:
-    """What Drake's own schemas describe is checked elsewhere; here only that its numbers are numbers."""
+def _check_foreign(value: object, kind: type, key: str) -> Check:
+    """What Drake's own schemas describe Drake checks; its numbers must be finite."""
+    wrong = list(_infinite(value, key))
+    if wrong:
+        yield from wrong
+        return
+    try:
+        yaml_load_typed(schema=kind, data=yaml_dump(value))
+    except (AssertionError, AttributeError, RuntimeError, TypeError, ValueError) as error:
+        reason = "a vector of the wrong size" if "incompatible function" in str(error) else str(error)
+        yield SchemaError(key, value, f"a {kind.__name__} as Drake describes it ({reason})")
+
+
+def _infinite(value: object, key: str) -> Check:
     if isinstance(value, dict):
         for name, item in value.items():
-            yield from _finite(item, _below(key, name))
+            yield from _infinite(item, _below(key, name))
     elif isinstance(value, list):
         for index, item in enumerate(value):
-            yield from _finite(item, f"{key}[{index}]")
+            yield from _infinite(item, f"{key}[{index}]")
     elif isinstance(value, float) and not math.isfinite(value):
-        yield key, value, "a finite number"
+        yield SchemaError(key, value, "a finite number")
 
 
 def _below(key: str, name: object) -> str:

@@ -1,7 +1,50 @@
 """What a scenario must satisfy before any body is known."""
 
+import dataclasses
+from collections.abc import Iterator
+from typing import Any
+
+from coop_drake.errors import ScenarioError
+from coop_drake.scenario.assembly import assemble
+from coop_drake.scenario.directives import check_directive
 from coop_drake.scenario.model import Scenario
+from coop_drake.scenario.rings import check_workspace
+
+_MAY_BE_ZERO = frozenset({"planner.margin", "planner.slice_overlap"})
 
 
 def validate(scenario: Scenario) -> None:
-    """Refuse a scenario whose values do not fit together."""
+    """Refuse a scenario whose values do not fit together.
+
+    Raises:
+        ScenarioError: With file, key, value and what is allowed there.
+    """
+    file = str(scenario.path)
+    check_workspace(scenario)
+    for key, value in _positive_numbers(scenario):
+        if value < 0.0 or (value == 0.0 and key not in _MAY_BE_ZERO):
+            kind = "zero or a positive number" if key in _MAY_BE_ZERO else "a positive number"
+            raise ScenarioError(file, key, value, kind)
+    if scenario.planner.slice_overlap > 1.0:
+        raise ScenarioError(file, "planner.slice_overlap", scenario.planner.slice_overlap, "at most 1")
+    if scenario.gains.selected not in scenario.gains.sets:
+        known = ", ".join(sorted(scenario.gains.sets))
+        raise ScenarioError(file, "gains.selected", scenario.gains.selected, f"a gain set, one of {known}")
+    for index, directive in enumerate(scenario.directives):
+        check_directive(file, f"directives[{index}]", directive)
+    assemble(scenario)
+
+
+def _positive_numbers(scenario: Scenario) -> Iterator[tuple[str, float]]:
+    """Yield ``(key, value)`` of every setting and tolerance that must not be negative."""
+    sections: dict[str, Any] = {
+        "goal.tolerances": scenario.goal.tolerances,
+        "planner": scenario.planner,
+        "simulator": scenario.simulator,
+        "visualization": scenario.visualization,
+    }
+    for key, section in sections.items():
+        for field in dataclasses.fields(section):
+            value = getattr(section, field.name)
+            if isinstance(value, int | float) and not isinstance(value, bool):
+                yield f"{key}.{field.name}", float(value)

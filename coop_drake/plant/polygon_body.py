@@ -1,0 +1,229 @@
+"""Writes models of polygonal bodies, convex or not: ``python -m coop_drake.plant.polygon_body --help``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from shapely import Polygon
+
+from coop_drake.errors import GeometryError
+from coop_drake.files import write_atomically
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.plant.convex_parts import convex_parts
+
+Point = Sequence[float]
+
+_COLOUR = "0.76 0.60 0.42 1"
+
+
+@dataclass(frozen=True)
+class PlanarMass:
+    """Exact mass properties of an upright prism of even density.
+
+    Attributes:
+        mass: Mass [kg].
+        centroid: Centre of mass in the plane, shape (2,) [m].
+        inertia: About the centre of mass, shape (3, 3) [kg m^2].
+    """
+
+    mass: float
+    centroid: FloatArray
+    inertia: FloatArray
+
+
+def planar_mass(
+    vertices: Sequence[Point], mass: float, height: float, inertia: float | None = None
+) -> PlanarMass:
+    """Compute the mass properties of a polygonal prism.
+
+    Args:
+        vertices: Corners, shape (n, 2) [m].
+        mass: Mass [kg].
+        height: Height of the prism [m].
+        inertia: If given, the whole inertia is scaled so that this is the part about the vertical [kg m^2].
+    """
+    corners = np.asarray(vertices, dtype=float)
+    corners = corners - (origin := corners.mean(axis=0))
+    following = np.roll(corners, -1, axis=0)
+    (x, y), (u, v) = corners.T, following.T
+    cross = x * v - u * y
+    area = 0.5 * cross.sum()
+    centroid = np.array([((x + u) * cross).sum(), ((y + v) * cross).sum()]) / (6.0 * area)
+    xx = ((x * x + x * u + u * u) * cross).sum() / (12.0 * area) - centroid[0] ** 2
+    yy = ((y * y + y * v + v * v) * cross).sum() / (12.0 * area) - centroid[1] ** 2
+    xy = ((x * v + 2.0 * x * y + 2.0 * u * v + u * y) * cross).sum() / (24.0 * area) - centroid.prod()
+    upright = height**2 / 12.0
+    moments = mass * np.array([[yy + upright, -xy, 0.0], [-xy, xx + upright, 0.0], [0.0, 0.0, xx + yy]])
+    if inertia is not None:
+        moments *= inertia / moments[2, 2]
+    return PlanarMass(mass, centroid + origin, moments)
+
+
+def polygon_body_files(
+    vertices: Sequence[Point],
+    mass: float,
+    name: str,
+    height: float = 0.2,
+    *,
+    inertia: float | None = None,
+    elevation: float = 0.4,
+    grasps: Sequence[Point] = (),
+) -> dict[str, str]:
+    """Write the model of a polygonal body as text: one SDF file, and one mesh for each convex part.
+
+    Args:
+        vertices: Corners of the outline in the body's frame, in either sense of rotation, shape (n, 2) [m].
+        mass: Mass [kg].
+        name: Name of the model; the files are named after it.
+        height: Height [m].
+        inertia: Inertia about the vertical through the centre of mass [kg m^2]; even density if None.
+        elevation: Height of the body's middle over the floor, the shipped robots' grasp height [m].
+        grasps: Grasp frames, each (x, y, facing) [m, rad]; they are named ``grasp_0``, ``grasp_1``, ...
+
+    Returns:
+        File names with their contents, ``name.sdf`` first.
+
+    Raises:
+        GeometryError: The outline crosses itself or has no area, or a number is not positive.
+    """
+    outline = _checked(vertices, {"mass": mass, "height": height, "inertia": inertia})
+    corners = np.array(outline.exterior.coords)[:-1]
+    parts = [np.array(part.exterior.coords)[:-1] for part in convex_parts(outline)]
+    meshes = {f"{name}_part_{index}.obj": _prism(part, height) for index, part in enumerate(parts)}
+    properties = planar_mass(corners.tolist(), mass, height, inertia)
+    sdf = _model(name, properties, list(meshes), elevation, grasps)
+    return {f"{name}.sdf": sdf, **meshes}
+
+
+def polygon_body_sdf(
+    vertices: Sequence[Point], mass: float, name: str, height: float, inertia: float | None = None
+) -> str:
+    """The SDF text alone of :func:`polygon_body_files`."""
+    return polygon_body_files(vertices, mass, name, height, inertia=inertia)[f"{name}.sdf"]
+
+
+def write_polygon_body(files: dict[str, str], directory: Path) -> Path:
+    """Write the files of :func:`polygon_body_files` into a directory; returns the SDF file's path."""
+    directory.mkdir(parents=True, exist_ok=True)
+    for file, text in reversed(files.items()):
+        write_atomically(directory / file, text.encode())
+    return directory / next(iter(files))
+
+
+def _checked(vertices: Sequence[Point], numbers: dict[str, float | None]) -> Polygon:
+    for label, value in numbers.items():
+        if value is not None and not (np.isfinite(value) and value > 0.0):
+            raise GeometryError(f"{label} must be a positive number, got {value!r}")
+    corners = np.asarray(vertices, dtype=float)
+    if corners.ndim != 2 or corners.shape[1] != 2 or len(corners) < 3 or not np.isfinite(corners).all():
+        raise GeometryError("an outline needs three or more corners, each (x, y)")
+    outline = Polygon(corners)
+    if not outline.is_valid or outline.area <= 0.0:
+        raise GeometryError("the outline crosses or touches itself, or has no area")
+    return outline if outline.exterior.is_ccw else Polygon(corners[::-1])
+
+
+def _prism(corners: FloatArray, height: float) -> str:
+    """A convex prism as Wavefront OBJ text, its middle at z = 0."""
+    count = len(corners)
+    lines = [
+        f"v {x:.12g} {y:.12g} {z:.12g}" for z in (-0.5 * height, 0.5 * height) for x, y in corners.tolist()
+    ]
+    lines.append("f " + " ".join(str(index) for index in range(count, 0, -1)))
+    lines.append("f " + " ".join(str(count + index) for index in range(1, count + 1)))
+    for index in range(count):
+        following = (index + 1) % count
+        lines.append(f"f {index + 1} {following + 1} {count + following + 1} {count + index + 1}")
+    return "\n".join(lines) + "\n"
+
+
+def _model(
+    name: str, properties: PlanarMass, meshes: list[str], elevation: float, grasps: Sequence[Point]
+) -> str:
+    (ixx, ixy, _), (_, iyy, _), (_, _, izz) = properties.inertia.tolist()
+    x, y = properties.centroid.tolist()
+    shapes = "".join(
+        _shape(kind, mesh, index) for index, mesh in enumerate(meshes) for kind in ("visual", "collision")
+    )
+    frames = "".join(
+        f'    <frame name="grasp_{index}" attached_to="body">\n'
+        f"      <pose>{gx:.12g} {gy:.12g} 0 0 0 {facing:.16g}</pose>\n    </frame>\n"
+        for index, (gx, gy, facing) in enumerate(grasps)
+    )
+    return f"""<?xml version="1.0"?>
+<sdf version="1.9">
+  <model name="{name}">
+    <link name="body">
+      <pose>0 0 {elevation:.12g} 0 0 0</pose>
+      <inertial>
+        <pose>{x:.16g} {y:.16g} 0 0 0 0</pose>
+        <mass>{properties.mass:.16g}</mass>
+        <inertia>
+          <ixx>{ixx:.16g}</ixx>
+          <iyy>{iyy:.16g}</iyy>
+          <izz>{izz:.16g}</izz>
+          <ixy>{ixy:.16g}</ixy>
+          <ixz>0</ixz>
+          <iyz>0</iyz>
+        </inertia>
+      </inertial>
+{shapes}    </link>
+{frames}  </model>
+</sdf>
+"""
+
+
+def _shape(kind: str, mesh: str, index: int) -> str:
+    declared = "            <drake:declare_convex/>\n" if kind == "collision" else ""
+    colour = f"        <material>\n          <diffuse>{_COLOUR}</diffuse>\n        </material>\n"
+    return (
+        f'      <{kind} name="{kind}_{index}">\n        <geometry>\n          <mesh>\n'
+        f"            <uri>{mesh}</uri>\n{declared}          </mesh>\n        </geometry>\n"
+        f"{colour if kind == 'visual' else ''}      </{kind}>\n"
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> Path:
+    """Write a polygonal body from the command line."""
+    parser = argparse.ArgumentParser(
+        prog="python -m coop_drake.plant.polygon_body", description="Write the model of a polygonal body."
+    )
+    parser.add_argument("vertices", help="corners in metres, as one text: 'X Y, X Y, X Y'")
+    parser.add_argument("--mass", type=float, required=True, help="kg")
+    parser.add_argument("--name", required=True, help="name of the model and of its files")
+    parser.add_argument("--height", type=float, default=0.2, help="m")
+    parser.add_argument("--inertia", type=float, help="about the vertical through the centre of mass, kg m^2")
+    parser.add_argument("--elevation", type=float, default=0.4, help="height of the body's middle, m")
+    parser.add_argument("--grasps", default="", help="grasp frames in m and rad: 'X Y FACING, X Y FACING'")
+    parser.add_argument("--out", type=Path, default=Path(), help="directory")
+    given = parser.parse_args(arguments)
+    try:
+        files = polygon_body_files(
+            _rows(given.vertices, 2),
+            given.mass,
+            given.name,
+            given.height,
+            inertia=given.inertia,
+            elevation=given.elevation,
+            grasps=_rows(given.grasps, 3),
+        )
+    except (GeometryError, ValueError) as error:
+        parser.error(str(error))
+    return write_polygon_body(files, given.out)
+
+
+def _rows(text: str, count: int) -> list[list[float]]:
+    """Numbers in rows: commas between rows, spaces inside."""
+    rows = [[float(number) for number in row.split()] for row in text.split(",") if row.strip()]
+    for row in rows:
+        if len(row) != count:
+            raise ValueError(f"{row} should be {count} numbers; write commas between rows, spaces inside")
+    return rows
+
+
+if __name__ == "__main__":
+    print(main())
