@@ -95,15 +95,37 @@ def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_
     assert (tmp_path / "transport.html").exists()
 
 
-def test_closed_is_infeasible_and_says_why(tmp_path):
-    (tmp_path / "plan.json").write_text("of an older run")
-    result = invoke("plan", MODELS / "closed.scenario.yaml", "--out", tmp_path, "--json")
+def test_a_gap_too_narrow_is_infeasible_and_an_older_plan_does_not_stay(tmp_path):
+    outer = [
+        [0, 0],
+        [4, 0],
+        [4, 1.8],
+        [5, 1.8],
+        [5, 0],
+        [9, 0],
+        [9, 4],
+        [5, 4],
+        [5, 2.2],
+        [4, 2.2],
+        [4, 4],
+        [0, 4],
+    ]
+    path = write_scenario(
+        tmp_path / "gap.scenario.yaml",
+        workspace={"outer": outer},
+        start={"object": {"x": 2.0, "y": 2.0, "theta": 0.0}, "joints": ROOM["start"]["joints"]},
+        goal={"object": {"x": 7.0, "y": 2.0, "theta": 0.0}},
+    )
+    out = tmp_path / "out"
+    out.mkdir()
+    (out / "plan.json").write_text("of an older run")
+    result = invoke("plan", path, "--out", out, "--json")
     assert result.exit_code == 3, result.stderr
     facts = json.loads(result.stdout)
     assert facts.keys() >= PLAN_KEYS
     assert (facts["answer"], facts["cells"]) == ("infeasible", 0)
     assert facts["reason"] in " ".join(result.stderr.split())
-    assert list(tmp_path.iterdir()) == []
+    assert list(out.iterdir()) == []
 
 
 def test_a_budget_that_ends_is_undecided(tmp_path):

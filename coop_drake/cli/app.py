@@ -49,7 +49,8 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")]
 def main() -> None:
     """Run the command line; wrong usage is answered like any bad input."""
     arguments = sys.argv[1:]
-    logging.getLogger("drake").setLevel(logging.WARNING)
+    # Drake warns that it does not simulate joint limits: the funnels keep them, and the run checks it.
+    logging.getLogger("drake").setLevel(logging.ERROR)
     try:
         code = app(arguments, standalone_mode=False)
     except _UsageError as error:  # type: ignore[misc]

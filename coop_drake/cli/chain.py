@@ -1,4 +1,4 @@
-"""The chain, link by link: scenario, plan, maps, simulation, pictures; each shows progress and notes its facts."""
+"""The chain, link by link: scenario, plan, maps, simulation, pictures; each notes its facts."""
 
 from __future__ import annotations
 

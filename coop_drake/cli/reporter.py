@@ -19,6 +19,7 @@ __all__ = ["ProgressCallback", "Reporter"]
 ProgressCallback = Callable[[str, float], None]
 
 _SMALLEST_STEP = 0.002  # Progress that is worth drawing.
+_NEARLY = 0.999
 
 
 class Reporter:
@@ -53,7 +54,8 @@ class Reporter:
                 nonlocal drawn
                 if doing != drawn[0] or fraction - drawn[1] >= _SMALLEST_STEP:
                     drawn = (doing, fraction)
-                    bars.update(bar, completed=fraction, doing=escape(doing))
+                    # A stage is over when it returns, whatever share of it is done.
+                    bars.update(bar, completed=min(fraction, _NEARLY), doing=escape(doing))
 
             yield advance
             bars.update(bar, completed=1.0, doing="")

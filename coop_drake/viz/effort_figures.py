@@ -42,9 +42,12 @@ def summary_figure(log: SimulationLog) -> Figure:
         axes[0].plot(log.times, getattr(log, f"{name}_clearance"), color=colour, linewidth=1.0, label=name)
     legend_above(axes[0])
     axes[1].plot(log.times, log.energy_margin, color=OBJECT, linewidth=1.0)
-    for ax in axes[:2]:
-        ax.axhline(0.0, color=INK, linewidth=0.8)
-    axes[1].set_yscale("symlog", linthresh=1e-3)
+    axes[0].axhline(0.0, color=INK, linewidth=0.8)
+    if log.energy_margin.min() > 0.0:
+        axes[1].set_yscale("log")
+    else:
+        axes[1].set_yscale("symlog", linthresh=1e-3)
+        axes[1].axhline(0.0, color=INK, linewidth=0.8)
     for robot, name in enumerate(log.robot_names):
         force = np.hypot(log.base_wrenches[:, robot, 0], log.base_wrenches[:, robot, 1])
         axes[2].plot(log.times, force, color=robot_colour(robot), linewidth=1.0, label=name)

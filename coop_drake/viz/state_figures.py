@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import ComponentTree
 from coop_drake.simulation import SimulationLog
 from coop_drake.viz.canvas import break_at, legend_above, mark_switches, switch_times, time_axes
@@ -28,11 +30,17 @@ def position_figure(log: SimulationLog) -> Figure:
 
 
 def angle_figure(log: SimulationLog) -> Figure:
-    """Draw the object's angle inside its funnel over time."""
-    caption = f"Figure 7. Angle of the object between the walls of its funnel. {_SWITCHES}"
-    figure, axes = time_axes(caption, ["theta [rad]"], height=3.0)
-    _draw_funnel(axes[0], log, 0)
-    axes[0].plot(log.times, log.object_pose[:, 2], color=OBJECT, label="theta")
+    """Draw the object's angle inside its funnel over time, and both again seen from the funnel's middle."""
+    caption = (
+        "Figure 7. Angle of the object between the walls of its funnel; below, both measured from the "
+        f"funnel's middle. {_SWITCHES}"
+    )
+    figure, axes = time_axes(caption, ["theta [rad]", "theta less middle [rad]"], height=2.6)
+    middle = 0.5 * (log.funnel_lower[:, 0] + log.funnel_upper[:, 0])
+    for ax, origin in zip(axes, (np.zeros_like(middle), middle), strict=True):
+        _draw_funnel(ax, log, 0, origin)
+        times, theta = break_at(log.times, log.object_pose[:, 2] - origin, log.cell_index)
+        ax.plot(times, theta, color=OBJECT, label="theta")
     legend_above(axes[0])
     mark_switches(axes, switch_times(log.times, log.cell_index))
     return figure
@@ -72,16 +80,17 @@ def joints_figure(tree: ComponentTree, log: SimulationLog, robot: int) -> Figure
     ]
     figure, axes = time_axes(caption, labels, height=3.0 if len(joints) == 1 else 2.1)
     for joint, ax in zip(joints, axes, strict=True):
-        _draw_funnel(ax, log, 1 + joint.index)
+        _draw_funnel(ax, log, 1 + joint.index, np.zeros_like(log.times))
         ax.plot(log.times, log.joints[:, joint.index], color=robot_colour(robot), label="joint")
     legend_above(axes[0])
     mark_switches(axes, switch_times(log.times, log.cell_index))
     return figure
 
 
-def _draw_funnel(ax: Axes, log: SimulationLog, axis: int) -> None:
-    times, lower = break_at(log.times, log.funnel_lower[:, axis], log.cell_index)
-    _, upper = break_at(log.times, log.funnel_upper[:, axis], log.cell_index)
+def _draw_funnel(ax: Axes, log: SimulationLog, axis: int, origin: FloatArray) -> None:
+    """Draw both walls of one axis' funnel, measured from an origin that may move, shape (T,)."""
+    times, lower = break_at(log.times, log.funnel_lower[:, axis] - origin, log.cell_index)
+    _, upper = break_at(log.times, log.funnel_upper[:, axis] - origin, log.cell_index)
     ax.fill_between(times, lower, upper, color=SKY, alpha=0.25, linewidth=0, label="funnel")
     for wall in (lower, upper):
         ax.plot(times, wall, color=INK, linewidth=0.7)

@@ -78,9 +78,12 @@ def test_figure_5_draws_the_path_that_was_logged():
 def test_figure_7_shows_the_angle_its_funnel_and_a_dashed_line_at_every_switch():
     problem = case("base")
     log = synthetic_log(problem)
-    (axes,) = angle_figure(log).axes
+    axes, from_middle = angle_figure(log).axes
     drawn = [np.asarray(line.get_ydata(), dtype=float) for line in axes.lines]
-    assert any(np.array_equal(values, log.object_pose[:, 2]) for values in drawn)
+    _, theta = break_at(log.times, log.object_pose[:, 2], log.cell_index)
+    assert any(np.array_equal(values, theta, equal_nan=True) for values in drawn)
+    lower, upper = (np.asarray(line.get_ydata(), dtype=float) for line in from_middle.lines[:2])
+    np.testing.assert_allclose(lower, -upper, rtol=0, atol=1e-12)
     switches = switch_times(log.times, log.cell_index)
     assert len(switches) == log.cell_index.max()
     vertical = {float(line.get_xdata()[0]) for line in axes.lines if len(set(line.get_xdata())) == 1}
