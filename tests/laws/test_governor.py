@@ -1,11 +1,13 @@
-"""Behind its governor the object never has the energy to reach a wall, and it ends at the target."""
+"""Behind its governor the object never has the energy to reach a wall, and every hand-over is reached."""
 
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from coop_drake.control import energy_margin, tracking_energy
+from coop_drake.control import ScheduledGains, energy_margin, tracking_energy
+from coop_drake.control.ready import clearance_margin
+from coop_drake.control.schedule import stiffness_for_neck
 from tests.support.governor_run import box_clearance, run_governor, straight_field
 
 LOWER, UPPER = np.array([0.0, -1.0]), np.array([4.0, 1.0])
@@ -48,3 +50,40 @@ def test_the_margin_never_becomes_negative(gains, smoothing, start, target, head
     assert run.margin.min() >= -1e-9
     assert min(clearance(p) for p in run.position) >= 0.0
     assert run.position[-1] == pytest.approx(target, abs=0.01)
+
+
+@settings(max_examples=10, deadline=None, derandomize=True)
+@given(st.floats(0.01, 0.4), st.floats(0.01, 0.4), st.floats(0.0, 1.0), st.sampled_from([0.0, 0.001]))
+def test_every_hand_over_is_reached_and_leaves_margin(half_height, half_overlap, heading, smoothing):
+    """Two corridors of any width overlap in a box: its pole is reached with margin to spare.
+
+    The next cell has its own stiffness, and the object comes with the speed that the last one allowed.
+    """
+    here = box_clearance(LOWER, np.array([3.0 + half_overlap, 1.0]))
+    height = np.array([0.0, half_height])
+    following = box_clearance(np.array([3.0 - half_overlap, 0.0]) - height, np.array([5.0, 0.0]) + height)
+    target, inradius = np.array([3.0, 0.0]), min(half_height, half_overlap)
+    stiffness = stiffness_for_neck(ScheduledGains(), half_height)
+    start = np.array([0.3, 1.8 * heading - 0.9])
+    run = run_governor(
+        here,
+        straight_field(target),
+        position=start,
+        velocity=np.zeros(2),
+        governor=start,
+        gains=(50.0, np.sqrt(50.0), 0.8 * np.sqrt(50.0), smoothing),
+        seconds=15.0,
+    )
+    margins = [
+        energy_margin(tracking_energy(p, v, g, stiffness=stiffness), following(g), stiffness=stiffness)
+        for p, v, g in zip(run.position, run.velocity, run.governor, strict=True)
+    ]
+    ready = [clearance_margin(m, stiffness=stiffness, inradius=inradius) >= 0.0 for m in margins]
+    first = ready.index(True)
+    assert following(run.position[first]) > 0.0
+    assert here(run.position[first]) > 0.0
+    # Nothing takes the readiness away again while other conditions are still waited for, once at rest.
+    assert ready[-1]
+    assert clearance_margin(margins[-1], stiffness=stiffness, inradius=inradius) == pytest.approx(
+        0.75, abs=0.01
+    )
