@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -54,10 +55,20 @@ class RobotPlant:
         state[len(z) + self.velocity_index] = z_rate
         self.plant.SetPositionsAndVelocities(self.context, state)
 
+    @cached_property
+    def _order(self) -> Any:
+        """Index that reorders the last axis; a slice, and so free, where Drake's order is z_k's already."""
+        in_order = bool((self.velocity_index == np.arange(len(self.velocity_index))).all())
+        return slice(None) if in_order else self.velocity_index
+
+    @cached_property
+    def _grasp_arguments(self) -> tuple[Any, ...]:
+        world = self.plant.world_frame()
+        return (JacobianWrtVariable.kV, self.gripper_frame, np.zeros(3), world, world)
+
     def mass_matrix(self) -> FloatArray:
         """M of (22), shape (3 + n_k, 3 + n_k) [kg, kg m, kg m^2]."""
-        matrix = self.plant.CalcMassMatrix(self.context)
-        return np.asarray(matrix[np.ix_(self.velocity_index, self.velocity_index)])
+        return self.plant.CalcMassMatrix(self.context)[self._order][:, self._order]
 
     def bias(self) -> FloatArray:
         """C z' + G of (22) with the joints' damping, shape (3 + n_k,) [N, N m]."""
@@ -79,32 +90,19 @@ class RobotPlant:
     def _inverse_dynamics(self, ordered_acceleration: FloatArray) -> FloatArray:
         forces = MultibodyForces(self.plant)
         self.plant.CalcForceElementsContribution(self.context, forces)
-        effort = self.plant.CalcInverseDynamics(self.context, ordered_acceleration, forces)
-        return np.asarray(effort[self.velocity_index])
+        effort: FloatArray = self.plant.CalcInverseDynamics(self.context, ordered_acceleration, forces)
+        return effort[self._order]
 
     def grasp_jacobian(self) -> FloatArray:
         """J of E_k: planar twist of the grasp in W per rate of z_k, shape (3, 3 + n_k)."""
-        jacobian = self.plant.CalcJacobianSpatialVelocity(
-            self.context,
-            JacobianWrtVariable.kV,
-            self.gripper_frame,
-            np.zeros(3),
-            self.plant.world_frame(),
-            self.plant.world_frame(),
-        )
-        return np.asarray(jacobian[np.ix_(_PLANAR, self.velocity_index)])
+        return self.plant.CalcJacobianSpatialVelocity(self.context, *self._grasp_arguments)[_PLANAR][
+            :, self._order
+        ]
 
     def grasp_bias(self) -> FloatArray:
         """J' z' of E_k, planar in W, shape (3,) [m/s^2, rad/s^2]."""
-        bias = self.plant.CalcBiasSpatialAcceleration(
-            self.context,
-            JacobianWrtVariable.kV,
-            self.gripper_frame,
-            np.zeros(3),
-            self.plant.world_frame(),
-            self.plant.world_frame(),
-        )
-        return np.asarray(bias.get_coeffs()[_PLANAR])
+        bias = self.plant.CalcBiasSpatialAcceleration(self.context, *self._grasp_arguments)
+        return bias.get_coeffs()[_PLANAR]
 
     def grasp_pose(self) -> FloatArray:
         """Pose (x, y, angle) of E_k in W, shape (3,) [m, rad]."""

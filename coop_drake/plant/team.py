@@ -56,7 +56,7 @@ class RobotModel:
         gripper_frame: Ek, fixed on the robot's hand.
         weld: The joint that grasps the object.
         weld_index: Place of the weld in the plant's ``reaction_forces`` output.
-        weld_sign: +1 if the object is the weld's parent, else -1.
+        weld_sign: +1: the object is the weld's parent, so the reaction on the child acts on the robot.
         X_LE: Pose of the grasp in the object's frame.
         q_slice: Where q_k stands in q.
     """
@@ -192,7 +192,7 @@ def _robot_model(
         gripper_frame=gripper,
         weld=weld,
         weld_index=place,
-        weld_sign=1 if weld.parent_body().index() == grasped else -1,
+        weld_sign=1,
         X_LE=planar_pose(gripper.CalcPose(context, object_frame)),
         q_slice=slice(first, first + len(joints)),
     )

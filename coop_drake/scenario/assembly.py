@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from pydrake.common.schema import Transform
+from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import AddWeld, ModelDirective, PackageMap
 
 from coop_drake.errors import ScenarioError
@@ -17,15 +19,13 @@ class RobotAssembly:
     Attributes:
         name: Name of the model that the base belongs to; the robot goes by this name.
         models: Names of its models, in the order of the directives.
-        grasp: The weld to the object.
-        object_frame: The weld's frame on the object, scoped.
-        gripper_frame: The weld's frame on the robot, scoped.
+        object_frame: The frame on the object that the grasp's weld starts from, scoped.
+        gripper_frame: The frame on the robot that it ends at, scoped.
         key: Where the robot's model stands in the scenario file.
     """
 
     name: str
     models: tuple[str, ...]
-    grasp: AddWeld
     object_frame: str
     gripper_frame: str
     key: str
@@ -121,6 +121,7 @@ class _Reader:
             raise self._refuse(
                 "object", object_model, "the name of a model, one of " + ", ".join(self.models)
             )
+        self._turn_grasps(object_model)
         welds = [
             (key, d.add_weld, *self._weld_owners(d.add_weld, key))
             for key, d in zip(self.keys, self.directives, strict=True)
@@ -138,6 +139,22 @@ class _Reader:
             self._in_order(robots),
             self._all_owners(),
         )
+
+    def _turn_grasps(self, object_model: str) -> None:
+        """Make the object the parent of every grasp, so that all grasp wrenches are read the same way."""
+        turned = []
+        for key, directive in zip(self.keys, self.directives, strict=True):
+            weld = directive.add_weld
+            if weld and self._weld_owners(weld, key)[1] == object_model:
+                X_PC = RigidTransform() if weld.X_PC is None else weld.X_PC.GetDeterministicValue()
+                turned.append(
+                    ModelDirective(
+                        add_weld=AddWeld(parent=weld.child, child=weld.parent, X_PC=Transform(X_PC.inverse()))
+                    )
+                )
+            else:
+                turned.append(directive)
+        self.directives = tuple(turned)
 
     def _in_order(self, robots: list[RobotAssembly]) -> tuple[RobotAssembly, ...]:
         order = list(self.models)
@@ -162,19 +179,14 @@ class _Reader:
             raise self._refuse(
                 self.models[name], list(models), "welds that lead from one base model outwards, parent first"
             )
-        grasps = [
-            (weld, weld.child, weld.parent) if parent in models else (weld, weld.parent, weld.child)
-            for _, weld, parent, child in welds
-            if {parent, child} & set(models) and object_model in (parent, child)
-        ]
+        grasps = [weld for _, weld, parent, child in welds if parent == object_model and child in models]
         if len(grasps) != 1:
             raise self._refuse(
                 f"{self.models[name]}.add_model.name",
                 name,
                 f"a robot with exactly one add_weld to a frame of {object_model} (found {len(grasps)})",
             )
-        weld, object_frame, gripper_frame = grasps[0]
-        return RobotAssembly(name, models, weld, object_frame, gripper_frame, self.models[name])
+        return RobotAssembly(name, models, grasps[0].parent, grasps[0].child, self.models[name])
 
     def _all_owners(self) -> tuple[frozenset[str], ...]:
         owners = []
