@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -51,7 +52,11 @@ class PassageFinder:
     def __init__(self, polygon: Polygon) -> None:
         self._polygon = polygon
         self._distance = BoundaryDistance(polygon)
-        self._graph, self._room = medial_graph(polygon, self._distance)
+
+    @cached_property
+    def _medial(self) -> tuple[Graph, FloatArray]:
+        """The medial graph and the clearance of its nodes; most questions are answered without it."""
+        return medial_graph(self._polygon, self._distance)
 
     def find(self, start: ArrayLike, end: ArrayLike) -> Passage:
         """Widest passage between two points, the shortest one among equally wide.
@@ -83,18 +88,19 @@ class PassageFinder:
 
     def _linked(self, ends: FloatArray) -> Graph:
         """The medial graph with the ends as its last two nodes."""
-        graph = replace(self._graph, nodes=np.vstack([self._graph.nodes, ends]))
+        medial, room = self._medial
+        graph = replace(medial, nodes=np.vstack([medial.nodes, ends]))
         for k, end in enumerate(ends):
-            away = np.linalg.norm(self._graph.nodes - end, axis=1)
-            away[self._room <= 0.0] = np.inf
+            away = np.linalg.norm(medial.nodes - end, axis=1)
+            away[room <= 0.0] = np.inf
             near = np.argsort(away, kind="stable")[:LINKS]
-            nodes = np.union1d(near[np.isfinite(away[near])], np.flatnonzero(away <= self._room))
+            nodes = np.union1d(near[np.isfinite(away[near])], np.flatnonzero(away <= room))
             clearance = np.array([self._distance.along(end, graph.nodes[node]) for node in nodes])
             seen = clearance > 0.0
             graph = replace(
                 graph,
                 pairs=np.vstack(
-                    [graph.pairs, np.stack([nodes, np.full_like(nodes, len(self._room) + k)], axis=1)[seen]]
+                    [graph.pairs, np.stack([nodes, np.full_like(nodes, len(room) + k)], axis=1)[seen]]
                 ),
                 clearance=np.append(graph.clearance, clearance[seen]),
                 length=np.append(graph.length, away[nodes][seen]),

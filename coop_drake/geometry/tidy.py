@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import shapely
 from shapely import LineString, Point, Polygon
 
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.corridor import corridor_around
 from coop_drake.geometry.passage import PassageFinder
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.simplify import simplify_inward
@@ -34,6 +36,9 @@ NECK_KEPT = 0.8
 
 MITRE_LIMIT = 1.9
 """Corners sharper than about 63 degrees are cut off; below 2, so that opposite corners keep a neck open."""
+
+CORRIDOR = 2.0
+"""Bays farther from the passage than this many clearances are left out where that saves vertices [-]."""
 
 STRENGTHS = (1.0, 0.5, 0.2, 0.0)
 """Shares of the full opening and simplification, tried in this order."""
@@ -76,8 +81,18 @@ def tidy_cell(safe: Polygon, points: Sequence[FloatArray]) -> Polygon:
     for strength in STRENGTHS:
         cell = _tidied(opened, route, strength)
         if _serves(cell, safe, points, NECK_KEPT * route.neck):
-            return cell
+            return _without_bays(cell, safe, points, route)
     return opened
+
+
+def _without_bays(cell: Polygon, safe: Polygon, points: Sequence[FloatArray], route: _Route) -> Polygon:
+    """The corridor around the passage, if it is a good cell with fewer vertices."""
+    if not cell.covers(route.path):
+        return cell
+    corridor = corridor_around(cell, route.path, CORRIDOR)
+    corridor = _simplified(Polygon(corridor.exterior), route, 1.0)
+    fewer = shapely.get_num_coordinates(corridor) < shapely.get_num_coordinates(cell)
+    return corridor if fewer and _serves(corridor, safe, points, NECK_KEPT * route.neck) else cell
 
 
 def _route(region: Polygon, points: Sequence[FloatArray]) -> _Route:
@@ -101,6 +116,10 @@ def _tidied(region: Polygon, route: _Route, strength: float) -> Polygon:
     if not region.interiors:
         # What the opening leaves out in the middle of a region without holes is safe all the same.
         shape = Polygon(shape.exterior)
+    return _simplified(shape, route, strength)
+
+
+def _simplified(shape: Polygon, route: _Route, strength: float) -> Polygon:
     depth = strength * min(DEEPEST_CUT, CUT_PER_NECK * route.neck)
     return simplify_inward(shape, max(depth, SLACK), SLACK) if not shape.is_empty else shape
 
