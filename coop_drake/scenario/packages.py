@@ -22,22 +22,16 @@ def package_map(scenario_path: Path) -> PackageMap:
     Raises:
         ScenarioError: A package.xml does not name its package.
     """
-    packages = PackageMap.MakeEmpty()
+    packages = PackageMap()
     folders = scenario_path.resolve().parents
-    for file in [folder / "package.xml" for folder in (*folders, _SHIPPED)]:
+    for file in reversed([folder / "package.xml" for folder in (*folders, _SHIPPED)]):
         if file.is_file():
             _add(packages, file)
-    for name in PackageMap().GetPackageNames():
-        if not packages.Contains(name):
-            own = PackageMap()
-            for other in own.GetPackageNames():
-                if other != name:
-                    own.Remove(other)
-            packages.AddMap(own)
     return packages
 
 
 def _add(packages: PackageMap, file: Path) -> None:
+    """Add a package in place of any other of its name."""
     single = PackageMap.MakeEmpty()
     try:
         single.AddPackageXml(file)
@@ -45,8 +39,10 @@ def _add(packages: PackageMap, file: Path) -> None:
         raise ScenarioError(
             str(file), "package.name", None, "a package.xml that names its package"
         ) from error
-    if not any(packages.Contains(name) for name in single.GetPackageNames()):
-        packages.AddMap(single)
+    for name in single.GetPackageNames():
+        if packages.Contains(name):
+            packages.Remove(name)
+    packages.AddMap(single)
 
 
 def resolve(file: str, beside: Path, packages: PackageMap, scenario_file: str, key: str) -> str:

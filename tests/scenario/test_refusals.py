@@ -1,0 +1,310 @@
+"""Wrong files are refused with file, key, value and what is allowed."""
+
+import pytest
+
+from coop_drake.errors import ScenarioError
+from coop_drake.scenario import load_scenario
+from tests.support.edited_scenario import write_edited
+
+WELD = "{parent: object::grasp_0, child: robot_0::gripper}"
+MODEL = "{name: robot_0, file: package://coop_drake_models/long_blue.sdf}"
+START = "object: {x: 0.9, y: 2, theta: 1.57}"
+OUTER = "[0, 0], [1.8, 0], [1.8, 3.6]"
+
+CASES = {
+    "unknown section": (("gains:", "gain:"), "gain", {"selected": "scheduled"}, "one of the keys workspace"),
+    "unknown key": ((START, START[:-1] + ", z: 1}"), "start.object.z", 1, "one of the keys x, y, theta"),
+    "missing section": (
+        ("object: object\n\nstart:", "object: object\n\nbegin:"),
+        "begin",
+        ...,
+        "one of the keys",
+    ),
+    "missing key": ((START, "object: {x: 0.9, y: 2}"), "start.object.theta", None, "this key is required"),
+    "missing joints": (("  joints:", "  joint:"), "start.joint", ..., "one of the keys object, joints"),
+    "text for number": (
+        (START, "object: {x: left, y: 2, theta: 1}"),
+        "start.object.x",
+        "left",
+        "a finite number",
+    ),
+    "bool for number": (
+        (START, "object: {x: yes, y: 2, theta: 1}"),
+        "start.object.x",
+        True,
+        "a finite number",
+    ),
+    "list for number": (
+        (START, "object: {x: [1], y: 2, theta: 1}"),
+        "start.object.x",
+        [1],
+        "a finite number",
+    ),
+    "number for mapping": ((START, "object: 3"), "start.object", 3, "a mapping with the keys x, y, theta"),
+    "not a number": ((START, "object: {x: .nan, y: 2, theta: 1}"), "start.object.x", ..., "a finite number"),
+    "infinite": (
+        (START, "object: {x: 1, y: -.inf, theta: 1}"),
+        "start.object.y",
+        -float("inf"),
+        "a finite number",
+    ),
+    "fraction of slices": (
+        ("gains:", "planner: {max_slices: 1.5}\ngains:"),
+        "planner.max_slices",
+        1.5,
+        "a whole",
+    ),
+    "text for joints": (("robot_0: [0.0]", "robot_0: zero"), "start.joints.robot_0", "zero", "a list"),
+    "number for joints": (("robot_0: [0.0]", "robot_0: 0.0"), "start.joints.robot_0", 0.0, "a list"),
+    "joints without names": (("robot_0: [0.0]", "1: [0.0]"), "start.joints.1", 1, "a text as the name"),
+    "corner of three": (
+        (OUTER, "[0, 0, 0], [1.8, 0], [1.8, 3.6]"),
+        "workspace.outer[0]",
+        [0, 0, 0],
+        "a list of 2",
+    ),
+    "corner not finite": ((OUTER, "[0, .nan], [1.8, 0]"), "workspace.outer[0][1]", ..., "a finite number"),
+    "zero tolerance": (
+        ("position: 0.01", "position: 0"),
+        "goal.tolerances.position",
+        0.0,
+        "a positive number",
+    ),
+    "negative tolerance": (("angle: 0.02", "angle: -1"), "goal.tolerances.angle", -1.0, "a positive number"),
+    "negative margin": (
+        ("gains:", "planner: {margin: -0.1}\ngains:"),
+        "planner.margin",
+        -0.1,
+        "zero or a positive",
+    ),
+    "large overlap": (
+        ("gains:", "planner: {slice_overlap: 2}\ngains:"),
+        "planner.slice_overlap",
+        2.0,
+        "at most 1",
+    ),
+    "no time": (
+        ("gains:", "simulator: {max_time: 0}\ngains:"),
+        "simulator.max_time",
+        0.0,
+        "a positive number",
+    ),
+    "integrator": (
+        ("gains:", "simulator: {integration_scheme: euler}\ngains:"),
+        "simulator.integration_scheme",
+        "euler",
+        "one of runge_kutta3",
+    ),
+    "gain set": (
+        ("selected: scheduled", "selected: fast"),
+        "gains.selected",
+        "fast",
+        "one of scheduled, table_2",
+    ),
+    "gain tag": (
+        ("the paper's", "x\n  sets: {mine: !Gains {}}"),
+        "gains.sets.mine",
+        "!Gains",
+        "one of !FixedGains, !ScheduledGains",
+    ),
+    "no gain tag": (
+        ("the paper's", "x\n  sets: {scheduled: {rate_gain: 5}}"),
+        "gains.sets.scheduled",
+        {"rate_gain": 5},
+        "one of !FixedGains, !ScheduledGains",
+    ),
+    "gain key": (
+        ("the paper's", "x\n  sets: {mine: !FixedGains {stifness: 3}}"),
+        "gains.sets.mine.stifness",
+        3,
+        "one of the keys stiffness",
+    ),
+    "gain value": (
+        ("the paper's", "x\n  sets: {mine: !FixedGains {stiffness: -3}}"),
+        "gains.sets.mine.stiffness",
+        -3.0,
+        "positive",
+    ),
+    "object": (("object: object", "object: box"), "object", "box", "one of object, robot_0, robot_1"),
+    "directive": (("add_weld", "add_wold"), "directives[3]", ..., "add_wold"),
+    "empty directive": (("- add_weld: " + WELD, "- {}"), "directives[3]", [], "exactly one of add_model"),
+    "two directives in one": (
+        ("add_model: " + MODEL, "add_model: " + MODEL + "\n  add_model_instance: {name: x}"),
+        "directives[1]",
+        ["add_model", "add_model_instance"],
+        "exactly one of",
+    ),
+    "model without name": (
+        (MODEL, MODEL.replace("robot_0", "''")),
+        "directives[1].add_model.name",
+        "",
+        "required",
+    ),
+    "model name": (
+        (MODEL, MODEL.replace("robot_0", "'a::b'")),
+        "directives[1].add_model.name",
+        "a::b",
+        "without",
+    ),
+    "model twice": (
+        (MODEL, MODEL.replace("robot_0", "object")),
+        "directives[1].add_model.name",
+        "object",
+        "a name that no other model has",
+    ),
+    "unknown package": (
+        (MODEL, "{name: robot_0, file: package://nowhere/arm.sdf}"),
+        "directives[1].add_model.file",
+        "package://nowhere/arm.sdf",
+        "a package among",
+    ),
+    "missing model": (
+        (MODEL, "{name: robot_0, file: arm.sdf}"),
+        "directives[1].add_model.file",
+        "arm.sdf",
+        "a file that exists (looked for ",
+    ),
+    "model format": (
+        (MODEL, "{name: robot_0, file: arm.stl}"),
+        "directives[1].add_model.file",
+        "arm.stl",
+        "an .sdf or .urdf file",
+    ),
+    "default pose": (
+        (MODEL, MODEL[:-1] + ", default_free_body_pose: {base: {}}}"),
+        "directives[1].add_model.default_free_body_pose",
+        ["base"],
+        "poses and joints stand under start",
+    ),
+    "default joints": (
+        (MODEL, MODEL[:-1] + ", default_joint_positions: {elbow: [1]}}"),
+        "directives[1].add_model.default_joint_positions",
+        ["elbow"],
+        "poses and joints stand under start",
+    ),
+    "grasps nothing": (
+        ("- add_weld: " + WELD, ""),
+        "directives[1].add_model.name",
+        "robot_0",
+        "exactly one add_weld to a frame of object (found 0)",
+    ),
+    "grasps twice": (
+        (WELD, WELD + "\n- add_weld: {parent: object::grasp_2, child: robot_0::base}"),
+        "directives[1].add_model.name",
+        "robot_0",
+        "exactly one add_weld to a frame of object (found 2)",
+    ),
+    "robots welded together": (
+        (WELD, WELD + "\n- add_weld: {parent: robot_0::base, child: robot_1::base}"),
+        "directives[1].add_model.name",
+        "robot_0",
+        "(found 2)",
+    ),
+    "weld within a model": (
+        (WELD, WELD + "\n- add_weld: {parent: robot_0::base, child: robot_0::link_2}"),
+        "directives[4].add_weld.child",
+        "robot_0::link_2",
+        "a frame of another model than robot_0",
+    ),
+    "weld to the world": (
+        (WELD, WELD + "\n- add_weld: {parent: world, child: robot_0::base}"),
+        "directives[4].add_weld.parent",
+        "world",
+        "one of object, robot_0, robot_1",
+    ),
+    "weld to nobody": (
+        (WELD, "{parent: object::grasp_0, child: robot_7::gripper}"),
+        "directives[3].add_weld.child",
+        "robot_7::gripper",
+        "one of object, robot_0, robot_1",
+    ),
+    "random weld": (
+        (WELD, WELD[:-1] + ", X_PC: {rotation: !Uniform {}}}"),
+        "directives[3].add_weld.X_PC",
+        ...,
+        "one pose, not a distribution",
+    ),
+    "weld with base frame": (
+        (WELD, WELD[:-1] + ", X_PC: {base_frame: object::body}}"),
+        "directives[3].add_weld.X_PC.base_frame",
+        "object::body",
+        "the pose is in the weld's parent frame",
+    ),
+    "weld in the plane": (
+        (WELD, WELD[:-1] + ", X_PC: {translation: [0.1, 0]}}"),
+        "directives[3]",
+        ...,
+        "a vector of the wrong size",
+    ),
+    "weld not finite": (
+        (WELD, WELD[:-1] + ", X_PC: {translation: [0.1, .inf, 0]}}"),
+        "directives[3].add_weld.X_PC.translation[1]",
+        float("inf"),
+        "a finite number",
+    ),
+    "frame without base": (
+        (WELD, WELD + "\n- add_frame: {name: robot_0::tip, X_PF: {translation: [0, 0, 0]}}"),
+        "directives[4].add_frame.X_PF.base_frame",
+        "",
+        "model::frame",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", sorted(CASES))
+def test_wrong_file_is_refused_with_key_value_and_what_is_allowed(name, tmp_path):
+    pair, key, value, allowed = CASES[name]
+    path = write_edited(tmp_path, pair)
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(path)
+    assert caught.value.file == str(path)
+    assert caught.value.key == key
+    if value is not ...:
+        assert caught.value.value == value
+    assert allowed in caught.value.allowed
+    assert str(caught.value).startswith(f"{path}: {key}: ")
+
+
+def test_one_robot_is_not_enough(tmp_path):
+    path = write_edited(
+        tmp_path,
+        ("- add_model: {name: robot_1, file: package://coop_drake_models/long_orange.sdf}\n", ""),
+        ("- add_weld: {parent: object::grasp_1, child: robot_1::gripper}\n", ""),
+    )
+    with pytest.raises(ScenarioError, match="two or more robots beside the object") as caught:
+        load_scenario(path)
+    assert caught.value.value == ["robot_0"]
+
+
+@pytest.mark.parametrize(
+    ("text", "place", "problem"),
+    [
+        ("workspace:\n  outer: [[0, 0]\nstart: 3\n", "line 3, column 1", "but got '<scalar>'"),
+        ("workspace: {}\nworkspace: {}\n", "line 2, column 1", "workspace"),
+        ("\tworkspace: {}\n", "line 1, column 1", "cannot start any token"),
+    ],
+)
+def test_text_that_does_not_parse_is_refused_with_its_line(text, place, problem, tmp_path):
+    path = tmp_path / "broken.scenario.yaml"
+    path.write_text(text)
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(path)
+    assert caught.value.key == place
+    assert problem in str(caught.value.value)
+
+
+@pytest.mark.parametrize("text", ["", "- 1\n- 2\n", "just words"])
+def test_file_without_mapping_is_refused(text, tmp_path):
+    path = tmp_path / "list.scenario.yaml"
+    path.write_text(text)
+    with pytest.raises(ScenarioError, match="a mapping with the keys workspace, directives, start, goal"):
+        load_scenario(path)
+
+
+def test_missing_and_unreadable_files_are_refused(tmp_path):
+    with pytest.raises(ScenarioError, match="a readable file"):
+        load_scenario(tmp_path / "nowhere.scenario.yaml")
+    binary = tmp_path / "binary.scenario.yaml"
+    binary.write_bytes(b"\xff\xfe\xff")
+    with pytest.raises(ScenarioError, match="a readable file"):
+        load_scenario(binary)
