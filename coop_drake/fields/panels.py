@@ -13,6 +13,7 @@ from coop_drake.fields.quadrature import FloatArray
 __all__ = ["Panels", "lay_panels", "segment_distance"]
 
 _MAX_ANGLE = np.pi / 3  # span of the boundary angle that one panel resolves
+_SLIVER = 1e-3  # parts of a leg that are not worth a panel
 _MAX_PANELS = 100_000  # stop of a subdivision that cannot end
 
 
@@ -49,6 +50,7 @@ def lay_panels(outline: Outline, closeness: float) -> Panels:
     # Length of boundary that spans the largest angle allowed; holes and collapsed arcs span none.
     longest = np.where(spans > 0.0, _MAX_ANGLE * np.abs(ends - starts) / np.maximum(spans, 1e-300), total)
     legs = _corner_legs(edges, outline.preceding, longest, closeness)
+    _close_slivers(np.abs(ends - starts), outline.following, legs)
     pieces = _edge_panels(edges, outline.following, legs, longest, closeness)
     return Panels(legs, pieces[:, 0].astype(np.int64), pieces[:, 1], pieces[:, 2], pieces[:, 3])
 
@@ -106,6 +108,19 @@ def _corner_legs(
             length = max(0.5 * length, closeness * gap)
         legs[v] = length
     return legs
+
+
+@compiled
+def _close_slivers(lengths: FloatArray, following: np.ndarray, legs: FloatArray) -> None:
+    """Let two legs that almost fill an edge meet: a panel as short as rounding could not be evaluated.
+
+    Goes round each ring; where the last edge still has a sliver, the first corner makes room.
+    """
+    for e in range(len(lengths)):
+        after = following[e]
+        rest = lengths[e] - legs[e] - legs[after]
+        if abs(rest) <= _SLIVER * min(legs[e], legs[after]):
+            legs[after] = lengths[e] - legs[e] if after > e else 0.8 * legs[after]
 
 
 @compiled
