@@ -151,6 +151,13 @@ def test_a_violation_ends_in_exit_code_1_and_says_which(finished, room, tmp_path
     assert (tmp_path / "log.npz").exists()
 
 
+def test_warming_up_leaves_nothing_behind(room, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = invoke("warm", room)
+    assert result.exit_code == 0, result.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
 MISTAKES = {
     "a key that does not exist": ({"work_space": {}}, "work_space", "one of the keys"),
     "a wrong type": ({"planner": {"margin": "wide"}}, "planner.margin", "'wide'"),

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from coop_drake.cli.chain import Task, load_task, plan_task, read_plan, simulate_task, write_pictures
+from coop_drake.cli.chain import Task, load_task, plan_task, read_plan, simulate_task, warm_up, write_pictures
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
 from coop_drake.cli.measures import answer_of
@@ -138,6 +138,18 @@ def simulate_command(
         folder = _folder(task, out)
         found = read_plan(task, plan or folder.plan, reporter, gains_given=gains is not None)
         return _carry_out(task, found, folder, reporter)
+
+    run_guarded(reporter, command)
+
+
+@app.command("warm")
+def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
+    """Compile all kernels, so that the next command starts at once; `make` does it when it sets up."""
+    reporter = Reporter(machine=False, quiet=quiet)
+
+    def command() -> ExitCode:
+        warm_up(load_task(scenario, None), reporter)
+        return ExitCode.DONE
 
     run_guarded(reporter, command)
 

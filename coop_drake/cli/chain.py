@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter, process_time
 
@@ -37,7 +37,9 @@ from coop_drake.scenario import Scenario, load_scenario
 from coop_drake.simulation import SimulationLog, build_maps, simulate
 from coop_drake.viz import table_1, write_figures, write_recording
 
-__all__ = ["Task", "load_task", "plan_task", "read_plan", "simulate_task", "write_pictures"]
+__all__ = ["Task", "load_task", "plan_task", "read_plan", "simulate_task", "warm_up", "write_pictures"]
+
+_WARM_UP_SECONDS = 0.05  # Simulated time that calls every kernel [s].
 
 
 @dataclass(frozen=True)
@@ -138,6 +140,16 @@ def write_pictures(
         write_figures(task.problem.workspace, task.problem.tree, found, log, folder.path)
     with reporter.stage("recording") as progress, _stopwatch(reporter, "recording"):
         write_recording(task.scenario, found, log, folder.recording, progress=progress)
+
+
+def warm_up(task: Task, reporter: Reporter) -> None:
+    """Go through the chain once without results: compiles every kernel, for later processes too."""
+    with reporter.stage("compiling") as progress:
+        result = plan(task.problem, task.scenario.gain_sets[task.gains], gain_set_name=task.gains)
+        if isinstance(result, Found):
+            maps = build_maps(result.plan, progress=progress)
+            short = replace(task.scenario.simulator, max_time=_WARM_UP_SECONDS)
+            simulate(replace(task.scenario, simulator=short), result.plan, maps)
 
 
 @contextmanager
