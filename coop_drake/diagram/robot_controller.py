@@ -15,7 +15,7 @@ from coop_drake.plant import ObjectInertia, RobotPlant
 from coop_drake.systems import (
     GovernedCell,
     JointPpc,
-    ObjectTwist,
+    ObjectEstimator,
     OrientationPpc,
     ReadyMonitor,
     ReferenceGovernor,
@@ -24,16 +24,16 @@ from coop_drake.systems import (
     axis_laws,
 )
 
-__all__ = ["RobotKnowledge", "build_robot_controller"]
+__all__ = ["TELEMETRY", "RobotKnowledge", "build_robot_controller"]
 
 TELEMETRY = {
-    "object_twist": "object_twist",
+    "object_state": "object_estimator",
     "governor_position": "governor_state",
     "energy_margin": "reference_governor",
     "angle_funnel": "orientation_ppc",
     "joint_funnels": "joint_ppc",
     "object_acceleration": "wrench_law",
-    "wrench_share": "wrench_law",
+    "hand_command": "wrench_law",
 }
 """Outputs that are exported for the log only, and the blocks that make them."""
 
@@ -98,7 +98,7 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
     p_LE = np.array([knowledge.X_LE.x, knowledge.X_LE.y])
     joint_axes = [1 + i for i in range(knowledge.joints.start, knowledge.joints.stop)]
     return {
-        "object_twist": ObjectTwist(knowledge.robot, p_LE),
+        "object_estimator": ObjectEstimator(knowledge.robot, p_LE),
         "reference_governor": ReferenceGovernor(cells),
         "governor_state": Integrator(plan.start[:2]),
         "orientation_ppc": OrientationPpc(axis_laws(plan, [0])),

@@ -74,8 +74,9 @@ def simulate(
     """
     loop = build_closed_loop(scenario, plan, maps, meshcat)
     clearance = TeamClearance(scenario.workspace.polygon, read_component_tree(loop.team))
-    watch = Watch(loop, Invariants(clearance, plan), scenario.goal.tolerances.position, progress)
-    simulator = Simulator(loop.diagram, loop.create_context())
+    root = loop.create_context()
+    watch = Watch(loop, Invariants(clearance, plan), scenario.goal.tolerances.position, root, progress)
+    simulator = Simulator(loop.diagram, root)
     _configure(simulator, scenario.simulator)
     simulator.set_monitor(watch)
     simulator.Initialize()

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import Context
+from pydrake.systems.framework import Context, System
 
 from coop_drake.control.load_sharing import rotate, total_wrench
-from coop_drake.diagram import ClosedLoop
+from coop_drake.diagram import TELEMETRY, ClosedLoop
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant import RobotModel, base_poses
 
@@ -63,86 +65,83 @@ class Telemetry:
 
     Args:
         loop: The closed loop.
+        root: Context of the whole diagram; every reading is of its present content.
     """
 
-    def __init__(self, loop: ClosedLoop) -> None:
-        self._loop, self._team = loop, loop.team
-        inertia = self._team.object_inertia
-        self._p_LLcm = inertia.p_LLcm
+    def __init__(self, loop: ClosedLoop, root: Context) -> None:
+        self._team, self._root = loop.team, root
+        self._plant_context = self._team.plant.GetMyContextFromRoot(root)
         self._grasps = [np.array([robot.X_LE.x, robot.X_LE.y]) for robot in self._team.robots]
-        self._commanded_axes = self._team.velocity_index[:3]
+        self._of_robots = {
+            name: [_reader(controller, name, root) for controller in loop.controllers]
+            for name in ("robot_effort", *TELEMETRY)
+        }
+        self._current_cell = _reader(loop.cell_planner, "current_cell", root)
+        self._arrived = _reader(loop.cell_planner, "arrived", root)
+        self._accelerations = _reader(loop.station.diagram, "generalized_acceleration", root)
+        self._reactions = _reader(loop.station.diagram, "reaction_forces", root)
 
-    def read(self, root: Context) -> Sample:
-        """Read one instant.
-
-        Args:
-            root: Context of the whole diagram.
-        """
-        plant_context = self._team.plant.GetMyContextFromRoot(root)
-        z = self._team.plant.GetPositions(plant_context)[self._team.position_index]
-        rates = self._team.plant.GetVelocities(plant_context)[self._team.velocity_index]
-        planner_context = self._loop.cell_planner.GetMyContextFromRoot(root)
-        cell, entry = self._loop.cell_planner.GetOutputPort("current_cell").Eval(planner_context)
-        efforts = self._from_robots(root, "robot_effort")
-        shares = np.array(self._from_robots(root, "wrench_share"))
-        lower, upper = self._funnels(root)
+    def read(self) -> Sample:
+        """Read the present instant."""
+        plant, team = self._team.plant, self._team
+        z = plant.GetPositions(self._plant_context)[team.position_index]
+        cell, entry = self._current_cell()
+        efforts, hands = self._from_robots("robot_effort"), np.array(self._from_robots("hand_command"))
+        lower, upper = self._funnels()
         offsets = np.array([rotate(z[2], grasp) for grasp in self._grasps])
+        com_offset = rotate(z[2], team.object_inertia.p_LLcm)
         return Sample(
-            time=root.get_time(),
+            time=self._root.get_time(),
             cell=int(cell),
             entry=float(entry),
             z=z,
-            rates=rates,
-            base_poses=base_poses(self._team, plant_context),
-            governor_position=self._from_robots(root, "governor_position")[0],
+            rates=plant.GetVelocities(self._plant_context)[team.velocity_index],
+            base_poses=base_poses(team, self._plant_context),
+            governor_position=self._from_robots("governor_position")[0],
             funnel_lower=lower,
             funnel_upper=upper,
-            energy_margin=float(min(margin[0] for margin in self._from_robots(root, "energy_margin"))),
-            object_wrench=total_wrench(shares, offsets, com_offset=rotate(z[2], self._p_LLcm)),
-            commanded_wrenches=shares,
-            measured_wrenches=self._measured_wrenches(root, plant_context),
+            energy_margin=float(min(self._from_robots("energy_margin"))[0]),
+            object_wrench=total_wrench(hands[:, 3:], offsets, com_offset=com_offset),
+            commanded_wrenches=hands[:, 3:],
+            measured_wrenches=self._measured_wrenches(),
             base_wrenches=np.array([effort[:3] for effort in efforts]),
             joint_torques=np.concatenate([effort[3:] for effort in efforts]),
-            acceleration_error=self._acceleration_error(root),
-            arrived=bool(self._loop.cell_planner.GetOutputPort("arrived").Eval(planner_context)[0]),
+            acceleration_error=self._acceleration_error(),
+            arrived=bool(self._arrived()[0]),
         )
 
-    def _from_robots(self, root: Context, output: str) -> list[FloatArray]:
-        return [
-            controller.GetOutputPort(output).Eval(controller.GetMyContextFromRoot(root))
-            for controller in self._loop.controllers
-        ]
+    def _from_robots(self, output: str) -> list[FloatArray]:
+        return [read() for read in self._of_robots[output]]
 
-    def _funnels(self, root: Context) -> tuple[FloatArray, FloatArray]:
-        angle = self._from_robots(root, "angle_funnel")[0]
-        halves = [np.split(funnels, 2) for funnels in self._from_robots(root, "joint_funnels")]
+    def _funnels(self) -> tuple[FloatArray, FloatArray]:
+        angle = self._from_robots("angle_funnel")[0]
+        halves = [np.split(funnels, 2) for funnels in self._from_robots("joint_funnels")]
         return (
             np.concatenate([angle[:1], *(lower for lower, _ in halves)]),
             np.concatenate([angle[1:], *(upper for _, upper in halves)]),
         )
 
-    def _acceleration_error(self, root: Context) -> float:
-        station = self._loop.station.diagram
-        port = station.GetOutputPort("generalized_acceleration")
-        realised = port.Eval(station.GetMyContextFromRoot(root))[self._commanded_axes]
-        return float(
-            max(
-                np.abs(realised - command).max() for command in self._from_robots(root, "object_acceleration")
-            )
-        )
+    def _acceleration_error(self) -> float:
+        realised = self._accelerations()[self._team.velocity_index[:3]]
+        return float(np.abs(np.array(self._from_robots("object_acceleration")) - realised).max())
 
-    def _measured_wrenches(self, root: Context, plant_context: Context) -> FloatArray:
-        station = self._loop.station.diagram
-        reactions = station.GetOutputPort("reaction_forces").Eval(station.GetMyContextFromRoot(root))
+    def _measured_wrenches(self) -> FloatArray:
+        reactions = self._reactions()
         return np.array(
             [
-                _wrench_on_object(robot, reactions[robot.weld_index], plant_context)
+                _wrench_on_object(robot, reactions[robot.weld_index], self._plant_context)
                 for robot in self._team.robots
             ]
         )
 
 
-def _wrench_on_object(robot: RobotModel, reaction: object, plant_context: Context) -> FloatArray:
+def _reader(system: System, output: str, root: Context) -> Callable[[], Any]:
+    """A function that evaluates one output; looking ports and contexts up takes longer than reading them."""
+    port, context = system.GetOutputPort(output), system.GetMyContextFromRoot(root)
+    return lambda: port.Eval(context)
+
+
+def _wrench_on_object(robot: RobotModel, reaction: Any, plant_context: Context) -> FloatArray:
     """From the reaction on the weld's child, in its frame, to the planar wrench on the object at Ek."""
     R_WJc = robot.weld.frame_on_child().CalcRotationMatrixInWorld(plant_context).matrix()
     force, torque = R_WJc @ reaction.translational(), R_WJc @ reaction.rotational()

@@ -22,6 +22,7 @@ class Watch:
         loop: The closed loop that runs.
         invariants: What must hold.
         position_tolerance: How close to the goal counts as arrived [m].
+        root: Context of the whole diagram in the simulator.
         progress: Told the stage and the fraction done, if given.
     """
 
@@ -30,13 +31,14 @@ class Watch:
         loop: ClosedLoop,
         invariants: Invariants,
         position_tolerance: float,
+        root: Context,
         progress: Callable[[str, float], None] | None,
     ) -> None:
         self.recorder = Recorder()
         self.reached = False
         self.violation = ""
         self._loop, self._invariants, self._progress = loop, invariants, progress
-        self._telemetry = Telemetry(loop)
+        self._telemetry = Telemetry(loop, root)
         self._tolerance = position_tolerance
         self._last: Sample | None = None
 
@@ -45,9 +47,9 @@ class Watch:
         """Whether there is nothing left to simulate."""
         return self.reached or bool(self.violation)
 
-    def __call__(self, root: Context) -> EventStatus | None:
+    def __call__(self, _: Context) -> EventStatus | None:
         """Look at one accepted step."""
-        sample = self._telemetry.read(root)
+        sample = self._telemetry.read()
         margins = self._invariants.check(sample)
         self.recorder.add(sample, margins)
         self._last = sample

@@ -4,7 +4,7 @@ from coop_drake.systems.axis_laws import AxisLaw, axis_laws
 from coop_drake.systems.cell_planner import CellPlanner
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
 from coop_drake.systems.joint_ppc import JointPpc
-from coop_drake.systems.object_twist import ObjectTwist
+from coop_drake.systems.object_estimator import ObjectEstimator
 from coop_drake.systems.orientation_ppc import OrientationPpc
 from coop_drake.systems.ready_monitor import ReadyMonitor
 from coop_drake.systems.reference_governor import GovernedCell, ReferenceGovernor
@@ -20,8 +20,8 @@ __all__ = [
     "CellPlanner",
     "GovernedCell",
     "JointPpc",
+    "ObjectEstimator",
     "ObjectPoseSensor",
-    "ObjectTwist",
     "OrientationPpc",
     "ReadyMonitor",
     "ReferenceGovernor",

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from coop_drake.geometry.pose import FloatArray
 
-__all__ = ["CURRENT_CELL_SIZE", "READY_SIZE", "CurrentCell", "read_current_cell"]
+__all__ = ["CURRENT_CELL_SIZE", "READY_SIZE", "index_of"]
 
 #: (index, time of entry).
 CURRENT_CELL_SIZE = 2
@@ -14,24 +12,17 @@ CURRENT_CELL_SIZE = 2
 READY_SIZE = 2
 
 
-class CurrentCell(NamedTuple):
-    """Index of the current cell and the time at which it was entered [s]."""
-
-    index: int
-    start: float
-
-
-def read_current_cell(value: FloatArray, cells: int) -> CurrentCell:
-    """Read a ``current_cell`` port.
+def index_of(current_cell: FloatArray, cells: int) -> int:
+    """Index of the current cell.
 
     Args:
-        value: (index, start), shape (2,) [-, s].
+        current_cell: Value of a ``current_cell`` port, shape (2,).
         cells: Number of cells of the plan.
 
     Raises:
         IndexError: The plan has no cell of this index.
     """
-    index = int(value[0])
-    if not 0 <= index < cells:
-        raise IndexError(f"current_cell is {index}; the plan has cells 0 to {cells - 1}")
-    return CurrentCell(index, float(value[1]))
+    index = int(current_cell[0])
+    if 0 <= index < cells:
+        return index
+    raise IndexError(f"current_cell is {index}; the plan has cells 0 to {cells - 1}")

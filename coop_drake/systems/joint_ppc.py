@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from coop_drake.systems.axis_laws import AxisLaw
-from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, read_current_cell
+from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 
 __all__ = ["JointPpc"]
 
@@ -49,8 +49,8 @@ class JointPpc(LeafSystem):
         )
 
     def _law(self, context: Context) -> tuple[AxisLaw, float]:
-        cell = read_current_cell(self._cell.Eval(context), len(self._laws))
-        return self._laws[cell.index], context.get_time() - cell.start
+        cell = self._cell.Eval(context)
+        return self._laws[index_of(cell, len(self._laws))], context.get_time() - cell[1]
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
         law, time = self._law(context)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from coop_drake.systems.axis_laws import AxisLaw
-from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, read_current_cell
+from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 
 __all__ = ["OrientationPpc"]
 
@@ -16,8 +16,7 @@ class OrientationPpc(LeafSystem):
     """Keeps the object's angle in its funnel: the angular acceleration of (17)-(20).
 
     ======= ======================== ==== ====================================================== =======
-    input   ``object_pose``          3    pose of L in W, angle unwrapped [m, rad]               W
-    input   ``object_twist``         3    velocity of L's origin, angular rate [m/s, rad/s]      W
+    input   ``object_state``         6    pose and twist of L, angle unwrapped                   W
     input   ``current_cell``         2    index of the current cell, time of its entry [-, s]
     output  ``angle_acceleration``   1    desired angular acceleration [rad/s^2]                 W
     output  ``angle_funnel``         2    lower and upper wall of the funnel now [rad]           W
@@ -37,8 +36,7 @@ class OrientationPpc(LeafSystem):
         if not laws or any(law.axes != 1 for law in laws):
             raise ValueError("OrientationPpc needs one law of one axis for each cell")
         self._laws = tuple(laws)
-        self._pose = self.DeclareVectorInputPort("object_pose", 3)
-        self._twist = self.DeclareVectorInputPort("object_twist", 3)
+        self._object = self.DeclareVectorInputPort("object_state", 6)
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self.DeclareVectorOutputPort("angle_acceleration", 1, self._write_acceleration)
         self.DeclareVectorOutputPort(
@@ -49,13 +47,13 @@ class OrientationPpc(LeafSystem):
         )
 
     def _law(self, context: Context) -> tuple[AxisLaw, float]:
-        cell = read_current_cell(self._cell.Eval(context), len(self._laws))
-        return self._laws[cell.index], context.get_time() - cell.start
+        cell = self._cell.Eval(context)
+        return self._laws[index_of(cell, len(self._laws))], context.get_time() - cell[1]
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
         law, time = self._law(context)
-        angle, rate = self._pose.Eval(context)[2:], self._twist.Eval(context)[2:]
-        output.SetFromVector(law.acceleration(angle, rate, time))
+        state = self._object.Eval(context)
+        output.SetFromVector(law.acceleration(state[2:3], state[5:6], time))
 
     def _write_funnel(self, context: Context, output: BasicVector) -> None:
         law, time = self._law(context)

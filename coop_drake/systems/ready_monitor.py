@@ -10,7 +10,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 from coop_drake.control.ready import arrival_margin, ready_margin
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.axis_laws import AxisLaw
-from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, read_current_cell
+from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.reference_governor import GovernedCell
 
 __all__ = ["ReadyMonitor"]
@@ -20,8 +20,7 @@ class ReadyMonitor(LeafSystem):
     """Judges whether object and own joints may enter the next cell; in the last cell, whether they arrived.
 
     ======= ====================== ========== ====================================================== =====
-    input   ``object_pose``        3          pose of L in W, angle unwrapped [m, rad]               W
-    input   ``object_twist``       3          velocity of L's origin, angular rate [m/s, rad/s]      W
+    input   ``object_state``       6          pose and twist of L, angle unwrapped                   W
     input   ``robot_state``        2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)         W
     input   ``governor_position``  2          p_G as the robot keeps it [m]                          W
     input   ``current_cell``       2          index of the current cell, time of its entry [-, s]
@@ -60,21 +59,19 @@ class ReadyMonitor(LeafSystem):
         self._cells, self._laws, self._inradii = tuple(cells), tuple(laws), tuple(inradii)
         self._goal, self._tolerance = np.array(goal_position, dtype=float), position_tolerance
         self._joints = n = laws[0].axes - 1
-        self._pose = self.DeclareVectorInputPort("object_pose", 3)
-        self._twist = self.DeclareVectorInputPort("object_twist", 3)
+        self._object = self.DeclareVectorInputPort("object_state", 6)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + n))
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self.DeclareVectorOutputPort("ready", READY_SIZE, self._write_ready)
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
-        index = read_current_cell(self._current.Eval(context), len(self._cells)).index
-        pose, twist = self._pose.Eval(context), self._twist.Eval(context)
-        state, n = self._state.Eval(context), self._joints
-        axes = np.concatenate([pose[2:], state[3 : 3 + n]])
-        rates = np.concatenate([twist[2:], state[6 + n :]])
+        index = index_of(self._current.Eval(context), len(self._cells))
+        thing, state, n = self._object.Eval(context), self._state.Eval(context), self._joints
+        axes = np.concatenate([thing[2:3], state[3 : 3 + n]])
+        rates = np.concatenate([thing[5:], state[6 + n :]])
         judge = self._arrival if index == len(self._cells) - 1 else self._readiness
-        margin = judge(index, pose[:2], twist[:2], axes, rates, self._governor.Eval(context))
+        margin = judge(index, thing[:2], thing[3:5], axes, rates, self._governor.Eval(context))
         output.SetFromVector([float(index), margin])
 
     def _readiness(

@@ -15,7 +15,7 @@ from coop_drake.control.governor import (
     tracking_energy,
 )
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, read_current_cell
+from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 
 __all__ = ["GovernedCell", "ReferenceGovernor"]
 
@@ -47,8 +47,7 @@ class ReferenceGovernor(LeafSystem):
     """Leads the object to the cell's target no faster than is safe: (13)-(16).
 
     ======= =========================== ==== ====================================================== =====
-    input   ``object_pose``             3    pose of L in W [m, rad]                                W
-    input   ``object_twist``            3    velocity of L's origin, angular rate [m/s, rad/s]      W
+    input   ``object_state``            6    pose and twist of L                                    W
     input   ``governor_position``       2    p_G, kept by an integrator outside [m]                 W
     input   ``current_cell``            2    index of the current cell, time of its entry [-, s]
     output  ``governor_velocity``       2    rate of p_G [m/s]                                      W
@@ -70,8 +69,7 @@ class ReferenceGovernor(LeafSystem):
         if not cells:
             raise ValueError("ReferenceGovernor needs at least one cell")
         self._cells = tuple(cells)
-        self._pose = self.DeclareVectorInputPort("object_pose", 3)
-        self._twist = self.DeclareVectorInputPort("object_twist", 3)
+        self._object = self.DeclareVectorInputPort("object_state", 6)
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self.DeclareVectorOutputPort("governor_velocity", 2, self._write_velocity)
@@ -79,7 +77,7 @@ class ReferenceGovernor(LeafSystem):
         self._margin = self.DeclareVectorOutputPort("energy_margin", 1, self._write_margin)
 
     def _cell(self, context: Context) -> GovernedCell:
-        return self._cells[read_current_cell(self._current.Eval(context), len(self._cells)).index]
+        return self._cells[index_of(self._current.Eval(context), len(self._cells))]
 
     def _write_velocity(self, context: Context, output: BasicVector) -> None:
         cell = self._cell(context)
@@ -94,11 +92,11 @@ class ReferenceGovernor(LeafSystem):
         )
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
-        gains = self._cell(context).gains
+        gains, state = self._cell(context).gains, self._object.Eval(context)
         output.SetFromVector(
             governed_acceleration(
-                self._pose.Eval(context)[:2],
-                self._twist.Eval(context)[:2],
+                state[:2],
+                state[3:5],
                 self._governor.Eval(context),
                 stiffness=gains.stiffness,
                 damping=gains.damping,
@@ -106,6 +104,5 @@ class ReferenceGovernor(LeafSystem):
         )
 
     def _write_margin(self, context: Context, output: BasicVector) -> None:
-        cell = self._cell(context)
-        pose, twist = self._pose.Eval(context), self._twist.Eval(context)
-        output.SetFromVector([cell.energy_margin(pose[:2], twist[:2], self._governor.Eval(context))])
+        cell, state = self._cell(context), self._object.Eval(context)
+        output.SetFromVector([cell.energy_margin(state[:2], state[3:5], self._governor.Eval(context))])

@@ -15,9 +15,9 @@ class RobotEffort(LeafSystem):
 
     ======= ======================== ========== ======================================================= =====
     input   ``robot_state``          2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)          W
-    input   ``grasp_acceleration``   3          acceleration of Ek wanted [m/s^2, rad/s^2]              W
+    input   ``hand_command``         6          acceleration of Ek wanted [m/s^2, rad/s^2],
+                                                then the wrench on the object at Ek [N, N m]            W
     input   ``joint_acceleration``   n          accelerations of the joints wanted [rad/s^2 or m/s^2]
-    input   ``wrench_share``         3          wrench on the object at Ek wanted [N, N m]              W
     output  ``robot_effort``         3 + n      base wrench at Bk, joint torques [N, N m]               W
     ======= ======================== ========== ======================================================= =====
 
@@ -32,19 +32,17 @@ class RobotEffort(LeafSystem):
         self._robot = robot
         self._size = 3 + len(robot.joints)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * self._size)
-        self._grasp = self.DeclareVectorInputPort("grasp_acceleration", 3)
+        self._hand = self.DeclareVectorInputPort("hand_command", 6)
         self._joints = self.DeclareVectorInputPort("joint_acceleration", self._size - 3)
-        self._wrench = self.DeclareVectorInputPort("wrench_share", 3)
         self.DeclareVectorOutputPort("robot_effort", self._size, self._write_effort)
 
     def _write_effort(self, context: Context, output: BasicVector) -> None:
         # Inputs first: evaluating them may move the shared scratch context.
-        state, grasp = self._state.Eval(context), self._grasp.Eval(context)
-        joints, wrench = self._joints.Eval(context), self._wrench.Eval(context)
-        robot = self._robot
+        state, hand = self._state.Eval(context), self._hand.Eval(context)
+        joints, robot = self._joints.Eval(context), self._robot
         robot.set_state(state[: self._size], state[self._size :])
         jacobian = robot.grasp_jacobian()
         acceleration = robot_acceleration(
-            grasp, joints, jacobian=jacobian, jacobian_rate_term=robot.grasp_bias()
+            hand[:3], joints, jacobian=jacobian, jacobian_rate_term=robot.grasp_bias()
         )
-        output.SetFromVector(robot.inertial_effort(acceleration) + wrench @ jacobian)
+        output.SetFromVector(robot.inertial_effort(acceleration) + hand[3:] @ jacobian)

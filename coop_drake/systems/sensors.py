@@ -71,9 +71,7 @@ class RobotStateSensor(LeafSystem):
     def _write_state(self, context: Context, output: BasicVector) -> None:
         team = self._team.Eval(context)
         self._plant.SetPositionsAndVelocities(self._scratch, team)
-        X_WB = self._base.EvalPoseInWorld(self._scratch)
-        V_WB = self._base.EvalSpatialVelocityInWorld(self._scratch)
-        R, p = X_WB.rotation().matrix(), X_WB.translation()
-        v, w = V_WB.translational(), V_WB.rotational()
-        base, base_rate = (p[0], p[1], atan2(R[1, 0], R[0, 0])), (v[0], v[1], w[2])
+        X = self._base.EvalPoseInWorld(self._scratch).GetAsMatrix34()
+        V = self._base.EvalSpatialVelocityInWorld(self._scratch).get_coeffs()
+        base, base_rate = (X[0, 3], X[1, 3], atan2(X[1, 0], X[0, 0])), (V[3], V[4], V[2])
         output.SetFromVector(np.concatenate([base, team[self._positions], base_rate, team[self._rates]]))

@@ -8,7 +8,7 @@ from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from coop_drake.plant import TeamPlant
+from coop_drake.plant import RobotModel, TeamPlant
 
 __all__ = ["TeamActuation"]
 
@@ -31,7 +31,7 @@ class TeamActuation(LeafSystem):
 
     def __init__(self, team: TeamPlant) -> None:
         super().__init__()
-        self._bodies = [robot.base_body.index() for robot in team.robots]
+        self._forces = [_force_on(robot) for robot in team.robots]
         self._efforts = [
             self.DeclareVectorInputPort(f"robot_{robot.index}_effort", 3 + len(robot.joints))
             for robot in team.robots
@@ -43,15 +43,17 @@ class TeamActuation(LeafSystem):
         return Value[list[ExternallyAppliedSpatialForce]]()
 
     def _write_wrenches(self, context: Context, output: AbstractValue) -> None:
-        forces = []
-        for body, port in zip(self._bodies, self._efforts, strict=True):
+        for force, port in zip(self._forces, self._efforts, strict=True):
             fx, fy, torque = port.Eval(context)[:3]
-            force = ExternallyAppliedSpatialForce()
-            force.body_index = body
-            force.p_BoBq_B = np.zeros(3)
-            force.F_Bq_W = SpatialForce(tau=[0.0, 0.0, torque], f=[fx, fy, 0.0])
-            forces.append(force)
-        output.set_value(forces)
+            force.F_Bq_W = SpatialForce([0.0, 0.0, torque, fx, fy, 0.0])
+        output.set_value(self._forces)
 
     def _write_torques(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(np.concatenate([port.Eval(context)[3:] for port in self._efforts]))
+
+
+def _force_on(robot: RobotModel) -> ExternallyAppliedSpatialForce:
+    force = ExternallyAppliedSpatialForce()
+    force.body_index = robot.base_body.index()
+    force.p_BoBq_B = np.zeros(3)
+    return force

@@ -14,15 +14,14 @@ __all__ = ["WrenchLaw"]
 class WrenchLaw(LeafSystem):
     """Turns the object's desired acceleration into one robot's share of the work: (21), (28) and (31).
 
-    ======= ============================ ==== ====================================================== =====
-    input   ``object_pose``              3    pose of L in W [m, rad]                                W
-    input   ``object_twist``             3    velocity of L's origin, angular rate [m/s, rad/s]      W
-    input   ``position_acceleration``    2    desired acceleration of L's origin [m/s^2]             W
-    input   ``angle_acceleration``       1    desired angular acceleration [rad/s^2]                 W
-    output  ``object_acceleration``      3    both in one [m/s^2, rad/s^2]                           W
-    output  ``grasp_acceleration``       3    acceleration of Ek that goes with it [m/s^2, rad/s^2]  W
-    output  ``wrench_share``             3    wrench on the object at Ek [N, N m]                    W
-    ======= ============================ ==== ====================================================== =====
+    ======= ========================== ==== ====================================================== =====
+    input   ``object_state``           6    pose and twist of L                                    W
+    input   ``position_acceleration``  2    desired acceleration of L's origin [m/s^2]             W
+    input   ``angle_acceleration``     1    desired angular acceleration [rad/s^2]                 W
+    output  ``object_acceleration``    3    both in one [m/s^2, rad/s^2]                           W
+    output  ``hand_command``           6    acceleration of Ek that goes with it [m/s^2, rad/s^2],
+                                            then the wrench on the object at Ek [N, N m]           W
+    ======= ========================== ==== ====================================================== =====
 
     No state.
 
@@ -47,31 +46,29 @@ class WrenchLaw(LeafSystem):
             )
         self._p_LE, self._p_LLcm = np.array(p_LE, dtype=float), np.array(p_LLcm, dtype=float)
         self._mass, self._inertia, self._robots = mass, inertia, robots
-        self._pose = self.DeclareVectorInputPort("object_pose", 3)
-        self._twist = self.DeclareVectorInputPort("object_twist", 3)
+        self._object = self.DeclareVectorInputPort("object_state", 6)
         self._linear = self.DeclareVectorInputPort("position_acceleration", 2)
         self._angular = self.DeclareVectorInputPort("angle_acceleration", 1)
-        self._command = self.DeclareVectorOutputPort("object_acceleration", 3, self._write_command)
-        self.DeclareVectorOutputPort("grasp_acceleration", 3, self._write_grasp)
-        self.DeclareVectorOutputPort("wrench_share", 3, self._write_share)
+        self.DeclareVectorOutputPort("object_acceleration", 3, self._write_object)
+        self.DeclareVectorOutputPort("hand_command", 6, self._write_hand)
 
-    def _write_command(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(np.concatenate([self._linear.Eval(context), self._angular.Eval(context)]))
+    def _object_acceleration(self, context: Context) -> FloatArray:
+        return np.concatenate([self._linear.Eval(context), self._angular.Eval(context)])
 
-    def _write_grasp(self, context: Context, output: BasicVector) -> None:
-        theta, rate = self._pose.Eval(context)[2], self._twist.Eval(context)[2]
-        output.SetFromVector(acceleration_at(self._command.Eval(context), rate, rotate(theta, self._p_LE)))
+    def _write_object(self, context: Context, output: BasicVector) -> None:
+        output.SetFromVector(self._object_acceleration(context))
 
-    def _write_share(self, context: Context, output: BasicVector) -> None:
-        theta, rate = self._pose.Eval(context)[2], self._twist.Eval(context)[2]
-        output.SetFromVector(
-            wrench_share(
-                self._command.Eval(context),
-                rate,
-                rotate(theta, self._p_LE),
-                com_offset=rotate(theta, self._p_LLcm),
-                mass=self._mass,
-                inertia=self._inertia,
-                robots=self._robots,
-            )
+    def _write_hand(self, context: Context, output: BasicVector) -> None:
+        state, acceleration = self._object.Eval(context), self._object_acceleration(context)
+        angle, rate = state[2], state[5]
+        offset = rotate(angle, self._p_LE)
+        share = wrench_share(
+            acceleration,
+            rate,
+            offset,
+            com_offset=rotate(angle, self._p_LLcm),
+            mass=self._mass,
+            inertia=self._inertia,
+            robots=self._robots,
         )
+        output.SetFromVector(np.concatenate([acceleration_at(acceleration, rate, offset), share]))

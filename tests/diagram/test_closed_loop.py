@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.diagram import build_closed_loop
-from coop_drake.diagram.robot_controller import TELEMETRY
+from coop_drake.diagram import TELEMETRY, build_closed_loop
 from coop_drake.errors import PlanError
 from coop_drake.plant import get_configuration, get_rates
 from tests.support.small_loop import TEAMS, small_loop, small_maps, small_problem
@@ -61,13 +60,13 @@ def test_a_controller_hears_three_things_and_no_more(loop):
         assert outputs == {
             "robot_effort": 3 + n,
             "ready": 2,
-            "object_twist": 3,
+            "object_state": 6,
             "governor_position": 2,
             "energy_margin": 1,
             "angle_funnel": 2,
             "joint_funnels": 2 * n,
             "object_acceleration": 3,
-            "wrench_share": 3,
+            "hand_command": 6,
         }
         assert set(TELEMETRY) == set(outputs) - {"robot_effort", "ready"}
 
@@ -75,7 +74,7 @@ def test_a_controller_hears_three_things_and_no_more(loop):
 def test_every_robot_runs_every_block_of_the_law(loop):
     for controller in loop.controllers:
         assert {system.get_name() for system in controller.GetSystems()} == {
-            "object_twist",
+            "object_estimator",
             "reference_governor",
             "governor_state",
             "orientation_ppc",
@@ -123,7 +122,7 @@ def test_the_state_is_the_teams_the_governors_and_the_cell(loop):
     assert context.get_discrete_state().num_groups() == 1
 
 
-def test_robots_agree_on_the_objects_twist_and_command(loop):
+def test_robots_agree_on_the_objects_state_and_command(loop):
     context = loop.create_context()
     state = context.get_continuous_state_vector().CopyToVector()
     context.SetContinuousState(state + 0.01 * np.sin(np.arange(len(state))))
@@ -131,7 +130,7 @@ def test_robots_agree_on_the_objects_twist_and_command(loop):
         # The governors' copies are alike in a run: put them on one point.
         integrator = controller.GetSubsystemByName("governor_state")
         integrator.set_integral_value(integrator.GetMyMutableContextFromRoot(context), [3.0, 3.0])
-    for output in ("object_twist", "object_acceleration"):
+    for output in ("object_state", "object_acceleration"):
         values = [
             controller.GetOutputPort(output).Eval(controller.GetMyContextFromRoot(context))
             for controller in loop.controllers

@@ -4,7 +4,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.control import robot_acceleration, robot_torque
 from coop_drake.plant import base_poses, build_robot_plant, build_team_plant, set_configuration
-from coop_drake.systems import ObjectPoseSensor, ObjectTwist, RobotEffort, RobotStateSensor, TeamActuation
+from coop_drake.systems import ObjectEstimator, ObjectPoseSensor, RobotEffort, RobotStateSensor, TeamActuation
 from tests.support.small_scenario import small_scenario
 from tests.support.system_checks import (
     SIZE_OF_ABSTRACT,
@@ -72,14 +72,16 @@ def test_the_robot_state_sensor_reads_base_and_joints(rig):
         )
 
 
-def test_every_robot_finds_the_objects_twist_from_its_own_motion(rig):
+def test_every_robot_finds_the_objects_state_from_its_own_motion(rig):
     for robot in rig.team.robots:
         k, n = robot.index, len(robot.joints)
-        system = ObjectTwist(build_robot_plant(rig.scenario, k), rig.grasp(k))
-        assert port_sizes(system) == ({"robot_state": 2 * (3 + n), "object_pose": 3}, {"object_twist": 3})
+        system = ObjectEstimator(build_robot_plant(rig.scenario, k), rig.grasp(k))
+        assert port_sizes(system) == ({"robot_state": 2 * (3 + n), "object_pose": 3}, {"object_state": 6})
         inputs = {"robot_state": rig.robot_state(k), "object_pose": rig.z[:3]}
-        np.testing.assert_allclose(evaluate(system, inputs, "object_twist"), rig.rates[:3], atol=1e-13)
-        assert_every_input_is_required(system, inputs, {"object_twist": set(inputs)})
+        known = evaluate(system, inputs, "object_state")
+        np.testing.assert_array_equal(known[:3], rig.z[:3])
+        np.testing.assert_allclose(known[3:], rig.rates[:3], atol=1e-13)
+        assert_every_input_is_required(system, inputs, {"object_state": set(inputs)})
 
 
 def test_the_effort_is_the_law_with_the_robots_own_dynamics(rig):
@@ -90,9 +92,8 @@ def test_the_effort_is_the_law_with_the_robots_own_dynamics(rig):
         system = RobotEffort(model)
         inputs = {
             "robot_state": rig.robot_state(k),
-            "grasp_acceleration": generator.normal(size=3),
+            "hand_command": generator.normal(size=6),
             "joint_acceleration": generator.normal(size=n),
-            "wrench_share": generator.normal(size=3),
         }
         assert port_sizes(system) == (
             {name: len(value) for name, value in inputs.items()},
@@ -100,14 +101,14 @@ def test_the_effort_is_the_law_with_the_robots_own_dynamics(rig):
         )
         model.set_state(*np.split(inputs["robot_state"], 2))
         acceleration = robot_acceleration(
-            inputs["grasp_acceleration"],
+            inputs["hand_command"][:3],
             inputs["joint_acceleration"],
             jacobian=model.grasp_jacobian(),
             jacobian_rate_term=model.grasp_bias(),
         )
         expected = robot_torque(
             acceleration,
-            inputs["wrench_share"],
+            inputs["hand_command"][3:],
             mass_matrix=model.mass_matrix(),
             bias=model.bias(),
             jacobian=model.grasp_jacobian(),

@@ -8,8 +8,7 @@ from tests.support.system_checks import assert_every_input_is_required, evaluate
 
 PLAN = small_plan(("a", "b", "c"))
 ANGLE_INPUTS = {
-    "object_pose": [3.1, 3.2, 0.37],
-    "object_twist": [0.2, -0.1, 0.4],
+    "object_state": [3.1, 3.2, 0.37, 0.2, -0.1, 0.4],
     "current_cell": [1.0, 2.0],
 }
 JOINT_INPUTS = {
@@ -45,7 +44,7 @@ def law_by_hand(axes, position, rate, cell, time):
 
 def test_ports(orientation, joints):
     assert port_sizes(orientation) == (
-        {"object_pose": 3, "object_twist": 3, "current_cell": 2},
+        {"object_state": 6, "current_cell": 2},
         {"angle_acceleration": 1, "angle_funnel": 2},
     )
     assert port_sizes(joints) == (

@@ -10,8 +10,7 @@ from tests.support.system_checks import assert_every_input_is_required, evaluate
 PLAN = small_plan(("a", "b", "c"))
 AXES = [0, 2, 3]
 INPUTS = {
-    "object_pose": [3.8, 3.5, 0.3],
-    "object_twist": [0.0, 0.0, 0.0],
+    "object_state": [3.8, 3.5, 0.3, 0.0, 0.0, 0.0],
     "robot_state": [1.0, 2.0, 0.3, 0.1, 0.12, *[0.0] * 5],
     "governor_position": [3.8, 3.5],
     "current_cell": [0.0, 0.0],
@@ -35,8 +34,7 @@ def monitor(cells):
 def test_ports(monitor):
     inputs, outputs = port_sizes(monitor)
     assert inputs == {
-        "object_pose": 3,
-        "object_twist": 3,
+        "object_state": 6,
         "robot_state": 10,
         "governor_position": 2,
         "current_cell": 2,
@@ -47,7 +45,7 @@ def test_ports(monitor):
 @pytest.mark.parametrize("index", [0, 1])
 def test_the_report_is_the_law_with_the_next_cells_energy(monitor, cells, index):
     laws = axis_laws(PLAN, AXES)
-    inputs = {**INPUTS, "current_cell": [index, 0.0], "object_twist": [0.1, 0.0, 0.05]}
+    inputs = {**INPUTS, "current_cell": [index, 0.0], "object_state": [3.8, 3.5, 0.3, 0.1, 0.0, 0.05]}
     governor = np.array(INPUTS["governor_position"])
     expected = ready_margin(
         position=np.array([3.8, 3.5]),
@@ -70,12 +68,14 @@ def test_ready_at_rest_on_the_target(monitor):
     middle = 0.5 * (PLAN.transitions[0].goal_lower + PLAN.transitions[0].goal_upper)[AXES]
     inputs = {
         **INPUTS,
-        "object_pose": [*target, middle[0]],
+        "object_state": [*target, middle[0], 0.0, 0.0, 0.0],
         "governor_position": target,
         "robot_state": [0.0, 0.0, 0.0, *middle[1:], *[0.0] * 5],
     }
     assert evaluate(monitor, inputs, "ready")[1] > 0.0
-    assert evaluate(monitor, {**inputs, "object_twist": [9.0, 0.0, 0.0]}, "ready")[1] < 0.0
+    assert (
+        evaluate(monitor, {**inputs, "object_state": [*target, middle[0], 9.0, 0.0, 0.0]}, "ready")[1] < 0.0
+    )
     assert evaluate(monitor, {**inputs, "governor_position": [2.5, 2.5]}, "ready")[1] < 0.0
     moved = [0.0, 0.0, 0.0, middle[1] + 0.3, middle[2], *[0.0] * 5]
     assert evaluate(monitor, {**inputs, "robot_state": moved}, "ready")[1] < 0.0
@@ -87,12 +87,11 @@ def test_in_the_last_cell_it_reports_arrival(monitor):
     inputs = {
         **INPUTS,
         "current_cell": [2.0, 1.0],
-        "object_pose": [GOAL_POSE[0] + 0.002, GOAL_POSE[1], GOAL_POSE[2] + 0.001],
-        "object_twist": [0.001, 0.0, 0.003],
+        "object_state": [GOAL_POSE[0] + 0.002, GOAL_POSE[1], GOAL_POSE[2] + 0.001, 0.001, 0.0, 0.003],
         "robot_state": state,
     }
     expected = arrival_margin(
-        position=np.array(inputs["object_pose"][:2]),
+        position=np.array(inputs["object_state"][:2]),
         velocity=np.array([0.001, 0.0]),
         target=np.array(GOAL_POSE[:2]),
         axis_position=np.array([GOAL_POSE[2] + 0.001, 0.3, 0.28]),

@@ -12,8 +12,7 @@ from tests.support.system_checks import assert_every_input_is_required, evaluate
 
 PLAN = small_plan(("a", "b"))
 INPUTS = {
-    "object_pose": [3.1, 3.2, 0.3],
-    "object_twist": [0.2, -0.1, 0.4],
+    "object_state": [3.1, 3.2, 0.3, 0.2, -0.1, 0.4],
     "governor_position": [3.2, 3.15],
     "current_cell": [1.0, 2.0],
 }
@@ -32,24 +31,22 @@ def cells():
 
 
 def expected_margin(cell, inputs):
-    pose, twist, governor = (
-        np.array(inputs[k]) for k in ("object_pose", "object_twist", "governor_position")
-    )
+    state, governor = np.array(inputs["object_state"]), np.array(inputs["governor_position"])
     stiffness = cell.gains.stiffness
-    energy = tracking_energy(pose[:2], twist[:2], governor, stiffness=stiffness)
+    energy = tracking_energy(state[:2], state[3:5], governor, stiffness=stiffness)
     return energy_margin(energy, cell.clearance(governor), stiffness=stiffness)
 
 
 def test_ports(cells):
     inputs, outputs = port_sizes(ReferenceGovernor(cells))
-    assert inputs == {"object_pose": 3, "object_twist": 3, "governor_position": 2, "current_cell": 2}
+    assert inputs == {"object_state": 6, "governor_position": 2, "current_cell": 2}
     assert outputs == {"governor_velocity": 2, "position_acceleration": 2, "energy_margin": 1}
 
 
 @pytest.mark.parametrize("index", [0, 1, 2])
 def test_outputs_are_the_law_of_the_current_cell(cells, index):
     inputs = {**INPUTS, "current_cell": [index, 2.0], "governor_position": [4.1, 3.15]}
-    inputs["object_pose"] = [4.15, 3.2, 0.3]
+    inputs["object_state"] = [4.15, 3.2, 0.3, 0.2, -0.1, 0.4]
     system, cell, gains = ReferenceGovernor(cells), cells[index], cells[index].gains
     governor = np.array(inputs["governor_position"])
     margin = expected_margin(cell, inputs)
@@ -57,8 +54,8 @@ def test_outputs_are_the_law_of_the_current_cell(cells, index):
     np.testing.assert_array_equal(
         evaluate(system, inputs, "position_acceleration"),
         governed_acceleration(
-            np.array(inputs["object_pose"][:2]),
-            np.array(inputs["object_twist"][:2]),
+            np.array(inputs["object_state"][:2]),
+            np.array(inputs["object_state"][3:5]),
             governor,
             stiffness=gains.stiffness,
             damping=gains.damping,
@@ -79,7 +76,7 @@ def test_outputs_are_the_law_of_the_current_cell(cells, index):
 
 
 def test_the_governor_waits_while_the_energy_margin_is_not_positive(cells):
-    inputs = {**INPUTS, "object_twist": [9.0, 0.0, 0.0]}
+    inputs = {**INPUTS, "object_state": [3.1, 3.2, 0.3, 9.0, 0.0, 0.0]}
     assert evaluate(ReferenceGovernor(cells), inputs, "energy_margin")[0] < 0.0
     np.testing.assert_array_equal(evaluate(ReferenceGovernor(cells), inputs, "governor_velocity"), [0.0, 0.0])
 

@@ -7,8 +7,7 @@ from tests.support.system_checks import assert_every_input_is_required, evaluate
 
 P_LE, P_LLCM = np.array([0.4, 0.1]), np.array([0.05, -0.02])
 INPUTS = {
-    "object_pose": [3.8, 3.5, 0.7],
-    "object_twist": [0.3, 0.1, 0.9],
+    "object_state": [3.8, 3.5, 0.7, 0.3, 0.1, 0.9],
     "position_acceleration": [1.2, -0.4],
     "angle_acceleration": [2.0],
 }
@@ -23,21 +22,19 @@ def law():
 def test_ports(law):
     inputs, outputs = port_sizes(law)
     assert inputs == {
-        "object_pose": 3,
-        "object_twist": 3,
+        "object_state": 6,
         "position_acceleration": 2,
         "angle_acceleration": 1,
     }
-    assert outputs == {"object_acceleration": 3, "grasp_acceleration": 3, "wrench_share": 3}
+    assert outputs == {"object_acceleration": 3, "hand_command": 6}
 
 
 def test_outputs_are_the_laws(law):
     np.testing.assert_array_equal(evaluate(law, INPUTS, "object_acceleration"), DESIRED)
+    grasp, share = np.split(evaluate(law, INPUTS, "hand_command"), 2)
+    np.testing.assert_array_equal(grasp, acceleration_at(DESIRED, 0.9, rotate(0.7, P_LE)))
     np.testing.assert_array_equal(
-        evaluate(law, INPUTS, "grasp_acceleration"), acceleration_at(DESIRED, 0.9, rotate(0.7, P_LE))
-    )
-    np.testing.assert_array_equal(
-        evaluate(law, INPUTS, "wrench_share"),
+        share,
         wrench_share(
             DESIRED,
             0.9,
@@ -57,8 +54,7 @@ def test_inputs_are_required(law):
         INPUTS,
         {
             "object_acceleration": command,
-            "grasp_acceleration": set(INPUTS),
-            "wrench_share": set(INPUTS),
+            "hand_command": set(INPUTS),
         },
     )
 

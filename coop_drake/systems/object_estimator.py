@@ -1,4 +1,4 @@
-"""The object's velocity as one robot knows it: from its own motion alone."""
+"""The object's state as one robot knows it: the measured pose, and the velocity from its own motion."""
 
 from __future__ import annotations
 
@@ -9,19 +9,21 @@ from coop_drake.control.load_sharing import object_twist, rotate
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant import RobotPlant
 
-__all__ = ["ObjectTwist"]
+__all__ = ["ObjectEstimator"]
+
+_PLANAR = [3, 4, 2]  # Drake's spatial order is rotation first
 
 
-class ObjectTwist(LeafSystem):
-    """The object's twist A_k^-1 J_k z_k' through the rigid grasp, (27); no other robot's state is needed.
+class ObjectEstimator(LeafSystem):
+    """Joins the object's pose with its twist A_k^-1 J_k z_k', which own motion tells through the grasp: (27).
 
     ======= ================= ========== ===================================================== =====
     input   ``robot_state``   2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)        W
-    input   ``object_pose``   3          pose of L in W [m, rad]                               W
-    output  ``object_twist``  3          velocity of L's origin, angular rate [m/s, rad/s]     W
+    input   ``object_pose``   3          pose of L, angle unwrapped [m, rad]                   W
+    output  ``object_state``  6          that pose, velocity of L's origin, angular rate       W
     ======= ================= ========== ===================================================== =====
 
-    No state.
+    No state. No other robot's state is needed.
 
     Args:
         robot: The robot's model of itself; only its scratch context changes.
@@ -34,11 +36,10 @@ class ObjectTwist(LeafSystem):
         self._size = 3 + len(robot.joints)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * self._size)
         self._pose = self.DeclareVectorInputPort("object_pose", 3)
-        self.DeclareVectorOutputPort("object_twist", 3, self._write_twist)
+        self.DeclareVectorOutputPort("object_state", 6, self._write_state)
 
-    def _write_twist(self, context: Context, output: BasicVector) -> None:
-        state, theta = self._state.Eval(context), self._pose.Eval(context)[2]
+    def _write_state(self, context: Context, output: BasicVector) -> None:
+        state, pose = self._state.Eval(context), self._pose.Eval(context)
         self._robot.set_state(state[: self._size], state[self._size :])
-        V_WE = self._robot.gripper_frame.CalcSpatialVelocityInWorld(self._robot.context)
-        (vx, vy, _), (_, _, w) = V_WE.translational(), V_WE.rotational()
-        output.SetFromVector(object_twist(rotate(theta, self._p_LE), (vx, vy, w)))
+        V_WE = self._robot.gripper_frame.CalcSpatialVelocityInWorld(self._robot.context).get_coeffs()[_PLANAR]
+        output.SetFromVector(np.concatenate([pose, object_twist(rotate(pose[2], self._p_LE), V_WE)]))
