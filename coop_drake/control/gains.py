@@ -112,7 +112,7 @@ class ScheduledGains:
         energy_allowance: ... plus this multiple of kappa.
     """
 
-    wall_stiffness: float = 2.0
+    wall_stiffness: float = 20.0
     min_stiffness: float = 50.0
     max_stiffness: float = 400.0
     damping_factor: float = 1.0

@@ -11,7 +11,7 @@ NEXT_INTERVALS = {
     "goal_lower": np.array([1.6, 0.6]),
     "goal_upper": np.array([1.8, 1.0]),
 }
-NEXT_GAINS = transition_gains(ScheduledGains(), neck=0.02, resting=np.array([0.9, 0.0]), **NEXT_INTERVALS)
+NEXT_GAINS = transition_gains(ScheduledGains(), neck=0.2, resting=np.array([0.9, 0.0]), **NEXT_INTERVALS)
 NEXT_FUNNEL = Funnel(**NEXT_INTERVALS, decay_rate=NEXT_GAINS.decay_rate, shape=NEXT_GAINS.funnel)
 AT_REST = {
     "position": np.array([3.0, 1.0]),
@@ -64,7 +64,7 @@ def test_clearance_counts_from_half_the_inradius():
 
 
 def test_the_next_cell_is_judged_by_its_own_stiffness():
-    """What E stores in the present spring does not matter: 0.3 m/s is much for K = 100 and d = 0.02."""
+    """With K = 100 and d = 0.02 m there is room for 0.17 m/s, whatever the present stiffness."""
     slow = {**AT_REST, "next_clearance": 0.02, "inradius": 0.02}
     assert ready_margin(**slow) > 0.0
     assert NEXT_GAINS.stiffness == 100.0
