@@ -113,6 +113,18 @@ class CellMaker:
             return []
         return _regions(self.under_region(expanded), _NEGLIGIBLE_AREA)
 
+    def fits(self, intervals: Intervals, positions: FloatArray) -> bool:
+        """Whether no wall crosses the over-footprint at any of some positions: quick, necessary for a box.
+
+        Args:
+            intervals: The slice.
+            positions: Positions p_WL, shape (k, 2) [m].
+        """
+        return all(
+            self._under_space.clear(self._swept.over(index, intervals), positions)
+            for index in reversed(range(len(self._swept.pieces)))
+        )
+
     def guide_cells(self, intervals: Intervals) -> list[Region]:
         """Free regions of the slice's middle configuration: a hint for the search, never a proof."""
         middle = tuple((0.5 * (lower + upper), 0.5 * (lower + upper)) for lower, upper in intervals)

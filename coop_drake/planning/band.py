@@ -1,0 +1,56 @@
+"""Straighten a candidate path and draw it away from the walls, so that long boxes fit around it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coop_drake.geometry.minkowski import polygon_rings
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning.band_kernels import improve
+from coop_drake.planning.collision_kernels import team_arrays, wall_segments
+from coop_drake.planning.margins import marginal_workspace
+from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.refine import axis_levers
+from coop_drake.planning.sampler import densified
+
+_EXTRA = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2)
+_SPACING = 0.05
+_PRICE = 0.006
+_MOVES = 8_000
+
+
+def configuration_scale(problem: PlanningProblem) -> FloatArray:
+    """How far a unit of each axis of z moves the team's furthest point, shape (3 + n,)."""
+    return np.array([1.0, 1.0, *axis_levers(problem.tree)])
+
+
+def drawn_tight(
+    problem: PlanningProblem, path: FloatArray, clearance: float, margin: float, gap: float
+) -> FloatArray:
+    """Improve a path; start and goal stay, joints that are free at the goal may end elsewhere.
+
+    Args:
+        problem: The question.
+        path: Configurations that keep the clearance, theta unwrapped, shape (m, 3 + n).
+        clearance: Distance from the walls that the path keeps and will keep [m].
+        margin: Margin that the boxes must keep; clearance above it is what they can use [m].
+        gap: Distance that pairs of bodies keep [m].
+    """
+    tree = problem.tree
+    scale = configuration_scale(problem)
+    rings = [wall_segments(polygon_rings(marginal_workspace(problem, clearance + extra))) for extra in _EXTRA]
+    room = clearance - margin + np.array(_EXTRA) + 0.005
+    unbounded = np.full(3, np.inf)
+    return improve(
+        team_arrays(tree),
+        np.concatenate(rings),
+        np.concatenate(([0], np.cumsum([len(ring) for ring in rings]))),
+        np.concatenate(([np.inf], _PRICE / room)),
+        densified(path, scale, _SPACING),
+        np.concatenate((-unbounded, tree.joint_lower)),
+        np.concatenate((unbounded, tree.joint_upper)),
+        scale,
+        gap,
+        all(value is None for value in problem.goal_joints),
+        np.random.default_rng(0).random((_MOVES, 5)),
+    )

@@ -1,0 +1,107 @@
+"""Compiled improvement of candidate paths: shorter in every axis, further from the walls."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning.collision_kernels import IntArray, TeamArrays, is_free
+
+
+@numba.njit(cache=True)
+def clearance_level(team: TeamArrays, walls: FloatArray, first: IntArray, z: FloatArray, gap: float) -> int:
+    """In how many of the nested workspaces, widest first, a configuration is free."""
+    low, high = 0, len(first) - 1
+    while low < high:
+        middle = (low + high + 1) // 2
+        if is_free(team, walls[first[middle - 1] : first[middle]], z, gap):
+            low = middle
+        else:
+            high = middle - 1
+    return low
+
+
+@numba.njit(cache=True)
+def improve(
+    team: TeamArrays,
+    walls: FloatArray,
+    first: IntArray,
+    price: FloatArray,
+    path: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    scale: FloatArray,
+    gap: float,
+    free_end: bool,
+    uniforms: FloatArray,
+) -> FloatArray:
+    """Lower the cost of a path move by move: bumps and straightenings of one axis over a window.
+
+    The cost is the length in the sum of all scaled axes plus a price for every sample by its clearance.
+
+    Args:
+        team: The team.
+        walls: Edges of nested workspaces one after the other, widest workspace first, shape (E, 4) [m].
+        first: Where each workspace's edges begin, shape (L + 1,).
+        price: Price of a sample by its level, shape (L + 1,); infinite at level 0.
+        path: Samples, close together, shape (m, d).
+        lower: Lower limits, shape (d,); minus infinity where there is none.
+        upper: Upper limits, shape (d,).
+        scale: How far a unit of each axis moves the team, shape (d,).
+        gap: Distance that pairs of bodies must keep [m].
+        free_end: Whether the joints of the last sample may move.
+        uniforms: Random numbers in [0, 1), one row for each move, shape (k, 5).
+    """
+    path = path.copy()
+    count, size = path.shape
+    cost = np.empty(count)
+    for k in range(count):
+        cost[k] = price[clearance_level(team, walls, first, path[k], gap)]
+    fresh = np.empty((count, size))
+    fresh_cost = np.empty(count)
+    for row in range(len(uniforms)):
+        u = uniforms[row]
+        axis = int(u[0] * size)
+        half = 1 << int(u[1] * 7.0)
+        middle = 1 + int(u[2] * (count - 1))
+        last_free = free_end and axis > 2
+        i = max(0, middle - half)
+        j = min(count if last_free else count - 1, middle + half)
+        if j - i < 2:
+            continue
+        straight = u[3] < 0.5
+        shift = (2.0 * u[4] - 1.0) * 0.3 / scale[axis]
+        change = 0.0
+        for k in range(i + 1, j):
+            share = (k - i) / (j - i)
+            value = path[k, axis]
+            if straight:
+                end = path[j, axis] if j < count else path[i, axis]
+                value = path[i, axis] + share * (end - path[i, axis])
+            elif j == count:
+                value += shift * min(1.0, 2.0 * share)
+            else:
+                value += shift * min(1.0, 3.0 * min(share, 1.0 - share))
+            fresh[k] = path[k]
+            fresh[k, axis] = min(upper[axis], max(lower[axis], value))
+            change += scale[axis] * abs(
+                fresh[k, axis] - (path[k - 1, axis] if k == i + 1 else fresh[k - 1, axis])
+            )
+            change -= scale[axis] * abs(path[k, axis] - path[k - 1, axis])
+        if j < count:
+            change += scale[axis] * (
+                abs(path[j, axis] - fresh[j - 1, axis]) - abs(path[j, axis] - path[j - 1, axis])
+            )
+        for k in range(i + 1, j):
+            change += price[len(price) - 1] - cost[k]
+        for k in range(i + 1, j):
+            if change >= -1e-9:
+                break
+            fresh_cost[k] = price[clearance_level(team, walls, first, fresh[k], gap)]
+            change += fresh_cost[k] - price[len(price) - 1]
+        if change < -1e-9:
+            for k in range(i + 1, j):
+                path[k] = fresh[k]
+                cost[k] = fresh_cost[k]
+    return path

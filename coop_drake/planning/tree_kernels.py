@@ -1,0 +1,152 @@
+"""Compiled bidirectional random trees: a source of candidate paths, never of proofs."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numba
+import numpy as np
+
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning.collision_kernels import IntArray, TeamArrays, segment_is_free
+
+
+@numba.njit(cache=True)
+def _nearest(nodes: FloatArray, count: int, z: FloatArray, scale: FloatArray) -> int:
+    """Index of the node nearest to z; theta (axis 2) is periodic."""
+    best, index = np.inf, 0
+    for i in range(count):
+        total = 0.0
+        for k in range(len(z)):
+            d = z[k] - nodes[i, k]
+            if k == 2:
+                d -= 2.0 * pi * np.rint(d / (2.0 * pi))
+            total += (d * scale[k]) ** 2
+            if total >= best:
+                break
+        if total < best:
+            best, index = total, i
+    return index
+
+
+@numba.njit(cache=True)
+def _grow(
+    team: TeamArrays,
+    walls: FloatArray,
+    nodes: FloatArray,
+    parents: IntArray,
+    count: int,
+    z: FloatArray,
+    reach: float,
+    gap: float,
+    scale: FloatArray,
+    step: float,
+) -> tuple[int, bool]:
+    """Add a node on the way from the nearest one to z; returns the new count and whether z was reached."""
+    near = _nearest(nodes, count, z, scale)
+    turn = z - nodes[near]
+    turn[2] -= 2.0 * pi * np.rint(turn[2] / (2.0 * pi))
+    length = np.sqrt(((turn * scale) ** 2).sum())
+    share = 1.0 if length <= reach else reach / length
+    passed = segment_is_free(team, walls, nodes[near], nodes[near] + share * turn, gap, scale, step)
+    if passed * share * length < 0.5 * step and passed < 1.0:
+        return count, False
+    nodes[count] = nodes[near] + passed * share * turn
+    parents[count] = near
+    return count + 1, passed == 1.0 and share == 1.0
+
+
+@numba.njit(cache=True)
+def _draw(
+    u: FloatArray, guide: FloatArray, spread: FloatArray, lower: FloatArray, upper: FloatArray
+) -> FloatArray:
+    """One sample: around the guide for most of the draws, uniform otherwise and on axes without spread."""
+    z = lower + u[2:] * (upper - lower)
+    if len(guide) > 0 and u[0] < 0.85:
+        at = guide[min(len(guide) - 1, int(u[1] * len(guide)))]
+        for k in range(len(z)):
+            if spread[k] > 0.0:
+                z[k] = at[k] + (2.0 * u[2 + k] - 1.0) * spread[k]
+                if k > 2:
+                    z[k] = min(upper[k], max(lower[k], z[k]))
+    return z
+
+
+@numba.njit(cache=True)
+def connect(
+    team: TeamArrays,
+    walls: FloatArray,
+    start: FloatArray,
+    roots: FloatArray,
+    guide: FloatArray,
+    spread: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    scale: FloatArray,
+    gap: float,
+    step: float,
+    uniforms: FloatArray,
+) -> FloatArray:
+    """Grow one tree from the start and one from the goals towards samples and towards each other.
+
+    Args:
+        team: The team.
+        walls: Edges of the workspace, shape (E, 4) [m].
+        start: Free configuration, shape (d,).
+        roots: Free goal configurations, shape (R, d).
+        guide: Configurations to sample around, shape (G, d); may be empty.
+        spread: How far around, per axis; 0 for axes that the guide does not know, shape (d,).
+        lower: Lower ends of the box sampled uniformly, shape (d,).
+        upper: Upper ends, shape (d,).
+        scale: How far a unit of each axis moves the team, shape (d,).
+        gap: Distance that pairs of bodies must keep [m].
+        step: Distance between checks [m].
+        uniforms: Random numbers in [0, 1), one row for each sample, shape (S, 2 + d).
+
+    Returns:
+        Path from start to a goal, theta unwrapped, shape (m, d); no rows if none was found.
+    """
+    room = 2 * len(uniforms) + len(roots) + 1
+    nodes = np.empty((2, room, len(start)))
+    parents = np.full((2, room), -1)
+    counts = np.array([1, len(roots)])
+    nodes[0, 0] = start
+    nodes[1, : len(roots)] = roots
+    side = 0
+    for row in range(len(uniforms)):
+        z = _draw(uniforms[row], guide, spread, lower, upper)
+        before = counts[side]
+        counts[side], _ = _grow(
+            team, walls, nodes[side], parents[side], before, z, 40.0 * step, gap, scale, step
+        )
+        other = 1 - side
+        if counts[side] > before:
+            z = nodes[side, before].copy()
+            counts[other], met = _grow(
+                team, walls, nodes[other], parents[other], counts[other], z, np.inf, gap, scale, step
+            )
+            if met:
+                return _join(nodes, parents, counts)
+        side = other
+    return np.empty((0, len(start)))
+
+
+@numba.njit(cache=True)
+def _join(nodes: FloatArray, parents: IntArray, counts: IntArray) -> FloatArray:
+    """Path through the newest nodes of both trees, which stand for one configuration."""
+    chain = np.empty((counts[0] + counts[1], nodes.shape[2]))
+    size = 0
+    i = counts[0] - 1
+    while i >= 0:
+        chain[size] = nodes[0, i]
+        size += 1
+        i = parents[0, i]
+    chain[:size] = chain[:size][::-1].copy()
+    i = parents[1, counts[1] - 1]
+    while i >= 0:
+        turn = nodes[1, i, 2] - chain[size - 1, 2]
+        chain[size] = nodes[1, i]
+        chain[size, 2] = chain[size - 1, 2] + turn - 2.0 * pi * np.rint(turn / (2.0 * pi))
+        size += 1
+        i = parents[1, i]
+    return chain[:size].copy()
