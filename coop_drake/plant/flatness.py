@@ -120,4 +120,4 @@ def axis_in_world(joint: Joint, context: Context) -> FloatArray:
 
 
 def _text(axis: FloatArray) -> str:
-    return "(" + ", ".join(f"{value:.4g}" for value in axis) + ")"
+    return "(" + ", ".join(f"{round(float(value), 9) + 0.0:.4g}" for value in axis) + ")"

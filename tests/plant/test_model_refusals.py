@@ -1,0 +1,229 @@
+"""Models that are no holonomic planar manipulators, or that Drake cannot read, are refused by name."""
+
+import math
+import re
+
+import pytest
+
+from coop_drake.errors import ScenarioError
+from coop_drake.scenario import load_scenario
+from tests.support.edited_scenario import MODELS, exchanged, team_of, write_edited, write_with_robot
+from tests.support.robot_models import Arm, urdf_arm
+
+LIMITS = "<limit><lower>-1</lower><upper>1</upper></limit>"
+
+
+def jointed(kind, axis="0 0 1", more=LIMITS, **rest):
+    return Arm(joints=((kind, axis, more),), **rest).text()
+
+
+def linked(name, kind, parent, child):
+    axis = "" if kind == "fixed" else f"<axis><xyz>0 0 1</xyz>{LIMITS}</axis>"
+    return f"<joint name='{name}' type='{kind}'><parent>{parent}</parent><child>{child}</child>{axis}</joint>"
+
+
+ARMS = {
+    "tilted axis": (
+        jointed("revolute", "0 0.1 1"),
+        "robot_0::joint_0",
+        "a vertical axis, not (0, -0.0995, 0.995)",
+    ),
+    "lying axis": (jointed("revolute", "1 0 0"), "robot_0::joint_0", "a vertical axis, not (-1, "),
+    "lifting slide": (jointed("prismatic", "0 0 1"), "robot_0::joint_0", "an axis in the floor's plane"),
+    "endless slide": (jointed("prismatic", "1 0 0", "<limit/>"), "robot_0::joint_0", "two finite limits"),
+    "half endless slide": (
+        jointed("prismatic", "1 0 0", "<limit><lower>0</lower></limit>"),
+        "robot_0::joint_0",
+        "two finite limits",
+    ),
+    "locked joint": (
+        jointed("revolute", more="<limit><lower>1</lower><upper>1</upper></limit>"),
+        "robot_0::joint_0",
+        "a lower limit below the upper one, not 1.0 and 1.0",
+    ),
+    "ball joint": (jointed("ball"), "robot_0::joint_0", "fixed, revolute or prismatic joints, not ball_rpy"),
+    "screw joint": (jointed("screw"), "robot_0::joint_0", "fixed, revolute or prismatic joints, not screw"),
+    "anchored": (
+        Arm(extra=linked("anchor", "fixed", "world", "base")).text(),
+        "robot_0::anchor",
+        "no joint ties to the world",
+    ),
+    "on rails to the world": (
+        Arm(extra=linked("rail", "prismatic", "world", "base")).text(),
+        "robot_0::rail",
+        "no joint ties to the world",
+    ),
+    "loose body": (
+        Arm(extra="<link name='loose'/>").text(),
+        "robot_0::base, robot_0::loose",
+        "one body that no joint leads to: the base",
+    ),
+    "loop": (
+        Arm(
+            joints=(("revolute", "0 0 1", LIMITS), ("revolute", "0 0 1", LIMITS)),
+            extra=linked("again", "revolute", "base", "link_2"),
+        ).text(),
+        "robot_0::again",
+        "one joint towards robot_0::link_2",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", sorted(ARMS))
+def test_other_mechanisms_are_refused(name, tmp_path):
+    text, value, allowed = ARMS[name]
+    scenario = load_scenario(write_with_robot(tmp_path, text))
+    with pytest.raises(ScenarioError, match=re.escape(allowed)) as caught:
+        team_of(scenario)
+    assert caught.value.key == "directives[1]"
+    assert caught.value.value == value
+
+
+BROKEN = {
+    "no xml": ("hello", "Error parsing XML"),
+    "cut off": (Arm().text()[:300], "Error parsing XML"),
+    "no model": ("<sdf version='1.9'/>", "must have a single <model>"),
+    "unknown element": (Arm(extra="<blah/>").text(), "not defined in SDF"),
+    "negative mass": (exchanged(Arm().text(), ("<mass>6.0", "<mass>-6")), "central inertia"),
+    "impossible inertia": (exchanged(Arm().text(), ("<izz>0.6", "<izz>9")), "triangle inequality"),
+    "negative size": (exchanged(Arm().text(), ("<radius>0.2", "<radius>-0.2")), "Using default value"),
+    "axis without direction": (jointed("revolute", "0 0 0"), "norm of the xyz vector cannot be zero"),
+    "limits exchanged": (
+        jointed("revolute", more="<limit><lower>1</lower><upper>-1</upper></limit>"),
+        "lower limit must be lower",
+    ),
+    "missing mesh": (
+        exchanged(
+            Arm().text(),
+            (Arm().text().split("<geometry>")[1].split("</geometry>")[0], "<mesh><uri>no.obj</uri></mesh>"),
+        ),
+        "which does not exist",
+    ),
+    "static": (Arm(extra="<static>true</static>").text(), "Only fixed joints are permitted in static models"),
+}
+
+
+@pytest.mark.parametrize("name", sorted(BROKEN))
+def test_files_that_drake_cannot_read_are_refused(name, tmp_path):
+    text, complaint = BROKEN[name]
+    scenario = load_scenario(write_with_robot(tmp_path, text))
+    with pytest.raises(ScenarioError, match=re.escape(complaint)) as caught:
+        team_of(scenario)
+    assert caught.value.key == "directives[1]"
+    assert caught.value.value == str(tmp_path / "other.sdf")
+
+
+@pytest.mark.parametrize(
+    ("text", "value", "allowed"),
+    [
+        (urdf_arm("planar"), "robot_0::yaw", "fixed, revolute or prismatic joints, not planar"),
+        (urdf_arm("floating"), "robot_0::base, robot_0::boom", "one body that no joint leads to"),
+        (
+            urdf_arm(mimic="<mimic joint='reach' multiplier='2'/>"),
+            "constraints in the models",
+            "joints that move on their own",
+        ),
+        (urdf_arm()[:-30], ..., "Failed to parse XML"),
+    ],
+)
+def test_urdf_robots_are_refused_alike(text, value, allowed, tmp_path):
+    scenario = load_scenario(write_with_robot(tmp_path, text, "urdf"))
+    with pytest.raises(ScenarioError, match=re.escape(allowed)) as caught:
+        team_of(scenario)
+    if value is not ...:
+        assert caught.value.value == value
+
+
+@pytest.mark.parametrize(
+    ("pair", "key", "value", "complaint"),
+    [
+        (
+            ("object::grasp_0", "object::grasp_9"),
+            "directives[3]",
+            "object::grasp_9, robot_0::gripper",
+            "grasp_9",
+        ),
+        (
+            ("- add_weld", "- add_frame: {name: object::body, X_PF: {base_frame: object::body}}\n- add_weld"),
+            "directives[3]",
+            "object::body",
+            "already contains a frame named 'body'",
+        ),
+        (
+            (
+                "object: object\n",
+                "- add_collision_filter_group: {name: g, members: ['robot_0::wing']}\nobject: object\n",
+            ),
+            "directives[5]",
+            "g",
+            "body with name 'robot_0::wing' not found",
+        ),
+    ],
+)
+def test_directives_that_drake_cannot_follow_are_refused_at_their_key(pair, key, value, complaint, tmp_path):
+    scenario = load_scenario(write_edited(tmp_path, pair))
+    with pytest.raises(ScenarioError, match=re.escape(complaint)) as caught:
+        team_of(scenario)
+    assert (caught.value.key, caught.value.value) == (key, value)
+
+
+@pytest.mark.parametrize(("tilt", "stands"), [("3.1415927", True), ("3.14", False), ("0.02", False)])
+def test_bases_must_stand_upright_when_grasped(tilt, stands, tmp_path):
+    """An upside-down base whose gripper frame is upside down too stands again; round-off passes."""
+    if stands:
+        text = Arm().text().replace("0 0 3.141592653589793", f"0 {2 * math.pi - 6.2831853:.7f} {tilt}")
+        assert len(team_of(load_scenario(write_with_robot(tmp_path, text)))[0].robots) == 2
+    else:
+        text = Arm().text().replace("0 0 3.141592653589793", f"{tilt} 0 3.141592653589793")
+        scenario = load_scenario(write_with_robot(tmp_path, text))
+        with pytest.raises(ScenarioError, match="a base whose z axis points up when grasped"):
+            team_of(scenario)
+
+
+OBJECT = (MODELS / "object.sdf").read_text()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "value", "allowed"),
+    [
+        (
+            "</link>",
+            "</link>" + linked("nail", "fixed", "world", "body"),
+            "object::nail",
+            "no joint ties to the world",
+        ),
+        (
+            "</link>",
+            "</link><link name='loose'/>",
+            "object::body, object::loose",
+            "whose bodies hang together",
+        ),
+        (
+            "</link>",
+            "</link><link name='lid'/>" + linked("hinge", "revolute", "body", "lid"),
+            "object::hinge",
+            "rigid: fixed joints only",
+        ),
+    ],
+)
+def test_objects_that_are_not_one_rigid_body_are_refused(old, new, value, allowed, tmp_path):
+    path = write_edited(
+        tmp_path,
+        ("package://coop_drake_models/object.sdf", "thing.sdf"),
+        thing_sdf=exchanged(OBJECT, (old, new)),
+    )
+    with pytest.raises(ScenarioError, match=re.escape(allowed)) as caught:
+        team_of(load_scenario(path))
+    assert (caught.value.key, caught.value.value) == ("object", value)
+
+
+def test_bodies_without_inertia_that_move_on_their_own_are_refused(tmp_path):
+    text = urdf_arm().replace('<mass value="1"/>', '<mass value="0"/>')
+    text = text.replace('ixx="0.1" iyy="0.1" izz="0.1"', 'ixx="0" iyy="0" izz="0"')
+    text = re.sub(
+        r'<mass value="6"/>\s*<inertia[^>]*>',
+        '<mass value="0"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/>',
+        text,
+    )
+    with pytest.raises(ScenarioError, match=r"resist every motion|tree of bodies"):
+        team_of(load_scenario(write_with_robot(tmp_path, text, "urdf")))
