@@ -20,6 +20,7 @@ from coop_drake.planning.channel import Channel, FreeBox
 from coop_drake.planning.estimate import SETTLING_TIME, travel_time
 from coop_drake.planning.plan import Cell, Plan, Transition
 from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.shortcuts import without_detours
 from coop_drake.planning.targets import choose_targets
 
 __all__ = ["make_plan", "reschedule"]
@@ -61,7 +62,7 @@ def make_plan(
         PlanError: If the channel does not join the start to the goal.
         StallError: If a passage is too narrow or too slow to be executed; names it.
     """
-    channel = _turned_to_start(channel, problem.start[2])
+    channel = without_detours(_turned_to_start(channel, problem.start[2]))
     _check_ends(problem, channel)
     start, goal = problem.start[:2], problem.goal_pose[:2]
     targets = choose_targets(channel, start, goal)

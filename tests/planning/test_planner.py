@@ -1,0 +1,86 @@
+"""The planner's three answers, with the search replaced by channels written by hand."""
+
+from dataclasses import replace
+
+import pytest
+from shapely import box
+
+from coop_drake.control import ScheduledGains
+from coop_drake.planning import Found, Infeasible, SearchReport, Undecided, planner
+from coop_drake.planning.search import NoChannel
+from tests.support.channels import bent_channel
+
+REPORT = SearchReport(10, 4, 2, ((0.1, "found"),))
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Play a list of answers of the search; returns the function that sets them and the questions asked."""
+    questions = []
+
+    def play(*answers):
+        left = list(answers)
+
+        def find_channel(problem, progress=None):
+            questions.append(problem)
+            return left.pop(0), REPORT
+
+        monkeypatch.setattr(planner, "find_channel", find_channel)
+        return questions
+
+    return play
+
+
+def blocked(channel):
+    """The same channel with an aisle of a tenth of a millimetre as its last cell."""
+    last = channel.boxes[-1]
+    x0, _, x1, _ = last.polygon.bounds
+    wall = box(x0, 6.2, x1, 6.4).difference(box(5.0, 6.1, 5.0001, 6.5))
+    return replace(channel, boxes=(*channel.boxes[:-1], replace(last, polygon=last.polygon.difference(wall))))
+
+
+def ask(problem):
+    return planner.plan(problem, ScheduledGains(), gain_set_name="scheduled")
+
+
+def test_a_channel_becomes_a_plan(asked):
+    problem, channel = bent_channel(cells=3)
+    asked(channel)
+    result = ask(problem)
+    assert isinstance(result, Found)
+    assert result.plan.gain_set == "scheduled"
+    assert result.report == REPORT
+
+
+def test_a_proof_is_infeasible_and_a_spent_budget_undecided(asked):
+    problem, _ = bent_channel(cells=3)
+    asked(NoChannel(True, "separated"))
+    assert ask(problem) == Infeasible("separated", REPORT)
+    asked(NoChannel(False, "budget spent"))
+    assert ask(problem) == Undecided("budget spent", REPORT)
+
+
+def test_a_channel_that_stalls_is_searched_again_at_half_the_margin(asked):
+    problem, channel = bent_channel(cells=3)
+    questions = asked(blocked(channel), channel)
+    result = ask(problem)
+    assert isinstance(result, Found)
+    assert result.report.slices == 20
+    assert [question.settings.margin for question in questions] == [0.1, channel.margin / 2]
+    assert result.plan.margin == channel.margin
+
+
+def test_channels_that_all_stall_are_undecided_with_the_passage_named(asked):
+    problem, channel = bent_channel(cells=3)
+    questions = asked(*[blocked(channel)] * 3)
+    result = ask(problem)
+    assert isinstance(result, Undecided)
+    assert len(questions) == 3
+    assert "cannot be executed: cell 2: the object's passage through (5.000," in result.reason
+
+
+def test_a_stall_at_no_margin_is_not_asked_again(asked):
+    problem, channel = bent_channel(cells=3)
+    questions = asked(replace(blocked(channel), margin=0.0))
+    assert isinstance(ask(problem), Undecided)
+    assert len(questions) == 1
