@@ -14,7 +14,7 @@ __all__ = ["without_detours"]
 LEAST_SHARED = 0.15
 """Share of the narrower interval that two boxes must have in common on every axis [-]."""
 
-LOOKAHEAD = 8
+LOOKAHEAD = 24
 """So many boxes further on is looked for one to go to directly."""
 
 
