@@ -17,7 +17,7 @@ from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.slits import component_at
 from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.planning.channel import Channel, FreeBox
-from coop_drake.planning.estimate import SETTLING_TIME, travel_time
+from coop_drake.planning.estimate import speed_per_clearance, transition_time, travel_time
 from coop_drake.planning.plan import Cell, Plan, Transition
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.shortcuts import without_detours
@@ -78,7 +78,12 @@ def make_plan(
         goal_lower, goal_upper = _goal_intervals(problem, channel, index)
         way = _way(problem, cells[index : index + 2], entry, target, index)
         gains = _gains(gain_set, cells[index], way.neck, (goal_lower, goal_upper), resting)
-        transitions.append(Transition(**vars(way), goal_lower=goal_lower, goal_upper=goal_upper, gains=gains))
+        time = _estimated_time(way.length, way.neck, gains)
+        transitions.append(
+            Transition(
+                **vars(way), goal_lower=goal_lower, goal_upper=goal_upper, estimated_time=time, gains=gains
+            )
+        )
         resting = 0.5 * (goal_lower + goal_upper)
     return Plan(
         cells=tuple(cells),
@@ -105,7 +110,8 @@ def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
     for cell, transition in zip(plan.cells, plan.transitions, strict=True):
         goal = (transition.goal_lower, transition.goal_upper)
         gains = _gains(gain_set, cell, transition.neck, goal, resting)
-        transitions.append(replace(transition, gains=gains))
+        time = _estimated_time(transition.length, transition.neck, gains)
+        transitions.append(replace(transition, gains=gains, estimated_time=time))
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
     return replace(plan, transitions=tuple(transitions), gain_set=name)
 
@@ -119,7 +125,6 @@ class _Way:
     inradius: float
     neck: float
     length: float
-    estimated_time: float
     only_angles: bool
 
 
@@ -138,7 +143,7 @@ def _way(
     if min(inradius, passage.neck) < NARROWEST or time > problem.settings.max_transition_time:
         raise StallError(_stall(problem, index, passage, target, inradius))
     only_angles = bool(passage.length <= SAME_PLACE)
-    return _Way(target, region, inradius, passage.neck, passage.length, SETTLING_TIME + time, only_angles)
+    return _Way(target, region, inradius, passage.neck, passage.length, only_angles)
 
 
 def _stall(
@@ -175,6 +180,10 @@ def _gains(
         goal_upper=goal[1],
         resting=resting,
     )
+
+
+def _estimated_time(length: float, neck: float, gains: TransitionGains) -> float:
+    return transition_time(length, neck, speed_per_clearance(gains))
 
 
 def _goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Intervals:
