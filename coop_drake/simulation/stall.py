@@ -6,6 +6,7 @@ import numpy as np
 
 from coop_drake.control.ready import arrival_margin, clearance_margin, funnel_margin, interval_margin
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.plan import Plan
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems import GovernedCell, axis_laws
@@ -70,18 +71,19 @@ def _readiness(plan: Plan, sample: Sample) -> dict[str, float]:
 def _arrival(plan: Plan, sample: Sample, position_tolerance: float) -> dict[str, float]:
     margins = _intervals(plan, sample)
     transition = plan.transitions[sample.cell]
-    still = np.zeros_like(sample.rates[2:])
-    arguments = {
-        "target": plan.goal_pose[:2],
-        "axis_position": 0.5 * (transition.goal_lower + transition.goal_upper),
-        "goal_lower": transition.goal_lower,
-        "goal_upper": transition.goal_upper,
-        "position_tolerance": position_tolerance,
-    }
-    margins["the object reaches its goal position"] = arrival_margin(
-        position=sample.z[:2], velocity=np.zeros(2), axis_rate=still, **arguments
-    )
-    margins["the object and the joints come to rest"] = arrival_margin(
-        position=plan.goal_pose[:2], velocity=sample.rates[:2], axis_rate=sample.rates[2:], **arguments
-    )
+
+    def judge(position: FloatArray, rates: FloatArray) -> float:
+        return arrival_margin(
+            position=position,
+            velocity=rates[:2],
+            target=plan.goal_pose[:2],
+            axis_position=0.5 * (transition.goal_lower + transition.goal_upper),
+            axis_rate=rates[2:],
+            goal_lower=transition.goal_lower,
+            goal_upper=transition.goal_upper,
+            position_tolerance=position_tolerance,
+        )
+
+    margins["the object reaches its goal position"] = judge(sample.z[:2], np.zeros_like(sample.rates))
+    margins["the object and the joints come to rest"] = judge(plan.goal_pose[:2], sample.rates)
     return margins
