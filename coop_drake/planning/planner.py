@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from coop_drake.control import GainSet
-from coop_drake.errors import PlanError, StallError
+from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.planning.channel import Channel, SearchReport
 from coop_drake.planning.plan import Found, Infeasible, PlanningResult, Undecided
 from coop_drake.planning.problem import PlanningProblem
@@ -46,7 +46,7 @@ def plan(
             return Undecided(stall or answer.reason, report)
         try:
             made = make_plan(question, answer, gain_set, gain_set_name=gain_set_name, progress=progress)
-        except (StallError, PlanError) as error:
+        except (GeometryError, PlanError, StallError) as error:
             stall = f"a channel exists but cannot be executed: {error}"
             if answer.margin == 0.0:
                 break
