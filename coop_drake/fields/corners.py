@@ -49,7 +49,7 @@ def leg_panels(angle: float, closeness: float) -> tuple[FloatArray, FloatArray]:
         closeness: Longest panel per unit of distance.
     """
     gap = min(angle, 2.0 * pi - angle)
-    if gap >= pi / 4:
+    if gap >= pi / 3 - 1e-9:
         return np.array([0.0, 1.0]), np.array([0.5, 1.0])
     count = ceil(log(2.0) / log1p(closeness * sin(gap)))
     ring = 0.5 * 2.0 ** (np.arange(count + 1) / count)

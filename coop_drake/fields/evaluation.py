@@ -3,6 +3,8 @@
 Far panels are summed directly, near ones through Legendre functions of the second kind, which are exact for
 the panel's polynomial density up to the wall itself: with zeta the point in the panel's own coordinate, the
 integral of P_k(x) / (x - zeta) over [-1, 1] is -2 Q_k(zeta). Near a corner its dyadic rings are the panels.
+
+All of it stays in this file: compiled code is cached by file, so a caller elsewhere would keep an old callee.
 """
 
 from __future__ import annotations
@@ -15,11 +17,12 @@ from coop_drake.fields.compiled import compiled
 from coop_drake.fields.layers import LEVELS, MapArrays
 from coop_drake.fields.quadrature import FloatArray, gauss_nodes
 
-__all__ = ["evaluate_many", "evaluate_one", "is_inside", "nearest_on_edges"]
+__all__ = ["evaluate_many", "evaluate_one", "velocity_at"]
 
 _FAR = 2.2**2  # |zeta|^2 beyond which the solved nodes do
 _NEAR = 2.9  # |zeta - 1| + |zeta + 1| below which the Legendre functions are needed
 _JUNCTION = 1e-6  # the Jacobian is taken no closer than this to where two panels meet, in half panels
+_STRAIGHT = 1e-6  # part of the slowdown radius within which the line to a point goal is straight
 _GAUSS_X, _GAUSS_W = gauss_nodes(16)
 
 Sums = tuple[float, float, float, float, float, float]
@@ -45,40 +48,56 @@ def _direct(s: FloatArray, first: int, last: int, x: float, y: float) -> Sums:
 
 
 @compiled
-def _panel(density: FloatArray, zx: float, zy: float, hx: float, hy: float, tolerance: float) -> Sums:
-    """One panel with density (2, 16, 2) seen from zeta = zx + i zy, half vector h."""
-    tu, tv, xu, yu, xv, yv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    plus, minus = (zx + 1.0) ** 2 + zy * zy, (zx - 1.0) ** 2 + zy * zy
+def _panel(density: FloatArray, ax: float, ay: float, bx: float, by: float, tolerance: float) -> Sums:
+    """One panel from a to b, both seen from the point, with density (2, 16, 2).
+
+    Neighbours that share an end to the last bit never miss or count twice a point between them.
+    """
+    hx, hy = 0.5 * (bx - ax), 0.5 * (by - ay)
+    squared = hx * hx + hy * hy
+    # zeta + 1 and zeta - 1.
+    px, py = -(ax * hx + ay * hy) / squared, (ax * hy - ay * hx) / squared
+    mx, my = -(bx * hx + by * hy) / squared, (bx * hy - by * hx) / squared
+    plus, minus = px * px + py * py, mx * mx + my * my
     if np.sqrt(plus) + np.sqrt(minus) > _NEAR:
-        for j in range(16):
-            rx = _GAUSS_X[j] - zx
-            inverse = 1.0 / (rx * rx + zy * zy)
-            re, im = rx * inverse, zy * inverse
-            u, v = _GAUSS_W[j] * density[0, j, 0], _GAUSS_W[j] * density[0, j, 1]
-            re2, im2 = re * re - im * im, 2.0 * re * im
-            tu += u * im
-            tv += v * im
-            xu += u * re2
-            yu += u * im2
-            xv += v * re2
-            yv += v * im2
-        return _turned(tu, tv, xu, yu, xv, yv, hx, hy)
-    plus, minus = max(plus, 1e-26), max(minus, 1e-26)
-    zeta = complex(zx, zy)
-    start, end = np.arctan2(zy, zx + 1.0), np.arctan2(zy, zx - 1.0)
+        return _turned(_gauss(density, 0.5 * (px + mx), 0.5 * (py + my)), hx, hy)
+    start = np.arctan2(py, px) if plus > 0.0 else 0.0
+    end = np.arctan2(my, mx) if minus > 0.0 else 0.0  # on a shared end, exactly one of two panels sees it
     # The cut is the panel itself; a point that rounding put behind it still sees it from the domain's side.
-    if end < -0.5 * pi < start and -zy * np.sqrt(hx * hx + hy * hy) < tolerance:
-        end += 2.0 * pi
-    q0 = complex(0.25 * np.log(plus / minus), 0.5 * (start - end))
-    d0 = 1.0 / (1.0 - zeta * zeta + (1e-26 if minus * plus < 1e-25 else 0.0))
+    if -my * np.sqrt(squared) < tolerance:
+        start = start if start > -0.5 * pi else start + 2.0 * pi
+        end = end if end > -0.5 * pi else end + 2.0 * pi
+    q0 = complex(0.25 * np.log(max(plus, 1e-60) / max(minus, 1e-60)), 0.5 * (start - end))
+    d0 = -1.0 / (complex(px, py) * complex(mx, my) + (1e-60 if plus * minus == 0.0 else 0.0))
+    return _turned(_legendre(density[1], complex(0.5 * (px + mx), 0.5 * (py + my)), q0, d0), hx, hy)
+
+
+@compiled
+def _gauss(density: FloatArray, zx: float, zy: float) -> Sums:
+    """Imaginary parts of the two integrals, real and imaginary parts of their derivatives, by quadrature."""
+    tu, tv, ru, iu, rv, iv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(16):
+        rx = _GAUSS_X[j] - zx
+        inverse = 1.0 / (rx * rx + zy * zy)
+        re, im = rx * inverse, zy * inverse
+        u, v = _GAUSS_W[j] * density[0, j, 0], _GAUSS_W[j] * density[0, j, 1]
+        re2, im2 = re * re - im * im, 2.0 * re * im
+        tu += u * im
+        tv += v * im
+        ru += u * re2
+        iu += u * im2
+        rv += v * re2
+        iv += v * im2
+    return tu, tv, ru, iu, rv, iv
+
+
+@compiled
+def _legendre(c: FloatArray, zeta: complex, q0: complex, d0: complex) -> Sums:
+    """The same through Q_k and its derivative, from their values for k = 0."""
     q1, d1 = zeta * q0 - 1.0, q0 + zeta * d0
-    c = density[1]
     tu = c[0, 0] * q0.imag + c[1, 0] * q1.imag
     tv = c[0, 1] * q0.imag + c[1, 1] * q1.imag
-    xu = c[0, 0] * d0.real + c[1, 0] * d1.real
-    yu = c[0, 0] * d0.imag + c[1, 0] * d1.imag
-    xv = c[0, 1] * d0.real + c[1, 1] * d1.real
-    yv = c[0, 1] * d0.imag + c[1, 1] * d1.imag
+    du, dv = c[0, 0] * d0 + c[1, 0] * d1, c[0, 1] * d0 + c[1, 1] * d1
     for k in range(1, 15):
         q2 = ((2 * k + 1) * zeta * q1 - k * q0) / (k + 1)
         d2 = d0 + (2 * k + 1) * q1
@@ -86,31 +105,33 @@ def _panel(density: FloatArray, zx: float, zy: float, hx: float, hy: float, tole
         u, v = c[k + 1, 0], c[k + 1, 1]
         tu += u * q2.imag
         tv += v * q2.imag
-        xu += u * d2.real
-        yu += u * d2.imag
-        xv += v * d2.real
-        yv += v * d2.imag
-    return _turned(-2.0 * tu, -2.0 * tv, -2.0 * xu, -2.0 * yu, -2.0 * xv, -2.0 * yv, hx, hy)
+        du += u * d2
+        dv += v * d2
+    return -2.0 * tu, -2.0 * tv, -2.0 * du.real, -2.0 * du.imag, -2.0 * dv.real, -2.0 * dv.imag
 
 
 @compiled
-def _turned(tu: float, tv: float, ru: float, iu: float, rv: float, iv: float, hx: float, hy: float) -> Sums:
+def _turned(s: Sums, hx: float, hy: float) -> Sums:
     """Divide the derivatives with respect to zeta, given by real and imaginary part, by h."""
+    tu, tv, ru, iu, rv, iv = s
     inverse = 1.0 / (hx * hx + hy * hy)
     hx, hy = hx * inverse, hy * inverse
     return tu, tv, iu * hx - ru * hy, ru * hx + iu * hy, iv * hx - rv * hy, rv * hx + iv * hy
 
 
 @compiled
-def _add(a: Sums, b: Sums) -> Sums:
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
+def _away(ax: float, ay: float, bx: float, by: float) -> complex:
+    """A step off the wall if the point, seen from which the panel runs from a to b, is at one of its ends."""
+    hx, hy = 0.5 * (bx - ax), 0.5 * (by - ay)
+    nearest = min(ax * ax + ay * ay, bx * bx + by * by)
+    if nearest < _JUNCTION * _JUNCTION * (hx * hx + hy * hy):
+        return complex(-hy, hx) * (2.0 * _JUNCTION)
+    return 0j
 
 
 @compiled
-def _local(rx: float, ry: float, hx: float, hy: float) -> tuple[float, float]:
-    """Point r seen from a panel's centre in the panel's own coordinate."""
-    inverse = 1.0 / (hx * hx + hy * hy)
-    return (rx * hx + ry * hy) * inverse, (ry * hx - rx * hy) * inverse
+def _add(a: Sums, b: Sums) -> Sums:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
 
 
 @compiled
@@ -143,8 +164,12 @@ def _tail(m: MapArrays, k: int, level: int, rx: float, ry: float) -> Sums:
 
 
 @compiled
-def _corner(m: MapArrays, k: int, rx: float, ry: float, tolerance: float) -> tuple[Sums, complex]:
-    """One corner seen from r relative to its vertex, not far from it; and a step away from a junction."""
+def _corner(m: MapArrays, k: int, x: float, y: float, tolerance: float) -> tuple[Sums, complex]:
+    """One corner seen from a point not far from it; and a step away from a junction of panels."""
+    rx, ry = x - m.corners[k, 0], y - m.corners[k, 1]
+    floor = max(2.0 * m.corners[k, 8] * 0.5**LEVELS, 4.0 * tolerance)
+    if rx * rx + ry * ry < floor * floor:
+        rx, ry = floor * m.corners[k, 6], floor * m.corners[k, 7]
     total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     step = 0j
     panels, first_break, first = m.corner_index[k, 1], m.corner_index[k, 4], m.corner_index[k, 5]
@@ -154,16 +179,17 @@ def _corner(m: MapArrays, k: int, rx: float, ry: float, tolerance: float) -> tup
     while level < LEVELS and distance < 2.0 * scale:
         for leg in range(2):
             dx, dy = scale * m.corners[k, 2 + 2 * leg], scale * m.corners[k, 3 + 2 * leg]
-            sign = 2.0 * leg - 1.0
             for j in range(panels):
                 a, b = m.breaks[first_break + j], m.breaks[first_break + j + 1]
-                middle, half = 0.5 * (a + b), 0.5 * sign * (b - a)
-                hx, hy = half * dx, half * dy
-                zx, zy = _local(rx - middle * dx, ry - middle * dy, hx, hy)
-                if (abs(zx) - 1.0) ** 2 + zy * zy < _JUNCTION * _JUNCTION:
-                    step = complex(-hy, hx) * (2.0 * _JUNCTION)
+                ax, ay, bx, by = a * dx - rx, a * dy - ry, b * dx - rx, b * dy - ry
+                if level == 0 and j == panels - 1:
+                    bx, by = m.corners[k, 9 + 2 * leg] - x, m.corners[k, 10 + 2 * leg] - y
+                if leg == 0:
+                    ax, ay, bx, by = bx, by, ax, ay
+                away = _away(ax, ay, bx, by)
+                step = away if away != 0j else step
                 ring = m.rings[first + (2 * level + leg) * panels + j]
-                total = _add(total, _panel(ring, zx, zy, hx, hy, tolerance))
+                total = _add(total, _panel(ring, ax, ay, bx, by, tolerance))
         scale *= 0.5
         level += 1
     return _add(total, _tail(m, k, level, rx, ry)), step
@@ -180,24 +206,21 @@ def _sums(m: MapArrays, x: float, y: float, tolerance: float) -> tuple[Sums, com
         if rx * rx + ry * ry >= 4.0 * leg * leg:
             part = _direct(m.sources, m.corner_index[k, 0], m.corner_index[k + 1, 0], x, y)
         else:
-            floor = max(2.0 * leg * 0.5**LEVELS, 4.0 * tolerance)
-            if rx * rx + ry * ry < floor * floor:
-                rx, ry = floor * m.corners[k, 6], floor * m.corners[k, 7]
-            part, away = _corner(m, k, rx, ry, tolerance)
+            part, away = _corner(m, k, x, y, tolerance)
             step = away if away != 0j else step
         total = _add(total, part)
     first = m.corner_index[corners, 0]
     nodes = (m.sources.shape[1] - first) // max(len(m.panels), 1)
     for k in range(len(m.panels)):
-        hx, hy = m.panels[k, 2], m.panels[k, 3]
-        rx, ry = x - m.panels[k, 0], y - m.panels[k, 1]
-        if rx * rx + ry * ry >= _FAR * (hx * hx + hy * hy):
+        ax, ay = m.panels[k, 0] - x, m.panels[k, 1] - y
+        bx, by = m.panels[k, 2] - x, m.panels[k, 3] - y
+        middle_squared = (ax + bx) ** 2 + (ay + by) ** 2
+        if middle_squared >= _FAR * ((bx - ax) ** 2 + (by - ay) ** 2):
             part = _direct(m.sources, first + k * nodes, first + (k + 1) * nodes, x, y)
         else:
-            zx, zy = _local(rx, ry, hx, hy)
-            if (abs(zx) - 1.0) ** 2 + zy * zy < _JUNCTION * _JUNCTION:
-                step = complex(-hy, hx) * (2.0 * _JUNCTION)
-            part = _panel(m.panel_density[k], zx, zy, hx, hy, tolerance)
+            away = _away(ax, ay, bx, by)
+            step = away if away != 0j else step
+            part = _panel(m.panel_density[k], ax, ay, bx, by, tolerance)
         total = _add(total, part)
     return total, step
 
@@ -262,3 +285,27 @@ def evaluate_many(m: MapArrays, points: FloatArray, tolerance: float) -> tuple[F
         jacobians[i, 0, 0], jacobians[i, 0, 1] = u_x, u_y
         jacobians[i, 1, 0], jacobians[i, 1, 1] = v_x, v_y
     return images, jacobians
+
+
+@compiled
+def velocity_at(
+    arrays: MapArrays, x: float, y: float, rounding: float,
+    goal: FloatArray, image: FloatArray, radius: float, max_speed: float,
+) -> FloatArray:  # fmt: skip
+    """Direction times speed at a point relative to the map's centre."""
+    velocity = np.zeros(2)
+    gx, gy = nearest_on_edges(goal, x, y)
+    remaining = np.hypot(gx - x, gy - y)
+    if remaining == 0.0 or is_inside(goal, x, y):
+        return velocity
+    if len(goal) == 1 and remaining < _STRAIGHT * radius:
+        dx, dy = gx - x, gy - y
+    else:
+        u, v, u_x, u_y, v_x, v_y = evaluate_one(arrays, x, y, rounding)
+        du, dv = image[0] - u, image[1] - v
+        dx, dy = v_y * du - u_y * dv, u_x * dv - v_x * du
+    norm = np.hypot(dx, dy)
+    if norm > 0.0:
+        speed = max_speed * min(1.0, remaining / radius)
+        velocity[0], velocity[1] = speed * dx / norm, speed * dy / norm
+    return velocity

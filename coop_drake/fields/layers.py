@@ -23,14 +23,15 @@ class MapArrays(NamedTuple):
     Attributes:
         edges: Rows (x0, y0, x1, y1), shape (edges, 4).
         sources: Rows x, y, dx, dy, mu_u, mu_v of the solved nodes, shape (6, n).
-        corners: Rows (vertex, back, out, inward bisector as x y, leg), shape (corners, 9).
+        corners: Rows (vertex, back, out, inward bisector as x y, leg, ends of the incoming and the outgoing
+            leg as x y), shape (corners, 13). Panels share their ends with these to the last bit.
         corner_index: Rows (first source, ring panels m, leg nodes n, first grid node, first ring break,
             first ring, first tail), shape (corners + 1, 7).
         grid: Rows (distance, weight) of leg grids scaled to [0, 1].
         breaks: Ring breakpoints scaled to [1/2, 1].
         rings: Values then Legendre coefficients of the density on ring panels, shape (., 2, REFINED, 2).
         tails: Weight-corrected density of the legs at every level, shape (., 2).
-        panels: Rows (centre, half vector) of regular panels, shape (panels, 4).
+        panels: Rows (start, end) as x y of regular panels, shape (panels, 4).
         panel_density: As ``rings`` for regular panels, shape (panels, 2, REFINED, 2).
     """
 
@@ -53,8 +54,6 @@ def pack_layers(
     v, ends, nodes = outline.vertices, outline.ends, density.nodes
     tangent = (ends - v) / np.abs(ends - v)
     regular = density.incoming[density.refined.corner_start[-1] :].reshape(-1, REFINED_NODES, 2)
-    middle, half = 0.5 * (panels.end + panels.start), 0.5 * (panels.end - panels.start)
-    centre, reach = v[panels.edge] + middle * tangent[panels.edge], half * tangent[panels.edge]
     inward = tangent * np.exp(0.5j * angles)
     index, grid, breaks, rings, tails = _pack_corners(angles, density, closeness)
     return MapArrays(
@@ -62,15 +61,35 @@ def pack_layers(
         sources=np.ascontiguousarray(
             np.column_stack((_columns(nodes.position, nodes.element), density.weighted)).T
         ),
-        corners=np.column_stack((_columns(v, -tangent[outline.preceding], tangent, inward), panels.legs)),
+        corners=np.column_stack(
+            (
+                _columns(v, -tangent[outline.preceding], tangent, inward),
+                panels.legs,
+                *_leg_ends(outline, panels),
+            )
+        ),
         corner_index=index,
         grid=grid,
         breaks=breaks,
         rings=_with_coefficients(rings),
         tails=tails,
-        panels=_columns(centre, reach),
+        panels=_columns(
+            v[panels.edge] + panels.start * tangent[panels.edge],
+            v[panels.edge] + panels.end * tangent[panels.edge],
+        ),
         panel_density=_with_coefficients(regular),
     )
+
+
+def _leg_ends(outline: Outline, panels: Panels) -> tuple[FloatArray, FloatArray]:
+    """End of the incoming and of the outgoing leg of each corner as x y, each of shape (corners, 2)."""
+    v, length = outline.vertices, np.abs(outline.ends - outline.vertices)
+    tangent = (outline.ends - v) / length
+    out = v + panels.legs * tangent
+    # Where no panel lies between two legs both end in the same point.
+    filled = np.isin(np.arange(len(v)), panels.edge)
+    last = np.where(filled, v + (length - panels.legs[outline.following]) * tangent, out)
+    return _columns(last[outline.preceding]), _columns(out)
 
 
 def _columns(*arrays: np.ndarray) -> FloatArray:

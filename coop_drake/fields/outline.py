@@ -94,7 +94,9 @@ def region_to_map(domain: Polygon, goal: Point | Polygon, inside: Point | None) 
         raise FieldError("the goal region must be one valid polygon with an area")
     if not domain.buffer(1e-9 * domain.length).covers(goal):
         raise FieldError("the goal region must lie in the domain; intersect it with the domain first")
-    pieces = [p for p in shapely.get_parts(domain.difference(goal)) if isinstance(p, Polygon)]
+    pieces = [
+        p for p in shapely.get_parts(domain.difference(goal)) if isinstance(p, Polygon) and not p.is_empty
+    ]
     if inside is not None:
         pieces = [p for p in pieces if p.covers(inside)]
     if len(pieces) != 1:
@@ -116,11 +118,12 @@ def outline_of(region: Polygon, goal: Point | Polygon) -> Outline:
         goal: The goal it was made with.
 
     Raises:
-        FieldError: If the goal bounds the outer ring in several separate arcs, or all of it.
+        FieldError: If the goal bounds the outer ring in several separate arcs, or all of it; if rings touch.
     """
     oriented = shapely.orient_polygons(region)
     centre = complex(*oriented.envelope.centroid.coords[0])
     scale = float(np.hypot(*np.subtract(region.bounds[2:], region.bounds[:2])))
+    _refuse_touching_rings(oriented, scale)
     vertices, touching, rings = [], [], []
     for index, ring in enumerate((oriented.exterior, *oriented.interiors)):
         points = np.asarray(ring.coords)[:-1]
@@ -148,6 +151,19 @@ def outline_of(region: Polygon, goal: Point | Polygon) -> Outline:
         goal_ring=collapsed[0] if collapsed and arc is None else None,
         goal_angle=arc,
     )
+
+
+def _refuse_touching_rings(region: Polygon, scale: float) -> None:
+    """Two rings that meet in a point leave a gap of width zero."""
+    rings = [region.exterior, *region.interiors]
+    for k, ring in enumerate(rings):
+        for other in rings[:k]:
+            if ring.distance(other) <= _STRAIGHT * scale:
+                place = shapely.shortest_line(ring, other).coords[0]
+                raise FieldError(
+                    f"a ring of the domain less the goal touches another at ({place[0]:.6g}, {place[1]:.6g})"
+                    " m; leave a gap or let them overlap"
+                )
 
 
 def _goal_edges(points: FloatArray, goal: BaseGeometry, scale: float) -> NDArray[np.bool_]:

@@ -120,7 +120,10 @@ def _close_slivers(lengths: FloatArray, following: np.ndarray, legs: FloatArray)
         after = following[e]
         rest = lengths[e] - legs[e] - legs[after]
         if abs(rest) <= _SLIVER * min(legs[e], legs[after]):
-            legs[after] = lengths[e] - legs[e] if after > e else 0.8 * legs[after]
+            if after > e:
+                legs[after] = lengths[e] - legs[e]
+            elif abs(rest) > 1e-12 * lengths[e]:
+                legs[after] *= 0.8
 
 
 @compiled

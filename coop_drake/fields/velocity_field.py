@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from math import hypot, pi, sqrt
+from math import pi, sqrt
 
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 from shapely import Point
 
-from coop_drake.fields.compiled import compiled
-from coop_drake.fields.evaluation import evaluate_one, is_inside, nearest_on_edges
+from coop_drake.fields.evaluation import velocity_at
 from coop_drake.fields.harmonic_map import HarmonicMap
-from coop_drake.fields.layers import MapArrays
 from coop_drake.fields.quadrature import FloatArray
 
 __all__ = ["VelocityField"]
-
-_STRAIGHT = 1e-6  # part of the slowdown radius within which the line to a point goal is straight
 
 
 class VelocityField:
@@ -63,31 +59,7 @@ class VelocityField:
             Velocity in W, shape (2,) [m/s].
         """
         x, y = np.asarray(point, dtype=float).tolist()
-        return _velocity(
+        return velocity_at(
             self._arrays, x - self._x, y - self._y, self._rounding,
             self._goal, self._image, self.slowdown_radius, self.max_speed,
         )  # fmt: skip
-
-
-@compiled
-def _velocity(
-    arrays: MapArrays, x: float, y: float, rounding: float,
-    goal: FloatArray, image: FloatArray, radius: float, max_speed: float,
-) -> FloatArray:  # fmt: skip
-    """Direction times speed at a point relative to the map's centre."""
-    velocity = np.zeros(2)
-    gx, gy = nearest_on_edges(goal, x, y)
-    remaining = hypot(gx - x, gy - y)
-    if remaining == 0.0 or is_inside(goal, x, y):
-        return velocity
-    if len(goal) == 1 and remaining < _STRAIGHT * radius:
-        dx, dy = gx - x, gy - y
-    else:
-        u, v, u_x, u_y, v_x, v_y = evaluate_one(arrays, x, y, rounding)
-        du, dv = image[0] - u, image[1] - v
-        dx, dy = v_y * du - u_y * dv, u_x * dv - v_x * du
-    norm = hypot(dx, dy)
-    if norm > 0.0:
-        speed = max_speed * min(1.0, remaining / radius)
-        velocity[0], velocity[1] = speed * dx / norm, speed * dy / norm
-    return velocity

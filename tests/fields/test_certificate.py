@@ -1,0 +1,70 @@
+import re
+
+import numpy as np
+import pytest
+from shapely import Point, Polygon, box
+
+from coop_drake.errors import FieldError
+from coop_drake.fields import HarmonicMap
+from tests.support import domains
+from tests.support.lightning import Lightning
+
+ELL = Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
+
+
+@pytest.mark.parametrize(
+    ("domain", "goal"),
+    [
+        domains.square(),
+        domains.u_corridor(),
+        domains.warehouse(),
+        domains.needle(10),
+        domains.blade(350),
+        domains.two_rooms(0.01),
+        domains.two_rooms(0.1),
+        domains.bevelled(1e-3),
+        domains.bevelled(1e-6),
+        domains.rounded_room(),
+    ],
+    ids=lambda value: None,
+)
+def test_clean_and_nasty_domains_are_certified(domain, goal):
+    certificate = HarmonicMap(domain, goal).certificate
+    holes = len(domain.interiors)
+    assert certificate.residual <= 1e-6
+    assert certificate.error_bound == (2 * holes + 1) * certificate.residual
+    assert certificate.samples > certificate.unknowns
+    assert 1.0 < certificate.condition < 1e7
+
+
+@pytest.mark.parametrize(
+    "domain", [ELL, box(0, 0, 2, 2).difference(box(0.7, 0.8, 1.2, 1.3))], ids=["ell", "with a hole"]
+)
+def test_bound_holds_for_the_true_error(domain):
+    oracle = Lightning(domain, poles=60, degree=50)
+    harmonic_map = HarmonicMap(domain, domain.representative_point())
+    points = domains.inside(domain, 500, clearance=0.1)
+    error = np.hypot(*(harmonic_map(points)[0] - oracle(points)).T).max()
+    assert error <= 1.01 * harmonic_map.certificate.error_bound + 3 * oracle.residual
+
+
+def test_more_is_spent_where_more_is_asked():
+    plain, fine = HarmonicMap(ELL, Point(0.5, 0.5)), HarmonicMap(ELL, Point(0.5, 0.5), tolerance=2e-10)
+    assert fine.certificate.unknowns > plain.certificate.unknowns
+    assert fine.certificate.error_bound <= 2e-10 < plain.certificate.error_bound
+
+
+def test_refusal_names_the_corner_at_fault():
+    message = "asked for; at fault is the corner at (0, "
+    with pytest.raises(FieldError, match=re.escape("1e-14 was ") + re.escape(message)) as caught:
+        HarmonicMap(*domains.needle(4), tolerance=1e-14)
+    assert "certified to" in str(caught.value)
+
+
+def test_refusal_of_a_domain_too_fine_names_the_gap():
+    comb = box(0, 0, 4, 1)
+    for k in range(60):
+        comb = comb.difference(box(0.05 + 0.066 * k, 0.2, 0.07 + 0.066 * k, 2))
+    ragged = [(x, 0.0 if i % 2 else -1e-4) for i, x in enumerate(np.linspace(0, 4, 400))]
+    with pytest.raises(FieldError, match=r"unknowns, at most \d+ are allowed; narrowest is the"):
+        HarmonicMap(comb.union(Polygon([*ragged, (4, 0.1), (0, 0.1)])), Point(2, 0.1))

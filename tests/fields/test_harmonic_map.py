@@ -1,0 +1,171 @@
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from shapely import Point, Polygon, affinity, box
+
+from coop_drake.fields import HarmonicMap
+from tests.support import domains
+from tests.support.lightning import Lightning
+from tests.support.rectangle_map import rectangle_map
+
+NAMED = {
+    "square": domains.square(),
+    "u_corridor": domains.u_corridor(),
+    "warehouse": domains.warehouse(),
+    "needle": domains.needle(10),
+    "blade": domains.blade(350),
+    "two_rooms": domains.two_rooms(0.01),
+    "bevelled": domains.bevelled(1e-3),
+    "rounded_room": domains.rounded_room(),
+    "maze": domains.maze(5),
+}
+
+
+@pytest.fixture(scope="module", params=NAMED)
+def mapped(request):
+    domain, goal = NAMED[request.param]
+    return HarmonicMap(domain, goal)
+
+
+def boundary_samples(region):
+    """Points of the outer ring, dense towards every vertex, and where they belong."""
+    ring = np.asarray(shapely.orient_polygons(region).exterior.coords)
+    length = np.hypot(*np.diff(ring, axis=0).T)
+    near = np.geomspace(1e-9, 0.5, 25)
+    part = np.concatenate((near, 1 - near))
+    s = np.concatenate([np.sum(length[:k]) + part * length[k] for k in range(len(length))])
+    points = np.concatenate([a + part[:, None] * (b - a) for a, b in pairwise(ring)])
+    angle = 2 * np.pi * s / length.sum()
+    return points, np.column_stack((np.cos(angle), np.sin(angle)))
+
+
+def test_rectangle_agrees_with_its_series():
+    domain = Polygon([(0, 0), (1.7, 0), (1.7, 0.9), (0, 0.9)])
+    points = domains.inside(domain, 300, clearance=0.03)
+    T, _ = HarmonicMap(domain, Point(1, 0.5))(points)
+    np.testing.assert_allclose(T, rectangle_map(1.7, 0.9, points), atol=2e-9)
+
+
+@pytest.mark.parametrize(
+    "domain",
+    [
+        Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]),
+        Polygon([(0, 0), (1, 0), (0.3, 0.8)]),
+        Polygon([(0, 0), (1, 0.1), (1.2, 0.9), (0.5, 0.6), (-0.1, 1)]),
+        box(0, 0, 2, 2).difference(box(0.7, 0.8, 1.2, 1.3)),
+    ],
+    ids=["ell", "triangle", "pentagon", "with a hole"],
+)
+def test_map_agrees_with_an_independent_solver(domain):
+    oracle = Lightning(domain, poles=40, degree=40)
+    harmonic_map = HarmonicMap(domain, domain.representative_point())
+    bound = harmonic_map.certificate.error_bound + 3 * oracle.residual
+    assert bound < 1e-5
+    points = domains.inside(domain, 200, clearance=0.01)
+    T, _ = harmonic_map(points)
+    assert np.hypot(*(T - oracle(points)).T).max() <= bound
+
+
+def test_square_keeps_its_symmetry():
+    harmonic_map = HarmonicMap(box(-1, -1, 1, 1), Point(0, 0))
+    points = domains.inside(box(-1, -1, 1, 1), 100)
+    T, _ = harmonic_map(points)
+    quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+    np.testing.assert_allclose(harmonic_map(points @ quarter.T)[0], T @ quarter.T, atol=1e-9)
+    np.testing.assert_allclose(harmonic_map.goal_image, 0.0, atol=1e-9)
+
+
+def test_outer_ring_goes_to_the_circle_linearly_in_arc_length(mapped):
+    points, expected = boundary_samples(mapped.region)
+    T, J = mapped(points)
+    offset = np.arctan2(T[0, 1], T[0, 0]) - np.arctan2(expected[0, 1], expected[0, 0])
+    turn = np.array([[np.cos(offset), -np.sin(offset)], [np.sin(offset), np.cos(offset)]])
+    np.testing.assert_allclose(T, expected @ turn.T, atol=1e-6)
+    assert np.isfinite(J).all()
+
+
+def test_holes_collapse_to_interior_points():
+    domain, goal = NAMED["warehouse"]
+    harmonic_map = HarmonicMap(domain, goal)
+    for hole in domain.interiors:
+        T, _ = harmonic_map(
+            np.array([hole.interpolate(s).coords[0] for s in np.linspace(0, hole.length, 40)])
+        )
+        assert np.ptp(T, axis=0).max() < 1e-7
+        assert np.hypot(*T[0]) < 1.0
+
+
+def test_image_is_in_the_disk_and_orientation_is_kept(mapped):
+    interior = domains.inside(mapped.region, 4000, clearance=1e-4)
+    near, _ = domains.off_wall(mapped.region, 1e-3)
+    near = near[shapely.contains_xy(mapped.region, *near.T)]
+    T, J = mapped(np.concatenate((interior, near)))
+    assert (np.hypot(*T.T) < 1.0).all()
+    assert (np.linalg.det(J) > 0.0).all()
+
+
+def test_jacobian_is_the_derivative(mapped):
+    points = domains.inside(mapped.region, 300, clearance=0.01)
+    points = points[:60] if len(points) > 60 else points
+    h = 1e-4
+    differences = []
+    for axis in np.eye(2):
+        f = [mapped(points + k * h * axis)[0] for k in (-2, -1, 1, 2)]
+        differences.append((f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * h))
+    _, J = mapped(points)
+    np.testing.assert_allclose(J, np.stack(differences, axis=-1), atol=1e-6 * np.abs(J).max())
+
+
+def test_map_has_the_mean_value_property(mapped):
+    centres = domains.inside(mapped.region, 1000, clearance=0.05)
+    centres = centres[:20]
+    radius = 0.9 * shapely.distance(mapped.region.boundary, shapely.points(centres))
+    angle = 2 * np.pi * np.arange(256) / 256
+    circle = np.column_stack((np.cos(angle), np.sin(angle)))
+    T, _ = mapped(centres[:, None] + radius[:, None, None] * circle)
+    np.testing.assert_allclose(T.mean(axis=1), mapped(centres)[0], atol=1e-9)
+
+
+def test_walls_vertices_and_the_outside_have_defined_values(mapped):
+    ring = np.asarray(mapped.region.exterior.coords)
+    everywhere = np.concatenate((ring, 0.5 * (ring[1:] + ring[:-1]), ring + 1e-3, ring - 0.7, ring * 1e3))
+    T, J = mapped(everywhere)
+    assert np.isfinite(T).all()
+    assert np.isfinite(J).all()
+    np.testing.assert_allclose(np.hypot(*T[: len(ring)].T), 1.0, atol=1e-5)
+
+
+def test_walls_are_the_limit_from_inside(mapped):
+    walls, normals = domains.off_wall(mapped.region, 0.0)
+    step = 1e-7
+    T_wall, J_wall = mapped(walls)
+    T_off, _ = mapped(walls + step * normals)
+    predicted = T_wall + step * np.einsum("nij,nj->ni", J_wall, normals)
+    np.testing.assert_allclose(T_off, predicted, atol=1e-9 + 1e-3 * step * np.abs(J_wall).max())
+
+
+def test_shape_of_the_points_is_kept():
+    harmonic_map = HarmonicMap(*NAMED["square"])
+    T, J = harmonic_map([[[0.1, 0.2]], [[0.3, 0.4]]])
+    assert T.shape == (2, 1, 2)
+    assert J.shape == (2, 1, 2, 2)
+    assert harmonic_map([0.1, 0.2])[0] == pytest.approx(T[0, 0])
+
+
+def test_coordinates_far_from_the_origin_do_no_harm():
+    domain, goal = NAMED["u_corridor"]
+    points = domains.inside(domain, 50, clearance=1e-3)
+    far = HarmonicMap(affinity.translate(domain, 1e4, -2e4), affinity.translate(goal, 1e4, -2e4))
+    np.testing.assert_allclose(
+        far(points + np.array([1e4, -2e4]))[0], HarmonicMap(domain, goal)(points)[0], atol=1e-7
+    )
+
+
+def test_same_question_same_answer():
+    domain, goal = NAMED["warehouse"]
+    points = domains.inside(domain, 50)
+    first, second = HarmonicMap(domain, goal), HarmonicMap(domain, goal)
+    assert first(points)[0].tobytes() == second(points)[0].tobytes()
+    assert first(points)[1].tobytes() == second(points)[1].tobytes()
