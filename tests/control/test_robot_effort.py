@@ -40,6 +40,15 @@ def test_end_effector_and_joints_accelerate_as_asked(joints):
     assert acceleration[3:].tolist() == joint_wanted.tolist()
 
 
+def test_any_invertible_base_and_memory_layout_will_do():
+    """Bases need not be driven in the workspace's directions, and Drake's matrices have their columns together."""
+    rng = np.random.default_rng(3)
+    jacobian, wanted, joints = rng.normal(size=(3, 5)), rng.normal(size=3), rng.normal(size=2)
+    for same in (jacobian, np.asfortranarray(jacobian), np.repeat(jacobian, 2, axis=1)[:, ::2]):
+        z = robot_acceleration(wanted, joints, jacobian=same, jacobian_rate_term=np.ones(3))
+        assert jacobian @ z + 1.0 == pytest.approx(wanted, abs=1e-12)
+
+
 @pytest.mark.parametrize("joints", [(1, 1), (2, 1, 3), (1, 0, 2, 1, 2)])
 def test_the_team_moves_the_object_as_commanded_and_loads_every_grasp_equally(joints):
     """Solve the team's constrained dynamics, (2) and (27), and find what every robot meant to happen."""
