@@ -1,4 +1,4 @@
-"""Collisions among the object, the arms and the bases: pairs of bodies over a slice, which eq. (4) leaves out."""
+"""Collisions among object, arms and bases: pairs of bodies over a slice, which eq. (4) leaves out."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class BodyPair:
 
 
 class BodyPairs:
-    """Conservative answers about every pair of ``ComponentTree.collision_pairs``, cached by the joints between.
+    """Conservative answers about all of ``ComponentTree.collision_pairs``, cached by the joints between.
 
     Args:
         swept: Sweeps of the tree's pieces.

@@ -13,7 +13,7 @@ SLACK = 1e-9
 
 _TURN = 2.0 * pi
 _SAME_ANGLE = 1e-5
-_SAME_POINT = 1e-8
+_SAME_POINT = 1e-11
 _LARGEST_TURN = 0.75 * pi
 _QUARTER_TURN = np.array([-1.0, 1.0])
 
@@ -69,10 +69,11 @@ def closed_directions(angles: FloatArray, largest_turn: float = _LARGEST_TURN) -
     ordered = ordered[ordered - np.concatenate((ordered[-1:] - _TURN, ordered[:-1])) > _SAME_ANGLE]
     gaps = np.concatenate((ordered[1:], ordered[:1] + _TURN)) - ordered
     if gaps.max() <= largest_turn:
-        return ordered
+        return np.asarray(ordered)
     counts = np.ceil(gaps / largest_turn).astype(np.int64)
     steps = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    return np.repeat(ordered, counts) + steps * np.repeat(gaps / counts, counts)
+    filled: FloatArray = np.repeat(ordered, counts) + steps * np.repeat(gaps / counts, counts)
+    return filled
 
 
 def circumscribed(angles: FloatArray, offsets: FloatArray) -> FloatArray:
@@ -119,7 +120,7 @@ def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray |
     sine = n[:, :1] * n[:, 1] - n[:, 1:] * n[:, 0]
     room = h - h[:, None] * (n @ n.T)
     parallel = np.abs(sine) < 1e-12
-    blocked = (parallel & (room < 0.0)).any(axis=1)
+    blocked = (parallel & (room < -1e-12)).any(axis=1)
     crossing = room / np.where(parallel, 1.0, sine)
     upper = np.where(~parallel & (sine > 0.0), crossing, np.inf).min(axis=1)
     lower = np.where(~parallel & (sine < 0.0), crossing, -np.inf).max(axis=1)

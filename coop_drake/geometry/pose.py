@@ -40,4 +40,5 @@ class PlanarPose:
     def apply(self, points: FloatArray) -> FloatArray:
         """Map points given in B to A; shape (..., 2) [m] to the same shape."""
         c, s = cos(self.angle), sin(self.angle)
-        return points @ np.array([[c, s], [-s, c]]) + np.array([self.x, self.y])
+        moved: FloatArray = points @ np.array([[c, s], [-s, c]]) + np.array([self.x, self.y])
+        return moved

@@ -9,6 +9,7 @@ from __future__ import annotations
 from math import ceil, pi, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coop_drake.geometry.convex import (
     circumscribed,
@@ -75,7 +76,7 @@ def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> Flo
     return circumscribed(directions, offsets)
 
 
-def _furthest(vertices: FloatArray) -> FloatArray:
+def _furthest(vertices: FloatArray) -> NDArray[np.bool_]:
     """Which vertices are no nearer to the origin than the points of their edges close by, shape (n,)."""
     if len(vertices) < 2:
         return np.ones(len(vertices), dtype=bool)
@@ -83,7 +84,7 @@ def _furthest(vertices: FloatArray) -> FloatArray:
     to_last = preceding(vertices) - vertices
     nearer_next = np.einsum("ij,ij->i", to_next, vertices) <= 0.0
     nearer_last = np.einsum("ij,ij->i", to_last, vertices) <= 0.0
-    outermost: FloatArray = nearer_next & nearer_last
+    outermost: NDArray[np.bool_] = nearer_next & nearer_last
     return outermost
 
 
@@ -129,7 +130,7 @@ def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> Fl
 
 
 def under_prismatic(vertices: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray | None:
-    """Find points that a convex polygon covers at every displacement of a segment: both end copies' overlap."""
+    """Find points that a convex polygon covers at every displacement of a segment: both ends' overlap."""
     angles = edge_angles(vertices)
     n = normals(angles)
     offsets = np.einsum("ij,ij->i", n, vertices)

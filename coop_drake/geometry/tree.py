@@ -138,7 +138,9 @@ class ComponentTree:
 
         Bodies of one component never move against each other; bodies that share a joint may touch at it.
         """
-        entries = [(i, j, body.name) for i, c in enumerate(self.components) for j, body in enumerate(c.bodies)]
+        entries = [
+            (i, j, body.name) for i, c in enumerate(self.components) for j, body in enumerate(c.bodies)
+        ]
         return tuple(
             ((i, j), (k, m))
             for n, (i, j, first) in enumerate(entries)
@@ -172,7 +174,12 @@ class ComponentTree:
     def _component_reach(self, index: int) -> float:
         component = self.components[index]
         own = max(
-            (hypot(*vertex) + shape.radius for body in component.bodies for shape in body.shapes for vertex in shape.vertices),
+            (
+                hypot(*vertex) + shape.radius
+                for body in component.bodies
+                for shape in body.shapes
+                for vertex in shape.vertices
+            ),
             default=0.0,
         )
         for ancestor in self.ancestors[index]:

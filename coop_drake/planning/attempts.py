@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import combinations
+from itertools import combinations, islice
 
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.pose import FloatArray
@@ -23,6 +23,7 @@ _LEAST_CLEARANCE = 0.002
 _SEEDS = 4
 _SAMPLES = 8_000
 _GAP = 0.01
+_CANDIDATES = 2
 
 
 class SampledAttempts:
@@ -43,8 +44,8 @@ class SampledAttempts:
     def boxes(self, margin: float) -> list[Box] | None:
         """Chain of boxes from start to goal whose cores keep the margin, or None if none was found."""
         maker = CellMaker(self._swept, self._pairs, marginal_workspace(self._problem, margin))
-        certifier = Certifier(self._problem.tree, maker, self._scale)
-        for clearance, path in self._paths(margin):
+        certifier = Certifier(self._problem.tree, maker, self._scale, margin)
+        for clearance, path in islice(self._paths(margin), _CANDIDATES):
             self._last = (clearance, path)
             better = drawn_tight(self._problem, path, clearance, margin, _GAP)
             chain = certifier.boxes(better)

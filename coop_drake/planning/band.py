@@ -41,7 +41,7 @@ def drawn_tight(
     rings = [wall_segments(polygon_rings(marginal_workspace(problem, clearance + extra))) for extra in _EXTRA]
     room = clearance - margin + np.array(_EXTRA) + 0.005
     unbounded = np.full(3, np.inf)
-    return improve(
+    better: FloatArray = improve(
         team_arrays(tree),
         np.concatenate(rings),
         np.concatenate(([0], np.cumsum([len(ring) for ring in rings]))),
@@ -54,3 +54,4 @@ def drawn_tight(
         all(value is None for value in problem.goal_joints),
         np.random.default_rng(0).random((_MOVES, 5)),
     )
+    return better

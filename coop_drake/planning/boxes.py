@@ -1,4 +1,4 @@
-"""From a channel of free cells to boxes: unwrapped theta, full polygons at margin zero, cores at the margin."""
+"""From free cells to boxes: unwrapped theta, full polygons at margin zero, cores at the margin."""
 
 from __future__ import annotations
 

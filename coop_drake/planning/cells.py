@@ -60,6 +60,23 @@ class Region:
             inside ^= bool(crossings.sum() % 2)
         return inside
 
+    def depths(self, points: FloatArray) -> FloatArray:
+        """Signed distances from the boundary, positive inside; shape (k, 2) to (k,) [m]."""
+        nearest = np.full(len(points), np.inf)
+        inside = np.zeros(len(points), dtype=bool)
+        x, y = points[:, :1], points[:, 1:]
+        for ring in self.rings:
+            along = following(ring) - ring
+            ax, ay = x - ring[:, 0], y - ring[:, 1]
+            length = np.maximum((along**2).sum(axis=1), 1e-18)
+            share = np.clip((along[:, 0] * ax + along[:, 1] * ay) / length, 0.0, 1.0)
+            away = np.hypot(ax - share * along[:, 0], ay - share * along[:, 1])
+            nearest = np.minimum(nearest, away.min(axis=1))
+            spans = (ay < 0.0) != (ay - along[:, 1] < 0.0)
+            slope = along[:, 0] / np.where(along[:, 1] == 0.0, 1.0, along[:, 1])
+            inside ^= (spans & (ax < ay * slope)).sum(axis=1) % 2 == 1
+        return np.where(inside, nearest, -nearest)
+
     def meets(self, other: Region) -> bool:
         """Whether both sets share more than their boundary."""
         a, b = self.bounds, other.bounds

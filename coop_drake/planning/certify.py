@@ -10,7 +10,9 @@ from coop_drake.geometry.tree import ComponentTree
 from coop_drake.planning.cells import CellMaker, Region
 from coop_drake.planning.sampler import densified
 
-_PADS = (0.06, 0.03, 0.015, 0.008)
+_LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001))
+_BOX_TIME = 0.6
+_SPEED = 3.0
 _RESOLUTION = 0.02
 
 Box = tuple[Intervals, Region]
@@ -26,10 +28,11 @@ class Certifier:
         tree: The team.
         maker: Cells in the workspace whose margin the boxes keep.
         scale: How far a unit of each axis of z moves the team, shape (3 + n,).
+        margin: Clearance that the boxes' positions have beyond their regions [m].
     """
 
-    def __init__(self, tree: ComponentTree, maker: CellMaker, scale: FloatArray) -> None:
-        self._maker, self._scale = maker, scale
+    def __init__(self, tree: ComponentTree, maker: CellMaker, scale: FloatArray, margin: float) -> None:
+        self._maker, self._scale, self._margin = maker, scale, margin
         self._guess = 4
         self._lower, self._upper = tree.joint_lower, tree.joint_upper
 
@@ -53,23 +56,34 @@ class Certifier:
     def _longest(self, samples: FloatArray, i: int) -> tuple[int, Box] | None:
         """Furthest sample that one box holds together with sample i, and that box."""
         last = len(samples) - 1
-        for pad in _PADS:
-            box = self._box(samples, i, i + 1, pad)
+        for pad, room in _LEVELS:
+            box = self._box(samples, i, i + 1, pad, room)
             if box is None:
                 continue
+            chosen, pace = (i + 1, box), self._pace(samples, i, i + 1, box)
             best, failed, reach = i + 1, last + 1, self._guess
             while failed - best > 1:
                 j = min(best + reach, last) if failed > last else (best + failed) // 2
-                longer = self._box(samples, i, j, pad)
+                longer = self._box(samples, i, j, pad, room)
                 if longer is None:
                     failed = j
-                else:
-                    best, box, reach = j, longer, 2 * reach
+                    continue
+                best, reach = j, 2 * reach
+                quicker = self._pace(samples, i, j, longer)
+                if quicker >= pace:
+                    chosen, pace = (j, longer), quicker
             self._guess = max(1, (best - i) // 2)
-            return best, box
+            return chosen
         return None
 
-    def _box(self, samples: FloatArray, i: int, j: int, pad: float) -> Box | None:
+    def _pace(self, samples: FloatArray, i: int, j: int, box: Box) -> float:
+        """Samples passed per second: a share for the box and the way at a speed that clearance allows."""
+        part = samples[i : j + 1]
+        length = float(np.hypot(*np.diff(part[:, :2], axis=0).T).sum())
+        clearance = self._margin + float(box[1].depths(part[:, :2]).min())
+        return (j - i) / (_BOX_TIME + length / (_SPEED * max(clearance, 1e-3)))
+
+    def _box(self, samples: FloatArray, i: int, j: int, pad: float, room: float) -> Box | None:
         part = samples[i : j + 1]
         lower, upper = part[:, 2:].min(axis=0), part[:, 2:].max(axis=0)
         grow = np.maximum(pad, pad * (upper - lower))
@@ -79,6 +93,6 @@ class Certifier:
         if not self._maker.fits(intervals, part[[0, -1], :2]):
             return None
         for region in self._maker.under_cells(intervals):
-            if region.holds(part[0]) and region.holds(part[-1]):
+            if region.depths(part[[0, -1], :2]).min() > room:
                 return intervals, region
         return None

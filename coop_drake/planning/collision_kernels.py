@@ -136,7 +136,8 @@ def _segment_meets(team: TeamArrays, piece: int, ax: float, ay: float, bx: float
     i, j, r = team.first[piece], team.first[piece + 1], team.radius[piece]
     if j - i == 1:
         x, y = team.vertices[i]
-        return _point_segment(x, y, ax, ay, bx, by) <= r * r
+        near: bool = _point_segment(x, y, ax, ay, bx, by) <= r * r
+        return near
     enter, leave = 0.0, 1.0
     for k in range(i, j):
         nx, ny = team.normals[k]
@@ -155,7 +156,7 @@ def _segment_meets(team: TeamArrays, piece: int, ax: float, ay: float, bx: float
 
 @numba.njit(cache=True)
 def _apart(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> bool:
-    """Whether piece a keeps the gap from piece b: an edge of b, or b's rim if a is a disc, tells them apart."""
+    """Whether piece a keeps the gap from b: an edge of b, or b's rim if a is a disc, tells them apart."""
     A, B = poses[team.owner[a]], poses[team.owner[b]]
     dx, dy = A[0] - B[0], A[1] - B[1]
     ox, oy = B[2] * dx + B[3] * dy, B[2] * dy - B[3] * dx

@@ -88,7 +88,8 @@ class Exploration:
                 return Outcome(Verdict.FOUND, tuple(path), len(self.slices.all))
             if len(self.slices.all) >= budget:
                 return Outcome(Verdict.BUDGET, tuple(path), len(self.slices.all))
-            if not any([self._split(cell) for cell in open_cells.values()]):
+            halved = [self._split(cell) for cell in open_cells.values()]
+            if not any(halved):
                 return Outcome(Verdict.RESOLUTION, tuple(path), len(self.slices.all))
             if progress is not None:
                 progress(len(self.slices.all))

@@ -8,6 +8,7 @@ from math import pi
 import numpy as np
 import shapely
 from shapely import MultiPolygon, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.minkowski import FreeSpace, polygon_rings, to_polygon
@@ -18,8 +19,8 @@ from coop_drake.planning.problem import PlanningProblem
 SMALLEST_MARGIN = 0.005
 """Below this a margin is not worth an attempt of its own [m]."""
 
-_OCTAGON = normals(np.arange(8) * pi / 4.0 + pi / 8.0) / np.cos(pi / 8.0)
-_SHARE = 0.5
+_OCTAGON = normals(np.arange(0.5, 8.0, dtype=np.float64) * (pi / 4.0)) / np.cos(pi / 8.0)
+_SHARE = 0.2
 
 
 def margins(first: float) -> Iterator[float]:
@@ -42,7 +43,7 @@ def shrunk(workspace: Polygon, margin: float) -> MultiPolygon:
 def marginal_workspace(problem: PlanningProblem, margin: float) -> MultiPolygon:
     """Workspace shrunk by the margin except where start or goal themselves stand closer to a wall.
 
-    There a patch around the footprint is shrunk by half of the footprint's own clearance only, so that a
+    There a patch around the footprint is shrunk by a fifth of the footprint's own clearance only, so that a
     start near a wall does not forbid a margin everywhere else.
     """
     result = shrunk(problem.workspace, margin)
@@ -58,17 +59,17 @@ def marginal_workspace(problem: PlanningProblem, margin: float) -> MultiPolygon:
     return result
 
 
-def _areas(shape: shapely.Geometry) -> MultiPolygon:
+def _areas(shape: BaseGeometry) -> MultiPolygon:
     parts = [part for part in shapely.get_parts(shape) if isinstance(part, Polygon)]
     return MultiPolygon(parts)
 
 
-def _start_footprint(problem: PlanningProblem) -> shapely.Geometry:
+def _start_footprint(problem: PlanningProblem) -> BaseGeometry:
     return exact_footprint(problem.tree, problem.start)
 
 
-def _goal_footprint(problem: PlanningProblem) -> shapely.Geometry:
-    """Footprint at the goal of what is known there: everything if all joints have a goal, else the object's."""
+def _goal_footprint(problem: PlanningProblem) -> BaseGeometry:
+    """Footprint at the goal of what is known there: of all if every joint has a goal, else the object's."""
     joints = [0.0 if value is None else value for value in problem.goal_joints]
     configuration = np.array([*problem.goal_pose, *joints])
     if any(value is None for value in problem.goal_joints):
@@ -78,7 +79,7 @@ def _goal_footprint(problem: PlanningProblem) -> shapely.Geometry:
 
 def exact_footprint(
     tree: ComponentTree, configuration: FloatArray, components: int | None = None
-) -> shapely.Geometry:
+) -> BaseGeometry:
     """Footprint of the first components at a configuration, eq. (3), discs by fine polygons.
 
     Args:

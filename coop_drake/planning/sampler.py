@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from shapely import MultiPolygon
 
@@ -49,7 +51,8 @@ class Sampler:
             samples: Samples spent at most on each stage.
         """
         robots = sorted({joint.robot for joint in self._problem.tree.joints})
-        guide, known = _NO_PATH, ()
+        guide = _NO_PATH
+        known: tuple[int, ...] = ()
         for count in range(len(robots) + 1):
             self.stages = count
             question, joints = relaxed(self._problem, robots[:count])
@@ -88,7 +91,7 @@ class Sampler:
         if len(roots) == 0 or not is_free(team, self._walls, question.start, self._gap):
             return np.empty((0, size))
         uniforms = self._random.random((samples, 2 + size))
-        path = connect(
+        path: FloatArray = connect(
             team,
             self._walls,
             question.start.astype(float),
@@ -142,7 +145,7 @@ class Sampler:
             part[:, axes] = (path[i] + share * (path[j] - path[i]))[:, axes]
             if all(
                 segment_is_free(team, self._walls, a, b, self._gap, scale, _STEP) == 1.0
-                for a, b in zip(part[:-1], part[1:], strict=True)
+                for a, b in pairwise(part)
             ):
                 path[i : j + 1] = part
         return path
@@ -151,7 +154,7 @@ class Sampler:
 def densified(path: FloatArray, scale: FloatArray, step: float) -> FloatArray:
     """The same path with no two neighbours further apart than a step in any scaled axis; shape (m, d)."""
     parts = [path[:1]]
-    for first, last in zip(path[:-1], path[1:], strict=True):
+    for first, last in pairwise(path):
         count = max(1, int(np.ceil(np.abs((last - first) * scale).max() / step)))
         parts.append(first + (last - first) * (np.arange(1, count + 1) / count)[:, None])
     return np.concatenate(parts)

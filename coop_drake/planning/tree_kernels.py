@@ -126,7 +126,8 @@ def connect(
                 team, walls, nodes[other], parents[other], counts[other], z, np.inf, gap, scale, step
             )
             if met:
-                return _join(nodes, parents, counts)
+                path: FloatArray = _join(nodes, parents, counts)
+                return path
         side = other
     return np.empty((0, len(start)))
 

@@ -110,7 +110,7 @@ def transport(
     joints_per_arm: int = 1,
     settings: PlannerSettings | None = None,
 ) -> PlanningProblem:
-    """A member of the family: from the start room through the corridor and the door, joints free at the goal."""
+    """A member of the family: from the start room to the goal room, joints free at the goal."""
     joints = robots * joints_per_arm
     start = (0.9, 2.0, 1.57) if robots == 2 else (1.6, 2.0, 1.57)
     return PlanningProblem(

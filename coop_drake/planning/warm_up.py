@@ -1,0 +1,36 @@
+"""Compile the planner's kernels once, into numba's cache: ``python -m coop_drake.planning.warm_up``."""
+
+from __future__ import annotations
+
+import numpy as np
+from shapely import box
+
+from coop_drake.geometry.convex import normals
+from coop_drake.geometry.pose import PlanarPose
+from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.planning.problem import PlannerSettings, PlanningProblem
+from coop_drake.planning.search import find_channel
+
+
+def main() -> None:
+    """Plan a square with one arm across an empty floor, which calls every kernel."""
+    square = Body("object", None, (ConvexShape(0.2 * normals(np.array([0.0, 0.5, 1.0, 1.5]) * np.pi)),))
+    base = Body("base", 0, (ConvexShape(np.zeros((1, 2)), 0.1),))
+    joint = TreeJoint("arm", "revolute", 0, 0, PlanarPose(0.5), 1.0, (1.0, 0.0), -1.0, 1.0)
+    tree = ComponentTree(
+        (Component("object", None, None, (square,)), Component("base", 0, joint, (base,))), frozenset()
+    )
+    find_channel(
+        PlanningProblem(
+            box(-2.0, -2.0, 2.0, 2.0),
+            tree,
+            np.zeros(4),
+            np.array([0.5, 0.2, 0.3]),
+            (None,),
+            settings=PlannerSettings(margin=0.1),
+        )
+    )
+
+
+if __name__ == "__main__":
+    main()

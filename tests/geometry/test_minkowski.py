@@ -1,0 +1,90 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import MultiPoint, MultiPolygon, Polygon, box, union_all
+from shapely.affinity import translate
+
+from coop_drake.geometry.minkowski import SAFE_SIDE, FreeSpace, polygon_rings, to_polygon
+from tests.support.trees import room
+
+POINTS = st.lists(st.tuples(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6)), min_size=3, max_size=9)
+
+
+def convex_ring(points: list[tuple[float, float]]) -> np.ndarray | None:
+    hull = MultiPoint(points).convex_hull
+    if not isinstance(hull, Polygon) or hull.area < 1e-3:
+        return None
+    return polygon_rings(hull)[0]
+
+
+def exact_difference(workspace: Polygon, footprint: np.ndarray) -> Polygon | MultiPolygon:
+    """W minus F by hulls of edge sums, in another library and another order of operations."""
+    walls = [
+        MultiPoint([tuple(end - vertex) for end in (a, b) for vertex in footprint]).convex_hull
+        for ring in polygon_rings(workspace)
+        for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)
+    ]
+    return translate(workspace, *-footprint[0]).difference(union_all(walls))
+
+
+def as_shapely(section) -> MultiPolygon:
+    return MultiPolygon([to_polygon(part) for part in section.decompose()])
+
+
+@settings(max_examples=60)
+@given(POINTS)
+def test_difference_equals_the_reference_on_a_floor_with_holes(points: list[tuple[float, float]]) -> None:
+    footprint = convex_ring(points)
+    if footprint is None:
+        return
+    exact = exact_difference(room(), footprint)
+    found = as_shapely(FreeSpace(polygon_rings(room())).minus(footprint))
+    assert found.symmetric_difference(exact).area < 1e-5
+
+
+@settings(max_examples=60)
+@given(POINTS, st.floats(-3, 3), st.floats(-3, 3))
+def test_safe_sides_bracket_the_truth(points: list[tuple[float, float]], x: float, y: float) -> None:
+    footprint = convex_ring(points)
+    if footprint is None:
+        return
+    under = as_shapely(FreeSpace.under(room()).minus(footprint))
+    over = as_shapely(FreeSpace.over(room()).minus(footprint))
+    placed = Polygon(footprint + np.array([x, y]))
+    here = MultiPoint([(x, y)])
+    if under.contains(here):
+        assert room().contains(placed)
+    if room().contains(placed):
+        assert over.intersects(here)
+    assert over.buffer(1e-9).contains(under)
+
+
+def test_disconnected_positions_come_apart() -> None:
+    dumbbell = union_all([box(0, 0, 2, 2), box(2, 0.9, 4, 1.1), box(4, 0, 6, 2)])
+    disc = 0.3 * np.column_stack((np.cos(np.arange(8) * np.pi / 4), np.sin(np.arange(8) * np.pi / 4)))
+    parts = FreeSpace.under(dumbbell).minus(disc).decompose()
+    assert len(parts) == 2
+
+
+def test_a_hole_stays_a_hole() -> None:
+    floor = Polygon(box(0, 0, 4, 4).exterior, [box(1.8, 1.8, 2.2, 2.2).exterior])
+    square = np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]])
+    (part,) = FreeSpace.under(floor).minus(square).decompose()
+    polygon = to_polygon(part)
+    assert len(polygon.interiors) == 1
+    assert Polygon(polygon.interiors[0]).area == pytest.approx(0.8**2, abs=10 * SAFE_SIDE)
+
+
+@given(POINTS, st.floats(-3, 3), st.floats(-3, 3))
+def test_clear_says_whether_a_wall_crosses(points: list[tuple[float, float]], x: float, y: float) -> None:
+    footprint = convex_ring(points)
+    if footprint is None:
+        return
+    placed = Polygon(footprint + np.array([x, y]))
+    crosses = room().boundary.distance(placed)
+    clear = FreeSpace(polygon_rings(room())).clear(footprint, np.array([[x, y]]))
+    if crosses > 1e-9:
+        assert clear
+    elif room().boundary.intersects(placed.buffer(-1e-6)):
+        assert not clear

@@ -1,0 +1,108 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from shapely import LineString, MultiPoint, Point, Polygon
+from shapely.affinity import rotate
+
+from coop_drake.geometry.sweeps import (
+    common_disc,
+    grown,
+    inscribed,
+    over_prismatic,
+    over_revolute,
+    under_prismatic,
+    under_revolute,
+)
+
+RECTANGLE = np.array([[0.1, -0.1], [0.6, -0.1], [0.6, 0.1], [0.1, 0.1]])
+ROUND_PIVOT = np.array([[-0.3, -0.2], [0.6, -0.2], [0.5, 0.3], [-0.2, 0.25]])
+RINGS = st.sampled_from((RECTANGLE, ROUND_PIVOT, RECTANGLE + 0.3))
+ANGLES = st.floats(-4.0, 4.0)
+HALVES = st.floats(0.0, 3.5)
+
+
+def turned(ring: np.ndarray, angle: float) -> Polygon:
+    return rotate(Polygon(ring), angle, origin=(0.0, 0.0), use_radians=True)
+
+
+@given(RINGS, ANGLES, HALVES, st.floats(-1.0, 1.0))
+def test_every_turned_copy_lies_in_the_over_sweep(
+    ring: np.ndarray, centre: float, half: float, share: float
+) -> None:
+    sweep = Polygon(over_revolute(ring, centre, half))
+    assert sweep.is_valid
+    assert sweep.covers(turned(ring, centre + share * half))
+
+
+@given(RINGS, ANGLES, HALVES, st.floats(-1.0, 1.0))
+def test_the_under_sweep_lies_in_every_turned_copy(
+    ring: np.ndarray, centre: float, half: float, share: float
+) -> None:
+    sweep = under_revolute(ring, centre, half)
+    if sweep is not None:
+        assert turned(ring, centre + share * half).covers(Polygon(sweep))
+
+
+@given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), ANGLES, HALVES, st.floats(-1.0, 1.0))
+def test_a_point_sweeps_an_arc(x: float, y: float, centre: float, half: float, share: float) -> None:
+    sweep = MultiPoint(over_revolute(np.array([[x, y]]), centre, half)).convex_hull
+    moved = rotate(Point(x, y), centre + share * half, origin=(0.0, 0.0), use_radians=True)
+    assert sweep.buffer(1e-9).covers(moved)
+
+
+@pytest.mark.parametrize("ring", [RECTANGLE, ROUND_PIVOT])
+def test_excess_vanishes_with_the_slice(ring: np.ndarray) -> None:
+    area = Polygon(ring).area
+    excess = [Polygon(over_revolute(ring, 0.7, half)).area - area for half in (0.2, 0.02, 0.002)]
+    assert excess[1] < 0.15 * excess[0]
+    assert excess[2] < 0.15 * excess[1]
+    missing = []
+    for half in (0.02, 0.002, 0.0002):
+        under = under_revolute(ring, 0.7, half)
+        assert under is not None
+        missing.append(area - Polygon(under).area)
+    assert missing[1] < 0.15 * missing[0]
+    assert missing[2] < 0.15 * missing[1]
+
+
+def test_turning_by_pi_or_more_leaves_nothing_beside_the_pivot() -> None:
+    assert under_revolute(RECTANGLE, 0.0, 0.5 * np.pi) is None
+    full = under_revolute(ROUND_PIVOT, 0.0, np.pi)
+    assert full is not None
+    radius = Polygon(ROUND_PIVOT).exterior.distance(Point(0, 0))
+    assert np.hypot(*full.T).max() <= radius
+
+
+@given(RINGS, st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(0.0, 1.0))
+def test_prismatic_sweeps_are_exact(ring: np.ndarray, dx: float, dy: float, share: float) -> None:
+    first, last = np.array([-0.05, 0.02]), np.array([dx, dy])
+    over = Polygon(over_prismatic(ring, first, last))
+    exact = MultiPoint(np.concatenate((ring + first, ring + last))).convex_hull
+    assert over.covers(exact)
+    assert over.area == pytest.approx(exact.area, abs=1e-6)
+    under = under_prismatic(ring, first, last)
+    common = Polygon(ring + first).intersection(Polygon(ring + last))
+    if under is None:
+        assert common.area < 1e-6
+    else:
+        assert Polygon(ring + first + share * (last - first)).covers(Polygon(under))
+        assert Polygon(under).area == pytest.approx(common.area, abs=1e-6)
+
+
+@pytest.mark.parametrize("turn", [0.6, 0.1])
+def test_grown_and_inscribed_bracket_a_capsule(turn: float) -> None:
+    segment = np.array([[0.0, 0.0], [0.4, 0.1]])
+    capsule = LineString(segment).buffer(0.1, quad_segs=256)
+    outer, inner = Polygon(grown(segment, 0.1, turn)), Polygon(inscribed(segment, 0.1, turn))
+    assert outer.buffer(1e-5).covers(capsule)
+    assert capsule.buffer(1e-5).covers(inner)
+    assert outer.area - inner.area < 0.02 * turn
+
+
+@given(st.lists(st.tuples(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2)), min_size=1, max_size=5))
+def test_common_disc_lies_in_the_disc_about_every_centre(points: list[tuple[float, float]]) -> None:
+    common = common_disc(np.array(points), 0.25, 0.2)
+    if common is not None:
+        for x, y in points:
+            assert np.hypot(common[:, 0] - x, common[:, 1] - y).max() <= 0.25

@@ -1,0 +1,111 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapely import Polygon, box, union_all
+
+from coop_drake.geometry.tree import Body, Component, ComponentTree
+from coop_drake.planning.channel import Channel
+from coop_drake.planning.problem import PlannerSettings, PlanningProblem
+from coop_drake.planning.search import NoChannel, find_channel
+from tests.support.cases import case, rectangle, transport
+from tests.support.soundness import assert_channel_is_sound
+
+
+def rod_problem(corridor: float, settings: PlannerSettings | None = None) -> PlanningProblem:
+    """A rod of 1.0 x 0.2 that must pass a corridor along x and may turn in both rooms."""
+    tree = ComponentTree(
+        (Component("rod", None, None, (Body("rod", None, (rectangle(-0.5, 0.5, -0.1, 0.1),)),)),), frozenset()
+    )
+    half = 0.5 * corridor
+    floor = union_all([box(-4, -1, -1, 1), box(-1.1, -half, 1.1, half), box(1, -1, 4, 1)])
+    assert isinstance(floor, Polygon)
+    return PlanningProblem(
+        floor,
+        tree,
+        np.array([-2.5, 0.0, 1.5]),
+        np.array([2.5, 0.0, 1.5]),
+        (),
+        settings=settings if settings is not None else PlannerSettings(),
+    )
+
+
+@pytest.mark.parametrize("name", ["base", "tight", "three", "elbow"])
+def test_feasible_cases_are_found_and_sound(name: str) -> None:
+    problem = case(name)
+    channel, report = find_channel(problem)
+    assert isinstance(channel, Channel)
+    assert channel.margin > 0.0
+    assert report.margins[-1] == (channel.margin, "found")
+    assert_channel_is_sound(problem, channel)
+
+
+def test_closed_is_proved() -> None:
+    channel, report = find_channel(case("closed"))
+    assert isinstance(channel, NoChannel)
+    assert channel.proved
+    assert report.margins[-1] == (0.0, "infeasible")
+
+
+@pytest.mark.parametrize(("corridor", "found"), [(0.23, True), (0.19, False)])
+def test_a_rod_passes_a_corridor_wider_than_itself_only(corridor: float, found: bool) -> None:
+    problem = rod_problem(corridor)
+    channel, _ = find_channel(problem)
+    if found:
+        assert isinstance(channel, Channel)
+        assert_channel_is_sound(problem, channel)
+    else:
+        assert isinstance(channel, NoChannel)
+        assert channel.proved
+
+
+def test_a_spent_budget_is_no_proof() -> None:
+    problem = rod_problem(0.203, PlannerSettings(max_slices=8))
+    channel, report = find_channel(problem)
+    assert isinstance(channel, NoChannel)
+    assert not channel.proved
+    assert report.resolution is not None
+    assert 0.0 < report.resolution <= 1.0
+
+
+def test_same_question_same_answer() -> None:
+    first, second = (find_channel(transport())[0] for _ in range(2))
+    assert isinstance(first, Channel)
+    assert isinstance(second, Channel)
+    assert first.margin == second.margin
+    for a, b in zip(first.boxes, second.boxes, strict=True):
+        assert a.polygon.wkb == b.polygon.wkb
+        assert a.core.wkb == b.core.wkb
+        assert a.lower.tobytes() == b.lower.tobytes()
+        assert a.upper.tobytes() == b.upper.tobytes()
+
+
+def test_a_start_near_a_wall_does_not_forbid_a_margin() -> None:
+    problem = case("base")
+    start = problem.start.copy()
+    start[0] = 0.28
+    near = replace(problem, start=start)
+    channel, _ = find_channel(near)
+    assert isinstance(channel, Channel)
+    assert channel.margin > 0.0
+    assert_channel_is_sound(near, channel)
+
+
+def test_joints_with_a_goal_reach_it() -> None:
+    problem = replace(case("base"), goal_joints=(-1.0, 0.6))
+    channel, _ = find_channel(problem)
+    assert isinstance(channel, Channel)
+    assert_channel_is_sound(problem, channel)
+
+
+def test_progress_is_told_and_may_interrupt() -> None:
+    told: list[str] = []
+
+    def stop(phase: str, count: float) -> None:
+        told.append(phase)
+        assert count >= 0.0
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        find_channel(case("base"), stop)
+    assert told == ["searching at margin 0.100 m"]

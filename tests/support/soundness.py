@@ -1,0 +1,52 @@
+"""Exact checks of a channel: sampled configurations of every box, and how consecutive boxes overlap."""
+
+from __future__ import annotations
+
+import numpy as np
+from shapely import Point, maximum_inscribed_circle
+
+from coop_drake.planning.channel import Channel, FreeBox
+from coop_drake.planning.problem import PlanningProblem
+from tests.support.trees import body_footprints, footprint
+
+
+def assert_channel_is_sound(problem: PlanningProblem, channel: Channel, samples: int = 6) -> None:
+    """Start in the first core, goal in the last, overlaps with interior, nothing touched in any box."""
+    first, last = channel.boxes[0], channel.boxes[-1]
+    assert first.core.contains(Point(problem.start[:2]))
+    assert np.all(first.lower <= problem.start[2:])
+    assert np.all(problem.start[2:] <= first.upper)
+    assert last.core.contains(Point(problem.goal_pose[:2]))
+    assert last.lower[0] < channel.goal_angle < last.upper[0]
+    assert np.isclose(np.remainder(channel.goal_angle - problem.goal_pose[2] + np.pi, 2 * np.pi), np.pi)
+    for axis, goal in enumerate(problem.goal_joints):
+        assert goal is None or last.lower[1 + axis] <= goal <= last.upper[1 + axis]
+    for one, other in zip(channel.boxes[:-1], channel.boxes[1:], strict=True):
+        assert np.all(np.minimum(one.upper, other.upper) - np.maximum(one.lower, other.lower) > 1e-6)
+        assert maximum_inscribed_circle(one.core.intersection(other.core), tolerance=1e-4).length > 1e-4
+    for number, box in enumerate(channel.boxes):
+        assert box.polygon.buffer(1e-6).contains(box.core)
+        assert np.all(box.lower[1:] >= problem.tree.joint_lower)
+        assert np.all(box.upper[1:] <= problem.tree.joint_upper)
+        assert_box_is_free(problem, box, samples, number)
+
+
+def assert_box_is_free(problem: PlanningProblem, box: FreeBox, samples: int, seed: int) -> None:
+    """Sampled configurations touch no wall and no other body; angles favour the box's corners."""
+    random = np.random.default_rng(seed)
+    ring = np.asarray(box.polygon.exterior.coords)
+    for k in range(samples):
+        share = random.random(len(box.lower))
+        angles = box.lower + (np.rint(share) if k % 2 else share) * (box.upper - box.lower)
+        if k % 3 == 0:
+            position = ring[random.integers(len(ring))]
+        else:
+            a, b = random.random(2)
+            x_min, y_min, x_max, y_max = box.polygon.bounds
+            position = np.array([x_min + a * (x_max - x_min), y_min + b * (y_max - y_min)])
+            if not box.polygon.contains(Point(position)):
+                continue
+        z = np.concatenate((position, angles))
+        assert problem.workspace.contains_properly(footprint(problem.tree, z))
+        bodies = body_footprints(problem.tree, z)
+        assert all(bodies[a].disjoint(bodies[b]) for a, b in problem.tree.collision_pairs)
