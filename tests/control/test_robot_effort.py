@@ -41,7 +41,7 @@ def test_end_effector_and_joints_accelerate_as_asked(joints):
 
 
 def test_any_invertible_base_and_memory_layout_will_do():
-    """Bases need not be driven in the workspace's directions, and Drake's matrices have their columns together."""
+    """Bases may be driven in any directions, and matrices may lie in memory column by column."""
     rng = np.random.default_rng(3)
     jacobian, wanted, joints = rng.normal(size=(3, 5)), rng.normal(size=3), rng.normal(size=2)
     for same in (jacobian, np.asfortranarray(jacobian), np.repeat(jacobian, 2, axis=1)[:, ::2]):
