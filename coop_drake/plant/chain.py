@@ -1,4 +1,4 @@
-"""Checks and orders one robot's bodies and joints, from the base outwards."""
+"""Checks and orders one robot's bodies and joints, from the base outwards; the base is the model's root."""
 
 from math import inf, isfinite, pi
 

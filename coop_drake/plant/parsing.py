@@ -155,7 +155,7 @@ def set_actuators(plant: MultibodyPlant, joints: Sequence[Joint]) -> None:
     """Give every joint of q exactly one actuator, so that the actuation input is the torques in q's order.
 
     Drake adds actuators only to joints whose file grants them effort; here every arm joint is driven. Effort
-    limits and rotor inertias that a file states are kept.
+    limits and rotor inertias that a file states are kept; Drake saturates torques at the limits.
 
     Args:
         plant: Not finalized yet.

@@ -136,3 +136,18 @@ def test_robot_of_two_models_is_one_robot(tmp_path):
     assert [robot.name for robot in team.robots] == ["robot_0", "robot_1"]
     assert team.robots[0].joint_names == ("robot_0::elbow",)
     assert team.robots[0].gripper_frame.name() == "tip"
+
+
+def test_torques_saturate_at_the_effort_that_a_file_states(tmp_path):
+    arm = Arm(
+        joints=(("revolute", "0 0 1", "<limit><lower>-1</lower><upper>1</upper><effort>3</effort></limit>"),)
+    )
+    team, builder = team_of(load_scenario(write_with_robot(tmp_path, arm.text())))
+    root = builder.Build().CreateDefaultContext()
+    context = team.plant.GetMyMutableContextFromRoot(root)
+    port = team.plant.get_generalized_acceleration_output_port()
+    team.plant.get_actuation_input_port().FixValue(context, [3.0, 0.0])
+    at_limit = port.Eval(context).copy()
+    team.plant.get_actuation_input_port().FixValue(context, [10.0, 0.0])
+    assert port.Eval(context) == pytest.approx(at_limit)
+    assert np.abs(at_limit).max() > 1.0
