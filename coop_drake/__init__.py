@@ -1,1 +1,1 @@
-"""Cooperative transport by mobile manipulators: certified plans, harmonic fields and decentralised control in Drake."""
+"""Cooperative transport by mobile manipulators: certified plans, harmonic fields, decentralised control."""

@@ -16,7 +16,7 @@ class ScenarioError(CoopDrakeError):
         file: Path of the offending file as the user wrote it.
         key: Dotted path of the key inside the file, for example ``workspace.outer[3]``.
         value: The offending value as it stands in the file.
-        allowed: What may stand there, as a sentence fragment, for example ``a ring that does not cross itself``.
+        allowed: What may stand there, for example ``a ring that does not cross itself``.
     """
 
     def __init__(self, file: str, key: str, value: object, allowed: str) -> None:

@@ -94,7 +94,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Infeasible:
-    """No plan exists: the over-approximations separate start from goal. ``reason`` says how, in a sentence."""
+    """No plan exists: the over-approximations separate start from goal. ``reason`` says how."""
 
     reason: str
     report: SearchReport
