@@ -55,6 +55,7 @@ def pack_layers(
     tangent = (ends - v) / np.abs(ends - v)
     regular = density.incoming[density.refined.corner_start[-1] :].reshape(-1, REFINED_NODES, 2)
     inward = tangent * np.exp(0.5j * angles)
+    leg_ends_in, leg_ends_out, panel_ends = _panel_ends(outline, panels)
     index, grid, breaks, rings, tails = _pack_corners(angles, density, closeness)
     return MapArrays(
         edges=_columns(v, ends),
@@ -65,7 +66,8 @@ def pack_layers(
             (
                 _columns(v, -tangent[outline.preceding], tangent, inward),
                 panels.legs,
-                *_leg_ends(outline, panels),
+                leg_ends_in,
+                leg_ends_out,
             )
         ),
         corner_index=index,
@@ -73,23 +75,28 @@ def pack_layers(
         breaks=breaks,
         rings=_with_coefficients(rings),
         tails=tails,
-        panels=_columns(
-            v[panels.edge] + panels.start * tangent[panels.edge],
-            v[panels.edge] + panels.end * tangent[panels.edge],
-        ),
+        panels=panel_ends,
         panel_density=_with_coefficients(regular),
     )
 
 
-def _leg_ends(outline: Outline, panels: Panels) -> tuple[FloatArray, FloatArray]:
-    """End of the incoming and of the outgoing leg of each corner as x y, each of shape (corners, 2)."""
-    v, length = outline.vertices, np.abs(outline.ends - outline.vertices)
-    tangent = (outline.ends - v) / length
+def _panel_ends(outline: Outline, panels: Panels) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Ends as x y of the incoming legs, of the outgoing legs (corners, 2), and of the panels (panels, 4).
+
+    Neighbours along an edge get the very same numbers, lest a point between them be missed or counted twice.
+    """
+    v = outline.vertices
+    tangent = (outline.ends - v) / np.abs(outline.ends - v)
+    start = v[panels.edge] + panels.start * tangent[panels.edge]
+    end = v[panels.edge] + panels.end * tangent[panels.edge]
+    following = panels.edge[1:] == panels.edge[:-1]
+    end[:-1] = np.where(following, start[1:], end[:-1])
     out = v + panels.legs * tangent
-    # Where no panel lies between two legs both end in the same point.
-    filled = np.isin(np.arange(len(v)), panels.edge)
-    last = np.where(filled, v + (length - panels.legs[outline.following]) * tangent, out)
-    return _columns(last[outline.preceding]), _columns(out)
+    filled, first, count = np.unique(panels.edge, return_index=True, return_counts=True)
+    out[filled] = start[first]
+    last = out.copy()  # without a panel between them, the edge's two legs end in the same point
+    last[filled] = end[first + count - 1]
+    return _columns(last[outline.preceding]), _columns(out), _columns(start, end)
 
 
 def _columns(*arrays: np.ndarray) -> FloatArray:
