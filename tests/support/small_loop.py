@@ -28,8 +28,12 @@ def small_maps() -> tuple[HarmonicMap, ...]:
 def small_problem(team: str = "base", gain_set: GainSet | None = None) -> tuple[Scenario, Plan]:
     """Scenario and hand-written plan of a team."""
     scenario = small_scenario(team)
-    names = build_team_plant(scenario, DiagramBuilder()).joint_names
-    return scenario, small_plan(names, gain_set)
+    return scenario, small_plan(joint_names(scenario), gain_set)
+
+
+def joint_names(scenario: Scenario) -> tuple[str, ...]:
+    """Names of a team's joints in the order of q."""
+    return build_team_plant(scenario, DiagramBuilder()).joint_names
 
 
 def small_loop(team: str = "base", gain_set: GainSet | None = None) -> ClosedLoop:

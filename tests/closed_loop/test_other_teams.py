@@ -1,0 +1,66 @@
+"""Teams that do not ship: the law stays exact for any object and any arm."""
+
+import pytest
+from pydrake.systems.framework import DiagramBuilder
+
+from coop_drake.plant import build_team_plant
+from coop_drake.plant.polygon_body import polygon_body_files, write_polygon_body
+from coop_drake.scenario import load_scenario
+from coop_drake.simulation import simulate
+from tests.support.edited_scenario import write_edited, write_with_robot
+from tests.support.robot_models import Arm
+from tests.support.small_loop import joint_names, small_maps
+from tests.support.small_plan import small_plan
+from tests.support.small_scenario import in_open_room
+
+SLIDING = Arm(
+    joints=(
+        ("prismatic", "1 0 0", "<limit><lower>-0.7</lower><upper>0.7</upper></limit>"),
+        ("revolute", "0 0 1", ""),
+    )
+)
+UPSIDE_DOWN = Arm(joints=(("revolute", "0 0 1", ""), ("revolute", "0 0 1", "")), roll=3.141592653589793)
+DAMPED = Arm(
+    joints=(
+        (
+            "revolute",
+            "0 0 1",
+            "<limit><lower>-1</lower><upper>1</upper></limit><dynamics><damping>2</damping></dynamics>",
+        ),
+    )
+)
+ANGLE_IRON = ((-0.4, -0.25), (0.4, -0.25), (0.4, 0.0), (-0.1, 0.0), (-0.1, 0.35), (-0.4, 0.35))
+
+
+def run(path):
+    scenario = in_open_room(load_scenario(path))
+    return scenario, simulate(scenario, small_plan(joint_names(scenario)), small_maps())
+
+
+def assert_exact_arrival(log):
+    assert log.violation == ""
+    assert log.reached
+    assert log.acceleration_error.max() <= 1e-9
+    assert log.wrench_error.max() <= 1e-8
+
+
+@pytest.mark.parametrize(
+    ("arm", "start"),
+    [(SLIDING, "[0.0, 0.0]"), (UPSIDE_DOWN, "[0.0, 0.0]"), (DAMPED, "[0.0]"), (Arm(joints=()), "[]")],
+    ids=["sliding", "upside-down", "damped", "no-joints"],
+)
+def test_a_team_of_unlike_robots(tmp_path, arm, start):
+    path = write_with_robot(tmp_path, arm.text(), "sdf", ("robot_0: [0.0]", f"robot_0: {start}"))
+    _, log = run(path)
+    assert_exact_arrival(log)
+    assert len(log.joint_names) == 1 + len(arm.joints)
+
+
+def test_an_object_whose_centre_of_mass_is_off_its_origin(tmp_path):
+    grasps = [(0.4, -0.15, 0.0), (-0.4, 0.2, 3.14159265358979)]
+    write_polygon_body(polygon_body_files(ANGLE_IRON, 7.0, "angle_iron", grasps=grasps), tmp_path)
+    path = write_edited(tmp_path, ("package://coop_drake_models/object.sdf", "angle_iron.sdf"))
+    scenario, log = run(path)
+    inertia = build_team_plant(scenario, DiagramBuilder()).object_inertia
+    assert abs(inertia.p_LLcm).max() > 0.05
+    assert_exact_arrival(log)
