@@ -7,7 +7,7 @@ from typing import TypeVar, cast
 
 import numba
 
-__all__ = ["compiled", "inlined"]
+__all__ = ["compiled"]
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -18,8 +18,3 @@ _FAST = {"contract", "reassoc"}
 def compiled(function: F) -> F:
     """Compile at the first call; single-threaded, division by zero gives infinity as in numpy."""
     return cast(F, numba.njit(cache=True, error_model="numpy", fastmath=_FAST)(function))
-
-
-def inlined(function: F) -> F:
-    """Compile into its compiled callers."""
-    return cast(F, numba.njit(cache=True, error_model="numpy", fastmath=_FAST, inline="never")(function))

@@ -14,6 +14,7 @@ from math import pi
 import numpy as np
 
 from coop_drake.fields.compiled import compiled
+from coop_drake.fields.density import REFINED_NODES
 from coop_drake.fields.layers import LEVELS, MapArrays
 from coop_drake.fields.quadrature import FloatArray, gauss_nodes
 
@@ -23,7 +24,7 @@ _FAR = 2.2**2  # |zeta|^2 beyond which the solved nodes do
 _NEAR = 2.9  # |zeta - 1| + |zeta + 1| below which the Legendre functions are needed
 _JUNCTION = 1e-6  # the Jacobian is taken no closer than this to where two panels meet, in half panels
 _STRAIGHT = 1e-6  # part of the slowdown radius within which the line to a point goal is straight
-_GAUSS_X, _GAUSS_W = gauss_nodes(16)
+_GAUSS_X, _GAUSS_W = gauss_nodes(REFINED_NODES)
 
 Sums = tuple[float, float, float, float, float, float]
 
@@ -49,7 +50,7 @@ def _direct(s: FloatArray, first: int, last: int, x: float, y: float) -> Sums:
 
 @compiled
 def _panel(density: FloatArray, ax: float, ay: float, bx: float, by: float, tolerance: float) -> Sums:
-    """One panel from a to b, both seen from the point, with density (2, 16, 2).
+    """One panel from a to b, both seen from the point, with density (2, REFINED, 2).
 
     Neighbours that share an end to the last bit never miss or count twice a point between them.
     """
@@ -76,7 +77,7 @@ def _panel(density: FloatArray, ax: float, ay: float, bx: float, by: float, tole
 def _gauss(density: FloatArray, zx: float, zy: float) -> Sums:
     """Imaginary parts of the two integrals, real and imaginary parts of their derivatives, by quadrature."""
     tu, tv, ru, iu, rv, iv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for j in range(16):
+    for j in range(REFINED_NODES):
         rx = _GAUSS_X[j] - zx
         inverse = 1.0 / (rx * rx + zy * zy)
         re, im = rx * inverse, zy * inverse
@@ -98,7 +99,7 @@ def _legendre(c: FloatArray, zeta: complex, q0: complex, d0: complex) -> Sums:
     tu = c[0, 0] * q0.imag + c[1, 0] * q1.imag
     tv = c[0, 1] * q0.imag + c[1, 1] * q1.imag
     du, dv = c[0, 0] * d0 + c[1, 0] * d1, c[0, 1] * d0 + c[1, 1] * d1
-    for k in range(1, 15):
+    for k in range(1, REFINED_NODES - 1):
         q2 = ((2 * k + 1) * zeta * q1 - k * q0) / (k + 1)
         d2 = d0 + (2 * k + 1) * q1
         q0, q1, d0, d1 = q1, q2, d1, d2
@@ -137,13 +138,12 @@ def _add(a: Sums, b: Sums) -> Sums:
 @compiled
 def _tail(m: MapArrays, k: int, level: int, rx: float, ry: float) -> Sums:
     """The corner's legs at one level, seen from afar, through their compressed density."""
-    total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    tu, tv, xu, yu, xv, yv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     n, grid, first = m.corner_index[k, 2], m.corner_index[k, 3], m.corner_index[k, 6]
     scale = m.corners[k, 8] * 0.5**level
     for leg in range(2):
         dx, dy = scale * m.corners[k, 2 + 2 * leg], scale * m.corners[k, 3 + 2 * leg]
-        sign = 2.0 * leg - 1.0
-        tu, tv, xu, yu, xv, yv = total
+        sign, row = 2.0 * leg - 1.0, first + (2 * level + leg) * n
         for j in range(n):
             s, w = m.grid[grid + j, 0], sign * m.grid[grid + j, 1]
             px, py = s * dx - rx, s * dy - ry
@@ -151,16 +151,14 @@ def _tail(m: MapArrays, k: int, level: int, rx: float, ry: float) -> Sums:
             px, py = px * inverse, py * inverse
             re, im = w * (dx * px + dy * py), w * (dy * px - dx * py)
             re2, im2 = re * px + im * py, im * px - re * py
-            u = m.tails[first + (2 * level + leg) * n + j, 0]
-            v = m.tails[first + (2 * level + leg) * n + j, 1]
+            u, v = m.tails[row + j, 0], m.tails[row + j, 1]
             tu += u * im
             tv += v * im
             xu += u * im2
             yu += u * re2
             xv += v * im2
             yv += v * re2
-        total = (tu, tv, xu, yu, xv, yv)
-    return total
+    return tu, tv, xu, yu, xv, yv
 
 
 @compiled
@@ -170,13 +168,10 @@ def _corner(m: MapArrays, k: int, x: float, y: float, tolerance: float) -> tuple
     floor = max(2.0 * m.corners[k, 8] * 0.5**LEVELS, 4.0 * tolerance)
     if rx * rx + ry * ry < floor * floor:
         rx, ry = floor * m.corners[k, 6], floor * m.corners[k, 7]
-    total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    step = 0j
+    total, step = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0j
     panels, first_break, first = m.corner_index[k, 1], m.corner_index[k, 4], m.corner_index[k, 5]
-    distance = np.hypot(rx, ry)
-    scale = m.corners[k, 8]
-    level = 0
-    while level < LEVELS and distance < 2.0 * scale:
+    scale, level = m.corners[k, 8], 0
+    while level < LEVELS and np.hypot(rx, ry) < 2.0 * scale:
         for leg in range(2):
             dx, dy = scale * m.corners[k, 2 + 2 * leg], scale * m.corners[k, 3 + 2 * leg]
             for j in range(panels):
@@ -198,8 +193,7 @@ def _corner(m: MapArrays, k: int, x: float, y: float, tolerance: float) -> tuple
 @compiled
 def _sums(m: MapArrays, x: float, y: float, tolerance: float) -> tuple[Sums, complex]:
     """Sum over the whole boundary; and a step away from a junction of panels, if one is at hand."""
-    total = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    step = 0j
+    total, step = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 0j
     corners = len(m.corners)
     for k in range(corners):
         rx, ry, leg = x - m.corners[k, 0], y - m.corners[k, 1], m.corners[k, 8]
@@ -256,21 +250,16 @@ def nearest_on_edges(edges: FloatArray, x: float, y: float) -> tuple[float, floa
 
 @compiled
 def evaluate_one(m: MapArrays, x: float, y: float, tolerance: float) -> Sums:
-    """u, v, u_x, u_y, v_x, v_y at a point; outside the domain: at the nearest point of its boundary.
+    """u, v, u_x, u_y, v_x, v_y at a point relative to the map's centre; outside: at the nearest wall.
 
-    Args:
-        m: The map's arrays.
-        x: First coordinate relative to the map's centre [m].
-        y: Second coordinate [m].
-        tolerance: Rounding of the coordinates [m]; closer than this a point counts as on the wall.
+    Behind a wall by less than ``tolerance``, the rounding of the coordinates [m], counts as on it.
     """
     if not is_inside(m.edges, x, y):
         x, y = nearest_on_edges(m.edges, x, y)
     total, step = _sums(m, x, y, tolerance)
     tu, tv, xu, yu, xv, yv = total
     if step != 0j:
-        moved, _ = _sums(m, x + step.real, y + step.imag, tolerance)
-        _, _, xu, yu, xv, yv = moved
+        _, _, xu, yu, xv, yv = _sums(m, x + step.real, y + step.imag, tolerance)[0]
     c = 0.5 / pi
     return c * tu, c * tv, c * xu, c * yu, c * xv, c * yv
 
@@ -280,10 +269,10 @@ def evaluate_many(m: MapArrays, points: FloatArray, tolerance: float) -> tuple[F
     """Images (n, 2) and Jacobians (n, 2, 2) of points (n, 2) relative to the map's centre."""
     images, jacobians = np.empty((len(points), 2)), np.empty((len(points), 2, 2))
     for i in range(len(points)):
-        u, v, u_x, u_y, v_x, v_y = evaluate_one(m, points[i, 0], points[i, 1], tolerance)
-        images[i, 0], images[i, 1] = u, v
-        jacobians[i, 0, 0], jacobians[i, 0, 1] = u_x, u_y
-        jacobians[i, 1, 0], jacobians[i, 1, 1] = v_x, v_y
+        values = evaluate_one(m, points[i, 0], points[i, 1], tolerance)
+        for k in range(2):
+            images[i, k] = values[k]
+            jacobians[i, 0, k], jacobians[i, 1, k] = values[2 + k], values[4 + k]
     return images, jacobians
 
 
