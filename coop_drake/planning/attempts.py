@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from itertools import combinations, islice
 
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.band import configuration_scale, drawn_tight
+from coop_drake.planning.boxes import make_channel
 from coop_drake.planning.cells import CellMaker
 from coop_drake.planning.certify import Box, Certifier
-from coop_drake.planning.exploration import Exploration, Outcome, Verdict
+from coop_drake.planning.channel import Channel
+from coop_drake.planning.exploration import Exploration, Verdict
 from coop_drake.planning.margins import marginal_workspace, shrunk
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.relaxation import relaxed
 from coop_drake.planning.sampler import Sampler
 
-Count = Callable[[int], None]
 _CLEARANCE_SHARE = 1.3
 _LEAST_CLEARANCE = 0.002
 _SEEDS = 4
@@ -31,21 +32,29 @@ class SampledAttempts:
 
     Args:
         problem: The question.
-        swept: Sweeps of its tree.
-        pairs: Self-collision of its tree.
+
+    Attributes:
+        object_blocked: Whether the last samples found no way even for the object alone.
     """
 
-    def __init__(self, problem: PlanningProblem, swept: SweptTree, pairs: BodyPairs) -> None:
-        self._problem, self._swept, self._pairs = problem, swept, pairs
+    def __init__(self, problem: PlanningProblem) -> None:
+        self._problem = problem
+        self._swept = SweptTree(problem.tree)
+        self._pairs = BodyPairs(self._swept)
         self._scale = configuration_scale(problem)
         self._last: tuple[float, FloatArray] | None = None
         self.object_blocked = False
 
-    def boxes(self, margin: float) -> list[Box] | None:
-        """Chain of boxes from start to goal whose cores keep the margin, or None if none was found."""
+    def boxes(self, margin: float, effort: int = 0) -> list[Box] | None:
+        """Chain of boxes from start to goal whose cores keep the margin, or None if none was found.
+
+        Args:
+            margin: Margin [m].
+            effort: 0 for a first try; each step up draws other samples, and twice as many.
+        """
         maker = CellMaker(self._swept, self._pairs, marginal_workspace(self._problem, margin))
         certifier = Certifier(self._problem.tree, maker, self._scale, margin)
-        for clearance, path in islice(self._paths(margin), _CANDIDATES):
+        for clearance, path in islice(self._paths(margin, effort), _CANDIDATES):
             self._last = (clearance, path)
             better = drawn_tight(self._problem, path, clearance, margin, _GAP)
             chain = certifier.boxes(better)
@@ -54,15 +63,21 @@ class SampledAttempts:
                 return chain
         return None
 
-    def _paths(self, margin: float) -> Iterator[tuple[float, FloatArray]]:
+    def channel(self, boxes: Sequence[Box], margin: float) -> Channel:
+        """Boxes with their full polygons and theta unwrapped."""
+        full = CellMaker(self._swept, self._pairs, self._problem.workspace)
+        angles = float(self._problem.start[2]), float(self._problem.goal_pose[2])
+        return make_channel(boxes, full, margin, *angles)
+
+    def _paths(self, margin: float, effort: int) -> Iterator[tuple[float, FloatArray]]:
         """Candidate paths with their clearance: the one that failed at a larger margin first."""
-        if self._last is not None:
+        if self._last is not None and effort == 0:
             yield self._last
         clearance = max(_CLEARANCE_SHARE * margin, _LEAST_CLEARANCE)
         workspace = marginal_workspace(self._problem, clearance)
         for seed in range(_SEEDS):
-            sampler = Sampler(self._problem, workspace, _GAP, seed)
-            path = sampler.path(_SAMPLES)
+            sampler = Sampler(self._problem, workspace, _GAP, seed + _SEEDS * effort)
+            path = sampler.path(_SAMPLES << effort)
             self.object_blocked = sampler.stages == 0
             if len(path):
                 yield clearance, path
@@ -85,7 +100,7 @@ def refuted_relaxation(problem: PlanningProblem, budget: int) -> tuple[str | Non
     for count in range(len(robots)):
         for chosen in combinations(robots, count):
             question, _ = relaxed(problem, chosen)
-            outcome = explore(question, budget, None)[1]
+            outcome = explorer(question).run(budget)
             slices += outcome.slices
             if outcome.verdict is Verdict.INFEASIBLE:
                 return "the object " + (
@@ -94,8 +109,7 @@ def refuted_relaxation(problem: PlanningProblem, budget: int) -> tuple[str | Non
     return None, slices
 
 
-def explore(problem: PlanningProblem, budget: int, progress: Count | None) -> tuple[Exploration, Outcome]:
-    """Explore by cells at margin zero: complete, and the only source of proofs."""
+def explorer(problem: PlanningProblem) -> Exploration:
+    """An exploration by cells at margin zero: complete, and the only source of proofs."""
     swept = SweptTree(problem.tree)
-    exploration = Exploration(problem, shrunk(problem.workspace, 0.0), swept, BodyPairs(swept))
-    return exploration, exploration.run(budget, progress)
+    return Exploration(problem, shrunk(problem.workspace, 0.0), swept, BodyPairs(swept))

@@ -9,7 +9,7 @@ from enum import Enum
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cell_graph import Cell, CellGraph, Kind
 from coop_drake.planning.cells import CellMaker, Region
 from coop_drake.planning.problem import PlanningProblem
@@ -93,6 +93,10 @@ class Exploration:
                 return Outcome(Verdict.RESOLUTION, tuple(path), len(self.slices.all))
             if progress is not None:
                 progress(len(self.slices.all))
+
+    def boxes(self, path: Sequence[Cell]) -> list[tuple[Intervals, Region]]:
+        """Expanded intervals and region of every cell of a free path."""
+        return [(self.slices.expanded(self.slices.all[cell.slice].intervals), cell.region) for cell in path]
 
     def counts(self) -> tuple[int, int]:
         """Numbers of FREE and of MIXED cells of the leaves."""

@@ -5,11 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.attempts import SampledAttempts, explore, refuted_relaxation
-from coop_drake.planning.boxes import make_channel
-from coop_drake.planning.cells import CellMaker
+from coop_drake.planning.attempts import SampledAttempts, explorer, refuted_relaxation
 from coop_drake.planning.channel import Channel, SearchReport
 from coop_drake.planning.exploration import Exploration, Outcome, Verdict
 from coop_drake.planning.margins import margins
@@ -18,6 +14,7 @@ from coop_drake.planning.relaxation import relaxed
 
 Progress = Callable[[str, float], None]
 _RELAXED_SHARE = 8
+_FIRST_SHARE = 500
 
 
 @dataclass(frozen=True)
@@ -49,9 +46,7 @@ def find_channel(
     Returns:
         The channel, or why there is none, and a report.
     """
-    swept = SweptTree(problem.tree)
-    pairs = BodyPairs(swept)
-    attempts = SampledAttempts(problem, swept, pairs)
+    attempts = SampledAttempts(problem)
     tried: list[tuple[float, str]] = []
     budget = problem.settings.max_slices
     slices, refutable = 0, True
@@ -61,18 +56,15 @@ def find_channel(
         boxes = attempts.boxes(margin)
         tried.append((margin, "found" if boxes is not None else "not found"))
         if boxes is not None:
-            full = CellMaker(swept, pairs, problem.workspace)
-            angles = float(problem.start[2]), float(problem.goal_pose[2])
-            report = SearchReport(slices, len(boxes), 0, tuple(tried))
-            return make_channel(boxes, full, margin, *angles), report
+            return attempts.channel(boxes, margin), SearchReport(slices, len(boxes), 0, tuple(tried))
         if refutable and attempts.object_blocked:
             refutable = False
-            _, outcome = explore(relaxed(problem, ())[0], budget // _RELAXED_SHARE, None)
+            outcome = explorer(relaxed(problem, ())[0]).run(budget // _RELAXED_SHARE)
             slices += outcome.slices
             if outcome.verdict is Verdict.INFEASIBLE:
                 tried.append((0.0, outcome.verdict.value))
                 return _refuted("the object alone", slices, tried)
-    return _decided(problem, swept, pairs, slices, tried, progress)
+    return _decided(problem, attempts, slices, tried, progress)
 
 
 def _refuted(what: str, slices: int, tried: list[tuple[float, str]]) -> tuple[NoChannel, SearchReport]:
@@ -82,35 +74,40 @@ def _refuted(what: str, slices: int, tried: list[tuple[float, str]]) -> tuple[No
 
 def _decided(
     problem: PlanningProblem,
-    swept: SweptTree,
-    pairs: BodyPairs,
+    attempts: SampledAttempts,
     slices: int,
     tried: list[tuple[float, str]],
     progress: Progress | None,
 ) -> tuple[Channel | NoChannel, SearchReport]:
-    """Answer at margin zero by exploring relaxations and then the whole."""
-    what, made = refuted_relaxation(problem, problem.settings.max_slices // _RELAXED_SHARE)
+    """Answer at margin zero: relaxations first, then the whole in turns with more samples."""
+    budget = problem.settings.max_slices
+    what, made = refuted_relaxation(problem, budget // _RELAXED_SHARE)
     slices += made
     if what is not None:
         tried.append((0.0, Verdict.INFEASIBLE.value))
         return _refuted(what, slices, tried)
-    exploration, outcome = explore(problem, problem.settings.max_slices, _counter(progress, 0.0))
+    exploration = explorer(problem)
+    share, effort = min(_FIRST_SHARE, budget), 0
+    outcome = exploration.run(share, _counter(progress))
+    while outcome.verdict is Verdict.BUDGET and share < budget:
+        share, effort = min(2 * share, budget), effort + 1
+        boxes = attempts.boxes(0.0, effort)
+        if boxes is not None:
+            tried.append((0.0, Verdict.FOUND.value))
+            report = _report(exploration, outcome, slices + outcome.slices, tried)
+            return attempts.channel(boxes, 0.0), report
+        outcome = exploration.run(share, _counter(progress))
     tried.append((0.0, outcome.verdict.value))
     report = _report(exploration, outcome, slices + outcome.slices, tried)
     if outcome.verdict is not Verdict.FOUND:
         return _refusal(outcome), report
-    boxes = [
-        (exploration.slices.expanded(exploration.slices.all[cell.slice].intervals), cell.region)
-        for cell in outcome.path
-    ]
-    full = CellMaker(swept, pairs, problem.workspace)
-    return make_channel(boxes, full, 0.0, float(problem.start[2]), float(problem.goal_pose[2])), report
+    return attempts.channel(exploration.boxes(outcome.path), 0.0), report
 
 
-def _counter(progress: Progress | None, margin: float) -> Callable[[int], None] | None:
+def _counter(progress: Progress | None) -> Callable[[int], None] | None:
     if progress is None:
         return None
-    return lambda count: progress(f"searching at margin {margin:.3f} m", float(count))
+    return lambda count: progress("exploring slices", float(count))
 
 
 def _refusal(outcome: Outcome) -> NoChannel:
@@ -123,7 +120,6 @@ def _report(
     exploration: Exploration, outcome: Outcome, slices: int, tried: list[tuple[float, str]]
 ) -> SearchReport:
     free, mixed = exploration.counts()
-    resolution = None
-    if outcome.verdict in (Verdict.RESOLUTION, Verdict.BUDGET):
-        resolution = exploration.widest(outcome.path)
+    undecided = outcome.verdict in (Verdict.RESOLUTION, Verdict.BUDGET)
+    resolution = exploration.widest(outcome.path) if undecided and tried[-1][1] != "found" else None
     return SearchReport(slices, free, mixed, tuple(tried), resolution)

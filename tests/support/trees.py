@@ -94,7 +94,7 @@ def configurations(
     count: int,
     position: tuple[float, float] = (0.0, 0.0),
 ) -> np.ndarray:
-    """Configurations of a slice at one position: its corners in turn, then random, shape (count, 3 + n)."""
+    """Configurations of a slice at one position: its corners, then random, shape (count, 3 + n)."""
     random = np.random.default_rng(seed)
     lower, upper = (np.array(ends) for ends in zip(*intervals, strict=True))
     share = random.random((count, len(lower)))
