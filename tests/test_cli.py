@@ -129,7 +129,7 @@ def test_a_gap_too_narrow_is_infeasible_and_an_older_plan_does_not_stay(tmp_path
 
 
 def test_a_budget_that_ends_is_undecided(tmp_path):
-    text = (MODELS / "base.scenario.yaml").read_text() + "\nplanner: {max_slices: 5}\n"
+    text = (MODELS / "closed.scenario.yaml").read_text() + "\nplanner: {max_slices: 5}\n"
     path = tmp_path / "short.scenario.yaml"
     path.write_text(text)
     result = invoke("plan", path, "--out", tmp_path / "out", "--json")

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.markup import escape
 
 from coop_drake.cli.chain import Task, load_task, plan_task, read_plan, simulate_task, warm_up, write_pictures
 from coop_drake.cli.exit_code import ExitCode
@@ -87,7 +88,7 @@ def run_command(
         folder = _folder(task, out)
         result = plan_task(task, folder, reporter)
         if not isinstance(result, Found):
-            return _no_plan(answer_of(result), result.reason, reporter)
+            return _no_plan(task, answer_of(result), result.reason, reporter)
         return _carry_out(task, result.plan, folder, reporter)
 
     run_guarded(reporter, command)
@@ -109,8 +110,9 @@ def plan_command(
         folder = _folder(task, out)
         result = plan_task(task, folder, reporter)
         if not isinstance(result, Found):
-            return _no_plan(answer_of(result), result.reason, reporter)
-        reporter.table(f"{task.scenario.name}: {folder.plan}", summary_rows(reporter.facts))
+            return _no_plan(task, answer_of(result), result.reason, reporter)
+        reporter.table(task.scenario.name, summary_rows(reporter.facts))
+        reporter.say(f"The plan is in {escape(str(folder.plan))}")
         return ExitCode.DONE
 
     run_guarded(reporter, command)
@@ -158,9 +160,9 @@ def _folder(task: Task, out: Path | None) -> ResultFolder:
     return ResultFolder(out if out is not None else Path("out") / task.scenario.name)
 
 
-def _no_plan(answer: str, reason: str, reporter: Reporter) -> ExitCode:
-    reporter.table(answer, summary_rows(reporter.facts))
-    reporter.say(f"[bold]{answer}[/]: {reason}")
+def _no_plan(task: Task, answer: str, reason: str, reporter: Reporter) -> ExitCode:
+    reporter.table(task.scenario.name, summary_rows(reporter.facts))
+    reporter.say(f"[bold]{answer}[/]: {escape(reason)}")
     return ExitCode.INFEASIBLE if answer == "infeasible" else ExitCode.UNDECIDED
 
 
@@ -168,7 +170,10 @@ def _carry_out(task: Task, found: Plan, folder: ResultFolder, reporter: Reporter
     """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run."""
     log = simulate_task(task, found, folder, reporter)
     write_pictures(task, found, log, folder, reporter)
-    reporter.table(f"{task.scenario.name}: {folder.path}/", summary_rows(reporter.facts))
+    reporter.table(task.scenario.name, summary_rows(reporter.facts))
+    reporter.say(
+        f"Results are in {escape(str(folder.path))}; open {escape(str(folder.recording))} in a browser"
+    )
     if log.violation:
         reporter.complain(log.violation)
     elif not log.reached:
