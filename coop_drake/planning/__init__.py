@@ -5,6 +5,7 @@ from coop_drake.planning.estimate import plan_time
 from coop_drake.planning.plan import Cell, Found, Infeasible, Plan, PlanningResult, Transition, Undecided
 from coop_drake.planning.plan_file import load_plan, save_plan
 from coop_drake.planning.problem import PlannerSettings, PlanningProblem
+from coop_drake.planning.search import NoChannel, find_channel
 from coop_drake.planning.transitions import make_plan, reschedule
 
 __all__ = [
@@ -13,6 +14,7 @@ __all__ = [
     "Found",
     "FreeBox",
     "Infeasible",
+    "NoChannel",
     "Plan",
     "PlannerSettings",
     "PlanningProblem",
@@ -20,6 +22,7 @@ __all__ = [
     "SearchReport",
     "Transition",
     "Undecided",
+    "find_channel",
     "load_plan",
     "make_plan",
     "plan_time",

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from coop_drake.geometry.convex import edge_angles, following, normals
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ComponentTree
+from coop_drake.geometry.tree import ComponentTree, ConvexShape
 
 IntArray = NDArray[np.int64]
 
@@ -31,6 +31,7 @@ class TeamArrays(NamedTuple):
         normals: Outward normals of the edges that start at them, shape (V, 2).
         offsets: Their distances from the component's origin, shape (V,).
         radius: Growth of each piece, shape (P,).
+        disc: A disc (x, y, radius) that holds each piece, in the component's frame, shape (P, 3).
         pairs: Pairs of pieces that must not touch, shape (K, 2).
     """
 
@@ -45,6 +46,7 @@ class TeamArrays(NamedTuple):
     normals: FloatArray
     offsets: FloatArray
     radius: FloatArray
+    disc: FloatArray
     pairs: IntArray
 
 
@@ -86,8 +88,15 @@ def team_arrays(tree: ComponentTree) -> TeamArrays:
         normals=np.concatenate(edges),
         offsets=np.concatenate([(n * ring).sum(axis=1) for n, ring in zip(edges, rings, strict=True)]),
         radius=np.array([shape.radius for _, _, shape in entries]),
+        disc=np.array([_disc(shape) for _, _, shape in entries]),
         pairs=np.array(pairs, dtype=np.int64).reshape(-1, 2),
     )
+
+
+def _disc(shape: ConvexShape) -> tuple[float, float, float]:
+    middle = 0.5 * (shape.vertices.min(axis=0) + shape.vertices.max(axis=0))
+    reach = float(np.hypot(*(shape.vertices - middle).T).max()) + shape.radius
+    return float(middle[0]), float(middle[1]), reach
 
 
 def wall_segments(rings: list[FloatArray]) -> FloatArray:
@@ -189,6 +198,19 @@ def _apart(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> b
 
 
 @numba.njit(cache=True)
+def _far(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> bool:
+    """Whether the discs about two pieces keep the gap already."""
+    A, B = poses[team.owner[a]], poses[team.owner[b]]
+    ax, ay, ar = team.disc[a]
+    bx, by, br = team.disc[b]
+    dx = A[0] + A[2] * ax - A[3] * ay - B[0] - B[2] * bx + B[3] * by
+    dy = A[1] + A[3] * ax + A[2] * ay - B[1] - B[3] * bx - B[2] * by
+    reach = ar + br + gap
+    far: bool = dx * dx + dy * dy > reach * reach
+    return far
+
+
+@numba.njit(cache=True)
 def is_free(team: TeamArrays, walls: FloatArray, z: FloatArray, gap: float) -> bool:
     """Whether a configuration touches no wall and no two bodies come closer than the gap.
 
@@ -226,6 +248,8 @@ def is_free(team: TeamArrays, walls: FloatArray, z: FloatArray, gap: float) -> b
         return False
     for k in range(len(team.pairs)):
         a, b = team.pairs[k]
+        if _far(team, poses, a, b, gap):
+            continue
         if not _apart(team, poses, a, b, gap) and not _apart(team, poses, b, a, gap):
             return False
     return True

@@ -1,0 +1,55 @@
+from itertools import pairwise
+
+import networkx as nx
+import numpy as np
+import pytest
+
+from coop_drake.planning.attempts import SampledAttempts, explorer
+from coop_drake.planning.cell_graph import Kind
+from coop_drake.planning.exploration import Verdict
+from coop_drake.planning.relaxation import relaxed
+from tests.planning.test_search import rod_problem
+from tests.support.cases import case
+from tests.support.soundness import assert_channel_is_sound
+
+
+def test_exploration_alone_finds_a_sound_channel() -> None:
+    problem = rod_problem(0.5)
+    exploration = explorer(problem)
+    outcome = exploration.run(2000)
+    assert outcome.verdict is Verdict.FOUND
+    assert all(cell.kind is Kind.FREE for cell in outcome.path)
+    for one, other in pairwise(outcome.path):
+        assert other.slice in exploration.slices.all[one.slice].neighbours
+        assert one.region.meets(other.region)
+    channel = SampledAttempts(problem).channel(exploration.boxes(outcome.path), 0.0)
+    assert_channel_is_sound(problem, channel)
+
+
+def test_the_graph_is_networkx_at_its_interface() -> None:
+    exploration = explorer(rod_problem(0.5))
+    outcome = exploration.run(2000)
+    graph = exploration.graph.as_networkx()
+    assert nx.has_path(graph, outcome.path[0].index, outcome.path[-1].index)
+    assert {data["kind"] for _, data in graph.nodes(data=True)} <= set(Kind)
+    free = graph.subgraph(n for n, data in graph.nodes(data=True) if data["kind"] is Kind.FREE)
+    assert nx.has_path(free, outcome.path[0].index, outcome.path[-1].index)
+
+
+@pytest.mark.parametrize(("name", "robots"), [("base", ()), ("base", (1,)), ("three", (2,)), ("elbow", ())])
+def test_no_relaxation_of_a_feasible_case_is_infeasible(name: str, robots: tuple[int, ...]) -> None:
+    question, joints = relaxed(case(name), robots)
+    assert len(joints) == len(question.tree.joints) == len(question.goal_joints)
+    outcome = explorer(question).run(150)
+    assert outcome.verdict in (Verdict.FOUND, Verdict.BUDGET)
+
+
+def test_a_relaxation_is_the_same_team_with_robots_left_out() -> None:
+    problem = case("elbow")
+    question, joints = relaxed(problem, (1,))
+    assert joints == (2, 3)
+    z = np.array([1.0, 2.0, 0.3, 0.1, -0.2, 0.4, 0.6])
+    whole = dict(zip((c.name for c in problem.tree.components), problem.tree.poses(z), strict=True))
+    part = question.tree.poses(np.concatenate((z[:3], z[5:])))
+    for component, X_WC in zip(question.tree.components, part, strict=True):
+        assert X_WC == whole[component.name]
