@@ -52,4 +52,4 @@ def test_a_relaxation_is_the_same_team_with_robots_left_out() -> None:
     whole = dict(zip((c.name for c in problem.tree.components), problem.tree.poses(z), strict=True))
     part = question.tree.poses(np.concatenate((z[:3], z[5:])))
     for component, X_WC in zip(question.tree.components, part, strict=True):
-        assert X_WC == whole[component.name]
+        assert whole[component.name] == X_WC
