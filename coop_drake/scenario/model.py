@@ -125,8 +125,8 @@ class SimulatorSettings:
 
     max_time: float = 300.0
     integration_scheme: Literal[
-        "runge_kutta3", "runge_kutta2", "runge_kutta5", "bogacki_shampine3", "explicit_euler"
-    ] = "runge_kutta3"
+        "runge_kutta5", "runge_kutta3", "runge_kutta2", "bogacki_shampine3", "explicit_euler"
+    ] = "runge_kutta5"
     max_step_size: float = 0.02
     accuracy: float = 1e-4
 

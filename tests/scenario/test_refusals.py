@@ -93,7 +93,7 @@ CASES = {
         ("gains:", "simulator: {integration_scheme: euler}\ngains:"),
         "simulator.integration_scheme",
         "euler",
-        "one of runge_kutta3",
+        "one of runge_kutta5, runge_kutta3",
     ),
     "gain set": (
         ("selected: scheduled", "selected: fast"),
