@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from pydrake.geometry import Meshcat, Rgba
-from shapely import LineString, Polygon
+from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.geometry.pose import FloatArray
@@ -56,8 +56,8 @@ def set_light(meshcat: Meshcat) -> None:
 
 
 def set_path(meshcat: Meshcat, positions: FloatArray) -> None:
-    """Draw the object's path on the floor; positions of shape (T, 2) [m]."""
-    path = LineString(positions).simplify(0.002)
+    """Draw the object's path on the floor; positions of shape (T, 2) [m]; a run that never moved leaves a dot."""
+    path = (LineString(positions) if len(positions) > 1 else Point(positions[0])).simplify(0.002)
     _set_flat(meshcat, "/stage/path", path.buffer(0.015), 0.010, _PATH)
 
 

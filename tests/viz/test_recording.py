@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 
@@ -43,6 +44,21 @@ def test_the_page_is_self_contained_and_small(page):
 
 def test_nothing_is_left_beside_the_page(page):
     assert list(page.parent.iterdir()) == [page]
+
+
+def test_a_run_that_starts_at_its_goal_is_recorded(tmp_path):
+    problem = case("base")
+    one = synthetic_log(problem)
+    one = dataclasses.replace(one, **{name: getattr(one, name)[:1] for name in _histories(one)})
+    path = tmp_path / "transport.html"
+    write_recording(load_scenario(MODELS / "base.scenario.yaml"), synthetic_plan(problem), one, path)
+    assert path.stat().st_size > 1e6
+
+
+def _histories(log):
+    return [
+        field.name for field in dataclasses.fields(log) if isinstance(getattr(log, field.name), np.ndarray)
+    ]
 
 
 def test_frames_lie_on_the_logged_motion():
