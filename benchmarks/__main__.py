@@ -16,7 +16,7 @@ from benchmarks.simulating import bench_simulation
 from coop_drake.files import write_atomically
 
 _RESULTS = Path("out/bench.json")
-_WIDTH = 120  # Wide enough for every row on one line.
+_WIDTH = 130  # Wide enough for every row on one line.
 
 
 def main() -> None:

@@ -27,7 +27,7 @@ def bench_mapping(plan: Plan) -> tuple[list[Row], tuple[HarmonicMap, ...]]:
     factor = best_seconds(lambda: np.linalg.solve(dense, dense[:, :2]), 1)
     rows = [
         Row(f"mapping {len(maps)} cells of base", warm, "s", "first time, operators cold", cold),
-        Row("mapping one cell", warm / len(maps), "s", f"one dense solve of {unknowns} unknowns", factor),
+        Row("mapping one cell", warm / len(maps), "s", f"dense solve, {unknowns} unknowns", factor),
         Row("largest residual", max(c.residual for c in certificates), "-", "tolerance", _TOLERANCE),
         *_evaluation(plan, maps),
     ]

@@ -19,7 +19,7 @@ CASES = ("base", "tight", "closed", "three", "elbow")
 
 
 def bench_planning() -> tuple[list[Row], Scenario, Plan]:
-    """Plan every case, the first one twice to warm the kernels; returns the base scenario and its plan, too."""
+    """Plan every case once the kernels are warm; returns the base scenario and its plan, too."""
     rows, base = [], load_scenario("models/base.scenario.yaml")
     _timed_plan(base)
     found, base_seconds = _timed_plan(base)
