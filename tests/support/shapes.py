@@ -3,7 +3,7 @@
 import numpy as np
 from hypothesis import assume
 from hypothesis import strategies as st
-from shapely import Polygon, box, union_all
+from shapely import Polygon, box, set_precision, union_all
 
 from coop_drake.geometry import pole
 
@@ -27,6 +27,8 @@ def floors(draw, *, pillars=4, ragged=True):
         floor = floor.difference(pillar.buffer(0.0))
     if ragged and draw(st.booleans()):
         floor = floor.buffer(-0.03).buffer(draw(st.floats(0.005, 0.02)))
+    # On a nanometre grid: with edges of 1e-300 m GEOS, the oracle, divides by zero.
+    floor = set_precision(floor, 1e-9)
     floor = max(getattr(floor, "geoms", [floor]), key=lambda part: part.area)
     assume(isinstance(floor, Polygon) and floor.area > 0.1 and floor.is_valid)
     return floor
