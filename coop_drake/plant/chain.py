@@ -10,6 +10,9 @@ from coop_drake.scenario import RobotAssembly, Scenario
 
 MOVABLE = ("revolute", "prismatic")
 
+_ENDLESS = 1e3
+"""Limits from here on mean none; files often write 1e16 for a joint without limits [rad or m]."""
+
 
 def scoped(plant: MultibodyPlant, element: RigidBody | Joint) -> str:
     """Name of a body or joint with its model: ``robot_0::link_1``."""
@@ -61,9 +64,8 @@ def find_base(
 def limits_of(joint: Joint) -> tuple[float, float]:
     """Limits of a joint [rad or m]; a revolute joint without limits gets half a turn each way."""
     lower, upper = float(joint.position_lower_limits()[0]), float(joint.position_upper_limits()[0])
-    if joint.type_name() == "revolute":
-        return (lower if lower > -inf else -pi, upper if upper < inf else pi)
-    return lower, upper
+    free = pi if joint.type_name() == "revolute" else inf
+    return (lower if lower > -_ENDLESS else -free, upper if upper < _ENDLESS else free)
 
 
 def _check_tree(scenario: Scenario, robot: RobotAssembly, plant: MultibodyPlant, joints: list[Joint]) -> None:

@@ -18,6 +18,9 @@ from coop_drake.plant.footprint import DIGITS, project
 from coop_drake.plant.parsing import bodies_of, joints_of, refusal
 from coop_drake.plant.team import TeamPlant
 
+_LARGEST = 1e4
+"""Footprints that reach further are slips of the pen [m]."""
+
 
 def read_component_tree(team: TeamPlant) -> ComponentTree:
     """Read footprints and joints of the team, as the planner needs them.
@@ -76,7 +79,18 @@ class _TreeReader:
                     queue.append((link.bodies, link.X_WC))
                     tree_joint = self._tree_joint(link, index, X_WP)
                     components.append(self._component(link.bodies, at, tree_joint, link.X_WC))
+        self._check_solid(components)
         return ComponentTree(tuple(components), self._may_overlap())
+
+    def _check_solid(self, components: list[Component]) -> None:
+        """A team whose models nobody can run into is a slip: geometry under visual names alone, or none."""
+        solid = {body.robot for component in components for body in component.bodies}
+        for robot, models in enumerate(self.team.assembly.robots):
+            if robot not in solid:
+                raise refusal(self.team.scenario, models, models.name, "a robot with collision geometry")
+        if None not in solid:
+            name = self.team.assembly.object_model
+            raise refusal(self.team.scenario, None, name, "an object with collision geometry")
 
     def _welded_to(self, body: RigidBody) -> tuple[RigidBody, ...]:
         """All bodies rigidly tied to one, itself included; the object's first, then in the plant's order."""
@@ -145,7 +159,7 @@ class _TreeReader:
         for geometry in geometries:
             try:
                 X_BG = self.inspector.GetPoseInFrame(geometry)
-                shapes.append(project(self.inspector.GetShape(geometry), X_CB @ X_BG))
+                shapes.append(_checked(project(self.inspector.GetShape(geometry), X_CB @ X_BG)))
             except (TypeError, RuntimeError) as error:
                 raise self._refusal(body, f"collision shapes with a bounded footprint ({error})") from error
         return tuple(shapes)
@@ -175,3 +189,10 @@ class _TreeReader:
                 ):
                     pairs.add((first, second))
         return frozenset(pairs)
+
+
+def _checked(shape: ConvexShape) -> ConvexShape:
+    extent = float(np.abs(shape.vertices).max()) + shape.radius
+    if not extent <= _LARGEST:
+        raise TypeError(f"it reaches {extent:.3g} m from its joint")
+    return shape

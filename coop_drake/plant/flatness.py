@@ -102,7 +102,10 @@ def check_masses(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant, 
     """
     if plant.num_constraints() > 0:
         raise refusal(scenario, None, "constraints in the models", "joints that move on their own")
-    values = np.linalg.eigvalsh(plant.CalcMassMatrix(context))
+    mass_matrix = plant.CalcMassMatrix(context)
+    if not np.isfinite(mass_matrix).all():
+        raise refusal(scenario, None, "an endless inertia", "masses and lengths that can be computed with")
+    values = np.linalg.eigvalsh(mass_matrix)
     if values[0] <= 1e-12 * values[-1]:
         raise refusal(
             scenario, None, f"least inertia {values[0]:.3g}", "masses and inertias that resist every motion"

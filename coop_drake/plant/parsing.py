@@ -59,9 +59,10 @@ def _process(
             ProcessModelDirectives(
                 ModelDirectives(directives=[assembly.directives[index] for index in indices]), parser
             )
-    except (RuntimeError, ValueError) as error:
+    except (RuntimeError, ValueError, SystemExit) as error:  # pydrake exits where Drake's C++ would abort
         return " ".join(str(error).split())
-    return "; ".join(" ".join(message.split()) for message in said if _REPLACED.search(message))
+    replaced = (" ".join(message.split()) for message in said if _REPLACED.search(message))
+    return "; ".join(dict.fromkeys(replaced))
 
 
 def _missing(assembly: Assembly, parser: Parser) -> PackageMap:
@@ -96,19 +97,27 @@ def _subject(assembly: Assembly, index: int) -> str:
 
 @contextmanager
 def _warnings() -> Iterator[list[str]]:
-    """Collect what Drake warns about meanwhile."""
+    """Collect what Drake warns about meanwhile, also while its logger is told to keep silent."""
+    records: list[logging.LogRecord] = []
     said: list[str] = []
 
     class Collector(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
+            records.append(record)
             said.append(record.getMessage())
 
-    logger, collector = logging.getLogger("drake"), Collector(logging.WARNING)
-    logger.addHandler(collector)
+    logger = logging.getLogger("drake")
+    level, handlers, propagate = logger.level, logger.handlers, logger.propagate
+    logger.handlers, logger.propagate = [Collector(logging.WARNING)], False
+    logger.setLevel(logging.WARNING)
     try:
         yield said
     finally:
-        logger.removeHandler(collector)
+        logger.handlers, logger.propagate = handlers, propagate
+        logger.setLevel(level)
+        for record in records:
+            if logger.isEnabledFor(record.levelno) and not _REPLACED.search(record.getMessage()):
+                logger.handle(record)
 
 
 def finalize(scenario: Scenario, plant: MultibodyPlant) -> None:

@@ -28,12 +28,17 @@ def parse(text: str) -> object:
         root = yaml.compose(text, Loader=yaml.SafeLoader)
         if root is not None:
             _refuse_duplicates(root)
+            _refuse_numbered(root)
         return yaml_load_data(text)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         raise DocumentError(_place(mark), error.problem or "unreadable text", "valid YAML") from error
-    except yaml.YAMLError as error:
+    except DocumentError:
+        raise
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: no number, or a day that no calendar has
         raise DocumentError("the file", str(error), "valid YAML") from error
+    except RecursionError as error:
+        raise DocumentError("the file", "endless nesting", "valid YAML that does not hold itself") from error
 
 
 def _place(mark: yaml.Mark | None) -> str:
@@ -52,3 +57,10 @@ def _refuse_duplicates(node: yaml.Node) -> None:
     elif isinstance(node, yaml.SequenceNode):
         for item in node.value:
             _refuse_duplicates(item)
+
+
+def _refuse_numbered(root: yaml.Node) -> None:
+    """Drake takes nothing but texts for the keys of a whole file."""
+    for key, _ in root.value if isinstance(root, yaml.MappingNode) else ():
+        if key.tag not in ("tag:yaml.org,2002:str", "tag:yaml.org,2002:merge"):
+            raise DocumentError(_place(key.start_mark), str(key.value), "a text as the key")

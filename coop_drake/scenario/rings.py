@@ -11,6 +11,9 @@ from coop_drake.scenario.model import Scenario
 
 Ring = Sequence[tuple[float, float]]
 
+_LEAST_AREA = 1e-9
+"""Rings round less are degenerate [m^2]."""
+
 
 def check_workspace(scenario: Scenario) -> None:
     """Refuse rings that do not enclose one floor.
@@ -45,7 +48,9 @@ def _check_ring(file: str, key: str, ring: Ring) -> None:
         if len(corner) != 2:
             raise ScenarioError(file, f"{key}[{index}]", list(corner), "two coordinates, x and y")
     polygon = Polygon(ring)
-    if polygon.is_valid and polygon.area > 0.0:
+    if polygon.is_valid:
+        if polygon.area < _LEAST_AREA:
+            raise ScenarioError(file, key, _plain(ring), f"a ring round {_LEAST_AREA:g} m^2 or more")
         return
     first, second, place = _meeting_edges(ring)
     raise ScenarioError(

@@ -34,6 +34,9 @@ class SchemaError(ValueError):
 
 Check = Iterator[SchemaError]
 
+LARGEST = 1e6
+"""Numbers beyond are slips of the pen in metres, radians, seconds and gains alike."""
+
 _SCALARS = {bool: "true or false", int: "a whole number", float: "a finite number", str: "a text"}
 
 
@@ -190,6 +193,8 @@ def _check_scalar(value: object, kind: type, key: str) -> Check:
     else:
         number = _as_number(value)
         fits = number is not None and math.isfinite(number) and (kind is float or number.is_integer())
+        if fits and number is not None and abs(number) > LARGEST:
+            yield SchemaError(key, value, f"a number between {-LARGEST:g} and {LARGEST:g}")
     if not fits:
         yield SchemaError(key, value, _SCALARS[kind])
 
@@ -202,6 +207,8 @@ def _as_number(value: object) -> float | None:
         return float(value)
     except ValueError:
         return None
+    except OverflowError:
+        return math.inf
 
 
 def _check_sequence(value: object, kind: Any, key: str) -> Check:
@@ -260,7 +267,7 @@ def _check_fields(value: object, schema: dict[str, Any], required: frozenset[str
 
 
 def _check_foreign(value: object, kind: type, key: str) -> Check:
-    """What Drake's own schemas describe Drake checks; its numbers must be finite."""
+    """What Drake's own schemas describe Drake checks; its numbers must be finite and not huge."""
     wrong = list(_infinite(value, key))
     if wrong:
         yield from wrong
@@ -279,8 +286,13 @@ def _infinite(value: object, key: str) -> Check:
     elif isinstance(value, list):
         for index, item in enumerate(value):
             yield from _infinite(item, f"{key}[{index}]")
-    elif isinstance(value, float) and not math.isfinite(value):
-        yield SchemaError(key, value, "a finite number")
+    elif isinstance(value, int | float):
+        number = _as_number(value)
+        if number is not None and not abs(number) <= LARGEST:
+            kind = (
+                f"a number between {-LARGEST:g} and {LARGEST:g}" if math.isfinite(number) else _SCALARS[float]
+            )
+            yield SchemaError(key, value, kind)
 
 
 def _below(key: str, name: object) -> str:

@@ -27,6 +27,8 @@ def validate(scenario: Scenario) -> None:
             raise ScenarioError(file, key, value, kind)
     if scenario.planner.slice_overlap > 1.0:
         raise ScenarioError(file, "planner.slice_overlap", scenario.planner.slice_overlap, "at most 1")
+    if scenario.simulator.accuracy >= 1.0:
+        raise ScenarioError(file, "simulator.accuracy", scenario.simulator.accuracy, "less than 1")
     if scenario.gains.selected not in scenario.gains.sets:
         known = ", ".join(sorted(scenario.gains.sets))
         raise ScenarioError(file, "gains.selected", scenario.gains.selected, f"a gain set, one of {known}")

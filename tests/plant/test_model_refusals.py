@@ -1,10 +1,13 @@
 """Models that are no holonomic planar manipulators, or that Drake cannot read, are refused by name."""
 
+import logging
+import math
 import re
 
 import pytest
 
 from coop_drake.errors import ScenarioError
+from coop_drake.plant import read_component_tree
 from coop_drake.scenario import load_scenario
 from tests.support.edited_scenario import MODELS, exchanged, team_of, write_edited, write_with_robot
 from tests.support.robot_models import Arm, urdf_arm
@@ -98,18 +101,39 @@ BROKEN = {
         ),
         "which does not exist",
     ),
+    "mass of nothing": (exchanged(Arm().text(), ("<mass>6.0", "<mass>0")), "central inertia"),
+    "mass of nan": (exchanged(Arm().text(), ("<mass>6.0", "<mass>nan")), "central inertia"),
+    "endless radius": (exchanged(Arm().text(), ("<radius>0.2", "<radius>inf")), "std::isfinite(radius)"),
+    "limits of nan": (
+        jointed("revolute", more="<limit><lower>nan</lower><upper>1</upper></limit>"),
+        "pos_lower_limits",
+    ),
+    "no size": (exchanged(Arm().text(), ("<size>0.4", "<size>0")), "Using default value"),
     "static": (Arm(extra="<static>true</static>").text(), "Only fixed joints are permitted in static models"),
 }
 
 
+@pytest.fixture
+def drake_logger():
+    """Drake's logger; its level is put back."""
+    logger = logging.getLogger("drake")
+    level = logger.level
+    yield logger
+    logger.setLevel(level)
+
+
+@pytest.mark.parametrize("level", [logging.WARNING, logging.ERROR])
 @pytest.mark.parametrize("name", sorted(BROKEN))
-def test_files_that_drake_cannot_read_are_refused(name, tmp_path):
+def test_files_that_drake_cannot_read_are_refused(name, level, tmp_path, drake_logger):
+    """Also where Drake's logger is told to keep silent, as the command line does."""
+    drake_logger.setLevel(level)
     text, complaint = BROKEN[name]
     scenario = load_scenario(write_with_robot(tmp_path, text))
     with pytest.raises(ScenarioError, match=re.escape(complaint)) as caught:
         team_of(scenario)
     assert caught.value.key == "directives[1]"
     assert caught.value.value == str(tmp_path / "other.sdf")
+    assert drake_logger.level == level
 
 
 @pytest.mark.parametrize(
@@ -229,3 +253,37 @@ def test_bodies_without_inertia_that_move_on_their_own_are_refused(tmp_path):
     )
     with pytest.raises(ScenarioError, match=r"resist every motion|tree of bodies"):
         team_of(load_scenario(write_with_robot(tmp_path, text, "urdf")))
+
+
+def test_robots_far_from_their_joints_are_refused(tmp_path):
+    text = exchanged(Arm().text(), ("<radius>0.2", "<radius>1e5"))
+    team, _builder = team_of(load_scenario(write_with_robot(tmp_path, text)))
+    with pytest.raises(ScenarioError, match=r"bounded footprint \(it reaches 1e\+05 m"):
+        read_component_tree(team)
+
+
+def test_masses_beyond_computing_are_refused(tmp_path):
+    text = exchanged(Arm().text(), ("<pose>0.3 0 0.4", "<pose>1e250 0 0.4"))
+    with pytest.raises(ScenarioError, match="masses and lengths that can be computed with"):
+        team_of(load_scenario(write_with_robot(tmp_path, text)))
+
+
+def test_robots_and_objects_that_nobody_can_run_into_are_refused(tmp_path):
+    bare = re.sub(r"<collision.*?</collision>", "", Arm().text())
+    team, _builder = team_of(load_scenario(write_with_robot(tmp_path, bare)))
+    with pytest.raises(ScenarioError, match="a robot with collision geometry") as caught:
+        read_component_tree(team)
+    assert (caught.value.key, caught.value.value) == ("directives[1]", "robot_0")
+    ghost = re.sub(r"<(collision|visual).*?</\1>", "", OBJECT, flags=re.DOTALL)
+    thing = ("package://coop_drake_models/object.sdf", "thing.sdf")
+    team, _builder = team_of(load_scenario(write_edited(tmp_path, thing, thing_sdf=ghost)))
+    with pytest.raises(ScenarioError, match="an object with collision geometry") as caught:
+        read_component_tree(team)
+    assert (caught.value.key, caught.value.value) == ("object", "object")
+
+
+def test_limits_as_far_as_files_write_for_none_count_as_none(tmp_path):
+    endless = jointed("revolute", more="<limit><lower>-1e16</lower><upper>1e16</upper></limit>")
+    team, _builder = team_of(load_scenario(write_with_robot(tmp_path, endless)))
+    joint = read_component_tree(team).joints[0]
+    assert (joint.lower, joint.upper) == (-math.pi, math.pi)

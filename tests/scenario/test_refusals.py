@@ -48,6 +48,25 @@ CASES = {
         -float("inf"),
         "a finite number",
     ),
+    "huge": ((START, "object: {x: 1e300, y: 2, theta: 1}"), "start.object.x", "1e300", "between -1e+06 and"),
+    "whole number too long for a float": (
+        (START, "object: {x: 1" + 400 * "0" + ", y: 2, theta: 1}"),
+        "start.object.x",
+        10**400,
+        "a finite number",
+    ),
+    "huge weld": (
+        (WELD, WELD[:-1] + ", X_PC: {translation: [0.1, 1.0e+9, 0]}}"),
+        "directives[3].add_weld.X_PC.translation[1]",
+        1e9,
+        "between -1e+06 and 1e+06",
+    ),
+    "coarse accuracy": (
+        ("gains:", "simulator: {accuracy: 1}\ngains:"),
+        "simulator.accuracy",
+        1.0,
+        "less than 1",
+    ),
     "fraction of slices": (
         ("gains:", "planner: {max_slices: 1.5}\ngains:"),
         "planner.max_slices",
@@ -282,6 +301,13 @@ def test_one_robot_is_not_enough(tmp_path):
         ("workspace:\n  outer: [[0, 0]\nstart: 3\n", "line 3, column 1", "but got '<scalar>'"),
         ("workspace: {}\nworkspace: {}\n", "line 2, column 1", "workspace"),
         ("\tworkspace: {}\n", "line 1, column 1", "cannot start any token"),
+        ("workspace: {}\n3: {}\n", "line 2, column 1", "3"),
+        ("~: {}\n", "line 1, column 1", "~"),
+        ("? [1, 2]\n: {}\n", "line 1, column 3", "ScalarNode"),
+        ("workspace: !!int floor\n", "the file", "invalid literal for int"),
+        ("workspace: 2026-13-41\n", "the file", "month must be in 1..12"),
+        ("workspace: &floor {outer: *floor}\n", "the file", "endless nesting"),
+        ("workspace: " + 2000 * "[" + 2000 * "]", "the file", "endless nesting"),
     ],
 )
 def test_text_that_does_not_parse_is_refused_with_its_line(text, place, problem, tmp_path):
