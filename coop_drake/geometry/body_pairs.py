@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from coop_drake.geometry.convex import separated
+import numpy as np
+
+from coop_drake.geometry.sweep_kernels import separated
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 
-_TOUCH = 1e-6
+TOUCH = 1e-6
+"""Bodies closer than this touch [m]."""
 
 
 @dataclass(frozen=True)
@@ -34,11 +37,24 @@ class BodyPairs:
 
     Args:
         swept: Sweeps of the tree's pieces.
+
+    Attributes:
+        pairs: All pairs of bodies.
+        pieces: All pairs of their pieces, each with its stages to the common component, shape (k, 4).
     """
 
     def __init__(self, swept: SweptTree) -> None:
         self._swept = swept
         self.pairs = tuple(self._pair(a, b) for a, b in swept.tree.collision_pairs)
+        self.pieces = np.array(
+            [
+                (i, j, pair.first_stages, pair.second_stages)
+                for pair in self.pairs
+                for i in pair.first
+                for j in pair.second
+            ],
+            dtype=np.int64,
+        ).reshape(-1, 4)
         self._touch: dict[tuple[object, ...], bool] = {}
         self._overlap: dict[tuple[object, ...], bool] = {}
 
@@ -67,7 +83,7 @@ class BodyPairs:
     def _may_touch(self, pair: BodyPair, intervals: Intervals) -> bool:
         others = [self._swept.over(j, intervals, pair.second_stages) for j in pair.second]
         return any(
-            not separated(self._swept.over(i, intervals, pair.first_stages), other, _TOUCH)
+            not separated(self._swept.over(i, intervals, pair.first_stages), other, TOUCH)
             for i in pair.first
             for other in others
         )
@@ -76,7 +92,7 @@ class BodyPairs:
         others = [self._swept.under(j, intervals, pair.second_stages) for j in pair.second]
         for i in pair.first:
             piece = self._swept.under(i, intervals, pair.first_stages)
-            if piece is not None and any(o is not None and not separated(piece, o, -_TOUCH) for o in others):
+            if piece is not None and any(o is not None and not separated(piece, o, -TOUCH) for o in others):
                 return True
         return False
 

@@ -12,9 +12,6 @@ SLACK = 1e-9
 """Directed rounding [m]: outer offsets grow and inner offsets shrink by it."""
 
 _TURN = 2.0 * pi
-_SAME_ANGLE = 1e-5
-_SAME_POINT = 1e-11
-_LARGEST_TURN = 0.75 * pi
 _QUARTER_TURN = np.array([-1.0, 1.0])
 
 
@@ -45,56 +42,6 @@ def edge_angles(vertices: FloatArray) -> FloatArray:
         return np.empty(0)
     edges = following(vertices) - vertices
     return np.arctan2(-edges[:, 0], edges[:, 1])
-
-
-def support(vertices: FloatArray, angles: FloatArray) -> FloatArray:
-    """Support function of the hull of the vertices: largest n . v; shapes (n, 2), (k,) to (k,) [m]."""
-    best: FloatArray = (normals(angles) @ vertices.T).max(axis=1)
-    return best
-
-
-def closed_directions(angles: FloatArray, largest_turn: float = _LARGEST_TURN) -> FloatArray:
-    """Sort directions, drop repeated ones and fill gaps so that no two neighbours are further apart.
-
-    Args:
-        angles: Any directions, shape (k,) [rad].
-        largest_turn: Largest angle between neighbours of the result [rad], below pi.
-
-    Returns:
-        Directions in ascending order within one turn, shape (m,).
-    """
-    ordered = np.sort(np.mod(angles, _TURN))
-    if len(ordered) == 0:
-        ordered = np.zeros(1)
-    ordered = ordered[ordered - np.concatenate((ordered[-1:] - _TURN, ordered[:-1])) > _SAME_ANGLE]
-    gaps = np.concatenate((ordered[1:], ordered[:1] + _TURN)) - ordered
-    if gaps.max() <= largest_turn:
-        return np.asarray(ordered)
-    counts = np.ceil(gaps / largest_turn).astype(np.int64)
-    steps = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    filled: FloatArray = np.repeat(ordered, counts) + steps * np.repeat(gaps / counts, counts)
-    return filled
-
-
-def circumscribed(angles: FloatArray, offsets: FloatArray) -> FloatArray:
-    """Polygon whose edges lie on supporting lines of one convex set; it encloses that set.
-
-    Args:
-        angles: Sorted directions, neighbours less than pi apart, shape (k,) [rad].
-        offsets: Value of the set's support function at each, shape (k,) [m].
-
-    Returns:
-        Vertices, counter-clockwise, without repetitions, shape (m, 2).
-    """
-    h = offsets + SLACK
-    n = normals(angles)
-    n_after, h_after = following(n), following(h)
-    turn = n[:, 0] * n_after[:, 1] - n[:, 1] * n_after[:, 0]
-    vertices = np.empty_like(n)
-    vertices[:, 0] = (h * n_after[:, 1] - h_after * n[:, 1]) / turn
-    vertices[:, 1] = (h_after * n[:, 0] - h * n_after[:, 0]) / turn
-    distinct = vertices[np.abs(vertices - preceding(vertices)).max(axis=1) > _SAME_POINT]
-    return distinct if len(distinct) >= 3 else vertices
 
 
 def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray | None:
@@ -130,19 +77,3 @@ def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray |
     n, h, upper = n[kept], h[kept, None], upper[kept, None]
     vertices: FloatArray = h * n + upper * (n[:, ::-1] * _QUARTER_TURN)
     return vertices
-
-
-def separated(first: FloatArray, second: FloatArray, gap: float = 0.0) -> bool:
-    """Whether some edge's line keeps two convex polygons further apart than ``gap`` [m].
-
-    A negative gap lets them overlap that deep and still be told apart.
-    """
-    return _edge_separates(first, second, gap) or _edge_separates(second, first, gap)
-
-
-def _edge_separates(first: FloatArray, second: FloatArray, gap: float) -> bool:
-    edges = following(first) - first
-    outward = edges[:, ::-1] * -_QUARTER_TURN
-    reach = np.einsum("ij,ij->i", outward, first) + gap * np.hypot(edges[:, 0], edges[:, 1])
-    nearest = (outward @ second.T).min(axis=1)
-    return bool((nearest > reach).any())

@@ -25,6 +25,10 @@ class FreeSpace:
 
     Args:
         rings: Outer rings counter-clockwise, holes clockwise, each of shape (n, 2) [m].
+
+    Attributes:
+        region: The workspace itself.
+        edges: Its edges (x0, y0, x1, y1), shape (E, 4) [m].
     """
 
     def __init__(self, rings: Sequence[FloatArray]) -> None:
@@ -33,6 +37,7 @@ class FreeSpace:
         tails = [following(ring) for ring in self.rings]
         self._from = np.concatenate(self.rings) if self.rings else np.empty((0, 2))
         self._to = np.concatenate(tails) if tails else np.empty((0, 2))
+        self.edges = np.hstack((self._from, self._to))
 
     @classmethod
     def under(cls, workspace: Polygon | MultiPolygon) -> FreeSpace:
@@ -54,29 +59,6 @@ class FreeSpace:
         contours = [ring - start for ring in self.rings]
         contours.extend(self._edge_sums(-footprint))
         return CrossSection(contours, FillRule.Positive)
-
-    def clear(self, footprint: FloatArray, positions: FloatArray) -> bool:
-        """Whether no edge of the workspace crosses a convex footprint at any of some positions.
-
-        Args:
-            footprint: Convex polygon, counter-clockwise, shape (n, 2) [m].
-            positions: Where it stands, shape (k, 2) [m].
-        """
-        sides = following(footprint) - footprint
-        normal = np.stack((sides[:, 1], -sides[:, 0]))
-        offset = (normal.T * footprint).sum(axis=1)
-        for position in positions:
-            room_from = offset - (self._from - position) @ normal
-            room_to = offset - (self._to - position) @ normal
-            rate = room_from - room_to
-            with np.errstate(divide="ignore", invalid="ignore"):
-                crossing = room_from / rate
-            leave = np.where(rate > 0.0, crossing, np.inf).min(axis=1)
-            enter = np.where(rate < 0.0, crossing, -np.inf).max(axis=1)
-            beside = ((rate == 0.0) & (room_from < 0.0)).any(axis=1)
-            if (~beside & (np.maximum(enter, 0.0) <= np.minimum(leave, 1.0))).any():
-                return False
-        return True
 
     def _edge_sums(self, convex: FloatArray) -> FloatArray:
         """Sums of every edge with a convex ring, clockwise, shape (edges, 2 n, 2).

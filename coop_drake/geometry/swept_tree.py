@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import cos, sin
 
 import numpy as np
 
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.sweeps import (
-    common_disc,
-    disc_turn,
-    grown,
-    inscribed,
-    over_prismatic,
-    over_revolute,
-    under_prismatic,
-    under_revolute,
-)
+from coop_drake.geometry.sweep_kernels import SweepArrays, disc_turn, over_piece
+from coop_drake.geometry.sweeps import common_disc, inscribed, under_prismatic, under_revolute
 from coop_drake.geometry.tree import ComponentTree, ConvexShape, TreeJoint
 
 Interval = tuple[float, float]
@@ -64,6 +58,7 @@ class SweptTree:
                 for shape in body.shapes
             ]
         self.pieces: tuple[Piece, ...] = tuple(pieces)
+        self.arrays = sweep_arrays(tree, self.pieces)
         self._over: dict[tuple[object, ...], FloatArray] = {}
         self._under: dict[tuple[object, ...], FloatArray | None] = {}
 
@@ -84,46 +79,34 @@ class SweptTree:
         Returns:
             Vertices, counter-clockwise, shape (n, 2) [m].
         """
-        piece = self.pieces[index]
-        count = len(piece.axes) if stages is None else stages
-        vertices = self._over_stage(index, intervals, count)
-        if piece.shape.radius == 0.0:
-            return vertices
-        return grown(vertices, piece.shape.radius, self._turn(piece, intervals, count))
+        axes = self.pieces[index].axes
+        count = len(axes) if stages is None else stages
+        key = (index, count, *[intervals[axis] for axis in axes[:count]])
+        found = self._over.get(key)
+        if found is None:
+            found = self._over[key] = self._swept(index, intervals, count, rounded=True)
+        return found
 
     def under(self, index: int, intervals: Intervals, stages: int | None = None) -> FloatArray | None:
         """Polygon that a piece covers at every configuration of a slice, or None; see ``over``."""
         piece = self.pieces[index]
         count = len(piece.axes) if stages is None else stages
         if len(piece.shape.vertices) == 1:
-            centres = self._over_stage(index, intervals, count)
+            centres = self._swept(index, intervals, count, rounded=False)
             return common_disc(centres, piece.shape.radius, self._turn(piece, intervals, count))
         return self._under_stage(index, intervals, count)
 
     @staticmethod
     def _turn(piece: Piece, intervals: Intervals, stages: int) -> float:
         widths = [intervals[axis][1] - intervals[axis][0] for axis in piece.axes[:stages]]
-        return disc_turn(0.5 * max(widths, default=0.0))
+        turn: float = disc_turn(0.5 * max(widths, default=0.0))
+        return turn
 
-    def _over_stage(self, index: int, intervals: Intervals, count: int) -> FloatArray:
-        piece = self.pieces[index]
-        if count == 0:
-            return piece.shape.vertices
-        key = (index, count, *[intervals[axis] for axis in piece.axes[:count]])
-        found = self._over.get(key)
-        if found is None:
-            inner = self._over_stage(index, intervals, count - 1)
-            found = self._over_joint(inner, piece, count - 1, intervals[piece.axes[count - 1]])
-            self._over[key] = found
-        return found
-
-    def _over_joint(self, vertices: FloatArray, piece: Piece, stage: int, interval: Interval) -> FloatArray:
-        joint = self.tree.components[piece.chain[stage]].joint
-        if joint is None or joint.kind == "revolute":
-            swept = over_revolute(vertices, *_turning(joint, interval))
-        else:
-            swept = over_prismatic(vertices, *_sliding(joint, interval))
-        return swept if joint is None else joint.X_PJ.apply(swept)
+    def _swept(self, index: int, intervals: Intervals, count: int, *, rounded: bool) -> FloatArray:
+        bounds = np.array(intervals)
+        lower, upper = bounds[:, 0].copy(), bounds[:, 1].copy()
+        swept: FloatArray = over_piece(self.arrays, index, lower, upper, count, rounded)
+        return swept
 
     def _under_stage(self, index: int, intervals: Intervals, count: int) -> FloatArray | None:
         piece = self.pieces[index]
@@ -160,3 +143,26 @@ def _sliding(joint: TreeJoint, interval: Interval) -> tuple[FloatArray, FloatArr
     """Displacements in J at both ends of an interval of a prismatic joint."""
     axis = np.array(joint.axis)
     return axis * interval[0], axis * interval[1]
+
+
+def sweep_arrays(tree: ComponentTree, pieces: Sequence[Piece]) -> SweepArrays:
+    """Lay out the pieces and the joints of their chains for the compiled sweeps."""
+    stages = [tree.components[i].joint for piece in pieces for i in piece.chain]
+    rings = [np.asarray(piece.shape.vertices, dtype=float).reshape(-1, 2) for piece in pieces]
+    return SweepArrays(
+        first=np.cumsum([0, *map(len, rings)]),
+        vertices=np.concatenate(rings),
+        radius=np.array([piece.shape.radius for piece in pieces], dtype=float),
+        first_stage=np.cumsum([0, *(len(piece.chain) for piece in pieces)]),
+        axis=np.array([axis for piece in pieces for axis in piece.axes]),
+        turning=np.array([joint is None or joint.kind == "revolute" for joint in stages], dtype=np.int64),
+        joint=np.array([_stage(joint) for joint in stages]),
+    )
+
+
+def _stage(joint: TreeJoint | None) -> tuple[float, ...]:
+    """Sign, axis and X_PJ of a joint; of theta if there is none."""
+    if joint is None:
+        return 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0
+    X_PJ = joint.X_PJ
+    return joint.sign, *joint.axis, X_PJ.x, X_PJ.y, cos(X_PJ.angle), sin(X_PJ.angle)

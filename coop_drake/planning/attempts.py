@@ -34,6 +34,7 @@ class SampledAttempts:
         problem: The question.
 
     Attributes:
+        slices: Boxes tried along sampled paths so far.
         object_blocked: Whether the last samples found no way even for the object alone.
     """
 
@@ -43,6 +44,7 @@ class SampledAttempts:
         self._pairs = BodyPairs(self._swept)
         self._scale = configuration_scale(problem)
         self._last: tuple[float, FloatArray] | None = None
+        self.slices = 0
         self.object_blocked = False
 
     def boxes(self, margin: float, effort: int = 0) -> list[Box] | None:
@@ -56,9 +58,11 @@ class SampledAttempts:
         certifier = Certifier(self._problem.tree, maker, self._scale, margin)
         for clearance, path in islice(self._paths(margin, effort), _CANDIDATES):
             self._last = (clearance, path)
+            before = certifier.trials
             better = drawn_tight(self._problem, path, clearance, margin, _GAP)
             chain = certifier.boxes(better)
             self._swept.forget()
+            self.slices += certifier.trials - before
             if chain is not None:
                 return chain
         return None

@@ -7,13 +7,14 @@ import numpy as np
 from coop_drake.geometry.minkowski import polygon_rings
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.band_kernels import improve
-from coop_drake.planning.collision_kernels import team_arrays, wall_segments
 from coop_drake.planning.margins import marginal_workspace
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.refine import axis_levers
 from coop_drake.planning.sampler import densified
+from coop_drake.planning.team_arrays import team_arrays, wall_segments
 
-_EXTRA = (0.0, 0.03, 0.06, 0.1, 0.15, 0.2)
+_FAR = 0.2
+_LEAST_ROOM = 0.005
 _SPACING = 0.05
 _PRICE = 0.006
 _MOVES = 8_000
@@ -38,14 +39,12 @@ def drawn_tight(
     """
     tree = problem.tree
     scale = configuration_scale(problem)
-    rings = [wall_segments(polygon_rings(marginal_workspace(problem, clearance + extra))) for extra in _EXTRA]
-    room = clearance - margin + np.array(_EXTRA) + 0.005
+    walls = wall_segments(polygon_rings(marginal_workspace(problem, clearance)))
     unbounded = np.full(3, np.inf)
     better: FloatArray = improve(
         team_arrays(tree),
-        np.concatenate(rings),
-        np.concatenate(([0], np.cumsum([len(ring) for ring in rings]))),
-        np.concatenate(([np.inf], _PRICE / room)),
+        walls,
+        np.array([_PRICE, max(clearance - margin, 0.0) + _LEAST_ROOM, _FAR]),
         densified(path, scale, _SPACING),
         np.concatenate((-unbounded, tree.joint_lower)),
         np.concatenate((unbounded, tree.joint_upper)),

@@ -6,28 +6,26 @@ import numba
 import numpy as np
 
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.collision_kernels import IntArray, TeamArrays, is_free
+from coop_drake.planning.collision_kernels import bodies_apart, place, wall_clearance
+from coop_drake.planning.team_arrays import TeamArrays
 
 
 @numba.njit(cache=True)
-def clearance_level(team: TeamArrays, walls: FloatArray, first: IntArray, z: FloatArray, gap: float) -> int:
-    """In how many of the nested workspaces, widest first, a configuration is free."""
-    low, high = 0, len(first) - 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        if is_free(team, walls[first[middle - 1] : first[middle]], z, gap):
-            low = middle
-        else:
-            high = middle - 1
-    return low
+def _price(team: TeamArrays, walls: FloatArray, z: FloatArray, gap: float, rate: FloatArray) -> float:
+    """Price of a sample: inverse to its clearance up to a limit, infinite where it is not free."""
+    poses = place(team, z)
+    clearance = wall_clearance(team, walls, poses, rate[2])
+    if clearance <= 0.0 or not bodies_apart(team, poses, gap):
+        return np.inf
+    price: float = rate[0] / (rate[1] + clearance)
+    return price
 
 
 @numba.njit(cache=True)
 def improve(
     team: TeamArrays,
     walls: FloatArray,
-    first: IntArray,
-    price: FloatArray,
+    rate: FloatArray,
     path: FloatArray,
     lower: FloatArray,
     upper: FloatArray,
@@ -42,9 +40,8 @@ def improve(
 
     Args:
         team: The team.
-        walls: Edges of nested workspaces one after the other, widest workspace first, shape (E, 4) [m].
-        first: Where each workspace's edges begin, shape (L + 1,).
-        price: Price of a sample by its level, shape (L + 1,); infinite at level 0.
+        walls: Edges of the workspace that the path stays in, shape (E, 4) [m].
+        rate: A sample with clearance c costs rate[0] / (rate[1] + min(c, rate[2])).
         path: Samples, close together, shape (m, d).
         lower: Lower limits, shape (d,); minus infinity where there is none.
         upper: Upper limits, shape (d,).
@@ -56,8 +53,9 @@ def improve(
     path = path.copy()
     count, size = path.shape
     cost = np.empty(count)
+    least = rate[0] / (rate[1] + rate[2])
     for k in range(count):
-        cost[k] = price[clearance_level(team, walls, first, path[k], gap)]
+        cost[k] = _price(team, walls, path[k], gap, rate)
     fresh = np.empty((count, size))
     fresh_cost = np.empty(count)
     for row in range(len(uniforms)):
@@ -94,12 +92,12 @@ def improve(
                 abs(path[j, axis] - fresh[j - 1, axis]) - abs(path[j, axis] - path[j - 1, axis])
             )
         for k in range(i + 1, j):
-            change += price[len(price) - 1] - cost[k]
+            change += least - cost[k]
         for k in range(i + 1, j):
             if change >= -1e-9:
                 break
-            fresh_cost[k] = price[clearance_level(team, walls, first, fresh[k], gap)]
-            change += fresh_cost[k] - price[len(price) - 1]
+            fresh_cost[k] = _price(team, walls, fresh[k], gap, rate)
+            change += fresh_cost[k] - least
         if change < -1e-9:
             for k in range(i + 1, j):
                 path[k] = fresh[k]

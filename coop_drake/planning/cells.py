@@ -14,6 +14,7 @@ from coop_drake.geometry.convex import following
 from coop_drake.geometry.minkowski import FreeSpace
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.planning.box_kernels import box_clearance
 
 _NEGLIGIBLE_AREA = 1e-9
 
@@ -130,17 +131,28 @@ class CellMaker:
             return []
         return _regions(self.under_region(expanded), _NEGLIGIBLE_AREA)
 
-    def fits(self, intervals: Intervals, positions: FloatArray) -> bool:
-        """Whether no wall crosses the over-footprint at any of some positions: quick, necessary for a box.
+    def clearance(self, intervals: Intervals, positions: FloatArray, enough: float) -> float:
+        """How far the over-footprint stays from the walls along a way: quick, and no proof.
 
         Args:
             intervals: The slice.
-            positions: Positions p_WL, shape (k, 2) [m].
+            positions: Positions p_WL along a way, shape (k, 2) [m].
+            enough: Clearance that is needed at the first and at the last of them [m].
+
+        Returns:
+            Least clearance [m]; negative where a wall is crossed, bodies may touch or an end has not enough.
         """
-        return all(
-            self._under_space.clear(self._swept.over(index, intervals), positions)
-            for index in reversed(range(len(self._swept.pieces)))
+        bounds = np.array(intervals)
+        least: float = box_clearance(
+            self._swept.arrays,
+            self._pairs.pieces,
+            self._under_space.edges,
+            bounds[:, 0].copy(),
+            bounds[:, 1].copy(),
+            np.ascontiguousarray(positions),
+            enough,
         )
+        return least
 
     def guide_cells(self, intervals: Intervals) -> list[Region]:
         """Free regions of the slice's middle configuration: a hint for the search, never a proof."""

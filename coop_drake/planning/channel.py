@@ -46,7 +46,8 @@ class SearchReport:
     """What the search did.
 
     Attributes:
-        slices: Compound slices made, all attempts together.
+        slices: Compound slices swept, all attempts together: those of explorations and the boxes that were
+            tried along sampled paths.
         free_cells: Under-cells found in the last attempt.
         mixed_cells: Undecided over-cells left in the last attempt.
         margins: Margins tried, in order, each with its verdict.

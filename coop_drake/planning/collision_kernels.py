@@ -3,105 +3,12 @@
 from __future__ import annotations
 
 from math import cos, sin
-from typing import NamedTuple
 
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-from coop_drake.geometry.convex import edge_angles, following, normals
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ComponentTree, ConvexShape
-
-IntArray = NDArray[np.int64]
-
-
-class TeamArrays(NamedTuple):
-    """A component tree as arrays, C components, P convex pieces, V vertices in all.
-
-    Attributes:
-        parent: Parent component, -1 for the object's, shape (C,).
-        axis: Place of the joint's value in z, shape (C,).
-        turning: 1 for revolute joints, 0 for prismatic ones, shape (C,).
-        joint: X_PJ as (x, y, angle), sign, and axis in J, shape (C, 6).
-        reach: Radius of a disc about the component's origin that holds it, shape (C,).
-        owner: Component of each piece, shape (P,).
-        first: Where each piece's vertices begin, shape (P + 1,).
-        vertices: Vertices in the component's frame, shape (V, 2).
-        normals: Outward normals of the edges that start at them, shape (V, 2).
-        offsets: Their distances from the component's origin, shape (V,).
-        radius: Growth of each piece, shape (P,).
-        disc: A disc (x, y, radius) that holds each piece, in the component's frame, shape (P, 3).
-        pairs: Pairs of pieces that must not touch, shape (K, 2).
-    """
-
-    parent: IntArray
-    axis: IntArray
-    turning: IntArray
-    joint: FloatArray
-    reach: FloatArray
-    owner: IntArray
-    first: IntArray
-    vertices: FloatArray
-    normals: FloatArray
-    offsets: FloatArray
-    radius: FloatArray
-    disc: FloatArray
-    pairs: IntArray
-
-
-def team_arrays(tree: ComponentTree) -> TeamArrays:
-    """Lay a tree out for the compiled checks."""
-    joints = [component.joint for component in tree.components]
-    entries = [
-        (c, b, shape)
-        for c, component in enumerate(tree.components)
-        for b, body in enumerate(component.bodies)
-        for shape in body.shapes
-    ]
-    rings = [shape.vertices for _, _, shape in entries]
-    edges = [normals(edge_angles(ring)) if len(ring) > 1 else np.zeros((1, 2)) for ring in rings]
-    members: dict[tuple[int, int], list[int]] = {}
-    for number, (c, b, _) in enumerate(entries):
-        members.setdefault((c, b), []).append(number)
-    pairs = [(i, j) for a, b in tree.collision_pairs for i in members[a] for j in members[b]]
-    reach = [
-        max((float(np.hypot(*s.vertices.T).max()) + s.radius for i, _, s in entries if i == c), default=0.0)
-        for c in range(len(tree.components))
-    ]
-    return TeamArrays(
-        parent=np.array([-1 if c.parent is None else c.parent for c in tree.components]),
-        axis=np.array([2 if joint is None else 3 + joint.index for joint in joints]),
-        turning=np.array([0 if joint is not None and joint.kind == "prismatic" else 1 for joint in joints]),
-        joint=np.array(
-            [
-                (0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
-                if joint is None
-                else (joint.X_PJ.x, joint.X_PJ.y, joint.X_PJ.angle, joint.sign, *joint.axis)
-                for joint in joints
-            ]
-        ),
-        reach=np.array(reach),
-        owner=np.array([c for c, _, _ in entries]),
-        first=np.concatenate(([0], np.cumsum([len(ring) for ring in rings]))),
-        vertices=np.concatenate(rings),
-        normals=np.concatenate(edges),
-        offsets=np.concatenate([(n * ring).sum(axis=1) for n, ring in zip(edges, rings, strict=True)]),
-        radius=np.array([shape.radius for _, _, shape in entries]),
-        disc=np.array([_disc(shape) for _, _, shape in entries]),
-        pairs=np.array(pairs, dtype=np.int64).reshape(-1, 2),
-    )
-
-
-def _disc(shape: ConvexShape) -> tuple[float, float, float]:
-    middle = 0.5 * (shape.vertices.min(axis=0) + shape.vertices.max(axis=0))
-    reach = float(np.hypot(*(shape.vertices - middle).T).max()) + shape.radius
-    return float(middle[0]), float(middle[1]), reach
-
-
-def wall_segments(rings: list[FloatArray]) -> FloatArray:
-    """Edges (x0, y0, x1, y1) of closed rings, shape (E, 4) [m]."""
-    return np.concatenate([np.hstack((ring, following(ring))) for ring in rings])
+from coop_drake.planning.team_arrays import TeamArrays
 
 
 @numba.njit(cache=True)
@@ -130,7 +37,7 @@ def place(team: TeamArrays, z: FloatArray) -> FloatArray:
 
 
 @numba.njit(cache=True)
-def _point_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+def point_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Squared distance of a point from a segment."""
     ux, uy = bx - ax, by - ay
     length = ux * ux + uy * uy
@@ -140,15 +47,49 @@ def _point_segment(px: float, py: float, ax: float, ay: float, bx: float, by: fl
 
 
 @numba.njit(cache=True)
+def _cross(u: FloatArray, w: FloatArray, ax: float, ay: float, bx: float, by: float) -> bool:
+    """Whether two segments cross."""
+    dx, dy = bx - ax, by - ay
+    first, last = dx * (u[1] - ay) - dy * (u[0] - ax), dx * (w[1] - ay) - dy * (w[0] - ax)
+    ex, ey = w[0] - u[0], w[1] - u[1]
+    start, end = ex * (ay - u[1]) - ey * (ax - u[0]), ex * (by - u[1]) - ey * (bx - u[0])
+    crossing: bool = first * last <= 0.0 and start * end <= 0.0 and first != last
+    return crossing
+
+
+@numba.njit(cache=True)
+def _segment_gap(team: TeamArrays, piece: int, ax: float, ay: float, bx: float, by: float) -> float:
+    """Distance of a segment in the component's frame from a piece, 0 if they meet."""
+    i, j = team.first[piece], team.first[piece + 1]
+    best, enter, leave = np.inf, 0.0, 1.0 if j - i > 2 else -1.0
+    for k in range(i, j):
+        u, w = team.vertices[k], team.vertices[k + 1 if k + 1 < j else i]
+        nx, ny = team.normals[k]
+        room = team.offsets[k] - nx * ax - ny * ay
+        rate = nx * (bx - ax) + ny * (by - ay)
+        if rate > 0.0:
+            leave = min(leave, room / rate)
+        elif rate < 0.0:
+            enter = max(enter, room / rate)
+        elif room < 0.0:
+            leave = -1.0
+        best = min(best, point_segment(u[0], u[1], ax, ay, bx, by))
+        best = min(best, point_segment(ax, ay, u[0], u[1], w[0], w[1]))
+        best = min(best, point_segment(bx, by, u[0], u[1], w[0], w[1]))
+    if enter <= leave or (j - i == 2 and _cross(team.vertices[i], team.vertices[i + 1], ax, ay, bx, by)):
+        return 0.0
+    gap: float = max(np.sqrt(best) - team.radius[piece], 0.0)
+    return gap
+
+
+@numba.njit(cache=True)
 def _segment_meets(team: TeamArrays, piece: int, ax: float, ay: float, bx: float, by: float) -> bool:
-    """Whether a segment in the component's frame meets a piece, whose grown corners are taken as mitred."""
+    """Whether a segment in the component's frame meets a piece."""
     i, j, r = team.first[piece], team.first[piece + 1], team.radius[piece]
-    if j - i == 1:
-        x, y = team.vertices[i]
-        near: bool = _point_segment(x, y, ax, ay, bx, by) <= r * r
-        return near
     enter, leave = 0.0, 1.0
     for k in range(i, j):
+        if j - i == 1:
+            break
         nx, ny = team.normals[k]
         room = team.offsets[k] + r - nx * ax - ny * ay
         rate = nx * (bx - ax) + ny * (by - ay)
@@ -160,7 +101,8 @@ def _segment_meets(team: TeamArrays, piece: int, ax: float, ay: float, bx: float
             return False
         if enter > leave:
             return False
-    return True
+    meets: bool = r == 0.0 or _segment_gap(team, piece, ax, ay, bx, by) <= 0.0
+    return meets
 
 
 @numba.njit(cache=True)
@@ -192,7 +134,7 @@ def _apart(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> b
     for k in range(i, j):
         after = k + 1 if k + 1 < j else i
         u, w = team.vertices[k], team.vertices[after]
-        if _point_segment(px, py, u[0], u[1], w[0], w[1]) <= need * need:
+        if point_segment(px, py, u[0], u[1], w[0], w[1]) <= need * need:
             return False
     return True
 
@@ -211,6 +153,18 @@ def _far(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> boo
 
 
 @numba.njit(cache=True)
+def bodies_apart(team: TeamArrays, poses: FloatArray, gap: float) -> bool:
+    """Whether no two bodies come closer than the gap."""
+    for k in range(len(team.pairs)):
+        a, b = team.pairs[k]
+        if _far(team, poses, a, b, gap):
+            continue
+        if not _apart(team, poses, a, b, gap) and not _apart(team, poses, b, a, gap):
+            return False
+    return True
+
+
+@numba.njit(cache=True)
 def is_free(team: TeamArrays, walls: FloatArray, z: FloatArray, gap: float) -> bool:
     """Whether a configuration touches no wall and no two bodies come closer than the gap.
 
@@ -221,38 +175,48 @@ def is_free(team: TeamArrays, walls: FloatArray, z: FloatArray, gap: float) -> b
         gap: Distance that pairs of bodies must keep [m].
     """
     poses = place(team, z)
-    x = poses[team.owner[0], 0] + poses[team.owner[0], 2] * team.vertices[0, 0]
-    x -= poses[team.owner[0], 3] * team.vertices[0, 1]
-    y = poses[team.owner[0], 1] + poses[team.owner[0], 3] * team.vertices[0, 0]
-    y += poses[team.owner[0], 2] * team.vertices[0, 1]
+    free: bool = wall_clearance(team, walls, poses, 0.0) >= 0.0 and bodies_apart(team, poses, gap)
+    return free
+
+
+@numba.njit(cache=True)
+def wall_clearance(team: TeamArrays, walls: FloatArray, poses: FloatArray, most: float) -> float:
+    """Distance of the team from the walls, at most ``most``; -1 where a wall is met or the team is outside.
+
+    Args:
+        team: The team.
+        walls: Edges of the workspace, shape (E, 4) [m].
+        poses: Poses of all components, shape (C, 4).
+        most: Distances above this one do not matter [m].
+    """
+    px, py, co, si = poses[team.owner[0]]
+    u, v = team.vertices[0]
+    x, y = px + co * u - si * v, py + si * u + co * v
     inside = False
+    best = most
     for e in range(len(walls)):
         x0, y0, x1, y1 = walls[e]
         if (y0 > y) != (y1 > y) and x0 + (y - y0) * (x1 - x0) / (y1 - y0) > x:
             inside = not inside
         for c in range(len(team.parent)):
             px, py, co, si = poses[c]
-            reach = team.reach[c]
+            reach = team.reach[c] + best
             if max(x0, x1) < px - reach or min(x0, x1) > px + reach:
                 continue
             if max(y0, y1) < py - reach or min(y0, y1) > py + reach:
                 continue
-            if _point_segment(px, py, x0, y0, x1, y1) > reach * reach:
+            if point_segment(px, py, x0, y0, x1, y1) > reach * reach:
                 continue
             ax, ay = co * (x0 - px) + si * (y0 - py), co * (y0 - py) - si * (x0 - px)
             bx, by = co * (x1 - px) + si * (y1 - py), co * (y1 - py) - si * (x1 - px)
             for piece in range(len(team.owner)):
-                if team.owner[piece] == c and _segment_meets(team, piece, ax, ay, bx, by):
-                    return False
-    if not inside:
-        return False
-    for k in range(len(team.pairs)):
-        a, b = team.pairs[k]
-        if _far(team, poses, a, b, gap):
-            continue
-        if not _apart(team, poses, a, b, gap) and not _apart(team, poses, b, a, gap):
-            return False
-    return True
+                if team.owner[piece] != c:
+                    continue
+                if _segment_meets(team, piece, ax, ay, bx, by):
+                    return -1.0
+                if best > 0.0:
+                    best = min(best, _segment_gap(team, piece, ax, ay, bx, by))
+    return best if inside else -1.0
 
 
 @numba.njit(cache=True)

@@ -9,11 +9,12 @@ from shapely import MultiPolygon
 
 from coop_drake.geometry.minkowski import polygon_rings
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.collision_kernels import is_free, segment_is_free, team_arrays, wall_segments
+from coop_drake.planning.collision_kernels import is_free
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.refine import axis_levers
 from coop_drake.planning.relaxation import relaxed
-from coop_drake.planning.tree_kernels import connect
+from coop_drake.planning.team_arrays import team_arrays, wall_segments
+from coop_drake.planning.tree_kernels import chain_is_free, connect
 
 _STEP = 0.03
 _SPREAD_POSITION = 0.3
@@ -143,10 +144,7 @@ class Sampler:
             part = path[i : j + 1].copy()
             share = np.linspace(0.0, 1.0, j - i + 1)[:, None]
             part[:, axes] = (path[i] + share * (path[j] - path[i]))[:, axes]
-            if all(
-                segment_is_free(team, self._walls, a, b, self._gap, scale, _STEP) == 1.0
-                for a, b in pairwise(part)
-            ):
+            if chain_is_free(team, self._walls, part, self._gap, scale, _STEP):
                 path[i : j + 1] = part
         return path
 

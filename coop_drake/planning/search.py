@@ -56,14 +56,15 @@ def find_channel(
         boxes = attempts.boxes(margin)
         tried.append((margin, "found" if boxes is not None else "not found"))
         if boxes is not None:
-            return attempts.channel(boxes, margin), SearchReport(slices, len(boxes), 0, tuple(tried))
+            report = SearchReport(slices + attempts.slices, len(boxes), 0, tuple(tried))
+            return attempts.channel(boxes, margin), report
         if refutable and attempts.object_blocked:
             refutable = False
             outcome = explorer(relaxed(problem, ())[0]).run(budget // _RELAXED_SHARE)
             slices += outcome.slices
             if outcome.verdict is Verdict.INFEASIBLE:
                 tried.append((0.0, outcome.verdict.value))
-                return _refuted("the object alone", slices, tried)
+                return _refuted("the object alone", slices + attempts.slices, tried)
     return _decided(problem, attempts, slices, tried, progress)
 
 
@@ -85,7 +86,7 @@ def _decided(
     slices += made
     if what is not None:
         tried.append((0.0, Verdict.INFEASIBLE.value))
-        return _refuted(what, slices, tried)
+        return _refuted(what, slices + attempts.slices, tried)
     exploration = explorer(problem)
     share, effort = min(_FIRST_SHARE, budget), 0
     outcome = exploration.run(share, _counter(progress))
@@ -94,11 +95,11 @@ def _decided(
         boxes = attempts.boxes(0.0, effort)
         if boxes is not None:
             tried.append((0.0, Verdict.FOUND.value))
-            report = _report(exploration, outcome, slices + outcome.slices, tried)
+            report = _report(exploration, outcome, slices + attempts.slices + outcome.slices, tried)
             return attempts.channel(boxes, 0.0), report
         outcome = exploration.run(share, _counter(progress))
     tried.append((0.0, outcome.verdict.value))
-    report = _report(exploration, outcome, slices + outcome.slices, tried)
+    report = _report(exploration, outcome, slices + attempts.slices + outcome.slices, tried)
     if outcome.verdict is not Verdict.FOUND:
         return _refusal(outcome), report
     return attempts.channel(exploration.boxes(outcome.path), 0.0), report

@@ -8,7 +8,9 @@ import numba
 import numpy as np
 
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.collision_kernels import IntArray, TeamArrays, segment_is_free
+from coop_drake.geometry.sweep_kernels import IntArray
+from coop_drake.planning.collision_kernels import segment_is_free
+from coop_drake.planning.team_arrays import TeamArrays
 
 
 @numba.njit(cache=True)
@@ -130,6 +132,17 @@ def connect(
                 return path
         side = other
     return np.empty((0, len(start)))
+
+
+@numba.njit(cache=True)
+def chain_is_free(
+    team: TeamArrays, walls: FloatArray, chain: FloatArray, gap: float, scale: FloatArray, step: float
+) -> bool:
+    """Whether all straight segments between consecutive configurations are free, shape (m, d)."""
+    for i in range(len(chain) - 1):
+        if segment_is_free(team, walls, chain[i], chain[i + 1], gap, scale, step) < 1.0:
+            return False
+    return True
 
 
 @numba.njit(cache=True)

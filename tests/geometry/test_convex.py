@@ -2,15 +2,8 @@ import numpy as np
 import pytest
 from shapely import Polygon, box
 
-from coop_drake.geometry.convex import (
-    circumscribed,
-    closed_directions,
-    edge_angles,
-    half_planes_polygon,
-    normals,
-    separated,
-    support,
-)
+from coop_drake.geometry.convex import edge_angles, half_planes_polygon, normals
+from coop_drake.geometry.sweep_kernels import circumscribed, closed_directions, separated, support
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 

@@ -74,17 +74,3 @@ def test_a_hole_stays_a_hole() -> None:
     polygon = to_polygon(part)
     assert len(polygon.interiors) == 1
     assert Polygon(polygon.interiors[0]).area == pytest.approx(0.8**2, abs=10 * SAFE_SIDE)
-
-
-@given(POINTS, st.floats(-3, 3), st.floats(-3, 3))
-def test_clear_says_whether_a_wall_crosses(points: list[tuple[float, float]], x: float, y: float) -> None:
-    footprint = convex_ring(points)
-    if footprint is None:
-        return
-    placed = Polygon(footprint + np.array([x, y]))
-    crosses = room().boundary.distance(placed)
-    clear = FreeSpace(polygon_rings(room())).clear(footprint, np.array([[x, y]]))
-    if crosses > 1e-9:
-        assert clear
-    elif room().boundary.intersects(placed.buffer(-1e-6)):
-        assert not clear

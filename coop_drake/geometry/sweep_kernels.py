@@ -1,0 +1,294 @@
+"""Compiled over-sweeps: convex sets as supporting lines, swept joint by joint from a piece to the object."""
+
+from __future__ import annotations
+
+from math import atan2, ceil, cos, hypot, pi, sin, sqrt
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from coop_drake.geometry.convex import SLACK
+from coop_drake.geometry.pose import FloatArray
+
+IntArray = NDArray[np.int64]
+
+_TURN = 2.0 * pi
+_SAME_ANGLE = 1e-5
+_SAME_POINT = 1e-11
+_LARGEST_TURN = 0.75 * pi
+_ARC_SHARE = 10.0
+
+
+class SweepArrays(NamedTuple):
+    """Every convex piece of a tree with the joints that move it, P pieces, V vertices, S stages in all.
+
+    Attributes:
+        first: Where each piece's vertices begin, shape (P + 1,).
+        vertices: Vertices in the component's frame, shape (V, 2) [m].
+        radius: Growth of each piece, shape (P,) [m].
+        first_stage: Where each piece's stages begin, its own joint first, theta last, shape (P + 1,).
+        axis: Axis of the slice (theta, q...) of each stage, shape (S,).
+        turning: 1 for revolute joints and theta, 0 for prismatic ones, shape (S,).
+        joint: Sign, axis in J and X_PJ as (x, y, cos, sin) of each stage, shape (S, 7).
+    """
+
+    first: IntArray
+    vertices: FloatArray
+    radius: FloatArray
+    first_stage: IntArray
+    axis: IntArray
+    turning: IntArray
+    joint: FloatArray
+
+
+@numba.njit(cache=True)
+def arc_parts(half_width: float) -> int:
+    """How many chords or tangents stand in for an arc: their error vanishes faster than the slice's."""
+    return max(1, ceil(sqrt(_ARC_SHARE * min(half_width, pi))))
+
+
+@numba.njit(cache=True)
+def disc_turn(half_width: float) -> float:
+    """Largest angle between neighbouring normals of a polygon that stands in for a disc [rad]."""
+    return min(0.6, max(0.05, 0.9 * sqrt(half_width))) if half_width > 0.0 else 0.6
+
+
+@numba.njit(cache=True)
+def closed_directions(angles: FloatArray, largest_turn: float = _LARGEST_TURN) -> FloatArray:
+    """Sort directions, drop repeated ones and fill gaps so that no two neighbours are further apart.
+
+    Args:
+        angles: Any directions, shape (k,) [rad].
+        largest_turn: Largest angle between neighbours of the result [rad], below pi.
+
+    Returns:
+        Directions in ascending order within one turn, shape (m,).
+    """
+    ordered = np.sort(angles - _TURN * np.floor(angles / _TURN)) if len(angles) else np.zeros(1)
+    kept = np.empty(len(ordered))
+    count = 0
+    for i in range(len(ordered)):
+        before = ordered[i - 1] if i > 0 else ordered[-1] - _TURN
+        if ordered[i] - before > _SAME_ANGLE:
+            kept[count] = ordered[i]
+            count += 1
+    total = 0
+    for i in range(count):
+        after = kept[i + 1] if i + 1 < count else kept[0] + _TURN
+        total += ceil((after - kept[i]) / largest_turn)
+    filled = np.empty(total)
+    size = 0
+    for i in range(count):
+        after = kept[i + 1] if i + 1 < count else kept[0] + _TURN
+        parts = ceil((after - kept[i]) / largest_turn)
+        for part in range(parts):
+            filled[size] = kept[i] + part * ((after - kept[i]) / parts)
+            size += 1
+    return filled
+
+
+@numba.njit(cache=True)
+def circumscribed(angles: FloatArray, offsets: FloatArray) -> FloatArray:
+    """Polygon whose edges lie on supporting lines of one convex set; it encloses that set.
+
+    Args:
+        angles: Sorted directions, neighbours less than pi apart, shape (k,) [rad].
+        offsets: Value of the set's support function at each, shape (k,) [m].
+
+    Returns:
+        Vertices, counter-clockwise, without repetitions, shape (m, 2).
+    """
+    count = len(angles)
+    x, y = np.cos(angles), np.sin(angles)
+    vertices = np.empty((count, 2))
+    for i in range(count):
+        k = i + 1 if i + 1 < count else 0
+        here, after = offsets[i] + SLACK, offsets[k] + SLACK
+        turn = x[i] * y[k] - y[i] * x[k]
+        vertices[i, 0] = (here * y[k] - after * y[i]) / turn
+        vertices[i, 1] = (after * x[i] - here * x[k]) / turn
+    distinct = np.empty((count, 2))
+    size = 0
+    for i in range(count):
+        step = max(abs(vertices[i, 0] - vertices[i - 1, 0]), abs(vertices[i, 1] - vertices[i - 1, 1]))
+        if step > _SAME_POINT:
+            distinct[size] = vertices[i]
+            size += 1
+    return distinct[:size].copy() if size >= 3 else vertices
+
+
+@numba.njit(cache=True)
+def support(vertices: FloatArray, angles: FloatArray) -> FloatArray:
+    """Support function of the hull of the vertices: largest n . v; shapes (n, 2), (k,) to (k,) [m]."""
+    best = np.empty(len(angles))
+    for i in range(len(angles)):
+        x, y = cos(angles[i]), sin(angles[i])
+        best[i] = x * vertices[0, 0] + y * vertices[0, 1]
+        for k in range(1, len(vertices)):
+            best[i] = max(best[i], x * vertices[k, 0] + y * vertices[k, 1])
+    return best
+
+
+@numba.njit(cache=True)
+def edge_directions(vertices: FloatArray) -> FloatArray:
+    """Angles of the outward normals of a counter-clockwise ring; shape (n, 2) to (n,), empty for a point."""
+    count = len(vertices) if len(vertices) > 1 else 0
+    angles = np.empty(count)
+    for i in range(count):
+        k = i + 1 if i + 1 < count else 0
+        angles[i] = atan2(vertices[i, 0] - vertices[k, 0], vertices[k, 1] - vertices[i, 1])
+    return angles
+
+
+@numba.njit(cache=True)
+def _furthest(vertices: FloatArray, i: int) -> bool:
+    """Whether a vertex is no nearer to the origin than the points of its edges close by."""
+    x, y = vertices[i]
+    ax, ay = vertices[i - 1]
+    bx, by = vertices[i + 1 if i + 1 < len(vertices) else 0]
+    outermost: bool = (bx - x) * x + (by - y) * y <= 0.0 and (ax - x) * x + (ay - y) * y <= 0.0
+    return outermost
+
+
+@numba.njit(cache=True)
+def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> FloatArray:
+    """Enclose a convex set turned about the origin by every angle of an interval.
+
+    The support function of the sweep is the largest of the set's over a window of directions. Its
+    directions are the edges' normals at both ends of the interval, and tangents to the arcs of those
+    vertices that are locally furthest from the pivot.
+
+    Args:
+        vertices: Convex ring, counter-clockwise, or one point or a segment, shape (n, 2) [m].
+        centre: Middle of the interval [rad].
+        half_width: Half of its width [rad].
+
+    Returns:
+        Vertices of an enclosing convex polygon, shape (m, 2).
+    """
+    count, parts = len(vertices), arc_parts(half_width)
+    edges = edge_directions(vertices)
+    radii, bearings = np.empty(count), np.empty(count)
+    angles = np.empty(2 * len(edges) + count * (parts + 1) + 4)
+    size = 0
+    for angle in edges:
+        angles[size], angles[size + 1] = angle - half_width, angle + half_width
+        size += 2
+    for i in range(count):
+        radii[i] = hypot(vertices[i, 0], vertices[i, 1])
+        bearings[i] = atan2(vertices[i, 1], vertices[i, 0])
+        if radii[i] > 0.0 and _furthest(vertices, i):
+            for part in range(parts + 1):
+                angles[size] = bearings[i] + half_width * (2.0 * part / parts - 1.0)
+                size += 1
+    for quarter in range(4 if count < 3 else 0):
+        angles[size] = bearings[0] + 0.5 * pi * quarter
+        size += 1
+    directions = closed_directions(angles[:size] + centre)
+    offsets = np.empty(len(directions))
+    for k in range(len(directions)):
+        best = -np.inf
+        for i in range(count):
+            off = directions[k] - bearings[i] - centre
+            off = max(abs(off - _TURN * np.rint(off / _TURN)) - half_width, 0.0)
+            best = max(best, radii[i] * cos(off))
+        offsets[k] = best
+    swept: FloatArray = circumscribed(directions, offsets)
+    return swept
+
+
+@numba.njit(cache=True)
+def over_prismatic(vertices: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray:
+    """Enclose a convex set moved along a segment of displacements: the hull of both end copies.
+
+    Args:
+        vertices: Convex ring or one point or a segment, shape (n, 2) [m].
+        first: Displacement at the interval's lower end, shape (2,) [m].
+        last: Displacement at its upper end, shape (2,) [m].
+    """
+    heading = atan2(last[1] - first[1], last[0] - first[0])
+    along = heading + 0.5 * pi * np.arange(-1.0, 3.0)
+    directions = closed_directions(np.concatenate((edge_directions(vertices), along)))
+    offsets = support(vertices, directions)
+    for k in range(len(directions)):
+        x, y = cos(directions[k]), sin(directions[k])
+        offsets[k] += max(x * first[0] + y * first[1], x * last[0] + y * last[1])
+    swept: FloatArray = circumscribed(directions, offsets)
+    return swept
+
+
+@numba.njit(cache=True)
+def grown(vertices: FloatArray, radius: float, largest_turn: float) -> FloatArray:
+    """Enclose a convex set grown by a radius in a polygon.
+
+    Args:
+        vertices: Convex ring or one point or a segment, shape (n, 2) [m].
+        radius: Growth [m].
+        largest_turn: Largest angle between neighbouring normals [rad].
+    """
+    directions = closed_directions(edge_directions(vertices), largest_turn)
+    outer: FloatArray = circumscribed(directions, support(vertices, directions) + radius)
+    return outer
+
+
+@numba.njit(cache=True)
+def over_piece(
+    sweeps: SweepArrays, piece: int, lower: FloatArray, upper: FloatArray, stages: int, rounded: bool
+) -> FloatArray:
+    """Polygon that encloses a piece at every configuration of a slice.
+
+    Args:
+        sweeps: The pieces and their joints.
+        piece: Which one.
+        lower: Lower ends of (theta, q...), shape (1 + n,) [rad, m].
+        upper: Upper ends, shape (1 + n,).
+        stages: Number of joints to sweep, from the piece's own.
+        rounded: Whether to grow the sweep by the piece's radius.
+
+    Returns:
+        Vertices, counter-clockwise, shape (n, 2) [m].
+    """
+    ring = sweeps.vertices[sweeps.first[piece] : sweeps.first[piece + 1]].copy()
+    widest = 0.0
+    for stage in range(sweeps.first_stage[piece], sweeps.first_stage[piece] + stages):
+        low, high = lower[sweeps.axis[stage]], upper[sweeps.axis[stage]]
+        sign, ax, ay, x, y, c, s = sweeps.joint[stage]
+        widest = max(widest, high - low)
+        if sweeps.turning[stage] == 1:
+            ring = over_revolute(ring, sign * 0.5 * (low + high), 0.5 * (high - low))
+        else:
+            ring = over_prismatic(ring, np.array([ax * low, ay * low]), np.array([ax * high, ay * high]))
+        for i in range(len(ring)):
+            u, v = ring[i]
+            ring[i, 0], ring[i, 1] = x + c * u - s * v, y + s * u + c * v
+    if rounded and sweeps.radius[piece] > 0.0:
+        ring = grown(ring, sweeps.radius[piece], disc_turn(0.5 * widest))
+    return ring
+
+
+@numba.njit(cache=True)
+def separated(first: FloatArray, second: FloatArray, gap: float = 0.0) -> bool:
+    """Whether some edge's line keeps two convex polygons further apart than ``gap`` [m].
+
+    A negative gap lets them overlap that deep and still be told apart.
+    """
+    apart: bool = _edge_separates(first, second, gap) or _edge_separates(second, first, gap)
+    return apart
+
+
+@numba.njit(cache=True)
+def _edge_separates(first: FloatArray, second: FloatArray, gap: float) -> bool:
+    for i in range(len(first)):
+        k = i + 1 if i + 1 < len(first) else 0
+        x, y = first[k, 1] - first[i, 1], first[i, 0] - first[k, 0]
+        reach = x * first[i, 0] + y * first[i, 1] + gap * hypot(x, y)
+        apart = True
+        for j in range(len(second)):
+            if x * second[j, 0] + y * second[j, 1] <= reach:
+                apart = False
+                break
+        if apart:
+            return True
+    return False
