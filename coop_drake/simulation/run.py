@@ -16,6 +16,7 @@ from coop_drake.plant import read_component_tree
 from coop_drake.scenario import Scenario, SimulatorSettings
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.invariants import Invariants
+from coop_drake.simulation.joint_limits import joint_limits_kept_by_funnels
 from coop_drake.simulation.log import SimulationLog
 from coop_drake.simulation.watch import Watch
 
@@ -79,9 +80,10 @@ def simulate(
     simulator = Simulator(loop.diagram, root)
     _configure(simulator, scenario.simulator)
     simulator.set_monitor(watch)
-    simulator.Initialize()
-    if not watch.ended:
-        _advance(simulator, watch, scenario.simulator.max_time)
+    with joint_limits_kept_by_funnels():
+        simulator.Initialize()
+        if not watch.ended:
+            _advance(simulator, watch, scenario.simulator.max_time)
     return watch.recorder.to_log(
         reached=watch.reached,
         violation=watch.violation,
