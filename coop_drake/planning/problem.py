@@ -27,7 +27,7 @@ class PlannerSettings:
     slice_overlap: float = 0.25
     angle_resolution: float = 0.002
     length_resolution: float = 0.001
-    max_slices: int = 20_000
+    max_slices: int = 4_000
     max_transition_time: float = 60.0
 
 

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 from coop_drake.planning.attempts import SampledAttempts, explorer, refuted_relaxation
 from coop_drake.planning.channel import Channel, SearchReport
 from coop_drake.planning.exploration import Exploration, Outcome, Verdict
+from coop_drake.planning.goals import blocked_goal
 from coop_drake.planning.margins import margins
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.relaxation import relaxed
 
 Progress = Callable[[str, float], None]
-_RELAXED_SHARE = 8
+_RELAXED_SHARE = 2
 _FIRST_SHARE = 500
 
 
@@ -46,10 +47,14 @@ def find_channel(
     Returns:
         The channel, or why there is none, and a report.
     """
+    blocked, slices = blocked_goal(problem)
+    if blocked:
+        reason = "the team collides at the goal pose whatever its free joints"
+        return NoChannel(True, reason), SearchReport(slices, 0, 0, ((0.0, Verdict.INFEASIBLE.value),))
     attempts = SampledAttempts(problem)
     tried: list[tuple[float, str]] = []
     budget = problem.settings.max_slices
-    slices, refutable = 0, True
+    refutable = True
     for margin in margins(problem.settings.margin):
         if progress is not None:
             progress(f"searching at margin {margin:.3f} m", float(len(tried)))

@@ -91,6 +91,24 @@ def test_a_start_near_a_wall_does_not_forbid_a_margin() -> None:
     assert_channel_is_sound(near, channel)
 
 
+@pytest.mark.parametrize(
+    ("pose", "joints"),
+    [
+        ((5.0, 6.6, 0.0), (None, None)),  # the object is in the door's wall
+        ((6.2, 4.5, 0.0), (None, None)),  # a hand fits, the base behind it does not, whatever its joint
+        ((5.0, 8.0, 1.57), (0.0, 2.9)),  # a joint beyond its limit puts a base into the other's hand
+    ],
+)
+def test_a_goal_in_collision_is_refuted_at_once(
+    pose: tuple[float, float, float], joints: tuple[float | None, float | None]
+) -> None:
+    channel, report = find_channel(replace(case("base"), goal_pose=np.array(pose), goal_joints=joints))
+    assert isinstance(channel, NoChannel)
+    assert channel.proved
+    assert "at the goal" in channel.reason
+    assert report.slices <= 128
+
+
 def test_joints_with_a_goal_reach_it() -> None:
     problem = replace(case("base"), goal_joints=(-1.0, 0.6))
     channel, _ = find_channel(problem)
