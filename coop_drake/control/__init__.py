@@ -6,6 +6,7 @@ from coop_drake.control.governor import (
     energy_margin,
     governed_acceleration,
     governor_velocity,
+    slowdown_radius,
     tracking_energy,
 )
 from coop_drake.control.load_sharing import (
@@ -44,6 +45,7 @@ __all__ = [
     "robot_acceleration",
     "robot_torque",
     "rotate",
+    "slowdown_radius",
     "total_wrench",
     "tracking_energy",
     "transition_gains",

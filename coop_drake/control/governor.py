@@ -8,6 +8,22 @@ import numpy as np
 
 from coop_drake.control.gains import FloatArray
 
+ATTRACTION_RATE = 30.0
+"""Rate at which p_G is drawn into its target [1/s]: faster than the object follows, slow enough for steps of
+0.02 s; a field that slows down only close to its target makes copies of p_G drift apart by its stiffness."""
+
+
+def slowdown_radius(max_speed: float, *, governor_gain: float) -> float:
+    """Return the distance from its target at which the field (13) starts to slow down [m].
+
+    Inside it p_G approaches the target like exp(-``ATTRACTION_RATE`` t).
+
+    Args:
+        max_speed: Largest magnitude of the field [m/s].
+        governor_gain: K_G [-].
+    """
+    return governor_gain * max_speed / ATTRACTION_RATE
+
 
 def governed_acceleration(
     position: FloatArray,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pydrake.geometry import Meshcat, MeshcatVisualizer
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
+from coop_drake.control import slowdown_radius
 from coop_drake.diagram.robot_controller import RobotKnowledge, build_robot_controller
 from coop_drake.diagram.station import TransportStation, build_station
 from coop_drake.errors import PlanError
@@ -19,6 +20,9 @@ from coop_drake.scenario import Scenario
 from coop_drake.systems import CellPlanner, GovernedCell
 
 __all__ = ["ClosedLoop", "build_closed_loop"]
+
+FIELD_SPEED = 1.0
+"""Largest magnitude of the velocity fields [m/s]; the governor scales it and bounds it by Delta E."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +101,9 @@ def _knowledge(
     scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], team: TeamPlant
 ) -> list[RobotKnowledge]:
     cells = [
-        GovernedCell(BoundaryDistance(cell.tidied), VelocityField(field_map), transition.gains)
+        GovernedCell(
+            BoundaryDistance(cell.tidied), _field(field_map, transition.gains.governor_gain), transition.gains
+        )
         for cell, transition, field_map in zip(plan.cells, plan.transitions, maps, strict=True)
     ]
     return [
@@ -113,6 +119,11 @@ def _knowledge(
         )
         for robot in team.robots
     ]
+
+
+def _field(harmonic_map: HarmonicMap, governor_gain: float) -> VelocityField:
+    radius = slowdown_radius(FIELD_SPEED, governor_gain=governor_gain)
+    return VelocityField(harmonic_map, FIELD_SPEED, slowdown_radius=radius)
 
 
 def _check(plan: Plan, maps: Sequence[HarmonicMap], team: TeamPlant) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 
 from coop_drake.control import TransitionGains
 from coop_drake.planning.plan import Plan
@@ -48,7 +48,7 @@ def travel_time(length: float, neck: float, speed: float = SPEED_PER_CLEARANCE) 
         neck: b, clearance that the path keeps [m].
         speed: Speed over clearance [1/s].
     """
-    return length / (speed * neck)
+    return length / (speed * neck) if neck > 0.0 else inf
 
 
 def transition_time(length: float, neck: float, speed: float = SPEED_PER_CLEARANCE) -> float:

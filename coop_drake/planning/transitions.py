@@ -76,9 +76,11 @@ def make_plan(
     resting = problem.start[2:]
     for index, (entry, target) in enumerate(zip(entries, targets, strict=True)):
         goal_lower, goal_upper = _goal_intervals(problem, channel, index)
-        way = _way(problem, cells[index : index + 2], entry, target, index)
+        way, passage = _way(problem, cells[index : index + 2], entry, target, index)
         gains = _gains(gain_set, cells[index], way.neck, (goal_lower, goal_upper), resting)
         time = _estimated_time(way.length, way.neck, gains)
+        if time > problem.settings.max_transition_time:
+            raise StallError(_stall(problem, index, passage, way, time))
         transitions.append(
             Transition(
                 **vars(way), goal_lower=goal_lower, goal_upper=goal_upper, estimated_time=time, gains=gains
@@ -130,7 +132,7 @@ class _Way:
 
 def _way(
     problem: PlanningProblem, cells: Sequence[Cell], entry: FloatArray, target: FloatArray, index: int
-) -> _Way:
+) -> tuple[_Way, Passage]:
     """The way from entry to target in the first cell; the second one, if any, is entered there."""
     here = cells[0].tidied
     if len(cells) > 1:
@@ -139,23 +141,20 @@ def _way(
         region = component_at(_disc(target, problem.position_tolerance).intersection(here), Point(target))
     inradius = 0.0 if region.is_empty else BoundaryDistance(region)(target)
     passage = PassageFinder(here).find(entry, target)
-    time = travel_time(passage.length, passage.neck)
-    if min(inradius, passage.neck) < NARROWEST or time > problem.settings.max_transition_time:
-        raise StallError(_stall(problem, index, passage, target, inradius))
     only_angles = bool(passage.length <= SAME_PLACE)
-    return _Way(target, region, inradius, passage.neck, passage.length, only_angles)
+    way = _Way(target, region, inradius, passage.neck, passage.length, only_angles)
+    if min(inradius, passage.neck) < NARROWEST:
+        raise StallError(_stall(problem, index, passage, way, travel_time(passage.length, passage.neck)))
+    return way, passage
 
 
-def _stall(
-    problem: PlanningProblem, index: int, passage: Passage, target: FloatArray, inradius: float
-) -> str:
+def _stall(problem: PlanningProblem, index: int, passage: Passage, way: _Way, seconds: float) -> str:
     x, y = passage.narrowest
-    seconds = travel_time(passage.length, passage.neck)
     return (
         f"cell {index}: the object's passage through ({x:.3f}, {y:.3f}) is {2e3 * passage.neck:.1f} mm "
         f"wide and {passage.length:.2f} m long, about {seconds:.0f} s, and its target "
-        f"({target[0]:.3f}, {target[1]:.3f}) has {1e3 * inradius:.1f} mm around it; expected at least "
-        f"{2e3 * NARROWEST:.0f} mm and {1e3 * NARROWEST:.0f} mm, and at most "
+        f"({way.target[0]:.3f}, {way.target[1]:.3f}) has {1e3 * way.inradius:.1f} mm around it; expected "
+        f"at least {2e3 * NARROWEST:.0f} mm and {1e3 * NARROWEST:.0f} mm, and at most "
         f"{problem.settings.max_transition_time:.0f} s"
     )
 

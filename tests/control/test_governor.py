@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
 
-from coop_drake.control import energy_margin, governed_acceleration, governor_velocity, tracking_energy
+from coop_drake.control import (
+    energy_margin,
+    governed_acceleration,
+    governor_velocity,
+    slowdown_radius,
+    tracking_energy,
+)
+from coop_drake.control.governor import ATTRACTION_RATE
+from coop_drake.scenario import SimulatorSettings
 
 GAINS = {"stiffness": 50.0, "governor_gain": 5.0}
 
@@ -55,3 +63,13 @@ def test_the_smoothed_root_is_lipschitz_and_the_printed_one_is_not():
 
     assert slope(0.0, 1e-12) > 1e3 * slope(0.0, 1e-4)
     assert slope(0.001, 1e-12) <= 5.0 / (2.0 * 0.001 * 50.0)
+
+
+def test_a_target_is_approached_no_faster_than_the_integrator_can_follow():
+    """Copies of p_G that differ by rounding must not drift apart: the step stays in RK's stable region."""
+    for governor_gain in (5.0, 16.0):
+        near = 0.01 * slowdown_radius(0.7, governor_gain=governor_gain)
+        field = np.array([0.7 * near / slowdown_radius(0.7, governor_gain=governor_gain), 0.0])
+        speed = governor_velocity(field, 1e6, stiffness=50.0, governor_gain=governor_gain, smoothing=0.0)
+        assert speed[0] / near == pytest.approx(ATTRACTION_RATE)
+    assert ATTRACTION_RATE * SimulatorSettings().max_step_size < 1.0

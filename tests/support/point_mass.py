@@ -16,6 +16,7 @@ from coop_drake.control import (
     governed_acceleration,
     governor_velocity,
     ready_margin,
+    slowdown_radius,
     tracking_energy,
 )
 from coop_drake.fields import HarmonicMap, VelocityField
@@ -43,7 +44,10 @@ class Transport:
 def build_fields(plan, *, tolerance=1e-4):
     """Velocity field of every transition, from its harmonic map."""
     return [
-        VelocityField(HarmonicMap(cell.tidied, Point(transition.target), tolerance=tolerance))
+        VelocityField(
+            HarmonicMap(cell.tidied, Point(transition.target), tolerance=tolerance),
+            slowdown_radius=slowdown_radius(1.0, governor_gain=transition.gains.governor_gain),
+        )
         for cell, transition in zip(plan.cells, plan.transitions, strict=True)
     ]
 
