@@ -56,7 +56,7 @@ def set_light(meshcat: Meshcat) -> None:
 
 
 def set_path(meshcat: Meshcat, positions: FloatArray) -> None:
-    """Draw the object's path on the floor; positions of shape (T, 2) [m]; a run that never moved leaves a dot."""
+    """Draw the object's path on the floor, a dot if it never moved; positions of shape (T, 2) [m]."""
     path = (LineString(positions) if len(positions) > 1 else Point(positions[0])).simplify(0.002)
     _set_flat(meshcat, "/stage/path", path.buffer(0.015), 0.010, _PATH)
 
