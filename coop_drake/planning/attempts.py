@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations, islice
 
 from coop_drake.geometry.body_pairs import BodyPairs
@@ -47,12 +47,15 @@ class SampledAttempts:
         self.slices = 0
         self.object_blocked = False
 
-    def boxes(self, margin: float, effort: int = 0) -> list[Box] | None:
+    def boxes(
+        self, margin: float, effort: int = 0, progress: Callable[[float], None] | None = None
+    ) -> list[Box] | None:
         """Chain of boxes from start to goal whose cores keep the margin, or None if none was found.
 
         Args:
             margin: Margin [m].
             effort: 0 for a first try; each step up draws other samples, and twice as many.
+            progress: Called with the share of a path that boxes cover.
         """
         maker = CellMaker(self._swept, self._pairs, marginal_workspace(self._problem, margin))
         certifier = Certifier(self._problem.tree, maker, self._scale, margin)
@@ -60,7 +63,7 @@ class SampledAttempts:
             self._last = (clearance, path)
             before = certifier.trials
             better = drawn_tight(self._problem, path, clearance, margin, _GAP)
-            chain = certifier.boxes(better)
+            chain = certifier.boxes(better, progress)
             self._swept.forget()
             self.slices += certifier.trials - before
             if chain is not None:

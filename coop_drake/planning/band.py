@@ -17,7 +17,7 @@ _FAR = 0.2
 _LEAST_ROOM = 0.005
 _SPACING = 0.05
 _PRICE = 0.006
-_MOVES = 8_000
+_MOVES = 4_000
 
 
 def configuration_scale(problem: PlanningProblem) -> FloatArray:

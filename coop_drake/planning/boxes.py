@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import shapely
@@ -12,6 +13,7 @@ from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import Interval, Intervals
 from coop_drake.planning.cells import CellMaker, Region
 from coop_drake.planning.channel import Channel, FreeBox
+from coop_drake.planning.shortcuts import without_detours
 from coop_drake.planning.slices import nearest_turn
 
 
@@ -36,7 +38,7 @@ def make_channel(
     start_angle: float,
     goal_angle: float,
 ) -> Channel:
-    """Give every box of a free path its full polygon back.
+    """Leave out boxes that are detours and give the others their full polygons back.
 
     Args:
         boxes: Expanded intervals and the core of each box.
@@ -46,17 +48,24 @@ def make_channel(
         goal_angle: Theta at the goal, any turn [rad].
     """
     turned = unwrapped([intervals for intervals, _ in boxes], start_angle)
-    free = [
+    cores = [
         FreeBox(
-            polygon=_surrounding(full, intervals, core),
-            core=to_polygon(core.section),
+            polygon=polygon,
+            core=polygon,
             lower=np.array([lower for lower, _ in angles]),
             upper=np.array([upper for _, upper in angles]),
         )
-        for (intervals, core), angles in zip(boxes, turned, strict=True)
+        for polygon, angles in zip([to_polygon(core.section) for _, core in boxes], turned, strict=True)
     ]
-    middle = 0.5 * (free[-1].lower[0] + free[-1].upper[0])
-    return Channel(tuple(free), margin, float(middle + nearest_turn(goal_angle - middle)))
+    middle = 0.5 * (cores[-1].lower[0] + cores[-1].upper[0])
+    goal = float(middle + nearest_turn(goal_angle - middle))
+    kept = {id(box) for box in without_detours(Channel(tuple(cores), margin, goal)).boxes}
+    free = [
+        replace(box, polygon=_surrounding(full, intervals, core))
+        for box, (intervals, core) in zip(cores, boxes, strict=True)
+        if id(box) in kept
+    ]
+    return Channel(tuple(free), margin, goal)
 
 
 def _surrounding(full: CellMaker, intervals: Intervals, core: Region) -> Polygon:

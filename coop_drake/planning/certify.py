@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from coop_drake.geometry.pose import FloatArray
@@ -41,11 +43,12 @@ class Certifier:
         self.trials = 0
         self._lower, self._upper = tree.joint_lower, tree.joint_upper
 
-    def boxes(self, path: FloatArray) -> list[Box] | None:
+    def boxes(self, path: FloatArray, progress: Callable[[float], None] | None = None) -> list[Box] | None:
         """Chain of boxes from the path's first to its last configuration, or None if one is missing.
 
         Args:
             path: Configurations with theta unwrapped, shape (m, 3 + n).
+            progress: Called with the share of the path that is covered.
         """
         samples = densified(path, self._scale, _RESOLUTION)
         chain: list[Box] = []
@@ -56,6 +59,8 @@ class Certifier:
                 return None
             i, box = found
             chain.append(box)
+            if progress is not None:
+                progress(i / (len(samples) - 1))
         return chain
 
     def _longest(self, samples: FloatArray, i: int) -> tuple[int, Box] | None:

@@ -42,7 +42,7 @@ def find_channel(
 
     Args:
         problem: The question.
-        progress: Called with a phase and a count of the work done in it.
+        progress: Called with a phase and the share of it that is done.
 
     Returns:
         The channel, or why there is none, and a report.
@@ -56,9 +56,9 @@ def find_channel(
     budget = problem.settings.max_slices
     refutable = True
     for margin in margins(problem.settings.margin):
-        if progress is not None:
-            progress(f"searching at margin {margin:.3f} m", float(len(tried)))
-        boxes = attempts.boxes(margin)
+        told = _teller(progress, f"searching at margin {margin:.3f} m")
+        told(0.0)
+        boxes = attempts.boxes(margin, progress=told)
         tried.append((margin, "found" if boxes is not None else "not found"))
         if boxes is not None:
             report = SearchReport(slices + attempts.slices, len(boxes), 0, tuple(tried))
@@ -94,7 +94,7 @@ def _decided(
         return _refuted(what, slices + attempts.slices, tried)
     exploration = explorer(problem)
     share, effort = min(_FIRST_SHARE, budget), 0
-    outcome = exploration.run(share, _counter(progress))
+    outcome = exploration.run(share, _counter(progress, budget))
     while outcome.verdict is Verdict.BUDGET and share < budget:
         share, effort = min(2 * share, budget), effort + 1
         boxes = attempts.boxes(0.0, effort)
@@ -102,7 +102,7 @@ def _decided(
             tried.append((0.0, Verdict.FOUND.value))
             report = _report(exploration, outcome, slices + attempts.slices + outcome.slices, tried)
             return attempts.channel(boxes, 0.0), report
-        outcome = exploration.run(share, _counter(progress))
+        outcome = exploration.run(share, _counter(progress, budget))
     tried.append((0.0, outcome.verdict.value))
     report = _report(exploration, outcome, slices + attempts.slices + outcome.slices, tried)
     if outcome.verdict is not Verdict.FOUND:
@@ -110,10 +110,15 @@ def _decided(
     return attempts.channel(exploration.boxes(outcome.path), 0.0), report
 
 
-def _counter(progress: Progress | None) -> Callable[[int], None] | None:
-    if progress is None:
-        return None
-    return lambda count: progress("exploring slices", float(count))
+def _teller(progress: Progress | None, phase: str) -> Callable[[float], None]:
+    """Tell the share of a phase, or nobody."""
+    return (lambda share: None) if progress is None else (lambda share: progress(phase, share))
+
+
+def _counter(progress: Progress | None, budget: int) -> Callable[[int], None]:
+    """Tell the share of the budget that slices have taken."""
+    told = _teller(progress, "exploring slices")
+    return lambda count: told(count / budget)
 
 
 def _refusal(outcome: Outcome) -> NoChannel:
