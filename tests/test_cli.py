@@ -210,11 +210,24 @@ def test_a_plan_of_another_scenario_and_a_file_that_is_no_plan_are_bad_input(fin
     result = invoke("simulate", other, "--plan", out / "plan.json", "--json")
     assert result.exit_code == 2
     assert "the plan starts at" in json.loads(result.stdout)["error"]
-    for content in ("{}", "not json"):
+    goal = write_scenario(
+        tmp_path / "goal.scenario.yaml", goal={"object": {**ROOM["goal"]["object"], "x": 2.0, "y": 2.0}}
+    )
+    result = invoke("simulate", goal, "--plan", out / "plan.json", "--json")
+    assert result.exit_code == 2
+    assert "the plan ends at" in json.loads(result.stdout)["error"]
+    for content in ("{}", "not json", "[" * 100_000):
         (tmp_path / "plan.json").write_text(content)
         result = invoke("simulate", room, "--plan", tmp_path / "plan.json", "--json")
         assert result.exit_code == 2
         assert "plan.json" in json.loads(result.stdout)["error"]
+
+
+def test_a_file_where_the_results_should_go_is_refused_before_planning(room, tmp_path):
+    (tmp_path / "taken").write_text("")
+    result = invoke("plan", room, "--out", tmp_path / "taken", "--json")
+    assert result.exit_code == 2
+    assert (tmp_path / "taken").read_text() == ""
 
 
 def test_wrong_usage_is_bad_input_for_people_and_machines():

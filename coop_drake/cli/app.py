@@ -36,7 +36,10 @@ app = typer.Typer(
 
 ScenarioPath = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")]
 OutPath = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Where results go; out/<scenario> by default.")
+    Path | None,
+    typer.Option(
+        "--out", metavar="DIR", file_okay=False, help="Where results go; out/<scenario> by default."
+    ),
 ]
 GainsName = Annotated[
     str | None, typer.Option("--gains", metavar="NAME", help="Gain set; the scenario's choice by default.")

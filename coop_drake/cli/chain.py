@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from math import remainder, tau
 from pathlib import Path
 from time import perf_counter, process_time
 
@@ -39,6 +40,7 @@ from coop_drake.viz import table_1, write_figures, write_recording
 
 __all__ = ["Task", "load_task", "plan_task", "read_plan", "simulate_task", "warm_up", "write_pictures"]
 
+_SAME_GOAL = 1e-9  # Rounding of whole turns of the goal's angle [m, rad].
 _WARM_UP_SECONDS = 0.05  # Simulated time that calls every kernel [s].
 
 
@@ -112,10 +114,21 @@ def read_plan(task: Task, path: Path, reporter: Reporter, *, gains_given: bool) 
         raise PlanError(
             f"{path}: the plan starts at {found.start}; the scenario starts at {task.problem.start}"
         )
+    _check_goal(task.problem, found, path)
     if gains_given and task.gains != found.gain_set:
         found = reschedule(found, task.scenario.gain_sets[task.gains], task.gains)
     reporter.facts.update(answer="found", slices=0, planning_cpu_seconds=0.0, **plan_measures(found))
     return found
+
+
+def _check_goal(problem: PlanningProblem, found: Plan, path: Path) -> None:
+    away = found.goal_pose - problem.goal_pose
+    away[2] = remainder(away[2], tau)
+    if found.goal_joints != problem.goal_joints or np.abs(away).max() > _SAME_GOAL:
+        raise PlanError(
+            f"{path}: the plan ends at {found.goal_pose} with joints {found.goal_joints}; "
+            f"the scenario's goal is {problem.goal_pose} with joints {problem.goal_joints}"
+        )
 
 
 def simulate_task(task: Task, found: Plan, folder: ResultFolder, reporter: Reporter) -> SimulationLog:

@@ -37,7 +37,7 @@ def shrunk(workspace: Polygon, margin: float) -> MultiPolygon:
     if margin <= 0.0:
         return MultiPolygon([workspace])
     section = FreeSpace(polygon_rings(workspace)).minus(margin * _OCTAGON)
-    return MultiPolygon([to_polygon(part) for part in section.decompose()])
+    return MultiPolygon([to_polygon(part) for part in section.decompose() if not part.is_empty()])
 
 
 def marginal_workspace(problem: PlanningProblem, margin: float) -> MultiPolygon:

@@ -48,7 +48,7 @@ def load_plan(path: Path | str) -> Plan:
     try:
         text = Path(path).read_text(encoding="utf-8")
         document = json.loads(text)
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, UnicodeDecodeError, RecursionError) as error:
         raise PlanError(f"{file}: cannot be read: {error}") from error
     except json.JSONDecodeError as error:
         raise PlanError(f"{file}: line {error.lineno}: {error.msg}; expected the JSON of a plan") from error
