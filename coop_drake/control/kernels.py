@@ -15,8 +15,9 @@ P = ParamSpec("P")
 R = TypeVar("R")
 Walls = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 
-# Walls closer than this fraction of the funnel's width are treated as this far away: trial steps of an
-# integrator may stand on a wall or beyond it, and must get a finite answer that points back inside.
+# Positions closer to a wall than this fraction of the funnel's width, or beyond it, count as this far inside:
+# trial steps of an integrator may stand there, and must get an answer that points back inside and does not
+# grow with the distance, or the next trial overflows before the integrator can shorten its step.
 SATURATION = 1e-7
 
 
@@ -54,8 +55,9 @@ def track_axis(
 ) -> tuple[float, float]:
     """Return the acceleration and the energy of the back-stepping law on one axis; see ``ppc``."""
     w, w_dot = upper - lower, upper_rate - lower_rate
-    dl = max(position - lower, SATURATION * w)
-    du = max(upper - position, SATURATION * w)
+    near, far = SATURATION * w, (1.0 - SATURATION) * w
+    dl = min(max(position - lower, near), far)
+    du = min(max(upper - position, near), far)
     dl_dot, du_dot = rate - lower_rate, upper_rate - rate
     s, s_dot = np.log(dl / du), dl_dot / dl - du_dot / du
     a = w / (dl * du)

@@ -7,7 +7,8 @@ With dl = x - rho_l, du = rho_u - x, w = dl + du, s = ln(dl / du) and a = w / (d
 
 and the energy V = kappa s^2 / 2 + (x' - v)^2 / 2 decays: V' = -kappa k1 s^2 - k2 (x' - v)^2. The printed
 forms need the errata E18, E20 and E35.
-Distances to a wall saturate at 1e-7 w, so that every state has a finite answer, also outside the funnel.
+Distances to a wall saturate at 1e-7 w and (1 - 1e-7) w, so that every state has an answer, also outside the
+funnel: that of an axis just inside the wall.
 """
 
 from __future__ import annotations

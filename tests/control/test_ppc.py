@@ -70,6 +70,17 @@ def test_beyond_a_wall_the_answer_is_finite_and_points_inside(distance):
     assert np.all(above < 0.0)
 
 
+@pytest.mark.parametrize("time", [0.0, 0.3, 40.0])
+def test_far_beyond_a_wall_the_answer_is_that_of_an_axis_just_inside(time):
+    """Trial steps that overshoot must not overshoot more with each stage of the integrator."""
+    walls, rate = funnel_walls(FUNNEL, time), np.array([0.1, 0.0, -0.4])
+    inset = 1e-7 * (walls.upper - walls.lower)
+    below, above = walls.lower - 1e9, walls.upper + 1e9
+    for inside, outside in ((walls.lower + inset, below), (walls.upper - inset, above)):
+        near = prescribed_acceleration(inside, rate, walls, **GAINS)
+        assert prescribed_acceleration(outside, rate, walls, **GAINS) == pytest.approx(near, rel=1e-6)
+
+
 def test_energy_is_the_log_term_plus_the_rate_error():
     walls = funnel_walls(FUNNEL, 40.0)
     x = 0.25 * walls.lower + 0.75 * walls.upper
