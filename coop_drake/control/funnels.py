@@ -32,6 +32,18 @@ class Funnel:
     decay_rate: FloatArray
     shape: FunnelShape = "smooth"
 
+    @property
+    def kernel_arguments(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, bool]:
+        """What the compiled kernels take, in their order."""
+        return (
+            self.slice_lower,
+            self.slice_upper,
+            self.goal_lower,
+            self.goal_upper,
+            self.decay_rate,
+            self.shape == "smooth",
+        )
+
     def select(self, axes: NDArray[np.intp]) -> Funnel:
         """Return the funnels of some axes only, for instance those that one robot controls."""
         return replace(
@@ -68,14 +80,4 @@ def funnel_walls(funnel: Funnel, time: float) -> FunnelWalls:
     Returns:
         Walls of every axis.
     """
-    return FunnelWalls(
-        *kernels.funnel_walls(
-            float(time),
-            funnel.slice_lower,
-            funnel.slice_upper,
-            funnel.goal_lower,
-            funnel.goal_upper,
-            funnel.decay_rate,
-            funnel.shape == "smooth",
-        )
-    )
+    return FunnelWalls(*kernels.funnel_walls(float(time), *funnel.kernel_arguments))

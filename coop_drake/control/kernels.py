@@ -129,21 +129,21 @@ def track_walls(
 @compiled
 def track_funnel(
     time: float,
-    position: FloatArray,
-    rate: FloatArray,
     slice_lower: FloatArray,
     slice_upper: FloatArray,
     goal_lower: FloatArray,
     goal_upper: FloatArray,
     decay_rate: FloatArray,
     smooth: bool,
+    position: FloatArray,
+    rate: FloatArray,
     log_gain: FloatArray,
     position_gain: float,
     rate_gain: float,
-) -> tuple[FloatArray, FloatArray]:
-    """Return acceleration and energy of every axis, each of shape (m,): both kernels above in one call."""
+) -> FloatArray:
+    """Return the acceleration of every axis, shape (m,): both kernels above in one call."""
     walls = funnel_walls(time, slice_lower, slice_upper, goal_lower, goal_upper, decay_rate, smooth)
-    return track_walls(position, rate, walls, log_gain, position_gain, rate_gain)
+    return track_walls(position, rate, walls, log_gain, position_gain, rate_gain)[0]
 
 
 @compiled

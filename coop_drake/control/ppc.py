@@ -68,18 +68,6 @@ def funnel_acceleration(
     rate_gain: float,
 ) -> FloatArray:
     """Return ``prescribed_acceleration`` between ``funnel_walls(funnel, time)``, in one call for the loop."""
-    acceleration, _ = kernels.track_funnel(
-        float(time),
-        position,
-        rate,
-        funnel.slice_lower,
-        funnel.slice_upper,
-        funnel.goal_lower,
-        funnel.goal_upper,
-        funnel.decay_rate,
-        funnel.shape == "smooth",
-        log_gain,
-        position_gain,
-        rate_gain,
+    return kernels.track_funnel(
+        float(time), *funnel.kernel_arguments, position, rate, log_gain, position_gain, rate_gain
     )
-    return acceleration
