@@ -35,7 +35,7 @@ TELEMETRY = {
     "object_acceleration": "wrench_law",
     "hand_command": "wrench_law",
 }
-"""Outputs that are exported for the log only, and the blocks that make them."""
+"""Outputs that are exported to be looked at, by the log or a user, and the blocks that make them."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def build_robot_controller(knowledge: RobotKnowledge) -> Diagram:
     input   ``current_cell``      2           (index, entry time), told by the cell planner
     output  ``robot_effort``      3 + n       its base wrench and joint torques
     output  ``ready``             2           (index, margin), told to the cell planner
-    output  see ``TELEMETRY``                 read by the log alone
+    output  see ``TELEMETRY``                 to be looked at, by no other robot
     ======= ===================== =========== ==========================================================
 
     Args:

@@ -33,7 +33,6 @@ def build_station(scenario: Scenario) -> TransportStation:
     input   ``robot_<k>_effort``        3 + n_k    base wrench and joint torques of robot k
     output  ``object_pose``             3          pose of L in W
     output  ``robot_<k>_state``         2(3+n_k)   z_k and its rate
-    output  ``team_state``              2(3+n)     the plant's state, for the log alone
     output  ``generalized_acceleration``  3+n      the plant's accelerations, for the log alone
     output  ``reaction_forces``         abstract   forces in the plant's joints, for the log alone
     output  ``query_object``            abstract   geometry, for visualization
@@ -60,7 +59,6 @@ def build_station(scenario: Scenario) -> TransportStation:
         builder.ExportOutput(sensor.GetOutputPort("robot_state"), f"robot_{robot.index}_state")
         effort = f"robot_{robot.index}_effort"
         builder.ExportInput(actuation.GetInputPort(effort), effort)
-    builder.ExportOutput(plant.get_state_output_port(), "team_state")
     builder.ExportOutput(plant.get_generalized_acceleration_output_port(), "generalized_acceleration")
     builder.ExportOutput(plant.get_reaction_forces_output_port(), "reaction_forces")
     builder.ExportOutput(team.scene_graph.get_query_output_port(), "query_object")

@@ -93,7 +93,6 @@ def test_station_ports(loop):
     assert outputs == {
         "object_pose": 3,
         **{f"robot_{k}_state": 2 * (3 + n_k) for k, n_k in enumerate(joints)},
-        "team_state": 2 * (3 + n),
         "generalized_acceleration": 3 + n,
         "reaction_forces": "abstract",
         "query_object": "abstract",
