@@ -37,4 +37,4 @@ class FieldError(CoopDrakeError):
 
 
 class StallError(CoopDrakeError):
-    """A transition would take unreasonably long; the message names the passage (rule 9)."""
+    """A transition would take unreasonably long; the message names the passage."""
