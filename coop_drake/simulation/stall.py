@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from coop_drake.control.governor import energy_margin, tracking_energy
 from coop_drake.control.ready import arrival_margin, clearance_margin, funnel_margin, interval_margin
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.plan import Plan
 from coop_drake.simulation.telemetry import Sample
-from coop_drake.systems import GovernedCell, axis_laws
+from coop_drake.systems import axis_laws
 
 __all__ = ["blocking_margin", "patience"]
 
@@ -53,12 +54,14 @@ def _intervals(plan: Plan, sample: Sample) -> dict[str, float]:
 
 
 def _readiness(plan: Plan, sample: Sample) -> dict[str, float]:
-    cell, gains = plan.cells[sample.cell + 1], plan.transitions[sample.cell + 1].gains
-    governed = GovernedCell(BoundaryDistance(cell.tidied), lambda point: point, gains)
-    energy = governed.energy_margin(sample.z[:2], sample.rates[:2], sample.governor_position)
+    cell, stiffness = plan.cells[sample.cell + 1], plan.transitions[sample.cell + 1].gains.stiffness
+    clearance = BoundaryDistance(cell.tidied)(sample.governor_position)
+    energy = tracking_energy(sample.z[:2], sample.rates[:2], sample.governor_position, stiffness=stiffness)
     margins = _intervals(plan, sample)
     margins["the object's position is safe in the next cell (Delta E)"] = clearance_margin(
-        energy, stiffness=gains.stiffness, inradius=plan.transitions[sample.cell].inradius
+        energy_margin(energy, clearance, stiffness=stiffness),
+        stiffness=stiffness,
+        inradius=plan.transitions[sample.cell].inradius,
     )
     for i, name in enumerate(_axes(plan)):
         law = axis_laws(plan, [i])[sample.cell + 1]

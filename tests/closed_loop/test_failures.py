@@ -87,6 +87,15 @@ def test_a_cell_that_is_never_left_stalls_and_names_what_blocks(problem, monkeyp
     assert "falls below the next funnel's bound (margin -" in log.violation
 
 
+def test_a_next_cell_out_of_reach_is_named_as_what_blocks(problem, monkeypatch):
+    monkeypatch.setattr(stall, "PATIENCE_ALLOWANCE", 0.5)
+    scenario, plan = problem
+    away = with_cell(plan, 1, tidied=box(8.0, 5.0, 9.0, 6.0))
+    log = simulate(scenario, with_transition(away, 0, estimated_time=0.1), small_maps())
+    blocking = "the object's position is safe in the next cell (Delta E) (margin -"
+    assert f"it waits until {blocking}" in log.violation
+
+
 def test_too_little_time_is_reported_with_what_is_missing(problem):
     scenario, plan = problem
     log = simulate(with_limit(scenario, 0.2), plan, small_maps())
