@@ -20,11 +20,12 @@ def floors(draw, *, pillars=4, ragged=True):
     floor = union_all(rooms)
     for _ in range(draw(st.integers(0, pillars))):
         x0, y0, x1, y1 = floor.bounds
-        # To a nanometre: with edges of 1e-300 m GEOS, the oracle, divides by zero.
-        px, py = round(draw(st.floats(x0, x1)), 9), round(draw(st.floats(y0, y1)), 9)
+        px, py = draw(st.floats(x0, x1)), draw(st.floats(y0, y1))
         angles = np.sort(draw(st.lists(st.floats(0.0, 6.28), min_size=3, max_size=6, unique=True)))
         size = draw(st.floats(0.02, 0.3))
-        pillar = Polygon(np.stack([px + size * np.cos(angles), py + size * np.sin(angles)], axis=1))
+        corners = np.stack([px + size * np.cos(angles), py + size * np.sin(angles)], axis=1)
+        # To a nanometre: with edges of 1e-300 m GEOS, the oracle, divides by zero.
+        pillar = Polygon(np.round(corners, 9))
         floor = floor.difference(pillar.buffer(0.0))
     if ragged and draw(st.booleans()):
         floor = floor.buffer(-0.03).buffer(draw(st.floats(0.005, 0.02)))
