@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 import sys
 from importlib.metadata import version
 from pathlib import Path
@@ -53,8 +52,6 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")]
 def main() -> None:
     """Run the command line; wrong usage is answered like any bad input."""
     arguments = sys.argv[1:]
-    # Drake warns that it does not simulate joint limits: the funnels keep them, and the run checks it.
-    logging.getLogger("drake").setLevel(logging.ERROR)
     try:
         code = app(arguments, standalone_mode=False)
     except _UsageError as error:  # type: ignore[misc]
