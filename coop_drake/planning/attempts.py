@@ -8,7 +8,7 @@ from itertools import combinations, islice
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.band import configuration_scale, drawn_tight
+from coop_drake.planning.band import drawn_tight
 from coop_drake.planning.boxes import make_channel
 from coop_drake.planning.cells import CellMaker
 from coop_drake.planning.certify import Box, Certifier
@@ -16,6 +16,7 @@ from coop_drake.planning.channel import Channel
 from coop_drake.planning.exploration import Exploration, Verdict
 from coop_drake.planning.margins import marginal_workspace, shrunk
 from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.refine import configuration_scale
 from coop_drake.planning.relaxation import relaxed
 from coop_drake.planning.sampler import Sampler
 
@@ -42,7 +43,7 @@ class SampledAttempts:
         self._problem = problem
         self._swept = SweptTree(problem.tree)
         self._pairs = BodyPairs(self._swept)
-        self._scale = configuration_scale(problem)
+        self._scale = configuration_scale(problem.tree)
         self._last: tuple[float, FloatArray] | None = None
         self.slices = 0
         self.object_blocked = False

@@ -9,7 +9,7 @@ from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.band_kernels import improve
 from coop_drake.planning.margins import marginal_workspace
 from coop_drake.planning.problem import PlanningProblem
-from coop_drake.planning.refine import axis_levers
+from coop_drake.planning.refine import configuration_scale
 from coop_drake.planning.sampler import densified
 from coop_drake.planning.team_arrays import team_arrays, wall_segments
 
@@ -18,11 +18,6 @@ _LEAST_ROOM = 0.005
 _SPACING = 0.05
 _PRICE = 0.006
 _MOVES = 4_000
-
-
-def configuration_scale(problem: PlanningProblem) -> FloatArray:
-    """How far a unit of each axis of z moves the team's furthest point, shape (3 + n,)."""
-    return np.array([1.0, 1.0, *axis_levers(problem.tree)])
 
 
 def drawn_tight(
@@ -38,7 +33,7 @@ def drawn_tight(
         gap: Distance that pairs of bodies keep [m].
     """
     tree = problem.tree
-    scale = configuration_scale(problem)
+    scale = configuration_scale(tree)
     walls = wall_segments(polygon_rings(marginal_workspace(problem, clearance)))
     unbounded = np.full(3, np.inf)
     better: FloatArray = improve(

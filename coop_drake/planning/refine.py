@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.geometry.tree import ComponentTree
 from coop_drake.planning.cells import CellMaker, Region
@@ -10,6 +13,7 @@ from coop_drake.planning.slices import Slices
 
 _DECIDED = 1e-3
 _MOSTLY_FREE = 0.5
+_LEAST_LEVER = 0.01
 
 
 class Blame:
@@ -106,3 +110,11 @@ def axis_levers(tree: ComponentTree) -> tuple[float, ...]:
         offset = (joint.X_PJ.x**2 + joint.X_PJ.y**2) ** 0.5
         reaches[component.parent] = max(reaches[component.parent], offset + slide + reaches[index])
     return tuple(levers)
+
+
+def configuration_scale(tree: ComponentTree) -> FloatArray:
+    """What a unit of each axis of z counts in distances between configurations, shape (3 + n,) [m/unit].
+
+    It is the lever, but never nothing: a joint that moves no solid body still has to be moved.
+    """
+    return np.maximum([1.0, 1.0, *axis_levers(tree)], _LEAST_LEVER)

@@ -11,7 +11,7 @@ from coop_drake.geometry.minkowski import polygon_rings
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.collision_kernels import is_free
 from coop_drake.planning.problem import PlanningProblem
-from coop_drake.planning.refine import axis_levers
+from coop_drake.planning.refine import configuration_scale
 from coop_drake.planning.relaxation import relaxed
 from coop_drake.planning.team_arrays import team_arrays, wall_segments
 from coop_drake.planning.tree_kernels import chain_is_free, connect
@@ -73,7 +73,7 @@ class Sampler:
     ) -> FloatArray:
         tree = question.tree
         team = team_arrays(tree)
-        scale = np.array([1.0, 1.0, *axis_levers(tree)])
+        scale = configuration_scale(tree)
         lower = np.array([*self._bounds[:2], -np.pi, *tree.joint_lower])
         upper = np.array([*self._bounds[2:], np.pi, *tree.joint_upper])
         size = len(lower)

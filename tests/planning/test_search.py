@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from shapely import Polygon, box, union_all
 
-from coop_drake.geometry.tree import Body, Component, ComponentTree
+from coop_drake.geometry.pose import PlanarPose
+from coop_drake.geometry.tree import Body, Component, ComponentTree, TreeJoint
 from coop_drake.planning.channel import Channel
 from coop_drake.planning.problem import PlannerSettings, PlanningProblem
 from coop_drake.planning.search import NoChannel, find_channel
@@ -38,6 +39,19 @@ def test_feasible_cases_are_found_and_sound(name: str) -> None:
     assert channel.margin > 0.0
     assert report.margins[-1] == (channel.margin, "found")
     assert_channel_is_sound(problem, channel)
+
+
+def test_a_joint_that_moves_no_solid_body_is_planned_too() -> None:
+    problem = rod_problem(1.0)
+    joint = TreeJoint("rod::idle", "revolute", 0, 0, PlanarPose(), 1.0, (1.0, 0.0), -1.0, 1.0)
+    bare = Component("bare", 0, joint, ())  # The plant leaves bodies without geometry out of components.
+    tree = ComponentTree((*problem.tree.components, bare), frozenset())
+    start = np.append(problem.start, 0.8)
+    idle = replace(problem, tree=tree, start=start, goal_joints=(-0.8,))
+    channel, _ = find_channel(idle)
+    assert isinstance(channel, Channel)
+    assert_channel_is_sound(idle, channel)
+    assert channel.boxes[-1].lower[1] <= -0.8 <= channel.boxes[-1].upper[1]
 
 
 def test_closed_is_proved() -> None:
