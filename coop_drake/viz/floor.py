@@ -10,6 +10,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from shapely import Polygon, box
 from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import ComponentTree
@@ -24,7 +25,8 @@ _RIM = 0.3  # Wall drawn around the floor [m].
 def draw_polygon(ax: Axes, polygon: BaseGeometry, **style: Any) -> None:
     """Add a polygon with its holes to ``ax``; polygons of several parts are drawn part by part."""
     for part in getattr(polygon, "geoms", [polygon]):
-        rings = [part.exterior, *part.interiors]
+        oriented = orient(part)  # Matplotlib leaves out what a ring the other way round encloses.
+        rings = [oriented.exterior, *oriented.interiors]
         outline = Outline.make_compound_path(
             *(Outline(np.asarray(ring.coords), closed=True) for ring in rings)
         )
