@@ -12,6 +12,15 @@ from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cell_graph import Cell, CellGraph, Kind
 from coop_drake.planning.cells import CellMaker, Region
+from coop_drake.planning.events import (
+    ChannelSearched,
+    ExplorationBegan,
+    ExplorationEnded,
+    SeenCell,
+    SliceAdded,
+    SliceSplit,
+    Watch,
+)
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.refine import Blame
 from coop_drake.planning.slices import Slices
@@ -56,6 +65,8 @@ class Exploration:
         workspace: Floor with the margin taken off [m].
         swept: Sweeps of the problem's tree, shared among attempts.
         pairs: Self-collision of the problem's tree, shared among attempts.
+        watch: Called with every event, in order; None costs nothing.
+        question: What is explored, in words, for whoever watches.
     """
 
     def __init__(
@@ -64,12 +75,17 @@ class Exploration:
         workspace: Polygon | MultiPolygon,
         swept: SweptTree,
         pairs: BodyPairs,
+        watch: Watch | None = None,
+        question: str = "the whole team",
     ) -> None:
-        self._problem = problem
+        self._problem, self._watch = problem, watch
         self.slices = Slices(problem.tree, problem.settings.slice_overlap)
         self.maker = CellMaker(swept, pairs, workspace)
         self.graph = CellGraph(self.slices)
         self.blame = Blame(problem.tree, self.maker, self.slices, problem.settings)
+        if watch is not None:
+            robots = sorted({joint.robot for joint in problem.tree.joints})
+            watch(ExplorationBegan(question, tuple(robots)))
         for index in self.slices.leaves():
             self._add(index)
 
@@ -79,8 +95,16 @@ class Exploration:
         The cheapest channel of FREE and undecided cells is searched; every slice on it that is not FREE is
         halved along the axis to blame. No channel at all is a proof that none exists.
         """
+        outcome = self._explored(budget, progress)
+        if self._watch is not None:
+            self._watch(ExplorationEnded(outcome.verdict.value, outcome.slices))
+        return outcome
+
+    def _explored(self, budget: int, progress: Callable[[int], None] | None) -> Outcome:
         while True:
             path = self.graph.cheapest(self._starts(), self._goals())
+            if self._watch is not None:
+                self._watch(ChannelSearched(_seen(path or ())))
             if path is None:
                 return Outcome(Verdict.INFEASIBLE, (), len(self.slices.all))
             open_cells = {cell.slice: cell for cell in path if cell.kind is not Kind.FREE}
@@ -118,6 +142,8 @@ class Exploration:
         if not self.blame.splittable(intervals):
             return False
         axis = self.blame.axis(intervals, cell.region)
+        if self._watch is not None:
+            self._watch(SliceSplit(cell.slice, axis))
         self.graph.remove(cell.slice)
         for half in self.slices.split(cell.slice, axis):
             self._add(half)
@@ -134,6 +160,8 @@ class Exploration:
         weight = _UNSPLITTABLE_WEIGHT if final else _MIXED_WEIGHT
         members += [(Kind.MIXED, region, weight) for region in mixed]
         self.graph.add(index, members)
+        if self._watch is not None:
+            self._watch(SliceAdded(index, intervals, _seen(self.graph.by_slice[index])))
 
     def _starts(self) -> list[Cell]:
         start = self._problem.start
@@ -152,6 +180,10 @@ class Exploration:
             for cell in self.graph.by_slice[index]
             if cell.region.holds(goal[:2])
         }
+
+
+def _seen(cells: Sequence[Cell]) -> tuple[SeenCell, ...]:
+    return tuple(SeenCell(cell.slice, cell.kind, cell.region) for cell in cells)
 
 
 def _free_weight(region: Region) -> float:
