@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
+from coop_drake.drawing.canvas import legend_above
+from coop_drake.drawing.colours import BLUE, GREEN, INK, OBJECT, ORANGE, robot_colour
 from coop_drake.simulation import SimulationLog
-from coop_drake.viz.canvas import legend_above, mark_switches, switch_times, time_axes
-from coop_drake.viz.colours import BLUE, GREEN, INK, OBJECT, ORANGE, robot_colour
+from coop_drake.viz.time_axes import mark_switches, switch_times, time_axes
 
 __all__ = ["force_figure", "summary_figure", "torque_figure"]
 

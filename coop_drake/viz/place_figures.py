@@ -7,16 +7,15 @@ import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from shapely import Polygon
 
+from coop_drake.drawing.canvas import legend_above, new_figure
+from coop_drake.drawing.colours import BLUE, INK
+from coop_drake.drawing.floor import draw_team, draw_workspace, team_legend
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import ComponentTree
 from coop_drake.planning.plan import Plan
 from coop_drake.simulation import SimulationLog
-from coop_drake.viz.canvas import legend_above, new_figure
-from coop_drake.viz.colours import BLUE, INK, OBJECT, robot_colour
-from coop_drake.viz.floor import draw_team, draw_workspace
 
 __all__ = ["path_figure", "start_and_goal_figure"]
 
@@ -39,7 +38,7 @@ def start_and_goal_figure(workspace: Polygon, tree: ComponentTree, plan: Plan) -
     figure = _floor_figure(workspace, caption)
     ax = figure.subplots()
     draw_workspace(ax, workspace)
-    legend_above(ax, _who_is_who(tree))
+    legend_above(ax, team_legend(tree))
     last = plan.transitions[-1]
     middle = 0.5 * (last.goal_lower + last.goal_upper)[1:]
     joints = [
@@ -52,17 +51,6 @@ def start_and_goal_figure(workspace: Polygon, tree: ComponentTree, plan: Plan) -
             label, (z[0], z[1]), xytext=(5, 4), textcoords="offset points", zorder=6, fontweight="bold"
         )
     return figure
-
-
-def _who_is_who(tree: ComponentTree) -> list[Patch]:
-    names = {
-        body.robot: body.name.split("::")[0] for component in tree.components for body in component.bodies
-    }
-    robots = sorted(robot for robot in names if robot is not None)
-    return [
-        Patch(color=OBJECT, alpha=0.55, label="object"),
-        *(Patch(color=robot_colour(robot), alpha=0.55, label=names[robot]) for robot in robots),
-    ]
 
 
 def path_figure(workspace: Polygon, tree: ComponentTree, log: SimulationLog) -> Figure:

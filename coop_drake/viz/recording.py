@@ -15,8 +15,7 @@ from coop_drake.planning.plan import Plan
 from coop_drake.plant import build_team_plant, set_configuration
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import SimulationLog
-from coop_drake.viz.camera import place_camera
-from coop_drake.viz.stage import set_cells, set_floor, set_light, set_path, switch_cells
+from coop_drake.viz.stage import place_camera, set_cells, set_floor, set_light, set_path, switch_cells
 
 __all__ = ["inline_frame", "recording_html", "write_recording"]
 

@@ -7,12 +7,13 @@ from pydrake.geometry import Meshcat, Rgba
 from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.drawing.camera import camera_pose
+from coop_drake.drawing.solids import flat_mesh, parts_of, ring_lines, wall_mesh, wall_polygons
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.plan import Plan
 from coop_drake.simulation.log import IntArray
-from coop_drake.viz.solids import flat_mesh, parts_of, ring_lines, wall_mesh, wall_polygons
 
-__all__ = ["set_cells", "set_floor", "set_light", "set_path", "switch_cells"]
+__all__ = ["place_camera", "set_cells", "set_floor", "set_light", "set_path", "switch_cells"]
 
 _FLOOR = Rgba(0.95, 0.95, 0.93, 1.0)
 _WALL = Rgba(0.45, 0.48, 0.52, 0.45)
@@ -27,6 +28,11 @@ _LIGHTS = {
     "PointLightNegativeX": 0.0,
     "PointLightPositiveX": 0.0,
 }
+
+
+def place_camera(meshcat: Meshcat, workspace: Polygon, height: float) -> None:
+    """Look at the whole workspace from above at an angle."""
+    meshcat.SetCameraPose(*camera_pose(workspace, height))
 
 
 def set_floor(meshcat: Meshcat, workspace: Polygon, wall_height: float) -> None:

@@ -6,11 +6,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from coop_drake.drawing.canvas import legend_above
+from coop_drake.drawing.colours import BLUE, GREY, INK, OBJECT, SKY, robot_colour
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import ComponentTree
 from coop_drake.simulation import SimulationLog
-from coop_drake.viz.canvas import break_at, legend_above, mark_switches, switch_times, time_axes
-from coop_drake.viz.colours import BLUE, GREY, INK, OBJECT, SKY, robot_colour
+from coop_drake.viz.time_axes import break_at, mark_switches, switch_times, time_axes
 
 __all__ = ["angle_figure", "angular_velocity_figure", "joints_figure", "position_figure", "velocity_figure"]
 

@@ -7,9 +7,9 @@ import pytest
 from PIL import Image
 
 from coop_drake.viz import write_figures
-from coop_drake.viz.canvas import break_at, switch_times
 from coop_drake.viz.place_figures import path_figure, start_and_goal_figure
 from coop_drake.viz.state_figures import angle_figure, joints_figure
+from coop_drake.viz.time_axes import break_at, switch_times
 from tests.support.cases import case
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapely import box
 
-from coop_drake.viz.camera import camera_pose
+from coop_drake.drawing.camera import camera_pose
 
 
 @pytest.mark.parametrize("floor", [box(0, 0, 7, 10), box(-20, 3, 20, 6), box(0, 0, 1, 30)])

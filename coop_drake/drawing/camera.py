@@ -5,12 +5,11 @@ from __future__ import annotations
 from math import cos, radians, sin, tan
 
 import numpy as np
-from pydrake.geometry import Meshcat
 from shapely import Polygon
 
 from coop_drake.geometry.pose import FloatArray
 
-__all__ = ["camera_pose", "place_camera"]
+__all__ = ["camera_pose"]
 
 _ELEVATION = radians(62.0)
 _HALF_HEIGHT = tan(radians(75.0) / 2)  # Meshcat's vertical field of view.
@@ -46,8 +45,3 @@ def camera_pose(workspace: Polygon, height: float) -> tuple[FloatArray, FloatArr
         extent = max(vertical.max() - centre, float(np.abs(horizontal).max()))
         distance *= (extent / _FILL) ** 0.5
     return target + distance * away, target
-
-
-def place_camera(meshcat: Meshcat, workspace: Polygon, height: float) -> None:
-    """Look at the whole workspace from above at an angle."""
-    meshcat.SetCameraPose(*camera_pose(workspace, height))

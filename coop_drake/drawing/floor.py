@@ -6,18 +6,18 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patches import PathPatch
+from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
 from shapely import Polygon, box
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
+from coop_drake.drawing.colours import FLOOR, INK, OBJECT, WALL, robot_colour
+from coop_drake.drawing.footprints import team_footprints
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import ComponentTree
-from coop_drake.viz.colours import FLOOR, INK, OBJECT, WALL, robot_colour
-from coop_drake.viz.footprints import team_footprints
 
-__all__ = ["draw_polygon", "draw_team", "draw_workspace"]
+__all__ = ["draw_polygon", "draw_team", "draw_workspace", "team_legend"]
 
 _RIM = 0.3  # Wall drawn around the floor [m].
 
@@ -72,3 +72,15 @@ def draw_team(
         draw_polygon(
             ax, footprint.shape, facecolor="none", edgecolor=fill, linewidth=0.9, zorder=zorder + 0.1
         )
+
+
+def team_legend(tree: ComponentTree) -> list[Patch]:
+    """Return legend entries that say which colour is the object's and which each robot's."""
+    names = {
+        body.robot: body.name.split("::")[0] for component in tree.components for body in component.bodies
+    }
+    robots = sorted(robot for robot in names if robot is not None)
+    return [
+        Patch(color=OBJECT, alpha=0.55, label="object"),
+        *(Patch(color=robot_colour(robot), alpha=0.55, label=names[robot]) for robot in robots),
+    ]

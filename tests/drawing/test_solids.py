@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from shapely import Polygon, box
 
-from coop_drake.viz.solids import flat_mesh, ring_lines, wall_mesh, wall_polygons
+from coop_drake.drawing.solids import flat_mesh, ring_lines, wall_mesh, wall_polygons
 
 FLOOR = Polygon([(0, 0), (4, 0), (4, 3), (2, 1), (0, 3)], [[(1, 0.5), (2, 0.5), (2, 0.8)]])
 

@@ -1,0 +1,27 @@
+"""Floor plans, footprints, meshes and blank figures: what every picture is drawn with."""
+
+from coop_drake.drawing.camera import camera_pose
+from coop_drake.drawing.canvas import house_style, legend_above, new_figure, save_figure
+from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace, team_legend
+from coop_drake.drawing.footprints import BodyFootprint, team_footprints
+from coop_drake.drawing.solids import TriangleMesh, flat_mesh, parts_of, ring_lines, wall_mesh, wall_polygons
+
+__all__ = [
+    "BodyFootprint",
+    "TriangleMesh",
+    "camera_pose",
+    "draw_polygon",
+    "draw_team",
+    "draw_workspace",
+    "flat_mesh",
+    "house_style",
+    "legend_above",
+    "new_figure",
+    "parts_of",
+    "ring_lines",
+    "save_figure",
+    "team_footprints",
+    "team_legend",
+    "wall_mesh",
+    "wall_polygons",
+]
