@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite
+from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -12,6 +15,7 @@ from shapely import Polygon
 
 from coop_drake.errors import PlanError
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning.digest import content_digest
 
 __all__ = ["Entry"]
 
@@ -32,6 +36,41 @@ class Entry:
     file: str
     key: str
     value: Any
+
+    @classmethod
+    def load(cls, path: Path | str, what: str) -> Entry:
+        """The whole of a JSON file.
+
+        Args:
+            path: The file.
+            what: What it should be, with its article, for the message.
+
+        Raises:
+            PlanError: If it cannot be read, is no JSON, or names a key of a mapping twice.
+        """
+        file = str(path)
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+            return cls(file, "", json.loads(text, object_pairs_hook=partial(_without_repetitions, file)))
+        except (OSError, UnicodeDecodeError, RecursionError) as error:
+            raise PlanError(f"{file}: cannot be read: {error}") from error
+        except json.JSONDecodeError as error:
+            raise PlanError(
+                f"{file}: line {error.lineno}: {error.msg}; expected the JSON of {what}"
+            ) from error
+
+    def check_digest(self) -> None:
+        """Refuse a document whose entry ``digest`` is not that of its other entries.
+
+        Raises:
+            PlanError: Names the digest it has and the one expected.
+        """
+        expected = content_digest(self.value)
+        if self.value["digest"] != expected:
+            raise PlanError(
+                f"{self.file}: digest: {self.value['digest']!r} is not allowed; expected '{expected}': "
+                "the content is not what was written"
+            )
 
     def refuse(self, allowed: str) -> NoReturn:
         """Raise the error that says what is wrong here.
@@ -115,6 +154,15 @@ class Entry:
                 "themselves nor each other"
             )
         return polygon
+
+
+def _without_repetitions(file: str, pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    result = dict(pairs)
+    if len(result) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise PlanError(f"{file}: {twice}: stands twice in one mapping; expected every key once")
+    return result
 
 
 def _ring(entry: Entry) -> list[tuple[float, float]]:

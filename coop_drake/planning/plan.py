@@ -9,6 +9,7 @@ from shapely import Polygon
 from coop_drake.control.gains import TransitionGains
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.channel import SearchReport
+from coop_drake.planning.separation import Separation
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,7 @@ class Plan:
         joint_names: Names of q's entries, length n.
         margin: rho [m].
         gain_set: Name of the gain set the gains were scheduled with.
+        problem: Digest of the question it answers; empty for a plan that answers none.
     """
 
     cells: tuple[Cell, ...]
@@ -82,6 +84,7 @@ class Plan:
     joint_names: tuple[str, ...]
     margin: float
     gain_set: str
+    problem: str = ""
 
 
 @dataclass(frozen=True)
@@ -94,10 +97,17 @@ class Found:
 
 @dataclass(frozen=True)
 class Infeasible:
-    """No plan exists: the over-approximations separate start from goal. ``reason`` says how."""
+    """No plan exists: the over-approximations separate start from goal.
+
+    Attributes:
+        reason: How, in a sentence.
+        report: What the search did.
+        separation: The proof, in a form that can be checked again.
+    """
 
     reason: str
     report: SearchReport
+    separation: Separation | None = None
 
 
 @dataclass(frozen=True)

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import shapely
-from shapely import Polygon
-
-from coop_drake.errors import PlanError
 from coop_drake.files import write_atomically
 from coop_drake.planning.document import Entry
+from coop_drake.planning.document_text import document_text, polygon_entry
 from coop_drake.planning.plan import Cell, Plan, Transition
 from coop_drake.planning.plan_checks import check_plan
 from coop_drake.planning.plan_reader import FORMAT, VERSION, read_plan
@@ -44,16 +40,10 @@ def load_plan(path: Path | str) -> Plan:
     Raises:
         PlanError: If the file is not a plan: names the file, the key, the value and what is allowed there.
     """
-    file = str(path)
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-        document = json.loads(text)
-    except (OSError, UnicodeDecodeError, RecursionError) as error:
-        raise PlanError(f"{file}: cannot be read: {error}") from error
-    except json.JSONDecodeError as error:
-        raise PlanError(f"{file}: line {error.lineno}: {error.msg}; expected the JSON of a plan") from error
-    plan = read_plan(Entry(file, "", document))
-    check_plan(plan, file)
+    root = Entry.load(path, "a plan")
+    plan = read_plan(root)
+    check_plan(plan, root.file)
+    root.check_digest()
     return plan
 
 
@@ -62,6 +52,7 @@ def _text(plan: Plan) -> str:
     head: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
+        "problem": plan.problem,
         "gain_set": plan.gain_set,
         "margin": plan.margin,
         "joint_names": plan.joint_names,
@@ -69,33 +60,20 @@ def _text(plan: Plan) -> str:
         "goal_pose": plan.goal_pose.tolist(),
         "goal_joints": plan.goal_joints,
     }
-    lines = [f' "{key}": {_line(value)}' for key, value in head.items()]
-    for key, entries in (
-        ("cells", [_cell_entry(cell) for cell in plan.cells]),
-        ("transitions", [_transition_entry(transition) for transition in plan.transitions]),
-    ):
-        lines.append(f' "{key}": [\n  ' + ",\n  ".join(_line(entry) for entry in entries) + "\n ]")
-    return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
-def _line(value: Any) -> str:
-    return json.dumps(value, allow_nan=False, ensure_ascii=False)
-
-
-def _polygon_entry(polygon: Polygon) -> dict[str, Any]:
-    outer, *holes = (
-        shapely.get_coordinates(ring)[:-1].tolist() for ring in (polygon.exterior, *polygon.interiors)
-    )
-    return {"outer": outer, "holes": holes}
+    rows = {
+        "cells": [_cell_entry(cell) for cell in plan.cells],
+        "transitions": [_transition_entry(transition) for transition in plan.transitions],
+    }
+    return document_text(head, rows)
 
 
 def _cell_entry(cell: Cell) -> dict[str, Any]:
     return {
         "lower": cell.lower.tolist(),
         "upper": cell.upper.tolist(),
-        "safe": _polygon_entry(cell.safe),
-        "core": _polygon_entry(cell.core),
-        "tidied": _polygon_entry(cell.tidied),
+        "safe": polygon_entry(cell.safe),
+        "core": polygon_entry(cell.core),
+        "tidied": polygon_entry(cell.tidied),
     }
 
 
@@ -113,5 +91,5 @@ def _transition_entry(transition: Transition) -> dict[str, Any]:
         "estimated_time": transition.estimated_time,
         "only_angles": transition.only_angles,
         "gains": gains,
-        "goal_region": _polygon_entry(transition.goal_region),
+        "goal_region": polygon_entry(transition.goal_region),
     }

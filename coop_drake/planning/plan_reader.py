@@ -17,7 +17,7 @@ __all__ = ["FORMAT", "VERSION", "read_plan"]
 FORMAT = "coop_drake plan"
 """What the document says it is."""
 
-VERSION = 1
+VERSION = 2
 """Version of its layout; another one is refused."""
 
 
@@ -31,8 +31,8 @@ def read_plan(root: Entry) -> Plan:
         PlanError: Names the file, the key, the value and what is allowed there.
     """
     entry = root.fields(
-        "format", "version", "gain_set", "margin", "joint_names", "start", "goal_pose", "goal_joints",
-        "cells", "transitions",
+        "format", "version", "problem", "gain_set", "margin", "joint_names", "start", "goal_pose",
+        "goal_joints", "digest", "cells", "transitions",
     )  # fmt: skip
     entry["format"].one_of(FORMAT)
     entry["version"].one_of(VERSION)
@@ -49,6 +49,7 @@ def read_plan(root: Entry) -> Plan:
         joint_names=names,
         margin=entry["margin"].number(at_least=0.0),
         gain_set=entry["gain_set"].text(),
+        problem=entry["problem"].text(),
     )
 
 

@@ -42,7 +42,7 @@ def plan(
         report = _added(report, latest)
         if not isinstance(answer, Channel):
             if answer.proved:
-                return Infeasible(answer.reason, report)
+                return Infeasible(answer.reason, report, answer.separation)
             return Undecided(stall or answer.reason, report)
         try:
             made = make_plan(question, answer, gain_set, gain_set_name=gain_set_name, progress=progress)

@@ -12,6 +12,7 @@ from coop_drake.planning.goals import blocked_goal
 from coop_drake.planning.margins import margins
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.relaxation import relaxed
+from coop_drake.planning.separation import Separation
 
 Progress = Callable[[str, float], None]
 _RELAXED_SHARE = 2
@@ -25,10 +26,12 @@ class NoChannel:
     Attributes:
         proved: True if none exists, False if the work or the resolution ended first.
         reason: Why, in a sentence.
+        separation: The proof in a form that can be checked again, where there is one.
     """
 
     proved: bool
     reason: str
+    separation: Separation | None = None
 
 
 def find_channel(

@@ -17,6 +17,7 @@ from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.slits import component_at
 from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.planning.channel import Channel, FreeBox
+from coop_drake.planning.digest import problem_digest
 from coop_drake.planning.estimate import speed_per_clearance, transition_time, travel_time
 from coop_drake.planning.plan import Cell, Plan, Transition
 from coop_drake.planning.problem import PlanningProblem
@@ -96,6 +97,7 @@ def make_plan(
         joint_names=tuple(joint.name for joint in problem.tree.joints),
         margin=channel.margin,
         gain_set=gain_set_name,
+        problem=problem_digest(problem),
     )
 
 

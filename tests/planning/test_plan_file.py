@@ -104,7 +104,7 @@ FAR = {"outer": [[90, 90], [91, 90], [91, 91]], "holes": []}
         (drop("cells", 1, "upper"), r"cells\[1\].upper: is missing"),
         (put(1, "colour"), r"colour: is unknown; expected the keys"),
         (put("song", "format"), r"format: 'song' is not allowed; expected 'coop_drake plan'"),
-        (put(2, "version"), r"version: 2 is not allowed; expected 1"),
+        (put(1, "version"), r"version: 1 is not allowed; expected 2"),
         (put(True, "version"), r"version: True is not allowed"),
         (put(7, "gain_set"), r"gain_set: 7 is not allowed; expected a string"),
         (put(-0.1, "margin"), r"margin: -0.1 is not allowed; expected a finite number, at least 0"),
@@ -152,6 +152,9 @@ FAR = {"outer": [[90, 90], [91, 90], [91, 91]], "holes": []}
         ),
         (put([90.0, 90.0, 0, 0, 0], "start"), r"start: .* expected a configuration in cells\[0\]"),
         (put([90.0, 90.0, 0], "goal_pose"), r"goal_pose: .* expected a pose in the last cell"),
+        (put("other", "problem"), r"digest: .* the content is not what was written"),
+        (put(3.0, "transitions", 0, "length"), r"digest: .* the content is not what was written"),
+        (put("0" * 64, "digest"), r"digest: '0000"),
     ],
 )
 def test_wrong_files_are_refused_by_file_key_value_and_what_is_allowed(saved, change, message):
@@ -168,6 +171,9 @@ def test_files_that_are_no_json_or_not_there_are_refused(tmp_path):
         load_plan(path)
     path.write_text('{"format": ')
     with pytest.raises(PlanError, match=r"plan\.json: line 1: .* expected the JSON of a plan"):
+        load_plan(path)
+    path.write_text('{"format": 1, "format": 1}')
+    with pytest.raises(PlanError, match=r"format: stands twice in one mapping; expected every key once"):
         load_plan(path)
     path.write_text("[1, 2]")
     with pytest.raises(PlanError, match=r"document: .* expected a mapping with the keys format"):
