@@ -18,7 +18,9 @@ from coop_drake.fields.quadrature import FloatArray
 
 __all__ = ["HarmonicMap"]
 
-_ATTEMPTS = ((10, 1.5), (16, 1.0), (16, 0.5))  # nodes a panel, longest panel per unit of distance
+_ATTEMPTS = ((10, 1.5), (12, 1.5), (16, 1.0), (16, 0.5))  # nodes a panel, longest panel per distance
+_FEWER = (8, 1.5)  # before these, where ten nodes a panel take seconds
+_MANY_UNKNOWNS = 4_000
 _MAX_UNKNOWNS = 9_000  # 0.7 GB and some ten seconds
 
 
@@ -123,11 +125,13 @@ def _solve(
     # Corner operators are cached by angle: rounded angles hit the cache and change nothing beyond rounding.
     angles = np.round(outline.corner_angles, 12)
     best: MapCertificate | None = None
-    for nodes, closeness in _ATTEMPTS:
+    for nodes, closeness in (_FEWER, *_ATTEMPTS):
         panels = lay_panels(outline, closeness)
         unknowns = nodes * (
             len(panels.edge) + sum(2 * len(leg_panels(float(a), closeness)[0]) - 2 for a in angles)
         )
+        if (nodes, closeness) == _FEWER and unknowns < _MANY_UNKNOWNS:
+            continue
         if unknowns > _MAX_UNKNOWNS:
             best = best or _refuse_size(outline, panels, unknowns)
             break
