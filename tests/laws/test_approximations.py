@@ -1,24 +1,23 @@
-"""Under-cells lie inside free space, free space inside over-cells."""
+"""Under-cells lie inside free space, free space inside over-cells, at a million configurations."""
 
 import numpy as np
+import shapely
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from shapely import Point, Polygon
+from shapely import MultiPolygon, Point, Polygon
+from shapely.affinity import scale
 
 from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.cells import CellMaker
-from tests.support.trees import (
-    body_footprints,
-    configurations,
-    footprint,
-    placed_shape,
-    room,
-    slices_of,
-    trees,
-)
+from coop_drake.planning.cells import CellMaker, Region
+from tests.support.free_positions import FreePositions, nudges
+from tests.support.shapes import floors
+from tests.support.trees import body_footprints, configurations, room, slices_of, trees
 
 SLOW = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+MANY_SLICES = settings(SLOW, max_examples=170)
+ANGLES, POSITIONS = 4, 1_500  # 170 slices x 4 angles x 1,500 positions: a million configurations
 
 
 @SLOW
@@ -27,39 +26,59 @@ def test_every_piece_stays_between_its_sweeps(data: st.DataObject) -> None:
     tree = data.draw(trees())
     intervals = data.draw(slices_of(tree))
     swept = SweptTree(tree)
-    for z in configurations(intervals, seed=1, count=12):
-        poses = tree.poses(z)
-        for index, piece in enumerate(swept.pieces):
-            exact = placed_shape(piece.shape, poses[piece.component], quad_segs=64)
-            assert Polygon(swept.over(index, intervals)).buffer(1e-8).covers(exact)
-            under = swept.under(index, intervals)
-            if under is not None:
-                assert exact.buffer(1e-4 * piece.shape.radius + 1e-9).covers(Polygon(under))
+    poses = [tree.poses(z) for z in configurations(intervals, seed=1, count=60)]
+    for index, piece in enumerate(swept.pieces):
+        copies = np.array([X_WC[piece.component].apply(piece.shape.vertices) for X_WC in poses])
+        over = swept.over(index, intervals)
+        outline, corners = Polygon(over), shapely.points(copies.reshape(-1, 2))
+        assert shapely.covers(outline, corners).all()
+        assert shapely.distance(outline.exterior, corners).min() >= piece.shape.radius - 1e-11
+        under = swept.under(index, intervals)
+        if under is not None:
+            cores = shapely.convex_hull(shapely.multipoints(copies))
+            far = shapely.distance(cores[:, None], shapely.points(under)[None, :])
+            assert far.max() <= piece.shape.radius + 1e-11
 
 
-@SLOW
+@MANY_SLICES
 @given(st.data())
 def test_under_cells_are_free_and_free_space_is_in_over_cells(data: st.DataObject) -> None:
     tree = data.draw(trees())
     intervals = data.draw(slices_of(tree))
-    swept = SweptTree(tree)
-    maker = CellMaker(swept, BodyPairs(swept), room())
-    under, over = maker.under_cells(intervals), maker.over_cells(intervals)
+    size = data.draw(st.sampled_from((1.0, 3.0, 6.0)))
+    workspace = scale(data.draw(floors()), size, size, origin=(0.0, 0.0))
     random = np.random.default_rng(data.draw(st.integers(0, 1000)))
-    for position in random.uniform(-3.0, 3.0, (8, 2)):
-        surely = any(region.holds(position) for region in under)
-        maybe = any(region.holds(position) for region in over)
-        for z in configurations(intervals, seed=2, count=10, position=tuple(position)):
-            free = is_free(tree, z)
-            assert free or not surely
-            assert maybe or not free
+    swept = SweptTree(tree)
+    maker = CellMaker(swept, BodyPairs(swept), workspace)
+    under, over = union(maker.under_cells(intervals)), union(maker.over_cells(intervals))
+    for z in configurations(intervals, seed=int(random.integers(1 << 30)), count=ANGLES):
+        exact = FreePositions(tree, workspace, z[2:])
+        positions = np.concatenate(
+            (
+                exact.contacts(random, POSITIONS // 4),
+                near_boundary(under, random, POSITIONS // 4),
+                near_boundary(over, random, POSITIONS // 4),
+                random.uniform(workspace.bounds[:2], workspace.bounds[2:], (POSITIONS // 4, 2)),
+            )
+        )
+        free = exact.free(positions)
+        assert free[shapely.contains_xy(under, positions)].all()
+        assert shapely.contains_xy(over, positions[free]).all()
 
 
-def is_free(tree, z: np.ndarray) -> bool:
-    bodies = body_footprints(tree, z)
-    if not room().contains_properly(footprint(tree, z)):
-        return False
-    return all(bodies[a].disjoint(bodies[b]) for a, b in tree.collision_pairs)
+def union(regions: list[Region]) -> MultiPolygon:
+    whole = MultiPolygon([to_polygon(region.section) for region in regions])
+    shapely.prepare(whole)
+    return whole
+
+
+def near_boundary(shape: MultiPolygon, random: np.random.Generator, count: int) -> np.ndarray:
+    """Points at corners and along edges of a shape, a hair aside; around the origin if it is empty."""
+    corners = shapely.get_coordinates(shape) if not shape.is_empty else np.zeros((1, 2))
+    first = random.integers(len(corners), size=count)
+    last = np.minimum(first + 1, len(corners) - 1)
+    share = random.random((count, 1)) * (random.random((count, 1)) < 0.5)
+    return corners[first] + share * (corners[last] - corners[first]) + nudges(random, count)
 
 
 @SLOW

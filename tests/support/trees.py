@@ -19,7 +19,14 @@ SHAPES = (
     (disc(0.25, 0.3),),
     (ConvexShape(np.array([[0.0, 0.0], [0.3, 0.1]]), 0.08),),
     (ConvexShape(np.array([[-0.1, -0.1], [0.3, -0.05], [0.2, 0.2]]), 0.05), disc(0.1, -0.1, 0.1)),
+    (rectangle(-0.2, 0.2, -0.2, -0.15), rectangle(-0.2, -0.15, -0.2, 0.2), rectangle(0.15, 0.2, -0.2, 0.2)),
+    (ConvexShape(np.array([[0.0, 0.0], [0.5, 0.0], [0.0, 0.001]])), disc(0.01, 0.4, 0.0)),
 )
+
+
+def scaled(shape: ConvexShape, factor: float) -> ConvexShape:
+    """The same shape larger or smaller about its component's origin."""
+    return ConvexShape(factor * shape.vertices, factor * shape.radius)
 
 
 def placed_shape(shape: ConvexShape, X_WC: PlanarPose, quad_segs: int = 32) -> BaseGeometry:
@@ -50,35 +57,59 @@ def body_footprints(tree: ComponentTree, z: np.ndarray) -> dict[tuple[int, int],
 
 
 @st.composite
-def trees(draw: st.DrawFn, robots: tuple[int, int] = (1, 3)) -> ComponentTree:
-    """A team of one to three robots with one or two joints each, in any pose about the object."""
-    number = st.floats(-0.4, 0.4)
-    turn = st.floats(-pi, pi)
+def trees(
+    draw: st.DrawFn, robots: tuple[int, int] = (1, 4), joints: tuple[int, int] = (1, 3)
+) -> ComponentTree:
+    """A team of one to four robots with one to three joints each, in any pose about the object."""
     count = draw(st.integers(*robots))
     components = [Component("object", None, None, (Body("object", None, draw(st.sampled_from(SHAPES))),))]
     sharing: set[tuple[str, str]] = set()
-    joints = 0
     for robot in range(count):
         parent, above = 0, "object"
-        for stage in range(draw(st.integers(1, 2))):
+        for stage in range(draw(st.integers(*joints))):
             name = f"robot_{robot}::link_{stage}"
-            X_PJ = PlanarPose(draw(number), draw(number), draw(turn))
-            kind = draw(st.sampled_from(("revolute", "prismatic")))
-            axis = (draw(st.sampled_from((1.0, -0.5, 0.0))), draw(st.sampled_from((0.3, 1.0))))
-            sign = draw(st.sampled_from((1.0, -1.0)))
-            limit = 1.9 if kind == "revolute" else 0.4
-            joint = TreeJoint(f"{name}_joint", kind, robot, joints, X_PJ, sign, axis, -limit, limit)
-            body = Body(name, robot, draw(st.sampled_from(SHAPES)))
-            components.append(Component(name, parent, joint, (body,)))
+            X_PJ = draw(_poses(2.0 * pi * robot / count if stage == 0 else 0.0))
+            joint = draw(_joints(f"{name}_joint", robot, len(components) - 1, X_PJ))
+            size = draw(st.sampled_from((0.2, 0.5, 1.0)))
+            bodies = [
+                Body(name, robot, tuple(scaled(shape, size) for shape in draw(st.sampled_from(SHAPES))))
+            ]
+            if draw(st.booleans()):
+                bodies.append(Body(f"{name}_welded", robot, (disc(0.1, 0.2, 0.3 * size),)))
+            components.append(Component(name, parent, joint, tuple(bodies)))
             sharing.add((name, above))
-            parent, above, joints = len(components) - 1, name, joints + 1
+            parent, above = len(components) - 1, name
     return ComponentTree(tuple(components), frozenset(sharing))
+
+
+_OFFSETS = st.floats(-0.4, 0.4)
+
+
+@st.composite
+def _poses(draw: st.DrawFn, bearing: float) -> PlanarPose:
+    """Where a joint's frame lies on its parent: mostly outwards, so that arms are apart, or anywhere."""
+    if draw(st.integers(0, 3)) == 0:
+        return PlanarPose(draw(_OFFSETS), draw(_OFFSETS), draw(st.floats(-pi, pi)))
+    outwards = PlanarPose(0.0, 0.0, bearing) @ PlanarPose(draw(st.floats(0.3, 0.7)), draw(_OFFSETS))
+    return outwards @ PlanarPose(0.0, 0.0, draw(st.floats(-0.5, 0.5)))
+
+
+@st.composite
+def _joints(draw: st.DrawFn, name: str, robot: int, index: int, X_PJ: PlanarPose) -> TreeJoint:
+    """A joint of either kind whose range holds zero."""
+    kind = draw(st.sampled_from(("revolute", "prismatic")))
+    axis = (draw(st.sampled_from((1.0, -0.5, 0.0))), draw(st.sampled_from((0.3, 1.0))))
+    sign = draw(st.sampled_from((1.0, -1.0)))
+    limits = (
+        draw(st.sampled_from(((-1.9, 1.9), (-pi, pi), (0.0, 2.8)))) if kind == "revolute" else (-0.4, 0.4)
+    )
+    return TreeJoint(name, kind, robot, index, X_PJ, sign, axis, *limits)
 
 
 @st.composite
 def slices_of(draw: st.DrawFn, tree: ComponentTree) -> tuple[tuple[float, float], ...]:
     """A compound slice inside the joints' limits, from a single configuration to wide ones."""
-    widest = draw(st.sampled_from((0.0, 0.02, 0.2, 0.8, 3.0)))
+    widest = draw(st.sampled_from((0.0, 1e-4, 0.02, 0.2, 0.8, 3.0, 2.0 * pi)))
     intervals = [(-pi, pi), *[(joint.lower, joint.upper) for joint in tree.joints]]
     result = []
     for lower, upper in intervals:
