@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-__all__ = ["CoopDrakeError", "FieldError", "GeometryError", "PlanError", "ScenarioError", "StallError"]
+__all__ = [
+    "CoopDrakeError",
+    "FieldError",
+    "GeometryError",
+    "PlanError",
+    "RefusalError",
+    "ScenarioError",
+    "StallError",
+]
 
 
 class CoopDrakeError(Exception):
@@ -38,3 +46,16 @@ class FieldError(CoopDrakeError):
 
 class StallError(CoopDrakeError):
     """A transition would take unreasonably long; the message names the passage."""
+
+
+class RefusalError(CoopDrakeError):
+    """A plan or a proof does not hold: says where, what is wrong there, and by how much.
+
+    Args:
+        where: The place in the document, for example ``cells[3].safe``.
+        finding: What is wrong there.
+    """
+
+    def __init__(self, where: str, finding: str) -> None:
+        self.where, self.finding = where, finding
+        super().__init__(f"{where}: {finding}")

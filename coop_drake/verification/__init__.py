@@ -1,0 +1,6 @@
+"""An independent check of the planner's answers, plans and proofs of infeasibility, by sweeps of its own."""
+
+from coop_drake.verification.checks import Check, Verified
+from coop_drake.verification.found import verify_plan
+
+__all__ = ["Check", "Verified", "verify_plan"]

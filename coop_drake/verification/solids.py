@@ -1,0 +1,120 @@
+"""The convex solids of a team with the joints that carry them, from the solid outwards to the object."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from coop_drake.geometry.pose import FloatArray, PlanarPose
+from coop_drake.geometry.tree import ComponentTree, TreeJoint
+
+__all__ = ["Solid", "Stage", "colliding_pairs", "team_solids"]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One motion that carries a solid: a joint, or theta of the object.
+
+    Attributes:
+        axis: Index into (theta, q...).
+        kind: ``revolute`` (also theta) or ``prismatic``.
+        scale: What an axis value is multiplied by: the sign of a turn, 1 for a slide.
+        direction: Direction in J of a slide, shape (2,).
+        X_PJ: Pose of the joint's frame in the parent; the identity for theta.
+    """
+
+    axis: int
+    kind: Literal["revolute", "prismatic"]
+    scale: float
+    direction: FloatArray
+    X_PJ: PlanarPose
+
+
+@dataclass(frozen=True)
+class Solid:
+    """One convex piece of one body.
+
+    Attributes:
+        name: Name of its body.
+        component: Index of its component.
+        body: Index of its body in the component.
+        vertices: Vertices in the component's frame, counter-clockwise, shape (n, 2) [m].
+        radius: Growth of their hull [m].
+        stages: What moves it: its own joint first, theta last.
+    """
+
+    name: str
+    component: int
+    body: int
+    vertices: FloatArray
+    radius: float
+    stages: tuple[Stage, ...]
+
+
+def team_solids(tree: ComponentTree, robots: Collection[int] | None = None) -> tuple[Solid, ...]:
+    """List every convex piece of a team.
+
+    Args:
+        tree: The team.
+        robots: Robots whose joints are kept, None for all; what hangs from a joint of another is left out.
+    """
+    solids = []
+    for index, component in enumerate(tree.components):
+        joints = _joints_to_object(tree, index)
+        if robots is not None and any(joint.robot not in robots for joint in joints):
+            continue
+        stages = (*[_stage(joint) for joint in joints], _THETA)
+        solids += [
+            Solid(body.name, index, number, np.asarray(shape.vertices, dtype=float), shape.radius, stages)
+            for number, body in enumerate(component.bodies)
+            for shape in body.shapes
+        ]
+    return tuple(solids)
+
+
+def colliding_pairs(
+    tree: ComponentTree, solids: Collection[Solid]
+) -> tuple[tuple[Solid, Solid, int, int], ...]:
+    """Pairs of solids that must never overlap, each with its stages up to the component both hang from.
+
+    Args:
+        tree: The team.
+        solids: The solids that are kept.
+    """
+    members: dict[tuple[int, int], list[Solid]] = {}
+    for solid in solids:
+        members.setdefault((solid.component, solid.body), []).append(solid)
+    pairs = []
+    for first, second in tree.collision_pairs:
+        one, other = (_components_to_object(tree, component) for component, _ in (first, second))
+        common = max(set(one) & set(other))
+        pairs += [
+            (a, b, one.index(common), other.index(common))
+            for a in members.get(first, [])
+            for b in members.get(second, [])
+        ]
+    return tuple(pairs)
+
+
+_THETA = Stage(0, "revolute", 1.0, np.zeros(2), PlanarPose())
+
+
+def _stage(joint: TreeJoint) -> Stage:
+    scale = joint.sign if joint.kind == "revolute" else 1.0
+    return Stage(1 + joint.index, joint.kind, scale, np.array(joint.axis), joint.X_PJ)
+
+
+def _components_to_object(tree: ComponentTree, index: int) -> list[int]:
+    """The component itself, its parent and so on, the object's last."""
+    way = [index]
+    while (parent := tree.components[way[-1]].parent) is not None:
+        way.append(parent)
+    return way
+
+
+def _joints_to_object(tree: ComponentTree, index: int) -> list[TreeJoint]:
+    joints = [tree.components[i].joint for i in _components_to_object(tree, index)]
+    return [joint for joint in joints if joint is not None]
