@@ -14,7 +14,7 @@ from shapely import Polygon
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.pose import FloatArray
 
-__all__ = ["BoundaryDistance", "edges_of", "squared_distance_compiled"]
+__all__ = ["BoundaryDistance", "edges_of", "signed_distance_compiled", "squared_distance_compiled"]
 
 
 def edges_of(polygon: Polygon) -> FloatArray:
@@ -49,7 +49,7 @@ def _signed_distance(edges: FloatArray, x: float, y: float) -> float:
     return sqrt(nearest) if inside else -sqrt(nearest)
 
 
-_signed_distance_compiled = numba.njit(cache=True)(_signed_distance)
+signed_distance_compiled = numba.njit(cache=True)(_signed_distance)
 
 
 def _segment_clearance(edges: FloatArray, ax: float, ay: float, bx: float, by: float) -> float:
@@ -77,7 +77,7 @@ def _signed_distances(edges: FloatArray, points: FloatArray) -> FloatArray:
     """The same for many points, shape (n, 2) -> (n,)."""
     result = np.empty(points.shape[0])
     for k in range(points.shape[0]):
-        result[k] = _signed_distance_compiled(edges, points[k, 0], points[k, 1])
+        result[k] = signed_distance_compiled(edges, points[k, 0], points[k, 1])
     return result
 
 
@@ -114,7 +114,7 @@ class BoundaryDistance:
             Distance [m], positive inside the polygon, negative outside.
         """
         x, y = cast(FloatArray, point)
-        return cast(float, _signed_distance_compiled(self._edges, float(x), float(y)))
+        return cast(float, signed_distance_compiled(self._edges, float(x), float(y)))
 
     def batch(self, points: ArrayLike) -> FloatArray:
         """Distances of many points.

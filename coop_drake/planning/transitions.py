@@ -18,7 +18,7 @@ from coop_drake.geometry.slits import component_at
 from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.planning.channel import Channel, FreeBox
 from coop_drake.planning.digest import problem_digest
-from coop_drake.planning.estimate import speed_per_clearance, transition_time, travel_time
+from coop_drake.planning.estimate import timed, travel_time
 from coop_drake.planning.plan import Cell, Plan, Transition
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.shortcuts import without_detours
@@ -73,22 +73,14 @@ def make_plan(
         cells.append(_cell(box, entry, target, index))
         if progress is not None:
             progress("tidying", (index + 1) / len(targets))
-    transitions = []
-    resting = problem.start[2:]
+    ways, transitions, resting = [], [], problem.start[2:]
     for index, (entry, target) in enumerate(zip(entries, targets, strict=True)):
-        goal_lower, goal_upper = _goal_intervals(problem, channel, index)
-        way, passage = _way(problem, cells[index : index + 2], entry, target, index)
-        gains = _gains(gain_set, cells[index], way.neck, (goal_lower, goal_upper), resting)
-        time = _estimated_time(way.length, way.neck, gains)
-        if time > problem.settings.max_transition_time:
-            raise StallError(_stall(problem, index, passage, way, time))
-        transitions.append(
-            Transition(
-                **vars(way), goal_lower=goal_lower, goal_upper=goal_upper, estimated_time=time, gains=gains
-            )
-        )
-        resting = 0.5 * (goal_lower + goal_upper)
-    return Plan(
+        goals = _goal_intervals(problem, channel, index)
+        way = _way(problem, cells[index : index + 2], entry, target, index)
+        ways.append(way)
+        transitions.append(_transition(gain_set, cells[index], way, goals, resting))
+        resting = 0.5 * (goals[0] + goals[1])
+    made = Plan(
         cells=tuple(cells),
         transitions=tuple(transitions),
         start=problem.start.copy(),
@@ -99,6 +91,11 @@ def make_plan(
         gain_set=gain_set_name,
         problem=problem_digest(problem),
     )
+    made = timed(made, [way.passage.path for way in ways])
+    for index, (way, transition) in enumerate(zip(ways, made.transitions, strict=True)):
+        if transition.estimated_time > problem.settings.max_transition_time:
+            raise StallError(_stall(problem, index, way, transition.estimated_time))
+    return made
 
 
 def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
@@ -112,29 +109,26 @@ def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
     resting = plan.start[2:]
     transitions = []
     for cell, transition in zip(plan.cells, plan.transitions, strict=True):
-        goal = (transition.goal_lower, transition.goal_upper)
-        gains = _gains(gain_set, cell, transition.neck, goal, resting)
-        time = _estimated_time(transition.length, transition.neck, gains)
-        transitions.append(replace(transition, gains=gains, estimated_time=time))
+        goals = (transition.goal_lower, transition.goal_upper)
+        gains = _gains(gain_set, cell, transition.neck, goals, resting)
+        transitions.append(replace(transition, gains=gains))
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
-    return replace(plan, transitions=tuple(transitions), gain_set=name)
+    return timed(replace(plan, transitions=tuple(transitions), gain_set=name))
 
 
 @dataclass(frozen=True)
 class _Way:
-    """What a transition knows about positions; named as in ``Transition``."""
+    """What a transition knows about positions."""
 
     target: FloatArray
-    goal_region: Polygon
+    region: Polygon
     inradius: float
-    neck: float
-    length: float
-    only_angles: bool
+    passage: Passage
 
 
 def _way(
     problem: PlanningProblem, cells: Sequence[Cell], entry: FloatArray, target: FloatArray, index: int
-) -> tuple[_Way, Passage]:
+) -> _Way:
     """The way from entry to target in the first cell; the second one, if any, is entered there."""
     here = cells[0].tidied
     if len(cells) > 1:
@@ -142,15 +136,33 @@ def _way(
     else:
         region = component_at(_disc(target, problem.position_tolerance).intersection(here), Point(target))
     inradius = 0.0 if region.is_empty else BoundaryDistance(region)(target)
-    passage = PassageFinder(here).find(entry, target)
-    only_angles = bool(passage.length <= SAME_PLACE)
-    way = _Way(target, region, inradius, passage.neck, passage.length, only_angles)
-    if min(inradius, passage.neck) < NARROWEST:
-        raise StallError(_stall(problem, index, passage, way, travel_time(passage.length, passage.neck)))
-    return way, passage
+    way = _Way(target, region, inradius, PassageFinder(here).find(entry, target))
+    if min(inradius, way.passage.neck) < NARROWEST:
+        seconds = travel_time(way.passage.length, way.passage.neck)
+        raise StallError(_stall(problem, index, way, seconds))
+    return way
 
 
-def _stall(problem: PlanningProblem, index: int, passage: Passage, way: _Way, seconds: float) -> str:
+def _transition(
+    gain_set: GainSet, cell: Cell, way: _Way, goals: Intervals, resting: FloatArray
+) -> Transition:
+    """A transition whose time is not estimated yet."""
+    return Transition(
+        target=way.target,
+        goal_region=way.region,
+        goal_lower=goals[0],
+        goal_upper=goals[1],
+        inradius=way.inradius,
+        neck=way.passage.neck,
+        length=way.passage.length,
+        estimated_time=0.0,
+        only_angles=bool(way.passage.length <= SAME_PLACE),
+        gains=_gains(gain_set, cell, way.passage.neck, goals, resting),
+    )
+
+
+def _stall(problem: PlanningProblem, index: int, way: _Way, seconds: float) -> str:
+    passage = way.passage
     x, y = passage.narrowest
     return (
         f"cell {index}: the object's passage through ({x:.3f}, {y:.3f}) is {2e3 * passage.neck:.1f} mm "
@@ -181,10 +193,6 @@ def _gains(
         goal_upper=goal[1],
         resting=resting,
     )
-
-
-def _estimated_time(length: float, neck: float, gains: TransitionGains) -> float:
-    return transition_time(length, neck, speed_per_clearance(gains))
 
 
 def _goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Intervals:
