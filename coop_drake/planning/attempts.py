@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations, islice
 
+from shapely import MultiPolygon
+
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.band import drawn_tight
 from coop_drake.planning.boxes import make_channel
-from coop_drake.planning.cells import CellMaker
-from coop_drake.planning.certify import Box, Certifier
+from coop_drake.planning.cells import CellMaker, Region
+from coop_drake.planning.certify import Certifier, PathBox
 from coop_drake.planning.channel import Channel
 from coop_drake.planning.exploration import Exploration, Verdict
 from coop_drake.planning.margins import marginal_workspace, shrunk
@@ -26,6 +28,9 @@ _SEEDS = 4
 _SAMPLES = 8_000
 _GAP = 0.01
 _CANDIDATES = 2
+
+
+Box = tuple[Intervals, Region]
 
 
 class SampledAttempts:
@@ -58,8 +63,8 @@ class SampledAttempts:
             effort: 0 for a first try; each step up draws other samples, and twice as many.
             progress: Called with the share of a path that boxes cover.
         """
-        maker = CellMaker(self._swept, self._pairs, marginal_workspace(self._problem, margin))
-        certifier = Certifier(self._problem.tree, maker, self._scale, margin)
+        workspace = marginal_workspace(self._problem, margin)
+        certifier = Certifier(self._swept, self._pairs, workspace, self._scale, margin)
         for clearance, path in islice(self._paths(margin, effort), _CANDIDATES):
             self._last = (clearance, path)
             before = certifier.trials
@@ -67,9 +72,22 @@ class SampledAttempts:
             chain = certifier.boxes(better, progress)
             self._swept.forget()
             self.slices += certifier.trials - before
-            if chain is not None:
-                return chain
+            regions = None if chain is None else self._regions(chain, workspace)
+            if regions is not None:
+                return regions
         return None
+
+    def _regions(self, chain: Sequence[PathBox], workspace: MultiPolygon) -> list[Box] | None:
+        """For every box all positions that are free for it and join its way's."""
+        maker = CellMaker(self._swept, self._pairs, workspace)
+        boxes: list[Box] = []
+        for box in chain:
+            regions = maker.under_cells(box.intervals)
+            region = next((r for r in regions if r.depths(box.way[[0, -1]]).min() > 0.0), None)
+            if region is None:
+                return None
+            boxes.append((box.intervals, region))
+        return boxes
 
     def channel(self, boxes: Sequence[Box], margin: float) -> Channel:
         """Boxes with their full polygons and theta unwrapped."""

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.geometry.minkowski import polygon_rings
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.band_kernels import improve
 from coop_drake.planning.margins import marginal_workspace
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.refine import configuration_scale
 from coop_drake.planning.sampler import densified
-from coop_drake.planning.team_arrays import team_arrays, wall_segments
+from coop_drake.planning.team_arrays import team_arrays
+from coop_drake.planning.walls import FAR, walls_for
 
-_FAR = 0.2
 _LEAST_ROOM = 0.005
 _SPACING = 0.05
 _PRICE = 0.006
@@ -34,12 +33,13 @@ def drawn_tight(
     """
     tree = problem.tree
     scale = configuration_scale(tree)
-    walls = wall_segments(polygon_rings(marginal_workspace(problem, clearance)))
+    team = team_arrays(tree)
+    walls = walls_for(marginal_workspace(problem, clearance), team)
     unbounded = np.full(3, np.inf)
     better: FloatArray = improve(
-        team_arrays(tree),
+        team,
         walls,
-        np.array([_PRICE, max(clearance - margin, 0.0) + _LEAST_ROOM, _FAR]),
+        np.array([_PRICE, max(clearance - margin, 0.0) + _LEAST_ROOM, FAR]),
         densified(path, scale, _SPACING),
         np.concatenate((-unbounded, tree.joint_lower)),
         np.concatenate((unbounded, tree.joint_upper)),

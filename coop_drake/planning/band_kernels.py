@@ -8,10 +8,11 @@ import numpy as np
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.collision_kernels import bodies_apart, place, wall_clearance
 from coop_drake.planning.team_arrays import TeamArrays
+from coop_drake.planning.walls import Walls
 
 
 @numba.njit(cache=True)
-def _price(team: TeamArrays, walls: FloatArray, z: FloatArray, gap: float, rate: FloatArray) -> float:
+def _price(team: TeamArrays, walls: Walls, z: FloatArray, gap: float, rate: FloatArray) -> float:
     """Price of a sample: inverse to its clearance up to a limit, infinite where it is not free."""
     poses = place(team, z)
     clearance = wall_clearance(team, walls, poses, rate[2])
@@ -24,7 +25,7 @@ def _price(team: TeamArrays, walls: FloatArray, z: FloatArray, gap: float, rate:
 @numba.njit(cache=True)
 def improve(
     team: TeamArrays,
-    walls: FloatArray,
+    walls: Walls,
     rate: FloatArray,
     path: FloatArray,
     lower: FloatArray,
@@ -40,7 +41,7 @@ def improve(
 
     Args:
         team: The team.
-        walls: Edges of the workspace that the path stays in, shape (E, 4) [m].
+        walls: The floor that the path stays on.
         rate: A sample with clearance c costs rate[0] / (rate[1] + min(c, rate[2])).
         path: Samples, close together, shape (m, d).
         lower: Lower limits, shape (d,); minus infinity where there is none.

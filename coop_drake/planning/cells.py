@@ -14,7 +14,6 @@ from coop_drake.geometry.convex import following
 from coop_drake.geometry.minkowski import FreeSpace
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.box_kernels import box_clearance
 
 _NEGLIGIBLE_AREA = 1e-9
 
@@ -130,29 +129,6 @@ class CellMaker:
         if self._pairs.touching(expanded) is not None:
             return []
         return _regions(self.under_region(expanded), _NEGLIGIBLE_AREA)
-
-    def clearance(self, intervals: Intervals, positions: FloatArray, enough: float) -> float:
-        """How far the over-footprint stays from the walls along a way: quick, and no proof.
-
-        Args:
-            intervals: The slice.
-            positions: Positions p_WL along a way, shape (k, 2) [m].
-            enough: Clearance that is needed at the first and at the last of them [m].
-
-        Returns:
-            Least clearance [m]; negative where a wall is crossed, bodies may touch or an end has not enough.
-        """
-        bounds = np.array(intervals)
-        least: float = box_clearance(
-            self._swept.arrays,
-            self._pairs.pieces,
-            self._under_space.edges,
-            bounds[:, 0].copy(),
-            bounds[:, 1].copy(),
-            np.ascontiguousarray(positions),
-            enough,
-        )
-        return least
 
     def guide_cells(self, intervals: Intervals) -> list[Region]:
         """Free regions of the slice's middle configuration: a hint for the search, never a proof."""

@@ -3,58 +3,82 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
+from shapely import MultiPolygon, Polygon
 
+from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.geometry.tree import ComponentTree
-from coop_drake.planning.cells import CellMaker, Region
+from coop_drake.geometry.sweep_kernels import IntArray
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.planning.box_kernels import BoxArrays, longest_box, padded
 from coop_drake.planning.sampler import densified
+from coop_drake.planning.walls import Walls, walls_under
 
 _LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001))
-_BOX_TIME = 0.6
-_SPEED = 3.0
 _RESOLUTION = 0.02
-_PROOFS = 3
 
-Box = tuple[Intervals, Region]
+
+@dataclass(frozen=True)
+class PathBox:
+    """A free box along a path.
+
+    Attributes:
+        intervals: Intervals of (theta, q...).
+        way: Positions along which the team is free for all of them, joined by straight lines, shape (k, 2).
+    """
+
+    intervals: Intervals
+    way: FloatArray
 
 
 class Certifier:
     """Lays boxes along paths in one workspace.
 
-    A box is sound whatever path it was laid for: its over-swept footprint fits everywhere in its region and
+    A box is sound whatever path it was laid for: its over-swept footprint touches no wall along its way and
     no two bodies touch. Consecutive boxes share a sample of the path, padded in every angle.
 
     Args:
-        tree: The team.
-        maker: Cells in the workspace whose margin the boxes keep.
+        swept: Sweeps of the team's pieces.
+        pairs: Self-collision of the team.
+        workspace: Where the team may be; the margin is already taken off [m].
         scale: How far a unit of each axis of z moves the team, shape (3 + n,).
-        margin: Clearance that the boxes' positions have beyond their regions [m].
+        margin: Clearance that the boxes' positions have beyond that [m].
 
     Attributes:
         trials: Boxes tried so far.
     """
 
-    def __init__(self, tree: ComponentTree, maker: CellMaker, scale: FloatArray, margin: float) -> None:
-        self._maker, self._scale, self._margin = maker, scale, margin
+    def __init__(
+        self,
+        swept: SweptTree,
+        pairs: BodyPairs,
+        workspace: Polygon | MultiPolygon,
+        scale: FloatArray,
+        margin: float,
+    ) -> None:
+        self._boxes = box_arrays(swept, pairs)
+        self._walls: Walls = walls_under(workspace, swept.tree.reach)
+        self._scale, self._margin = scale, margin
         self._guess = 4
         self.trials = 0
-        self._lower, self._upper = tree.joint_lower, tree.joint_upper
 
-    def boxes(self, path: FloatArray, progress: Callable[[float], None] | None = None) -> list[Box] | None:
+    def boxes(
+        self, path: FloatArray, progress: Callable[[float], None] | None = None, *, quick: bool = False
+    ) -> list[PathBox] | None:
         """Chain of boxes from the path's first to its last configuration, or None if one is missing.
 
         Args:
-            path: Configurations with theta unwrapped, shape (m, 3 + n).
+            path: Configurations with theta unwrapped, the first one free, shape (m, 3 + n).
             progress: Called with the share of the path that is covered.
+            quick: Whether to take the longest boxes instead of those that are passed quickest.
         """
         samples = densified(path, self._scale, _RESOLUTION)
-        chain: list[Box] = []
+        chain: list[PathBox] = []
         i = 0
         while i < len(samples) - 1:
-            found = self._longest(samples, i)
+            found = self._longest(samples, i, quick)
             if found is None:
                 return None
             i, box = found
@@ -63,47 +87,39 @@ class Certifier:
                 progress(i / (len(samples) - 1))
         return chain
 
-    def _longest(self, samples: FloatArray, i: int) -> tuple[int, Box] | None:
-        """Sample that one box holds together with sample i, and that box: the quickest of those tried."""
-        last = len(samples) - 1
+    def _longest(self, samples: FloatArray, i: int, quick: bool) -> tuple[int, PathBox] | None:
+        """Sample that one box holds together with sample i, and that box."""
         for pad, room in _LEVELS:
-            tried: list[tuple[float, int, Intervals]] = []
-            best, failed, reach = i, last + 1, 1
-            while failed - best > 1:
-                j = min(best + reach, last) if failed > last else (best + failed) // 2
-                intervals = self._intervals(samples[i : j + 1], pad)
-                self.trials += 1
-                clearance = self._maker.clearance(intervals, samples[i : j + 1, :2], room)
-                if clearance < 0.0:
-                    failed = j
-                    continue
-                reach = self._guess if best == i else 2 * reach
-                best = j
-                tried.append((self._pace(samples[i : j + 1], clearance), j, intervals))
-            if tried:
-                self._guess = max(1, (best - i) // 2)
-            for _, j, intervals in sorted(tried, key=lambda entry: -entry[0])[:_PROOFS]:
-                region = self._proved(intervals, samples[[i, j], :2], room)
-                if region is not None:
-                    return j, (intervals, region)
+            quickest, longest, trials = longest_box(
+                self._boxes, self._walls, samples, i, self._guess, pad, room, self._margin
+            )
+            self.trials += trials
+            j = longest if quick else quickest
+            if j > i:
+                self._guess = max(1, (longest - i) // 2)
+                part = samples[i : j + 1]
+                lower, upper = padded(self._boxes, part, pad)
+                intervals = tuple((float(a), float(b)) for a, b in zip(lower, upper, strict=True))
+                return j, PathBox(intervals, part[:, :2].copy())
         return None
 
-    def _pace(self, part: FloatArray, clearance: float) -> float:
-        """Samples passed per second: a share for the box and the way at a speed that clearance allows."""
-        length = float(np.hypot(*np.diff(part[:, :2], axis=0).T).sum())
-        return (len(part) - 1) / (_BOX_TIME + length / (_SPEED * max(self._margin + clearance, 1e-3)))
 
-    def _intervals(self, part: FloatArray, pad: float) -> Intervals:
-        """Angles of some samples, padded, joints clipped at their limits."""
-        lower, upper = part[:, 2:].min(axis=0), part[:, 2:].max(axis=0)
-        grow = np.maximum(pad, pad * (upper - lower))
-        lower, upper = lower - grow, upper + grow
-        lower[1:], upper[1:] = np.maximum(lower[1:], self._lower), np.minimum(upper[1:], self._upper)
-        return tuple((float(a), float(b)) for a, b in zip(lower, upper, strict=True))
+def box_arrays(swept: SweptTree, pairs: BodyPairs) -> BoxArrays:
+    """Lay a team out for the compiled boxes; every piece that a pair needs is swept once."""
+    frames: dict[tuple[int, int], int] = {}
+    rows: list[tuple[int, int]] = []
+    for i, j, first_stages, second_stages in pairs.pieces.tolist():
+        first = frames.setdefault((i, first_stages), len(frames))
+        rows.append((first, frames.setdefault((j, second_stages), len(frames))))
+    infinite = np.array([np.inf])
+    return BoxArrays(
+        swept.arrays,
+        _table(list(frames)),
+        _table(rows),
+        np.concatenate((-infinite, swept.tree.joint_lower)),
+        np.concatenate((infinite, swept.tree.joint_upper)),
+    )
 
-    def _proved(self, intervals: Intervals, ends: FloatArray, room: float) -> Region | None:
-        """The region of a box that holds both ends with some room, proved by sweeps and differences."""
-        for region in self._maker.under_cells(intervals):
-            if region.depths(ends).min() > room:
-                return region
-        return None
+
+def _table(rows: list[tuple[int, int]]) -> IntArray:
+    return np.array(rows, dtype=np.int64).reshape(-1, 2)

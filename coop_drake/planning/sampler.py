@@ -7,14 +7,14 @@ from itertools import pairwise
 import numpy as np
 from shapely import MultiPolygon
 
-from coop_drake.geometry.minkowski import polygon_rings
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.collision_kernels import is_free
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.refine import configuration_scale
 from coop_drake.planning.relaxation import relaxed
-from coop_drake.planning.team_arrays import team_arrays, wall_segments
+from coop_drake.planning.team_arrays import team_arrays
 from coop_drake.planning.tree_kernels import chain_is_free, connect
+from coop_drake.planning.walls import walls_for
 
 _STEP = 0.03
 _SPREAD_POSITION = 0.3
@@ -38,7 +38,7 @@ class Sampler:
 
     def __init__(self, problem: PlanningProblem, workspace: MultiPolygon, gap: float, seed: int) -> None:
         self._problem, self._gap = problem, gap
-        self._walls = wall_segments(polygon_rings(workspace))
+        self._walls = walls_for(workspace, team_arrays(problem.tree))
         self._bounds = workspace.bounds
         self._random = np.random.default_rng(seed)
         self.stages = 0

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.geometry.convex import edge_angles, following, normals
+from coop_drake.geometry.convex import edge_angles, normals
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.sweep_kernels import IntArray
 from coop_drake.geometry.tree import ComponentTree, ConvexShape
@@ -93,8 +93,3 @@ def _disc(shape: ConvexShape) -> tuple[float, float, float]:
     middle = 0.5 * (shape.vertices.min(axis=0) + shape.vertices.max(axis=0))
     reach = float(np.hypot(*(shape.vertices - middle).T).max()) + shape.radius
     return float(middle[0]), float(middle[1]), reach
-
-
-def wall_segments(rings: list[FloatArray]) -> FloatArray:
-    """Edges (x0, y0, x1, y1) of closed rings, shape (E, 4) [m]."""
-    return np.concatenate([np.hstack((ring, following(ring))) for ring in rings])

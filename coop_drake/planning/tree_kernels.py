@@ -11,6 +11,7 @@ from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.sweep_kernels import IntArray
 from coop_drake.planning.collision_kernels import segment_is_free
 from coop_drake.planning.team_arrays import TeamArrays
+from coop_drake.planning.walls import Walls
 
 
 @numba.njit(cache=True)
@@ -34,7 +35,7 @@ def _nearest(nodes: FloatArray, count: int, z: FloatArray, scale: FloatArray) ->
 @numba.njit(cache=True)
 def _grow(
     team: TeamArrays,
-    walls: FloatArray,
+    walls: Walls,
     nodes: FloatArray,
     parents: IntArray,
     count: int,
@@ -77,7 +78,7 @@ def _draw(
 @numba.njit(cache=True)
 def connect(
     team: TeamArrays,
-    walls: FloatArray,
+    walls: Walls,
     start: FloatArray,
     roots: FloatArray,
     guide: FloatArray,
@@ -93,7 +94,7 @@ def connect(
 
     Args:
         team: The team.
-        walls: Edges of the workspace, shape (E, 4) [m].
+        walls: The floor.
         start: Free configuration, shape (d,).
         roots: Free goal configurations, shape (R, d).
         guide: Configurations to sample around, shape (G, d); may be empty.
@@ -136,7 +137,7 @@ def connect(
 
 @numba.njit(cache=True)
 def chain_is_free(
-    team: TeamArrays, walls: FloatArray, chain: FloatArray, gap: float, scale: FloatArray, step: float
+    team: TeamArrays, walls: Walls, chain: FloatArray, gap: float, scale: FloatArray, step: float
 ) -> bool:
     """Whether all straight segments between consecutive configurations are free, shape (m, d)."""
     for i in range(len(chain) - 1):

@@ -8,9 +8,12 @@ from hypothesis import strategies as st
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import polygon_rings
 from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.planning.box_kernels import box_clearance
 from coop_drake.planning.cells import CellMaker
+from coop_drake.planning.certify import box_arrays
 from coop_drake.planning.collision_kernels import place, wall_clearance
-from coop_drake.planning.team_arrays import team_arrays, wall_segments
+from coop_drake.planning.team_arrays import team_arrays
+from coop_drake.planning.walls import FAR, walls_near, walls_under
 from tests.support.trees import configurations, footprint, room, slices_of, trees
 
 SLOW = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -21,7 +24,7 @@ ROUNDING = 2e-3
 @given(st.data())
 def test_a_configuration_is_as_far_from_the_walls_as_its_footprint(data: st.DataObject) -> None:
     tree = data.draw(trees())
-    walls = wall_segments(polygon_rings(room()))
+    walls = walls_near(polygon_rings(room()), 2.0)
     position = tuple(data.draw(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))))
     for z in configurations(data.draw(slices_of(tree)), seed=4, count=4, position=position):
         found = wall_clearance(team_arrays(tree), walls, place(team_arrays(tree), z), 0.5)
@@ -39,16 +42,22 @@ def test_a_box_has_the_clearance_of_its_cell(data: st.DataObject) -> None:
     tree = data.draw(trees())
     intervals = data.draw(slices_of(tree))
     swept = SweptTree(tree)
-    maker = CellMaker(swept, BodyPairs(swept), room())
-    regions = maker.under_cells(intervals)
+    pairs = BodyPairs(swept)
+    boxes, walls = box_arrays(swept, pairs), walls_under(room(), tree.reach)
+    bounds = np.array(intervals)
+
+    def clearance(position: np.ndarray) -> float:
+        return box_clearance(boxes, walls, bounds[:, 0].copy(), bounds[:, 1].copy(), position, 1e-3)
+
+    regions = CellMaker(swept, pairs, room()).under_cells(intervals)
     for region in regions:
         middle = region.rings[0].mean(axis=0, keepdims=True)
-        found = maker.clearance(intervals, middle, 1e-3)
         depth = max(float(other.depths(middle)[0]) for other in regions)
-        assert found == pytest.approx(depth, abs=1e-5) if depth > 2e-3 else found < 2.1e-3
+        found = min(clearance(middle), FAR)
+        assert found == pytest.approx(min(depth, FAR), abs=1e-5) if depth > 2e-3 else found < 2.1e-3
     if not regions:
         for position in np.random.default_rng(5).uniform(-3.0, 3.0, (5, 2)):
-            inside = maker.clearance(intervals, position[None], 1e-3) >= 0.0
+            inside = clearance(position[None]) >= 0.0
             assert not (inside and room().covers(footprint(tree, _middle(intervals, position))))
 
 
