@@ -53,6 +53,6 @@ def legend_above(ax: Axes, handles: list[Patch] | None = None) -> None:
     )
 
 
-def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG; an interrupted write leaves no file behind."""
-    write_atomically(path, lambda file: figure.savefig(file, dpi=150, format="png"))
+def save_figure(figure: Figure, path: Path, *, dpi: float = 150) -> None:
+    """Write a figure as PNG of ``dpi`` points per inch; an interrupted write leaves no file behind."""
+    write_atomically(path, lambda file: figure.savefig(file, dpi=dpi, format="png"))

@@ -10,6 +10,7 @@ __all__ = [
     "INK",
     "OBJECT",
     "ORANGE",
+    "PURPLE",
     "SKY",
     "VERMILLION",
     "WALL",

@@ -1,0 +1,18 @@
+"""Watching the planner think: what it tells while it searches, as pictures and as a scene in space."""
+
+from coop_drake.watching.film import Film, film_cells
+from coop_drake.watching.moments import Leaf, Link, Moment, moments
+from coop_drake.watching.sequence import write_sequence
+from coop_drake.watching.storyboard import Shot, storyboard
+
+__all__ = [
+    "Film",
+    "Leaf",
+    "Link",
+    "Moment",
+    "Shot",
+    "film_cells",
+    "moments",
+    "storyboard",
+    "write_sequence",
+]

@@ -1,0 +1,120 @@
+"""A line through a channel: taut inside every region, theta moving with it; a sketch, not a plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+from shapely import Point, Polygon
+
+from coop_drake.geometry.minkowski import to_polygon
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning.cell_graph import Kind
+from coop_drake.planning.slices import nearest_turn
+from coop_drake.watching.moments import Link
+
+__all__ = ["Leg", "legs_through"]
+
+_INSET = 0.02  # How far crossings stay inside what two regions share, where there is room [m].
+_COARSE = 0.01  # Corners of regions that are straightened before lines are drawn round them [m].
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """The line through one cell.
+
+    Attributes:
+        kind: What is known about the cell.
+        positions: Shape (k, 2), k >= 2 [m].
+        angles: (theta, q...) along it, theta unwrapped from leg to leg, shape (k, 1 + n) [rad, m].
+    """
+
+    kind: Kind
+    positions: FloatArray
+    angles: FloatArray
+
+
+def legs_through(channel: Sequence[Link], start: FloatArray, goal: FloatArray) -> list[Leg]:
+    """Draw a line from start to goal through the cells of a channel.
+
+    Args:
+        channel: Cells whose regions meet one after the other.
+        start: (x, y, theta, q...), shape (2 + axes,) [m, rad].
+        goal: The same at the goal; NaN for joints that are free.
+    """
+    legs: list[Leg] = []
+    polygons = [_coarse(to_polygon(link.region.section)) for link in channel]
+    here, angles = np.asarray(start[:2]), np.asarray(start[2:])
+    for number, link in enumerate(channel):
+        if number + 1 < len(channel):
+            there = _crossing(polygons[number], polygons[number + 1], here)
+            then = _shared_angles(link, channel[number + 1], angles)
+        else:
+            there, then = np.asarray(goal[:2]), np.where(np.isnan(goal[2:]), angles, goal[2:])
+            then = np.array([angles[0] + nearest_turn(then[0] - angles[0]), *then[1:]])
+        positions = _taut(polygons[number], here, there)
+        steps = np.hypot(*np.diff(positions, axis=0).T)
+        share = np.concatenate([[0.0], np.cumsum(steps)]) / max(float(steps.sum()), 1e-12)
+        share[-1] = 1.0
+        legs.append(Leg(link.kind, positions, angles + share[:, None] * (then - angles)))
+        here, angles = there, then
+    return legs
+
+
+def _coarse(polygon: Polygon) -> Polygon:
+    simpler = polygon.simplify(_COARSE)
+    return simpler if isinstance(simpler, Polygon) and simpler.is_valid else polygon
+
+
+def _crossing(first: Polygon, second: Polygon, here: FloatArray) -> FloatArray:
+    """Point nearest to ``here`` that both polygons hold, a little inside where there is room."""
+    shared = shapely.intersection(first, second)
+    inner = shared.buffer(-_INSET)
+    target = shared if inner.is_empty else inner
+    if target.is_empty:
+        target = second  # Regions that meet may lose the touch when they are straightened.
+    nearest = shapely.shortest_line(target, Point(here))
+    return np.asarray(nearest.coords[0])
+
+
+def _shared_angles(link: Link, following: Link, angles: FloatArray) -> FloatArray:
+    """Angles in both cells' intervals nearest to ``angles``; theta on the turn nearest to it."""
+    result = []
+    for axis, ((a, b), (c, d)) in enumerate(zip(link.intervals, following.intervals, strict=True)):
+        turn_a = _turn(0.5 * (a + b), float(angles[axis])) if axis == 0 else 0.0
+        turn_c = _turn(0.5 * (c + d), 0.5 * (a + b) + turn_a) if axis == 0 else 0.0
+        low, high = max(a + turn_a, c + turn_c), min(b + turn_a, d + turn_c)
+        result.append(float(np.clip(angles[axis], min(low, high), max(low, high))))
+    return np.array(result)
+
+
+def _turn(value: float, near: float) -> float:
+    """Whole turns that bring an angle nearest to another one."""
+    return near + nearest_turn(value - near) - value
+
+
+def _taut(polygon: Polygon, here: FloatArray, there: FloatArray) -> FloatArray:
+    """Shortest line between two points of a polygon, straight where there is none; shape (k, 2)."""
+    ends = np.array([here, there])
+    room = polygon.buffer(1e-6)
+    if room.covers(shapely.LineString(ends)):
+        return ends
+    rings = [polygon.exterior, *polygon.interiors]
+    nodes = np.concatenate([ends, *[np.asarray(ring.coords)[:-1] for ring in rings]])
+    i, j = np.triu_indices(len(nodes), 1)
+    lines = np.asarray(shapely.linestrings(np.stack([nodes[i], nodes[j]], axis=1)))
+    shapely.prepare(room)
+    seen = shapely.covers(room, lines)
+    lengths = np.maximum(shapely.length(lines[seen]), 1e-9)
+    graph = csr_array((lengths, (i[seen], j[seen])), shape=(len(nodes), len(nodes)))
+    _, back = dijkstra(graph, directed=False, indices=np.array([0]), return_predecessors=True)
+    if back[0, 1] < 0:
+        return ends
+    way = [1]
+    while way[-1] != 0:
+        way.append(int(back[0, way[-1]]))
+    return nodes[way[::-1]]
