@@ -1,4 +1,4 @@
-"""One exploration of the free configuration space at one margin: Algorithm 1 with blame for its heuristic."""
+"""One exploration of the free configuration space at one margin: Algorithm 1 with better split rules."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ from coop_drake.planning.events import (
     SliceSplit,
     Watch,
 )
+from coop_drake.planning.halves import Halves
 from coop_drake.planning.problem import PlanningProblem
-from coop_drake.planning.refine import Blame
-from coop_drake.planning.slices import Slices
+from coop_drake.planning.slices import Slices, holds
+from coop_drake.planning.split_rules import Refinement, SplitRule
 
 _FREE_TIME = 0.6
 _NARROW_TIME = 0.03
@@ -67,6 +68,7 @@ class Exploration:
         pairs: Self-collision of the problem's tree, shared among attempts.
         watch: Called with every event, in order; None costs nothing.
         question: What is explored, in words, for whoever watches.
+        split: Which axis of a slice is halved.
     """
 
     def __init__(
@@ -77,23 +79,28 @@ class Exploration:
         pairs: BodyPairs,
         watch: Watch | None = None,
         question: str = "the whole team",
+        split: SplitRule = "strong",
     ) -> None:
         self._problem, self._watch = problem, watch
         self.slices = Slices(problem.tree, problem.settings.slice_overlap)
         self.maker = CellMaker(swept, pairs, workspace)
         self.graph = CellGraph(self.slices)
-        self.blame = Blame(problem.tree, self.maker, self.slices, problem.settings)
+        self._halves = Halves(self.slices, self.maker)
+        self.refinement = Refinement(problem, self.slices, self.maker, self._halves, split)
+        self._starts: dict[int, list[Cell]] = {}
+        self._goals: dict[int, list[int]] = {}
         if watch is not None:
             robots = sorted({joint.robot for joint in problem.tree.joints})
             watch(ExplorationBegan(question, tuple(robots)))
         for index in self.slices.leaves():
-            self._add(index)
+            self._add(index, self.maker.over_cells(self.slices.all[index].intervals))
 
     def run(self, budget: int, progress: Callable[[int], None] | None = None) -> Outcome:
         """Search and split until there is an answer or the budget of slices is spent.
 
-        The cheapest channel of FREE and undecided cells is searched; every slice on it that is not FREE is
-        halved along the axis to blame. No channel at all is a proof that none exists.
+        The cheapest channel of FREE and undecided cells is searched, and slices on it are halved as the
+        split rule says. No channel at all is a proof that none exists. A spent budget may be raised: call
+        again, and the exploration goes on where it stopped.
         """
         outcome = self._explored(budget, progress)
         if self._watch is not None:
@@ -102,21 +109,28 @@ class Exploration:
 
     def _explored(self, budget: int, progress: Callable[[int], None] | None) -> Outcome:
         while True:
-            path = self.graph.cheapest(self._starts(), self._goals())
+            path = self._channel()
             if self._watch is not None:
                 self._watch(ChannelSearched(_seen(path or ())))
+            made = len(self.slices.all)
             if path is None:
-                return Outcome(Verdict.INFEASIBLE, (), len(self.slices.all))
-            open_cells = {cell.slice: cell for cell in path if cell.kind is not Kind.FREE}
-            if not open_cells:
-                return Outcome(Verdict.FOUND, tuple(path), len(self.slices.all))
-            if len(self.slices.all) >= budget:
-                return Outcome(Verdict.BUDGET, tuple(path), len(self.slices.all))
-            halved = [self._split(cell) for cell in open_cells.values()]
-            if not any(halved):
-                return Outcome(Verdict.RESOLUTION, tuple(path), len(self.slices.all))
+                return Outcome(Verdict.INFEASIBLE, (), made)
+            if all(cell.kind is Kind.FREE for cell in path):
+                return Outcome(Verdict.FOUND, tuple(path), made)
+            if made >= budget:
+                return Outcome(Verdict.BUDGET, tuple(path), made)
+            splits = self.refinement.splits(path)
+            if not splits:
+                return Outcome(Verdict.RESOLUTION, tuple(path), made)
+            for index, axis in splits:
+                self._split(index, axis)
             if progress is not None:
                 progress(len(self.slices.all))
+
+    def _channel(self) -> list[Cell] | None:
+        starts = [cell for index in sorted(self._starts) for cell in self._starts[index]]
+        goals = {cell for cells in self._goals.values() for cell in cells}
+        return self.graph.cheapest(starts, goals)
 
     def boxes(self, path: Sequence[Cell]) -> list[tuple[Intervals, Region]]:
         """Expanded intervals and region of every cell of a free path."""
@@ -137,49 +151,38 @@ class Exploration:
             for (lower, upper), width in zip(self.slices.all[cell.slice].intervals, whole, strict=True)
         )
 
-    def _split(self, cell: Cell) -> bool:
-        intervals = self.slices.all[cell.slice].intervals
-        if not self.blame.splittable(intervals):
-            return False
-        axis = self.blame.axis(intervals, cell.region)
+    def _split(self, index: int, axis: int) -> None:
         if self._watch is not None:
-            self._watch(SliceSplit(cell.slice, axis))
-        self.graph.remove(cell.slice)
-        for half in self.slices.split(cell.slice, axis):
-            self._add(half)
-        return True
+            self._watch(SliceSplit(index, axis))
+        self.graph.remove(index)
+        self._starts.pop(index, None)
+        self._goals.pop(index, None)
+        parts = self._halves.taken(index, axis)
+        for half, part in zip(self.slices.split(index, axis), parts, strict=True):
+            self._add(half, part.regions)
 
-    def _add(self, index: int) -> None:
+    def _add(self, index: int, mixed: Sequence[Region]) -> None:
         intervals = self.slices.all[index].intervals
-        mixed = self.maker.over_cells(intervals)
         free = self.maker.under_cells(self.slices.expanded(intervals)) if mixed else []
         guide = self.maker.guide_cells(intervals) if mixed else []
-        final = not self.blame.splittable(intervals)
+        final = not self.refinement.splittable(intervals)
         members = [(Kind.FREE, region, _free_weight(region)) for region in free]
         members += [(Kind.GUIDE, region, _GUIDE_WEIGHT) for region in guide if not final]
         weight = _UNSPLITTABLE_WEIGHT if final else _MIXED_WEIGHT
         members += [(Kind.MIXED, region, weight) for region in mixed]
         self.graph.add(index, members)
+        self._note_ends(index, intervals)
         if self._watch is not None:
             self._watch(SliceAdded(index, intervals, _seen(self.graph.by_slice[index])))
 
-    def _starts(self) -> list[Cell]:
-        start = self._problem.start
-        return [
-            cell
-            for index in self.slices.holding([float(angle) for angle in start[2:]])
-            for cell in self.graph.by_slice[index]
-            if cell.region.holds(start[:2])
-        ]
-
-    def _goals(self) -> set[int]:
-        goal = self._problem.goal_pose
-        return {
-            cell.index
-            for index in self.slices.holding([float(goal[2]), *self._problem.goal_joints])
-            for cell in self.graph.by_slice[index]
-            if cell.region.holds(goal[:2])
-        }
+    def _note_ends(self, index: int, intervals: Intervals) -> None:
+        """Remember which cells of a new leaf hold the start and which hold the goal."""
+        cells = self.graph.by_slice[index]
+        start, goal = self._problem.start, self._problem.goal_pose
+        if holds(intervals, [float(angle) for angle in start[2:]]):
+            self._starts[index] = [cell for cell in cells if cell.region.holds(start[:2])]
+        if holds(intervals, [float(goal[2]), *self._problem.goal_joints]):
+            self._goals[index] = [cell.index for cell in cells if cell.region.holds(goal[:2])]
 
 
 def _seen(cells: Sequence[Cell]) -> tuple[SeenCell, ...]:

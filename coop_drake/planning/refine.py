@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.geometry.tree import ComponentTree
 from coop_drake.planning.cells import CellMaker, Region
-from coop_drake.planning.problem import PlannerSettings
-from coop_drake.planning.slices import Slices
+from coop_drake.planning.slices import Slices, halves
 
 _DECIDED = 1e-3
 _MOSTLY_FREE = 0.5
@@ -17,47 +18,28 @@ _LEAST_LEVER = 0.01
 
 
 class Blame:
-    """Chooses axes for one exploration.
+    """Chooses axes by what a halving frees.
 
     Args:
-        tree: The team.
         maker: Cells of slices.
         slices: The subdivision.
-        settings: Resolutions below which no axis is halved.
+        levers: How far a unit of each axis moves the team.
     """
 
-    def __init__(
-        self, tree: ComponentTree, maker: CellMaker, slices: Slices, settings: PlannerSettings
-    ) -> None:
-        self._maker, self._slices = maker, slices
-        self._levers = axis_levers(tree)
-        self._finest = (
-            settings.angle_resolution,
-            *(
-                settings.angle_resolution if joint.kind == "revolute" else settings.length_resolution
-                for joint in tree.joints
-            ),
-        )
+    def __init__(self, maker: CellMaker, slices: Slices, levers: Sequence[float]) -> None:
+        self._maker, self._slices, self._levers = maker, slices, levers
 
-    def splittable(self, intervals: Intervals) -> list[int]:
-        """Axes that are still wider than the resolution."""
-        return [
-            axis
-            for axis, ((lower, upper), finest) in enumerate(zip(intervals, self._finest, strict=True))
-            if upper - lower > finest
-        ]
-
-    def axis(self, intervals: Intervals, region: Region) -> int:
+    def axis(self, intervals: Intervals, region: Region, axes: Sequence[int]) -> int:
         """Axis whose halving frees most of a region.
 
         Where no halving frees anything yet, it is the axis along which the team sweeps furthest. A contact
         among bodies in a slice that the walls leave free is charged to the joints involved alone.
 
         Args:
-            intervals: A slice with at least one splittable axis.
+            intervals: A slice.
             region: The undecided cell of that slice.
+            axes: The axes to choose from, at least one.
         """
-        axes = self.splittable(intervals)
         expanded = self._slices.expanded(intervals)
         pair = self._maker.blocked_pair(expanded)
         if pair is not None:
@@ -70,17 +52,14 @@ class Blame:
             return self._widest(intervals, axes)
         return axes[freed.index(max(freed))]
 
-    def _widest(self, intervals: Intervals, axes: list[int]) -> int:
+    def _widest(self, intervals: Intervals, axes: Sequence[int]) -> int:
         sweep = [(intervals[axis][1] - intervals[axis][0]) * self._levers[axis] for axis in axes]
         return axes[sweep.index(max(sweep))]
 
     def _freed(self, intervals: Intervals, axis: int, region: Region) -> float:
-        lower, upper = intervals[axis]
-        middle = 0.5 * (lower + upper)
         total = 0.0
-        for part in ((lower, middle), (middle, upper)):
-            half = self._slices.expanded((*intervals[:axis], part, *intervals[axis + 1 :]))
-            total += (self._maker.under_region(half) ^ region.section).area()
+        for half in halves(intervals, axis):
+            total += (self._maker.under_region(self._slices.expanded(half)) ^ region.section).area()
         return round(total, 9)
 
 

@@ -60,12 +60,8 @@ class Slices:
     def split(self, index: int, axis: int) -> tuple[int, int]:
         """Halve a leaf along an axis; returns the ids of its halves."""
         parent = self.all[index]
-        lower, upper = parent.intervals[axis]
-        middle = 0.5 * (lower + upper)
         ids = len(self.all), len(self.all) + 1
-        for part in ((lower, middle), (middle, upper)):
-            intervals = (*parent.intervals[:axis], part, *parent.intervals[axis + 1 :])
-            self.all.append(Slice(intervals, parent.depth + 1))
+        self.all += [Slice(half, parent.depth + 1) for half in halves(parent.intervals, axis)]
         parent.halves = ids
         self.all[ids[0]].neighbours.add(ids[1])
         self.all[ids[1]].neighbours.add(ids[0])
@@ -91,6 +87,14 @@ class Slices:
     def holding(self, angles: Sequence[float | None]) -> list[int]:
         """Leaves whose closed nominal intervals hold the angles (theta, q...); None holds anywhere."""
         return [i for i in self.leaves() if holds(self.all[i].intervals, angles)]
+
+
+def halves(intervals: Intervals, axis: int) -> tuple[Intervals, Intervals]:
+    """Both halves of a slice along an axis, the lower one first."""
+    lower, upper = intervals[axis]
+    middle = 0.5 * (lower + upper)
+    before, after = intervals[:axis], intervals[axis + 1 :]
+    return (*before, (lower, middle), *after), (*before, (middle, upper), *after)
 
 
 def holds(intervals: Intervals, angles: Sequence[float | None]) -> bool:

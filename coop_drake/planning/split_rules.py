@@ -1,0 +1,112 @@
+"""Which slices of a channel to halve, and along which axis: by strong branching, blame or length."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from coop_drake.geometry.swept_tree import Intervals
+from coop_drake.planning.branching import StrongBranching, Trial
+from coop_drake.planning.cell_graph import Cell, Kind
+from coop_drake.planning.cells import CellMaker
+from coop_drake.planning.halves import Halves
+from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.refine import Blame, axis_levers
+from coop_drake.planning.slices import Slices
+
+SplitRule = Literal["strong", "blame", "longest"]
+
+_BALANCE = 16.0
+_DECIDED = 1e-3
+
+
+class Refinement:
+    """Chooses halvings for one exploration.
+
+    What is surely in doubt goes first: as long as a channel passes cells of which not even the middle
+    configuration is free, only these are halved; then those that a guide calls free.
+
+    Args:
+        problem: The question.
+        slices: The subdivision.
+        maker: Cells of slices.
+        halves: Over-cells of halves.
+        rule: How an axis is chosen.
+    """
+
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        slices: Slices,
+        maker: CellMaker,
+        halves: Halves,
+        rule: SplitRule = "strong",
+    ) -> None:
+        self._slices, self._rule = slices, rule
+        self._levers = axis_levers(problem.tree)
+        self._blame = Blame(maker, slices, self._levers)
+        self._branching = StrongBranching(problem, slices, halves)
+        settings = problem.settings
+        self._finest = (
+            settings.angle_resolution,
+            *(
+                settings.angle_resolution if joint.kind == "revolute" else settings.length_resolution
+                for joint in problem.tree.joints
+            ),
+        )
+
+    def splittable(self, intervals: Intervals) -> list[int]:
+        """Axes that are still wider than the resolution."""
+        return [
+            axis
+            for axis, ((lower, upper), finest) in enumerate(zip(intervals, self._finest, strict=True))
+            if upper - lower > finest
+        ]
+
+    def splits(self, channel: Sequence[Cell]) -> list[tuple[int, int]]:
+        """Slices of a channel to halve, each with its axis; none where all of them are below resolution."""
+        places = self._doubtful(channel)
+        if self._rule == "strong":
+            return self._strong(channel, places)
+        return [(channel[place].slice, self._axis(channel[place])) for place in places]
+
+    def _doubtful(self, channel: Sequence[Cell]) -> list[int]:
+        """Places of the cells to halve, one for each slice."""
+        open_places: dict[Kind, dict[int, int]] = {Kind.MIXED: {}, Kind.GUIDE: {}}
+        for place, cell in enumerate(channel):
+            if cell.kind is not Kind.FREE and self.splittable(self._slices.all[cell.slice].intervals):
+                open_places[cell.kind].setdefault(cell.slice, place)
+        return list((open_places[Kind.MIXED] or open_places[Kind.GUIDE]).values())
+
+    def _axis(self, cell: Cell) -> int:
+        intervals = self._slices.all[cell.slice].intervals
+        axes = self.splittable(intervals)
+        if self._rule == "blame":
+            return self._blame.axis(intervals, cell.region, axes)
+        return max(axes, key=lambda axis: (intervals[axis][1] - intervals[axis][0], -axis))
+
+    def _strong(self, channel: Sequence[Cell], places: Sequence[int]) -> list[tuple[int, int]]:
+        """Where a halving cuts the channel, such halvings alone; else for every place the best one."""
+        best = [(channel[place].slice, self._best(channel, place)) for place in places]
+        cutting = [(index, trial.axis) for index, trial in best if trial.cuts]
+        return cutting or [(index, trial.axis) for index, trial in best]
+
+    def _best(self, channel: Sequence[Cell], place: int) -> Trial:
+        """The halving that cuts, or that leaves least of the cell; where none takes anything, the widest."""
+        cell = channel[place]
+        intervals = self._slices.all[cell.slice].intervals
+        sweeps = {
+            axis: (intervals[axis][1] - intervals[axis][0]) * self._levers[axis]
+            for axis in self.splittable(intervals)
+        }
+        widest = max(sweeps.values())
+        trials = [
+            self._branching.trial(channel, place, axis)
+            for axis, sweep in sweeps.items()
+            if sweep * _BALANCE >= widest
+        ]
+        trials = [trial for trial in trials if trial.cuts] or trials
+        areas = [trial.area for trial in trials]
+        if max(areas) - min(areas) <= _DECIDED * cell.region.area:
+            return max(trials, key=lambda trial: (sweeps[trial.axis], -trial.axis))
+        return min(trials, key=lambda trial: (trial.area, trial.axis))
