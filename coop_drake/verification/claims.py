@@ -14,7 +14,6 @@ from shapely import Point, Polygon
 from coop_drake.control import GainSet, TransitionGains, transition_gains
 from coop_drake.errors import RefusalError
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.estimate import speed_per_clearance, transition_time
 from coop_drake.planning.plan import Plan, Transition
 from coop_drake.verification.checks import Check
 
@@ -31,7 +30,10 @@ SAME_PLACE = 1e-9
 
 
 def check_claims(plan: Plan, gain_sets: Mapping[str, GainSet]) -> tuple[Check, Check, Check]:
-    """Recompute inradius, neck, length, gains and time of every transition.
+    """Recompute inradius and gains of every transition; test neck and length.
+
+    The estimated time comes of a simulation and is no claim about safety: of all figures it alone is left to
+    the document's digest.
 
     Args:
         plan: The plan.
@@ -59,13 +61,11 @@ def check_claims(plan: Plan, gain_sets: Mapping[str, GainSet]) -> tuple[Check, C
             resting=resting,
         )
         _check_gains(transition.gains, gains, f"{where}.gains")
-        seconds = transition_time(transition.length, transition.neck, speed_per_clearance(gains))
-        _require_equal(transition.estimated_time, seconds, f"{where}.estimated_time")
         entry, resting = transition.target, 0.5 * (transition.goal_lower + transition.goal_upper)
     necks = [transition.neck for transition in plan.transitions]
     return (
         Check("some way to the target is as wide as its neck", len(necks), min(necks), "m, narrowest neck"),
-        Check("inradii, lengths and times are what they say", 3 * len(necks)),
+        Check("inradii are distances, lengths no shorter than straight lines", 2 * len(necks)),
         Check("gains follow from the cells", len(necks)),
     )
 

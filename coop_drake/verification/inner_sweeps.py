@@ -11,7 +11,7 @@ from coop_drake.geometry.pose import FloatArray
 from coop_drake.verification.outer_sweeps import hull_vertices, outer_sweep, turned
 from coop_drake.verification.solids import Solid, Stage
 
-__all__ = ["inner_sweep"]
+__all__ = ["inner_sweep", "inscribed_circle"]
 
 HAIR = 1e-8
 """Inner sweeps stay this far inside, so that rounding never carries them out [m]."""
@@ -100,10 +100,11 @@ def _cut(ring: FloatArray, normal: FloatArray, offset: float) -> FloatArray | No
     inside = height <= 0.0
     if inside.all():
         return ring
-    first = np.flatnonzero(inside & ~np.roll(inside, 1))
+    first = np.flatnonzero(inside & ~np.concatenate((inside[-1:], inside[:-1])))
     if not len(first):
         return None
-    ring, height = np.roll(ring, -first[0], axis=0), np.roll(height, -first[0])
+    order = (np.arange(len(ring)) + first[0]) % len(ring)
+    ring, height = ring[order], height[order]
     count = int(np.argmax(height > 0.0))
     ends = [(count - 1, count), (0, len(ring) - 1)]
     leave, enter = (ring[a] + (ring[b] - ring[a]) * height[a] / (height[a] - height[b]) for a, b in ends)
@@ -121,7 +122,7 @@ def _half_planes(ring: FloatArray) -> tuple[FloatArray, FloatArray]:
     return normals, np.einsum("ij,ij->i", normals, ring)
 
 
-def _circle(radius: float, tolerance: float) -> FloatArray:
+def inscribed_circle(radius: float, tolerance: float) -> FloatArray:
     """Points on a circle whose polygon leaves out no more than the tolerance, shape (k, 2)."""
     count = max(8, ceil(2.0 * pi / sqrt(8.0 * tolerance / max(radius, tolerance))))
     return radius * turned(np.array([[1.0, 0.0]]), 2.0 * pi * np.arange(count) / count)
@@ -130,7 +131,7 @@ def _circle(radius: float, tolerance: float) -> FloatArray:
 def _rounded(solid: Solid, tolerance: float) -> FloatArray:
     """Polygon inside a hull grown by a radius; it has the corners where arcs meet straight sides."""
     radius, ring = solid.radius - HAIR, solid.vertices
-    arcs = ring[:, None, :] + _circle(radius, tolerance)
+    arcs = ring[:, None, :] + inscribed_circle(radius, tolerance)
     sides = np.roll(ring, -1, axis=0) - ring
     outward = radius * np.stack((sides[:, 1], -sides[:, 0]), axis=1) / np.hypot(*sides.T)[:, None]
     corners = (ring + outward, np.roll(ring, -1, axis=0) + outward)
@@ -148,24 +149,22 @@ def _common_to_discs(centres: FloatArray, radius: float, tolerance: float) -> Fl
     room = radius**2 - np.einsum("ij,ij->i", away, away)
     if (room <= 0.0).any():
         return None
-    rays = _circle(1.0, tolerance / max(radius, tolerance))
+    rays = inscribed_circle(1.0, tolerance / max(radius, tolerance))
     along = rays @ away.T
     reach = np.sqrt(along**2 + room) - along
     nearest = np.argmin(reach, axis=1)
-    points = [middle + rays * reach.min(axis=1)[:, None]]
-    for a, b in zip(nearest, np.roll(nearest, -1), strict=True):
-        if a != b:
-            points.append(_crossings(centres[a], centres[b], radius))
-    candidates = np.concatenate(points)
+    after = np.roll(nearest, -1)
+    crossings = _crossings(centres[nearest[nearest != after]], centres[after[nearest != after]], radius)
+    candidates = np.concatenate((middle + rays * reach.min(axis=1)[:, None], crossings))
     distances = np.hypot(*(candidates[:, None, :] - centres).transpose(2, 0, 1)).max(axis=1)
     return hull_vertices(candidates[distances <= radius + 0.1 * HAIR])
 
 
 def _crossings(first: FloatArray, second: FloatArray, radius: float) -> FloatArray:
-    """Both points where circles of one radius about two centres cross, shape (2, 2)."""
+    """Both points where circles of one radius about two centres each cross; shapes (k, 2) to (2 k, 2)."""
     across = second - first
-    distance = float(np.hypot(*across))
-    height = sqrt(max(radius**2 - 0.25 * distance**2, 0.0))
-    side = height / distance * np.array([-across[1], across[0]])
+    square = np.einsum("ij,ij->i", across, across)
+    height = np.sqrt(np.maximum(radius**2 / square - 0.25, 0.0))[:, None]
+    side = height * np.stack((-across[:, 1], across[:, 0]), axis=1)
     middle = 0.5 * (first + second)
-    return np.array([middle + side, middle - side])
+    return np.concatenate((middle + side, middle - side))

@@ -6,7 +6,7 @@ from math import ceil, cos, sqrt
 
 import numpy as np
 import shapely
-from shapely import MultiPoint
+from shapely import LineString, Point
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.verification.solids import Solid, Stage
@@ -51,7 +51,8 @@ def outer_sweep(
 
 def hull_vertices(points: FloatArray) -> FloatArray:
     """Vertices of the convex hull of points; shape (k, 2) to (m, 2)."""
-    vertices: FloatArray = shapely.get_coordinates(MultiPoint(points).convex_hull)
+    chain = LineString(points) if len(points) > 1 else Point(points[0])
+    vertices: FloatArray = shapely.get_coordinates(chain.convex_hull)
     closed = len(vertices) > 1 and bool((vertices[0] == vertices[-1]).all())
     return vertices[:-1] if closed else vertices
 

@@ -11,7 +11,7 @@ import numpy as np
 from coop_drake.geometry.pose import FloatArray, PlanarPose
 from coop_drake.geometry.tree import ComponentTree, TreeJoint
 
-__all__ = ["Solid", "Stage", "colliding_pairs", "team_solids"]
+__all__ = ["Solid", "Stage", "colliding_pairs", "component_stages", "team_solids"]
 
 
 @dataclass(frozen=True)
@@ -66,13 +66,18 @@ def team_solids(tree: ComponentTree, robots: Collection[int] | None = None) -> t
         joints = _joints_to_object(tree, index)
         if robots is not None and any(joint.robot not in robots for joint in joints):
             continue
-        stages = (*[_stage(joint) for joint in joints], _THETA)
+        stages = component_stages(tree, index)
         solids += [
             Solid(body.name, index, number, np.asarray(shape.vertices, dtype=float), shape.radius, stages)
             for number, body in enumerate(component.bodies)
             for shape in body.shapes
         ]
     return tuple(solids)
+
+
+def component_stages(tree: ComponentTree, index: int) -> tuple[Stage, ...]:
+    """What moves a component: its own joint first, theta last."""
+    return (*[_stage(joint) for joint in _joints_to_object(tree, index)], _THETA)
 
 
 def colliding_pairs(

@@ -56,6 +56,4 @@ def wall_sums(starts: FloatArray, ends: FloatArray, ring: FloatArray) -> NDArray
         One convex geometry for every edge, shape (E,).
     """
     copies = np.concatenate((starts[:, None, :] - ring, ends[:, None, :] - ring), axis=1)
-    edges, points = copies.shape[:2]
-    clouds = shapely.multipoints(copies.reshape(-1, 2), indices=np.repeat(np.arange(edges), points))
-    return np.asarray(shapely.convex_hull(clouds), dtype=np.object_)
+    return np.asarray(shapely.convex_hull(shapely.linestrings(copies)), dtype=np.object_)
