@@ -18,6 +18,7 @@ from coop_drake.cli.measures import answer_of
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import summary_rows
+from coop_drake.cli.verify import verify_command
 from coop_drake.planning import Found, Plan
 
 __all__ = ["app", "main"]
@@ -88,7 +89,7 @@ def run_command(
         folder = _folder(task, out)
         result = plan_task(task, folder, reporter)
         if not isinstance(result, Found):
-            return _no_plan(task, answer_of(result), result.reason, reporter)
+            return _no_plan(task, answer_of(result), result.reason, folder, reporter)
         return _carry_out(task, result.plan, folder, reporter)
 
     run_guarded(reporter, command)
@@ -110,7 +111,7 @@ def plan_command(
         folder = _folder(task, out)
         result = plan_task(task, folder, reporter)
         if not isinstance(result, Found):
-            return _no_plan(task, answer_of(result), result.reason, reporter)
+            return _no_plan(task, answer_of(result), result.reason, folder, reporter)
         reporter.table(task.scenario.name, summary_rows(reporter.facts))
         reporter.say(f"The plan is in {escape(str(folder.plan))}")
         return ExitCode.DONE
@@ -156,13 +157,18 @@ def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
     run_guarded(reporter, command)
 
 
+app.command("verify")(verify_command)
+
+
 def _folder(task: Task, out: Path | None) -> ResultFolder:
     return ResultFolder(out if out is not None else Path("out") / task.scenario.name)
 
 
-def _no_plan(task: Task, answer: str, reason: str, reporter: Reporter) -> ExitCode:
+def _no_plan(task: Task, answer: str, reason: str, folder: ResultFolder, reporter: Reporter) -> ExitCode:
     reporter.table(task.scenario.name, summary_rows(reporter.facts))
     reporter.say(f"[bold]{answer}[/]: {escape(reason)}")
+    if folder.certificate.exists():
+        reporter.say(f"The proof is in {escape(str(folder.certificate))}")
     return ExitCode.INFEASIBLE if answer == "infeasible" else ExitCode.UNDECIDED
 
 

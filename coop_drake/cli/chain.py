@@ -25,6 +25,7 @@ from coop_drake.errors import PlanError, ScenarioError
 from coop_drake.files import write_atomically
 from coop_drake.planning import (
     Found,
+    Infeasible,
     Plan,
     PlanningProblem,
     PlanningResult,
@@ -33,6 +34,7 @@ from coop_drake.planning import (
     save_plan,
 )
 from coop_drake.planning.planner import plan
+from coop_drake.planning.separation_file import save_separation
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.scenario import Scenario, load_scenario
 from coop_drake.simulation import SimulationLog, build_maps, simulate
@@ -79,7 +81,7 @@ def load_task(path: Path, gains: str | None) -> Task:
 
 
 def plan_task(task: Task, folder: ResultFolder, reporter: Reporter) -> PlanningResult:
-    """Plan, note what it took, and write the plan if there is one."""
+    """Plan, note what it took, and write the plan, or the proof that there is none."""
     with reporter.stage("planning") as progress, _stopwatch(reporter, "planning", cpu=True):
         gain_set = task.scenario.gain_sets[task.gains]
         result = plan(task.problem, gain_set, gain_set_name=task.gains, progress=progress)
@@ -89,6 +91,8 @@ def plan_task(task: Task, folder: ResultFolder, reporter: Reporter) -> PlanningR
     if isinstance(result, Found):
         save_plan(result.plan, folder.plan)
         write_atomically(folder.table, table_1(result.plan).encode())
+    elif isinstance(result, Infeasible) and result.separation is not None:
+        save_separation(result.separation, task.problem, folder.certificate)
     return result
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 __all__ = ["ResultFolder"]
 
-_AFTER_PLANNING = ("plan.json", "table_1.md")
+_AFTER_PLANNING = ("plan.json", "certificate.json", "table_1.md")
 _AFTER_SIMULATING = ("log.npz", "transport.html", "fig[01][0-9]_*.png", "summary.png")
 
 
@@ -25,6 +25,11 @@ class ResultFolder:
     def plan(self) -> Path:
         """The plan."""
         return self.path / "plan.json"
+
+    @property
+    def certificate(self) -> Path:
+        """The proof that there is no plan."""
+        return self.path / "certificate.json"
 
     @property
     def table(self) -> Path:

@@ -1,0 +1,61 @@
+"""Verify a plan or a proof of infeasibility by an independent checker."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import process_time
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from coop_drake.cli.chain import load_task
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.reporter import Reporter
+from coop_drake.errors import RefusalError
+from coop_drake.verification import Check, verify_file
+
+__all__ = ["verify_command"]
+
+
+def verify_command(
+    certificate: Annotated[
+        Path, typer.Argument(metavar="FILE", help="plan.json or certificate.json, as `plan` wrote it.")
+    ],
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")],
+    machine: Annotated[
+        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+) -> None:
+    """Check a plan, or a proof that there is none, without anything of the search."""
+    reporter = Reporter(machine=machine, quiet=quiet)
+
+    def command() -> ExitCode:
+        task = load_task(scenario, None)
+        begun = process_time()
+        try:
+            with reporter.stage("verifying") as progress:
+                verified = verify_file(certificate, task.problem, task.scenario.gain_sets, progress)
+        except RefusalError as error:
+            reporter.facts["valid"] = False
+            reporter.complain(f"{certificate}: {error}", where=error.where, finding=error.finding)
+            return ExitCode.FAILED_RUN
+        reporter.facts.update(
+            valid=True,
+            verifying_cpu_seconds=round(process_time() - begun, 4),
+            answer=verified.answer,
+            subject=verified.subject,
+            checks=[vars(check) for check in verified.checks],
+        )
+        reporter.table(task.scenario.name, [_row(check) for check in verified.checks])
+        reporter.say(f"[bold]valid, {verified.answer}[/]: {escape(verified.subject)}")
+        return ExitCode.DONE
+
+    run_guarded(reporter, command)
+
+
+def _row(check: Check) -> tuple[str, str]:
+    tightest = "" if check.tightest is None else f", {check.tightest:.3g} {check.unit}"
+    return check.name, f"{check.count}{tightest}"
