@@ -19,6 +19,7 @@ from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import summary_rows
 from coop_drake.cli.verify import verify_command
+from coop_drake.cli.why import why_command
 from coop_drake.planning import Found, Plan
 
 __all__ = ["app", "main"]
@@ -157,6 +158,7 @@ def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
     run_guarded(reporter, command)
 
 
+app.command("why")(why_command)
 app.command("verify")(verify_command)
 
 
@@ -169,6 +171,7 @@ def _no_plan(task: Task, answer: str, reason: str, folder: ResultFolder, reporte
     reporter.say(f"[bold]{answer}[/]: {escape(reason)}")
     if folder.certificate.exists():
         reporter.say(f"The proof is in {escape(str(folder.certificate))}")
+    reporter.say(f"What blocks, and what would help: coop-drake why {escape(str(task.scenario.path))}")
     return ExitCode.INFEASIBLE if answer == "infeasible" else ExitCode.UNDECIDED
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 __all__ = ["ResultFolder"]
 
 _AFTER_PLANNING = ("plan.json", "certificate.json", "table_1.md")
+_AFTER_DIAGNOSING = ("why.png", "why.svg")
 _AFTER_SIMULATING = ("log.npz", "transport.html", "fig[01][0-9]_*.png", "summary.png")
 
 
@@ -46,6 +47,11 @@ class ResultFolder:
         """The Meshcat recording."""
         return self.path / "transport.html"
 
+    @property
+    def diagnosis(self) -> tuple[Path, Path]:
+        """The picture that says why there is no plan, for screens and for print."""
+        return self.path / "why.png", self.path / "why.svg"
+
     def make(self) -> None:
         """Make the folder."""
         self.path.mkdir(parents=True, exist_ok=True)
@@ -58,6 +64,10 @@ class ResultFolder:
     def forget_simulation(self) -> None:
         """Remove an older simulation's log, recording and figures."""
         self._remove(_AFTER_SIMULATING)
+
+    def forget_diagnosis(self) -> None:
+        """Remove an older diagnosis."""
+        self._remove(_AFTER_DIAGNOSING)
 
     def _remove(self, patterns: tuple[str, ...]) -> None:
         for pattern in patterns:

@@ -1,0 +1,71 @@
+"""The command why: says what keeps a scenario from having a plan."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import process_time
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from coop_drake.cli.chain import Task, load_task
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.results import ResultFolder
+from coop_drake.diagnosis import Answer, diagnose, diagnosis_figure, facts_of, rows_of, sentences_of
+from coop_drake.drawing import house_style, save_figure
+
+__all__ = ["why_command"]
+
+_EXIT_CODES = {
+    Answer.FOUND: ExitCode.DONE,
+    Answer.INFEASIBLE: ExitCode.INFEASIBLE,
+    Answer.UNDECIDED: ExitCode.UNDECIDED,
+}
+
+
+def why_command(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="DIR", file_okay=False, help="Where the picture goes; out/<scenario> by default."
+        ),
+    ] = None,
+    machine: Annotated[
+        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+) -> None:
+    """Say why there is no plan: what blocks, where, how much is missing, and what would help."""
+    reporter = Reporter(machine=machine, quiet=quiet)
+
+    def command() -> ExitCode:
+        task = load_task(scenario, None)
+        return _explain(
+            task, ResultFolder(out if out is not None else Path("out") / task.scenario.name), reporter
+        )
+
+    run_guarded(reporter, command)
+
+
+def _explain(task: Task, folder: ResultFolder, reporter: Reporter) -> ExitCode:
+    """Diagnose, show a table and sentences, and draw the picture if there is anything to see."""
+    before = process_time()
+    with reporter.stage("diagnosing") as progress:
+        diagnosis = diagnose(task.problem, progress)
+    reporter.facts.update(facts_of(diagnosis), diagnosis_cpu_seconds=round(process_time() - before, 4))
+    folder.forget_diagnosis()
+    with house_style():
+        figure = diagnosis_figure(task.problem, diagnosis)
+        if figure is not None:
+            for path in folder.diagnosis:
+                save_figure(figure, path)
+    reporter.table(task.scenario.name, rows_of(diagnosis))
+    for sentence in sentences_of(diagnosis):
+        reporter.say(escape(sentence))
+    if figure is not None:
+        reporter.say(f"The picture is {escape(str(folder.diagnosis[0]))}")
+    return _EXIT_CODES[diagnosis.answer]

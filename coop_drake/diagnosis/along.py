@@ -1,0 +1,40 @@
+"""Whether a given way is free: proved by boxes laid along it, whatever the way came from."""
+
+from __future__ import annotations
+
+from coop_drake.errors import GeometryError
+from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.planning import PlanningProblem
+from coop_drake.planning.certify import Certifier
+from coop_drake.planning.margins import marginal_workspace
+from coop_drake.planning.refine import configuration_scale
+from coop_drake.planning.sampler import densified
+
+__all__ = ["is_free_along"]
+
+_SPACINGS = (0.02, 0.005)
+
+
+def is_free_along(problem: PlanningProblem, way: FloatArray) -> tuple[bool, int]:
+    """Try to cover a way with free boxes, at margin zero; close samples make narrow boxes that fit better.
+
+    Args:
+        problem: The question.
+        way: Configurations from start to goal, theta unwrapped, shape (m, 3 + n) [m, rad].
+
+    Returns:
+        Whether the way is proved free (a failure proves nothing), and how many boxes were tried.
+    """
+    swept = SweptTree(problem.tree)
+    scale = configuration_scale(problem.tree)
+    try:
+        workspace = marginal_workspace(problem, 0.0)
+        certifier = Certifier(swept, BodyPairs(swept), workspace, scale, 0.0)
+        proved = any(
+            certifier.boxes(densified(way, scale, spacing), quick=True) is not None for spacing in _SPACINGS
+        )
+    except GeometryError:
+        return False, 0
+    return proved, certifier.trials

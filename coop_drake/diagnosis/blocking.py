@@ -1,0 +1,115 @@
+"""Which stretches of a way must be widened, and by how much each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from coop_drake.diagnosis.growth import Growth
+from coop_drake.diagnosis.passages import Stretch, stretches
+from coop_drake.diagnosis.trials import Answer, Trial, Trials
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning import PlanningProblem
+
+__all__ = ["Passage", "blocking_passages"]
+
+_MOST = 4
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A passage that blocks.
+
+    Attributes:
+        stretch: Where, what sticks out, at which angles.
+        enough: How far moving its walls back was found enough, the other passages widened by theirs [m].
+        refuted: How far was proved not to be enough whatever is done elsewhere up to ``enough`` there; None
+            if nothing was proved [m].
+    """
+
+    stretch: Stretch
+    enough: float
+    refuted: float | None
+
+
+@dataclass(frozen=True)
+class Growths:
+    """How far walls move back everywhere, as far as it is known.
+
+    Attributes:
+        refuted: Largest growth that was proved not to be enough, None if none was [m].
+        enough: Growth with which a channel was found [m].
+        way: A way in that channel, drawn away from the walls, shape (m, 3 + n).
+        needed: How far that way sticks out of the floor as it is [m].
+    """
+
+    refuted: float | None
+    enough: float
+    way: FloatArray
+    needed: float
+
+
+def blocking_passages(
+    problem: PlanningProblem, growth: Growth, everywhere: Growths, trials: Trials
+) -> tuple[list[Passage], bool]:
+    """Choose the stretches that have to be widened, and say by how much.
+
+    Args:
+        problem: The question with the floor as it is.
+        growth: Moves walls back.
+        everywhere: What is known about moving all walls back.
+        trials: Keeps account of the work.
+
+    Returns:
+        The passages in the order of the way, and whether widening them alone was found enough.
+    """
+    found = stretches(problem, everywhere.way)
+    choice = _Choice(problem, growth, everywhere, trials)
+    ranked = sorted(range(len(found)), key=lambda k: (-found[k].bodies[0].depth, k))
+    for count in range(1, min(len(ranked), _MOST) + 1):
+        chosen = [found[k] for k in sorted(ranked[:count])]
+        if choice.is_enough(chosen):
+            return choice.passages(chosen), True
+    return [Passage(stretch, choice.amount(stretch), None) for stretch in found], False
+
+
+class _Choice:
+    """Asks about floors that are widened round some stretches only."""
+
+    def __init__(self, problem: PlanningProblem, growth: Growth, everywhere: Growths, trials: Trials) -> None:
+        self._problem, self._growth = problem, growth
+        self._everywhere, self._trials = everywhere, trials
+
+    def amount(self, stretch: Stretch) -> float:
+        """What a stretch needs, and the same room for the boxes as the worst one has."""
+        room = self._everywhere.enough - self._everywhere.needed
+        return min(self._everywhere.enough, stretch.bodies[0].depth + room)
+
+    def is_enough(self, chosen: Sequence[Stretch]) -> bool:
+        """Whether a channel is found if these are widened; along the known way, else anywhere."""
+        question = self._widened(chosen)
+        laid = self._trials.lay(question, self._everywhere.way, "widening the passage")
+        if laid.answer is Answer.FOUND:
+            return True
+        return self._ask(question).answer is Answer.FOUND
+
+    def passages(self, chosen: Sequence[Stretch]) -> list[Passage]:
+        """The stretches that remain when those are left out that the others do without."""
+        if len(chosen) == 1:
+            return [Passage(chosen[0], self.amount(chosen[0]), self._everywhere.refuted)]
+        passages = []
+        for stretch in chosen:
+            others = [other for other in chosen if other is not stretch]
+            answer = self._ask(self._widened(others)).answer
+            if answer is Answer.FOUND:
+                return self.passages(others)
+            proved = answer is Answer.INFEASIBLE
+            passages.append(Passage(stretch, self.amount(stretch), 0.0 if proved else None))
+        return passages
+
+    def _ask(self, question: PlanningProblem) -> Trial:
+        return self._trials.ask(question, "widening the passage")
+
+    def _widened(self, chosen: Sequence[Stretch]) -> PlanningProblem:
+        zones = [(stretch.zone, self.amount(stretch)) for stretch in chosen]
+        return replace(self._problem, workspace=self._growth.around(zones))

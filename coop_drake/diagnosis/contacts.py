@@ -1,0 +1,117 @@
+"""What is in the way at one configuration: bodies that stick out of the floor, bodies that overlap."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import shapely
+from shapely import Point, Polygon
+
+from coop_drake.drawing import BodyFootprint, team_footprints
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.tree import ComponentTree
+
+__all__ = ["Contact", "Overlap", "contacts", "deepest", "overlaps"]
+
+NEGLIGIBLE = 1e-4
+"""Arcs are drawn as polygons: less than this is no contact [m]."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One body that sticks out of the floor on one side.
+
+    Attributes:
+        body: Its name.
+        robot: Its robot, None for the object.
+        depth: How far it sticks out [m].
+        point: Its point that is farthest out, shape (2,) [m].
+        wall: Point of the wall nearest to that, shape (2,) [m].
+    """
+
+    body: str
+    robot: int | None
+    depth: float
+    point: FloatArray
+    wall: FloatArray
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """Two bodies that overlap.
+
+    Attributes:
+        bodies: Their names.
+        depth: How far one would have to move to leave the other, convex piece by convex piece [m].
+    """
+
+    bodies: tuple[str, str]
+    depth: float
+
+
+def contacts(workspace: Polygon, tree: ComponentTree, configuration: FloatArray) -> list[Contact]:
+    """Bodies that stick out of the floor, one entry for each side on which they do, the deepest first.
+
+    Args:
+        workspace: The floor W [m].
+        tree: The team.
+        configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
+    """
+    found = []
+    shapely.prepare(workspace)
+    for footprint in team_footprints(tree, configuration):
+        if not workspace.covers(footprint.shape):
+            found += _outside(workspace, footprint)
+    return sorted(found, key=lambda contact: (-contact.depth, contact.body))
+
+
+def deepest(workspace: Polygon, tree: ComponentTree, configuration: FloatArray) -> float:
+    """How far the body sticks out that does so most, 0 if none does [m]; arguments as above."""
+    found = contacts(workspace, tree, configuration)
+    return found[0].depth if found else 0.0
+
+
+def _outside(workspace: Polygon, footprint: BodyFootprint) -> list[Contact]:
+    found = []
+    for part in shapely.get_parts(shapely.difference(footprint.shape, workspace)):
+        corners = shapely.get_coordinates(part)
+        depths = np.array([workspace.distance(Point(corner)) for corner in corners])
+        worst = int(np.argmax(depths))
+        if depths[worst] > NEGLIGIBLE:
+            ends = shapely.get_coordinates(shapely.shortest_line(Point(corners[worst]), workspace.boundary))
+            found.append(Contact(footprint.name, footprint.robot, float(depths[worst]), ends[0], ends[-1]))
+    return found
+
+
+def overlaps(tree: ComponentTree, configuration: FloatArray) -> list[Overlap]:
+    """Pairs of bodies that overlap but must not, the deepest first.
+
+    Args:
+        tree: The team.
+        configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
+    """
+    poses = tree.poses(configuration)
+    found = []
+    for (i, j), (k, m) in tree.collision_pairs:
+        first, second = tree.components[i].bodies[j], tree.components[k].bodies[m]
+        depth = max(
+            (
+                _depth(poses[i].apply(a.vertices), a.radius, poses[k].apply(b.vertices), b.radius)
+                for a, b in product(first.shapes, second.shapes)
+            ),
+            default=0.0,
+        )
+        if depth > NEGLIGIBLE:
+            found.append(Overlap((first.name, second.name), depth))
+    return sorted(found, key=lambda overlap: (-overlap.depth, overlap.bodies))
+
+
+def _depth(a: FloatArray, grown_a: float, b: FloatArray, grown_b: float) -> float:
+    """Depth of the overlap of two grown convex polygons: the origin's depth in their Minkowski difference."""
+    hull = shapely.MultiPoint((a[:, None, :] - b[None, :, :]).reshape(-1, 2)).convex_hull
+    origin, grown = Point(0.0, 0.0), grown_a + grown_b
+    if isinstance(hull, Polygon) and hull.covers(origin):
+        return grown + float(hull.exterior.distance(origin))
+    return max(0.0, grown - float(hull.distance(origin)))

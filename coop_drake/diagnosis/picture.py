@@ -1,0 +1,157 @@
+"""One picture that says why not: the floor, the walls that pinch, the team where it is tightest."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from shapely import Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from coop_drake.diagnosis.blocking import Passage
+from coop_drake.diagnosis.diagnosis import Diagnosis
+from coop_drake.drawing import draw_polygon, draw_workspace, new_figure, team_footprints
+from coop_drake.drawing.colours import BLUE, GREY, INK, VERMILLION
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning import PlanningProblem
+
+__all__ = ["diagnosis_figure"]
+
+_OUT = "#8b0000"
+_CALM = "#b9c4cc"
+_MOST_PANELS = 3
+_ROOM = 0.35
+
+
+def diagnosis_figure(problem: PlanningProblem, diagnosis: Diagnosis) -> Figure | None:
+    """Draw the whole floor with what blocks, and every blocking place enlarged beside it.
+
+    Args:
+        problem: The question.
+        diagnosis: Its diagnosis.
+
+    Returns:
+        The figure; None if there is nothing to show.
+    """
+    places = _places(diagnosis)
+    if not places:
+        return None
+    places = places[:_MOST_PANELS]
+    figure = new_figure(5.0 + 5.0 * len(places), 5.8, _caption(diagnosis))
+    axes = figure.subplots(1, 1 + len(places), squeeze=False)[0]
+    _overview(axes[0], problem, diagnosis, [configuration for configuration, _, _ in places])
+    for number, (ax, (configuration, bodies, passage)) in enumerate(
+        zip(axes[1:], places, strict=True), start=1
+    ):
+        _enlarged(ax, problem, configuration, bodies)
+        title = f"{number}: " if len(places) > 1 else ""
+        if passage is not None:
+            title += _mark_gap(ax, passage)
+        else:
+            title += "the goal is blocked"
+        ax.set_title(title, color=_OUT, fontweight="bold")
+    return figure
+
+
+def _places(diagnosis: Diagnosis) -> list[tuple[FloatArray, frozenset[str], Passage | None]]:
+    """Configurations to show, with the bodies at fault."""
+    if diagnosis.goal is not None:
+        goal = diagnosis.goal
+        names = {contact.body for contact in goal.contacts}
+        names.update(name for overlap in goal.overlaps for name in overlap.bodies)
+        return [(goal.configuration, frozenset(names), None)]
+    if diagnosis.passages is None:
+        return []
+    return [
+        (p.stretch.configuration, frozenset(body.name for body in p.stretch.bodies), p)
+        for p in diagnosis.passages.passages
+    ]
+
+
+def _caption(diagnosis: Diagnosis) -> str:
+    return (
+        "Bodies in orange stick out of the floor somewhere in the passage, dark red is what lies outside "
+        "where they are shown; the blue line is the object's way with the walls moved back."
+        if diagnosis.passages is not None
+        else "Bodies in orange are in the way at the goal, dark red is what lies outside the floor."
+    )
+
+
+def _overview(ax: Axes, problem: PlanningProblem, diagnosis: Diagnosis, places: list[FloatArray]) -> None:
+    draw_workspace(ax, problem.workspace)
+    if diagnosis.passages is not None and diagnosis.passages.way is not None:
+        way = diagnosis.passages.way
+        ax.plot(way[:, 0], way[:, 1], color=BLUE, linewidth=1.6, zorder=4)
+    for label, pose in (("start", problem.start), ("goal", problem.goal_pose)):
+        ax.plot(pose[0], pose[1], "o", color=INK, markersize=5, zorder=6)
+        ax.annotate(label, _xy(pose), xytext=(6, 5), textcoords="offset points", zorder=6, fontweight="bold")
+    for number, z in enumerate(places, start=1):
+        for footprint in team_footprints(problem.tree, z):
+            draw_polygon(ax, footprint.shape, facecolor=_CALM, edgecolor="none", zorder=3)
+        ax.add_patch(_ring(z, problem.tree.reach))
+        if len(places) > 1:
+            ax.annotate(
+                str(number), _xy(z), ha="center", va="center", zorder=7, color=_OUT, fontweight="bold"
+            )
+
+
+def _ring(z: FloatArray, radius: float) -> Circle:
+    return Circle((float(z[0]), float(z[1])), radius, fill=False, edgecolor=_OUT, linewidth=1.6, zorder=6)
+
+
+def _enlarged(ax: Axes, problem: PlanningProblem, z: FloatArray, bodies: frozenset[str]) -> None:
+    draw_workspace(ax, problem.workspace)
+    for footprint in team_footprints(problem.tree, z):
+        faulty = footprint.name in bodies
+        fill, edge = (VERMILLION, VERMILLION) if faulty else (_CALM, GREY)
+        draw_polygon(ax, footprint.shape, facecolor=fill, edgecolor="none", alpha=0.65, zorder=3)
+        draw_polygon(ax, footprint.shape, facecolor="none", edgecolor=edge, linewidth=1.0, zorder=4)
+        outside = footprint.shape.difference(problem.workspace)
+        for part in _areas(outside):
+            draw_polygon(ax, part, facecolor=_OUT, edgecolor=_OUT, linewidth=1.5, zorder=5)
+    reach = max(_reach(problem, z), 0.5) + _ROOM
+    ax.set_xlim(z[0] - reach, z[0] + reach)
+    ax.set_ylim(z[1] - reach, z[1] + reach)
+
+
+def _areas(shape: BaseGeometry) -> list[Polygon]:
+    return [
+        part for part in getattr(shape, "geoms", [shape]) if isinstance(part, Polygon) and not part.is_empty
+    ]
+
+
+def _reach(problem: PlanningProblem, z: FloatArray) -> float:
+    """How far the team reaches from the object's origin at a configuration [m]."""
+    centre = Point(z[:2])
+    return max(centre.hausdorff_distance(footprint.shape) for footprint in team_footprints(problem.tree, z))
+
+
+def _mark_gap(ax: Axes, passage: Passage) -> str:
+    """Draw the two wall points, the width between them and what is missing; returns the title."""
+    gap = passage.stretch.gap
+    missing = f"{2.0 * passage.enough:.3f} m more is enough"
+    if gap is None:
+        return missing
+    ax.annotate(
+        "",
+        _xy(gap.second),
+        xytext=_xy(gap.first),
+        arrowprops={"arrowstyle": "<->", "color": INK, "linewidth": 2.0, "shrinkA": 0, "shrinkB": 0},
+        zorder=7,
+    )
+    ax.plot(*np.array([gap.first, gap.second]).T, "o", color=_OUT, markersize=7, zorder=8)
+    ax.annotate(
+        f"{gap.width:.3f} m",
+        _xy(0.5 * (gap.first + gap.second)),
+        ha="center",
+        va="center",
+        zorder=9,
+        fontweight="bold",
+        bbox={"boxstyle": "round,pad=0.25", "facecolor": "white", "edgecolor": INK, "linewidth": 0.8},
+    )
+    return f"{gap.width:.3f} m wide, {missing}"
+
+
+def _xy(point: FloatArray) -> tuple[float, float]:
+    return float(point[0]), float(point[1])

@@ -1,0 +1,86 @@
+"""Varied questions put to the planner, within a budget of work, each answered in one of three ways."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import Enum
+
+from coop_drake.diagnosis.along import is_free_along
+from coop_drake.diagnosis.way import way_through
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning import Channel, PlanningProblem, find_channel
+
+__all__ = ["Answer", "Trial", "Trials"]
+
+_STEP = 0.05
+_BOXES_PER_SLICE = 20
+
+Progress = Callable[[str, float], None]
+
+
+class Answer(Enum):
+    """What is known about a question."""
+
+    FOUND = "found"
+    INFEASIBLE = "infeasible"
+    UNDECIDED = "undecided"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One question and its answer.
+
+    Attributes:
+        problem: The question.
+        answer: What was computed; INFEASIBLE is a proof.
+        way: Configurations from start to goal that are proved free, shape (m, 3 + n); None if none was found.
+    """
+
+    problem: PlanningProblem
+    answer: Answer
+    way: FloatArray | None = None
+
+
+class Trials:
+    """Asks the planner at margin zero, and keeps account of the work.
+
+    Args:
+        slices: Budget of each search, in slices.
+        total: Budget of all searches together, in slices; when it is spent everything is undecided.
+        progress: Called with a stage and the share of the total budget that is spent.
+    """
+
+    def __init__(self, slices: int, total: int, progress: Progress | None = None) -> None:
+        self._slices, self._total, self._progress = slices, total, progress
+        self.asked, self.spent = 0, 0
+
+    def ask(self, problem: PlanningProblem, stage: str) -> Trial:
+        """Ask for a channel.
+
+        Args:
+            problem: The question; its margin and its budget of slices are set here.
+            stage: What this is done for, in a few words.
+        """
+        self._tell(stage)
+        if self.spent >= self._total:
+            return Trial(problem, Answer.UNDECIDED)
+        self.asked += 1
+        settings = replace(problem.settings, margin=0.0, max_slices=self._slices)
+        question = replace(problem, settings=settings)
+        answer, report = find_channel(question, lambda _, __: self._tell(stage))
+        self.spent += max(report.slices, 1)
+        if isinstance(answer, Channel):
+            return Trial(problem, Answer.FOUND, way_through(problem, answer, _STEP))
+        return Trial(problem, Answer.INFEASIBLE if answer.proved else Answer.UNDECIDED)
+
+    def lay(self, problem: PlanningProblem, way: FloatArray, stage: str) -> Trial:
+        """Prove a given way free; a failure proves nothing."""
+        self._tell(stage)
+        free, tried = is_free_along(problem, way)
+        self.spent += tried // _BOXES_PER_SLICE
+        return Trial(problem, Answer.FOUND if free else Answer.UNDECIDED, way if free else None)
+
+    def _tell(self, stage: str) -> None:
+        if self._progress is not None:
+            self._progress(stage, min(1.0, self.spent / self._total))
