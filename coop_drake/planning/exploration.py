@@ -6,9 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cell_graph import Cell, CellGraph, Kind
 from coop_drake.planning.cells import CellMaker, Region
@@ -25,6 +27,7 @@ from coop_drake.planning.halves import Halves
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.slices import Slices, holds
 from coop_drake.planning.split_rules import Refinement, SplitRule
+from coop_drake.planning.undecided import MixedCell
 
 _FREE_TIME = 0.6
 _NARROW_TIME = 0.03
@@ -141,15 +144,34 @@ class Exploration:
         kinds = [cell.kind for cells in self.graph.by_slice.values() for cell in cells]
         return kinds.count(Kind.FREE), kinds.count(Kind.MIXED)
 
+    def over_leaves(self) -> dict[int, list[Region]]:
+        """Over-cells of every leaf by its id; none where all of it is blocked."""
+        return {
+            index: [cell.region for cell in self.graph.by_slice[index] if cell.kind is Kind.MIXED]
+            for index in self.slices.leaves()
+        }
+
+    def undecided(self, path: Sequence[Cell]) -> tuple[MixedCell, ...]:
+        """Cells of a channel that are not free, the widest first."""
+        robots = tuple(sorted({joint.robot for joint in self._problem.tree.joints}))
+        cells = [self._undecided(robots, cell) for cell in path if cell.kind is not Kind.FREE]
+        return tuple(sorted(cells, key=lambda cell: -cell.share))
+
+    def _undecided(self, robots: tuple[int, ...], cell: Cell) -> MixedCell:
+        bounds = np.array(self.slices.all[cell.slice].intervals)
+        return MixedCell(
+            robots=robots,
+            lower=bounds[:, 0].copy(),
+            upper=bounds[:, 1].copy(),
+            polygon=to_polygon(cell.region.section),
+            share=float((np.ptp(bounds, axis=1) / np.array(self.slices.axis_widths)).max()),
+            hinted=cell.kind is Kind.GUIDE,
+            finest=not self.refinement.splittable(self.slices.all[cell.slice].intervals),
+        )
+
     def widest(self, path: Sequence[Cell]) -> float:
         """Widest interval left undecided on a channel, as a fraction of its axis."""
-        whole = self.slices.axis_widths
-        return max(
-            (upper - lower) / width
-            for cell in path
-            if cell.kind is not Kind.FREE
-            for (lower, upper), width in zip(self.slices.all[cell.slice].intervals, whole, strict=True)
-        )
+        return max(cell.share for cell in self.undecided(path))
 
     def _split(self, index: int, axis: int) -> None:
         if self._watch is not None:
