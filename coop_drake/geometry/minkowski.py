@@ -11,6 +11,7 @@ from shapely.geometry.polygon import orient
 
 from coop_drake.geometry.convex import following
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.safeguards import checked_buffer, second_opinion
 
 SAFE_SIDE = 1e-6
 """How far a workspace is shrunk or grown once [m]: a hundred times the clipping library's grid."""
@@ -23,31 +24,38 @@ class FreeSpace:
     so ``W - F = (W - f) minus the union of e + (-F)`` for any f in F. Convex F makes every ``e + (-F)``
     convex. All contours go into one clipping pass: the workspace winds once, each edge's sum unwinds.
 
+    Where the clipping library fails, what is called free is too small and what is not called blocked too
+    large: nothing stands in for an under-space, another library's answer or a box for an over-space.
+
     Args:
         rings: Outer rings counter-clockwise, holes clockwise, each of shape (n, 2) [m].
+        over: Whether positions that are left out are called blocked; else those that are kept, free.
 
     Attributes:
         region: The workspace itself.
         edges: Its edges (x0, y0, x1, y1), shape (E, 4) [m].
     """
 
-    def __init__(self, rings: Sequence[FloatArray]) -> None:
-        self.rings = tuple(rings)
+    def __init__(self, rings: Sequence[FloatArray], *, over: bool = False) -> None:
+        self.rings, self._over = tuple(rings), over
         self.region = CrossSection(list(self.rings), FillRule.Positive)
         tails = [following(ring) for ring in self.rings]
         self._from = np.concatenate(self.rings) if self.rings else np.empty((0, 2))
         self._to = np.concatenate(tails) if tails else np.empty((0, 2))
         self.edges = np.hstack((self._from, self._to))
+        along = self._to - self._from
+        doubled = float((self._from[:, 0] * along[:, 1] - self._from[:, 1] * along[:, 0]).sum())
+        self._most_area = 0.5 * doubled + SAFE_SIDE * float(np.hypot(*along.T).sum())
 
     @classmethod
     def under(cls, workspace: Polygon | MultiPolygon) -> FreeSpace:
         """The workspace shrunk by a hair, so that rounding never leaves it."""
-        return cls(polygon_rings(workspace.buffer(-SAFE_SIDE, join_style="mitre")))
+        return cls(polygon_rings(checked_buffer(workspace, -SAFE_SIDE)))
 
     @classmethod
     def over(cls, workspace: Polygon | MultiPolygon) -> FreeSpace:
         """The workspace grown by a hair, so that rounding never loses a position."""
-        return cls(polygon_rings(workspace.buffer(SAFE_SIDE, join_style="mitre")))
+        return cls(polygon_rings(checked_buffer(workspace, SAFE_SIDE)), over=True)
 
     def minus(self, footprint: FloatArray) -> CrossSection:
         """Positions p with p + F inside the workspace.
@@ -55,10 +63,32 @@ class FreeSpace:
         Args:
             footprint: Convex polygon F, counter-clockwise, relative to p, shape (n, 2) [m].
         """
-        start = footprint[0]
-        contours = [ring - start for ring in self.rings]
+        try:
+            found: CrossSection | None = self._clipped(footprint)
+        except (RuntimeError, ValueError):
+            found = None
+        if found is not None and self._plausible(found, footprint[0]):
+            return found
+        return self._stand_in(footprint) if self._over else CrossSection()
+
+    def _clipped(self, footprint: FloatArray) -> CrossSection:
+        contours = [ring - footprint[0] for ring in self.rings]
         contours.extend(self._edge_sums(-footprint))
         return CrossSection(contours, FillRule.Positive)
+
+    def _plausible(self, found: CrossSection, start: FloatArray) -> bool:
+        """Whether a difference lies where it must; one that blocks everything is always asked about again."""
+        if found.is_empty():
+            return not self._over
+        x_min, y_min, x_max, y_max = found.bounds()
+        lower, upper = self._from.min(axis=0) - start, self._from.max(axis=0) - start
+        beyond = max(lower[0] - x_min, lower[1] - y_min, x_max - upper[0], y_max - upper[1])
+        return bool(beyond <= SAFE_SIDE and 0.0 <= found.area() <= self._most_area)
+
+    def _stand_in(self, footprint: FloatArray) -> CrossSection:
+        """The difference as another library sees it, or a box that holds every position there can be."""
+        rings = second_opinion(self.rings, np.stack((self._from, self._to), axis=1), footprint)
+        return CrossSection(rings, FillRule.Positive)
 
     def _edge_sums(self, convex: FloatArray) -> FloatArray:
         """Sums of every edge with a convex ring, clockwise, shape (edges, 2 n, 2).

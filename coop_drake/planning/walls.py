@@ -58,7 +58,15 @@ def walls_near(rings: Sequence[FloatArray], reach: float) -> Walls:
     Args:
         rings: Closed rings of the floor, holes too, in any direction, shape (n, 2) each [m].
         reach: How far from a place its walls are wanted [m].
+
+    Returns:
+        The walls; of a floor without rings a grid without squares, on which nothing is inside.
     """
+    if not rings:
+        none = np.empty(0, np.int64)
+        return Walls(
+            np.empty((0, 4)), np.zeros(2), 1.0, 0, 0, reach, np.zeros(1, np.int64), none, np.empty(0), none
+        )
     edges = np.concatenate([np.hstack((ring, following(ring))) for ring in rings])
     ends = edges.reshape(-1, 2)
     corner, size = ends.min(axis=0), np.ptp(ends, axis=0)

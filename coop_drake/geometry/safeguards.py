@@ -1,0 +1,64 @@
+"""What stands in where a geometry library fails: it never claims that something is free, or blocked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+from shapely.errors import ShapelyError
+from shapely.geometry.base import BaseGeometry
+
+from coop_drake.geometry.pose import FloatArray
+
+
+def checked_buffer(workspace: Polygon | MultiPolygon, distance: float) -> Polygon | MultiPolygon:
+    """Workspace grown or shrunk by a distance; where that fails, its bounding box or nothing.
+
+    Args:
+        workspace: W [m].
+        distance: Positive to enclose W, negative to stay inside it [m].
+    """
+    try:
+        result = workspace.buffer(distance, join_style="mitre")
+        nested = result.covers(workspace) if distance > 0.0 else workspace.covers(result)
+    except ShapelyError:
+        nested = False
+    if nested and isinstance(result, Polygon | MultiPolygon):
+        return result
+    if distance < 0.0 or workspace.is_empty:
+        return Polygon()
+    x_min, y_min, x_max, y_max = workspace.bounds
+    return shapely.box(x_min - distance, y_min - distance, x_max + distance, y_max + distance)
+
+
+def second_opinion(rings: Sequence[FloatArray], edges: FloatArray, footprint: FloatArray) -> list[FloatArray]:
+    """Positions p with p + F inside a floor by GEOS, or a box around all of them where GEOS fails, too.
+
+    Args:
+        rings: The floor's rings, shape (n, 2) each [m].
+        edges: All their edges, shape (E, 2, 2) [m].
+        footprint: Convex polygon F relative to p, shape (n, 2) [m].
+
+    Returns:
+        Rings, outer ones counter-clockwise, holes clockwise.
+    """
+    start = footprint[0]
+    try:
+        floor = shapely.symmetric_difference_all([Polygon(ring) for ring in rings])
+        sums = (edges[:, :, None, :] - footprint).reshape(len(edges), -1, 2)
+        walls = shapely.union_all(shapely.convex_hull(shapely.linestrings(sums)))
+        left = shapely.transform(floor, lambda points: points - start).difference(walls)
+        return [ring for part in shapely.get_parts(left) for ring in _rings(part)]
+    except (ShapelyError, ValueError):
+        corners = edges.reshape(-1, 2) - start
+        return _rings(shapely.box(*corners.min(axis=0), *corners.max(axis=0)))
+
+
+def _rings(part: BaseGeometry) -> list[FloatArray]:
+    """Rings of a polygon, the outer one counter-clockwise, holes clockwise; none of anything else."""
+    if not isinstance(part, Polygon) or part.is_empty:
+        return []
+    oriented = shapely.orient_polygons(part, exterior_cw=False)
+    return [np.asarray(ring.coords)[:-1] for ring in (oriented.exterior, *oriented.interiors)]
