@@ -1,47 +1,61 @@
-"""Attempts at a channel: sampled paths that are certified, and explorations that prove."""
+"""Attempts at a channel: paths are sampled, improved and covered with boxes; sound whatever was sampled."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from itertools import combinations, islice
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
-from shapely import MultiPolygon
+import numpy as np
 
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.band import drawn_tight
-from coop_drake.planning.boxes import make_channel
-from coop_drake.planning.cells import CellMaker, Region
+from coop_drake.planning.boxes import Box, Regions, make_channel
+from coop_drake.planning.cells import Region
 from coop_drake.planning.certify import Certifier, PathBox
 from coop_drake.planning.channel import Channel
-from coop_drake.planning.exploration import Exploration, Verdict
-from coop_drake.planning.margins import marginal_workspace, shrunk
+from coop_drake.planning.margins import exact_footprint, margins, marginal_workspace
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.refine import configuration_scale
-from coop_drake.planning.relaxation import relaxed
-from coop_drake.planning.sampler import Sampler
+from coop_drake.planning.sampler import Ladder, Sampler
 
+_CLEARANCES = (0.015, 0.002)
 _CLEARANCE_SHARE = 1.3
-_LEAST_CLEARANCE = 0.002
-_SEEDS = 4
-_SAMPLES = 8_000
+_SAMPLES = 4_000
 _GAP = 0.01
-_CANDIDATES = 2
+_FEW_MOVES, _MOVES = 600, 3_000
+_FRESH = 2
+_STEPS_UP = (1.2, 1.1)
+_STEPS_DOWN = (0.9, 0.8)
+
+Progress = Callable[[float], None]
 
 
-Box = tuple[Intervals, Region]
+@dataclass(frozen=True)
+class Chain:
+    """Boxes along a path that are proved free: a channel, but for its polygons.
+
+    Attributes:
+        boxes: From the start's to the goal's.
+        path: The path that they cover, theta unwrapped, shape (m, 3 + n).
+        margin: The margin that the path's positions keep, in every box [m].
+    """
+
+    boxes: tuple[PathBox, ...]
+    path: FloatArray
+    margin: float
 
 
 class SampledAttempts:
-    """Sample a path with some clearance, improve it, lay boxes along it: sound whatever was sampled.
+    """Find a chain of boxes at any margin first, then look for a larger margin near it.
 
     Args:
         problem: The question.
 
     Attributes:
-        slices: Boxes tried along sampled paths so far.
-        object_blocked: Whether the last samples found no way even for the object alone.
+        slices: Boxes tried so far.
+        object_blocked: How many times in a row no path was found even for the object alone.
     """
 
     def __init__(self, problem: PlanningProblem) -> None:
@@ -49,93 +63,113 @@ class SampledAttempts:
         self._swept = SweptTree(problem.tree)
         self._pairs = BodyPairs(self._swept)
         self._scale = configuration_scale(problem.tree)
-        self._last: tuple[float, FloatArray] | None = None
+        self._ladder = Ladder(problem)
+        self._inside = problem.workspace.contains(exact_footprint(problem.tree, problem.start))
+        self._tries = 0
         self.slices = 0
-        self.object_blocked = False
+        self.object_blocked = 0
 
-    def boxes(
-        self, margin: float, effort: int = 0, progress: Callable[[float], None] | None = None
-    ) -> list[Box] | None:
-        """Chain of boxes from start to goal whose cores keep the margin, or None if none was found.
+    def first(self, progress: Progress | None = None) -> Chain | None:
+        """Sample one path and cover it, at no margin; every call draws other samples, now and then more.
 
         Args:
-            margin: Margin [m].
-            effort: 0 for a first try; each step up draws other samples, and twice as many.
-            progress: Called with the share of a path that boxes cover.
+            progress: Called with the share of the sampling that is done.
         """
-        workspace = marginal_workspace(self._problem, margin)
-        certifier = Certifier(self._swept, self._pairs, workspace, self._scale, margin)
-        for clearance, path in islice(self._paths(margin, effort), _CANDIDATES):
-            self._last = (clearance, path)
-            before = certifier.trials
-            better = drawn_tight(self._problem, path, clearance, margin, _GAP)
-            chain = certifier.boxes(better, progress)
-            self._swept.forget()
-            self.slices += certifier.trials - before
-            regions = None if chain is None else self._regions(chain, workspace)
-            if regions is not None:
-                return regions
+        if not self._inside:
+            return None
+        number = self._tries
+        self._tries += 1
+        clearance = _CLEARANCES[number % len(_CLEARANCES)]
+        workspace = marginal_workspace(self._problem, clearance)
+        sampler = Sampler(self._ladder, workspace, _GAP, number, progress)
+        path = sampler.path(_SAMPLES * luby(number + 1))
+        self.object_blocked = self.object_blocked + 1 if sampler.object_blocked else 0
+        if len(path) == 0:
+            return None
+        for moves in (_FEW_MOVES, _MOVES):
+            path = drawn_tight(self._problem, path, clearance, 0.0, _GAP, moves)
+            chain = self._chain(path, 0.0, quick=True)
+            if chain is not None:
+                return chain
         return None
 
-    def _regions(self, chain: Sequence[PathBox], workspace: MultiPolygon) -> list[Box] | None:
-        """For every box all positions that are free for it and join its way's."""
-        maker = CellMaker(self._swept, self._pairs, workspace)
-        boxes: list[Box] = []
-        for box in chain:
-            regions = maker.under_cells(box.intervals)
-            region = next((r for r in regions if r.depths(box.way[[0, -1]]).min() > 0.0), None)
-            if region is None:
-                return None
-            boxes.append((box.intervals, region))
-        return boxes
+    def with_margin(
+        self, chain: Chain, tried: list[tuple[float, str]], progress: Callable[[float, float], None]
+    ) -> Chain:
+        """Look for the largest margin at which a path can be covered, best near the one that is known.
 
-    def channel(self, boxes: Sequence[Box], margin: float) -> Channel:
-        """Boxes with their full polygons and theta unwrapped."""
-        full = CellMaker(self._swept, self._pairs, self._problem.workspace)
-        angles = float(self._problem.start[2]), float(self._problem.goal_pose[2])
-        return make_channel(boxes, full, margin, *angles)
+        Args:
+            chain: Boxes at no margin.
+            tried: Takes the margins that are tried, each with its verdict.
+            progress: Called with a margin and the share of a path that is covered.
 
-    def _paths(self, margin: float, effort: int) -> Iterator[tuple[float, FloatArray]]:
-        """Candidate paths with their clearance: the one that failed at a larger margin first."""
-        if self._last is not None and effort == 0:
-            yield self._last
-        clearance = max(_CLEARANCE_SHARE * margin, _LEAST_CLEARANCE)
-        workspace = marginal_workspace(self._problem, clearance)
-        for seed in range(_SEEDS):
-            sampler = Sampler(self._problem, workspace, _GAP, seed + _SEEDS * effort)
-            path = sampler.path(_SAMPLES << effort)
-            self.object_blocked = sampler.stages == 0
-            if len(path):
-                yield clearance, path
-            if self.object_blocked:
-                return
+        Returns:
+            A chain at the margin, or at none if that is all there is.
+        """
+        for count, margin in enumerate(margins(self._problem.settings.margin)):
+            progress(margin, 0.0)
+            found = self._at(margin, chain.path, fresh=count < _FRESH, progress=progress)
+            tried.append(
+                (margin if found is None else found.margin, "not found" if found is None else "found")
+            )
+            if found is not None:
+                return found
+        path = drawn_tight(self._problem, chain.path, _CLEARANCES[-1], 0.0, _GAP, _MOVES)
+        tried.append((0.0, "found"))
+        return self._chain(path, 0.0) or self._chain(chain.path, 0.0) or chain
+
+    def _at(
+        self, margin: float, near: FloatArray, *, fresh: bool, progress: Callable[[float, float], None]
+    ) -> Chain | None:
+        """A chain at a margin or not far from it, along a path near another one or, if asked, anywhere."""
+        clearance = _CLEARANCE_SHARE * margin
+        sampler = Sampler(self._ladder, marginal_workspace(self._problem, clearance), _GAP, 0)
+        path = sampler.along(near, _SAMPLES)
+        if len(path) == 0 and fresh:
+            path = sampler.path(_SAMPLES)
+        if len(path) == 0:
+            return None
+        path = drawn_tight(self._problem, path, clearance, margin, _GAP, _MOVES)
+        chain = self._chain(path, margin, progress)
+        if chain is None:
+            smaller = (self._chain(path, share * margin, progress) for share in _STEPS_DOWN)
+            return next((less for less in smaller if less is not None), None)
+        if margin < self._problem.settings.margin:
+            larger = (self._chain(path, share * margin, progress) for share in _STEPS_UP)
+            return next((more for more in larger if more is not None), chain)
+        return chain
+
+    def _chain(
+        self,
+        path: FloatArray,
+        margin: float,
+        progress: Callable[[float, float], None] | None = None,
+        *,
+        quick: bool = False,
+    ) -> Chain | None:
+        """Cover a path with boxes that keep a margin."""
+        workspace = marginal_workspace(self._problem, margin)
+        certifier = Certifier(self._swept, self._pairs, workspace, self._scale, margin)
+        told = None if progress is None else (lambda share: progress(margin, share))
+        boxes = certifier.boxes(path, told, quick=quick)
+        self.slices += certifier.trials
+        return None if boxes is None else Chain(tuple(boxes), path, margin)
+
+    def channel(self, chain: Chain) -> Channel | None:
+        """Boxes of a chain with all positions that are free for them; None if geometry fails."""
+        regions = Regions(self._problem, self._swept, self._pairs, chain.margin)
+        boxes = [regions.around(box) for box in chain.boxes]
+        held = [box for box in boxes if box is not None]
+        return (
+            make_channel(self._problem, held, chain.margin, chain.path) if len(held) == len(boxes) else None
+        )
+
+    def channel_of(self, boxes: Sequence[tuple[Intervals, Region]]) -> Channel:
+        """The channel of boxes that an exploration found, at no margin."""
+        return make_channel(self._problem, [Box(*box, core=box[1]) for box in boxes], 0.0, None)
 
 
-def refuted_relaxation(problem: PlanningProblem, budget: int) -> tuple[str | None, int]:
-    """Look for a proof of infeasibility with some of the robots left out.
-
-    Args:
-        problem: The question, whose margin is zero.
-        budget: Slices that each relaxation may make.
-
-    Returns:
-        What is infeasible, in words, or None; and the slices made.
-    """
-    robots = sorted({joint.robot for joint in problem.tree.joints})
-    slices = 0
-    for count in range(len(robots)):
-        for chosen in combinations(robots, count):
-            question, _ = relaxed(problem, chosen)
-            outcome = explorer(question).run(budget)
-            slices += outcome.slices
-            if outcome.verdict is Verdict.INFEASIBLE:
-                return "the object " + (
-                    "alone" if not chosen else f"with robots {list(chosen)} alone"
-                ), slices
-    return None, slices
-
-
-def explorer(problem: PlanningProblem) -> Exploration:
-    """An exploration by cells at margin zero: complete, and the only source of proofs."""
-    swept = SweptTree(problem.tree)
-    return Exploration(problem, shrunk(problem.workspace, 0.0), swept, BodyPairs(swept))
+def luby(number: int) -> int:
+    """Luby's budgets for restarts: 1 1 2 1 1 2 4 and so on, counted from 1."""
+    size = int(np.log2(number + 1))
+    return 1 << size - 1 if number + 1 == 1 << size else luby(number + 1 - (1 << size))

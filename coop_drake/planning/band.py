@@ -16,11 +16,15 @@ from coop_drake.planning.walls import FAR, walls_for
 _LEAST_ROOM = 0.005
 _SPACING = 0.05
 _PRICE = 0.006
-_MOVES = 4_000
 
 
 def drawn_tight(
-    problem: PlanningProblem, path: FloatArray, clearance: float, margin: float, gap: float
+    problem: PlanningProblem,
+    path: FloatArray,
+    clearance: float,
+    margin: float,
+    gap: float,
+    moves: int = 4_000,
 ) -> FloatArray:
     """Improve a path; start and goal stay, joints that are free at the goal may end elsewhere.
 
@@ -30,6 +34,7 @@ def drawn_tight(
         clearance: Distance from the walls that the path keeps and will keep [m].
         margin: Margin that the boxes must keep; clearance above it is what they can use [m].
         gap: Distance that pairs of bodies keep [m].
+        moves: Changes that are tried.
     """
     tree = problem.tree
     scale = configuration_scale(tree)
@@ -46,6 +51,6 @@ def drawn_tight(
         scale,
         gap,
         all(value is None for value in problem.goal_joints),
-        np.random.default_rng(0).random((_MOVES, 5)),
+        np.random.default_rng(0).random((moves, 5)),
     )
     return better

@@ -1,20 +1,75 @@
-"""From free cells to boxes: unwrapped theta, full polygons at margin zero, cores at the margin."""
+"""From free boxes along a path to a channel: unwrapped theta, full polygons, cores at the margin."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 
 import numpy as np
-import shapely
-from shapely import Polygon
 
-from coop_drake.geometry.minkowski import to_polygon
-from coop_drake.geometry.swept_tree import Interval, Intervals
+from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.minkowski import FreeSpace, to_polygon
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.swept_tree import Interval, Intervals, SweptTree
 from coop_drake.planning.cells import CellMaker, Region
+from coop_drake.planning.certify import PathBox
 from coop_drake.planning.channel import Channel, FreeBox
+from coop_drake.planning.margins import disc_polygon, is_patched, marginal_workspace
+from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.shortcuts import without_detours
 from coop_drake.planning.slices import nearest_turn
+
+
+@dataclass(frozen=True)
+class Box:
+    """A free box with its positions.
+
+    Attributes:
+        intervals: Expanded intervals of (theta, q...).
+        full: Positions that are free at no margin.
+        core: Those of them that keep the margin.
+    """
+
+    intervals: Intervals
+    full: Region
+    core: Region
+
+
+class Regions:
+    """Finds the positions of boxes along a path.
+
+    Args:
+        problem: The question.
+        swept: Sweeps of its tree.
+        pairs: Self-collision of its tree.
+        margin: Margin that cores keep [m].
+    """
+
+    def __init__(self, problem: PlanningProblem, swept: SweptTree, pairs: BodyPairs, margin: float) -> None:
+        self._margin = margin
+        self._full = CellMaker(swept, pairs, problem.workspace)
+        self._core: CellMaker | None = None
+        if margin > 0.0 and is_patched(problem, margin):
+            self._core = CellMaker(swept, pairs, marginal_workspace(problem, margin))
+
+    def around(self, box: PathBox) -> Box | None:
+        """The positions that are joined to those of a box's way; None if geometry fails."""
+        full = _joined(self._full.under_cells(box.intervals), box)
+        if full is None:
+            return None
+        if self._margin == 0.0:
+            return Box(box.intervals, full, full)
+        if self._core is not None:
+            core = _joined(self._core.under_cells(box.intervals), box)
+        else:
+            section = FreeSpace(full.rings).minus(disc_polygon(self._margin))
+            core = _joined([Region.of(part) for part in section.decompose()], box)
+        return None if core is None else Box(box.intervals, full, core)
+
+
+def _joined(regions: Sequence[Region], box: PathBox) -> Region | None:
+    ends = box.way[[0, -1]]
+    return next((region for region in regions if region.depths(ends).min() > 0.0), None)
 
 
 def unwrapped(intervals: Sequence[Intervals], start_angle: float) -> list[Intervals]:
@@ -32,45 +87,26 @@ def unwrapped(intervals: Sequence[Intervals], start_angle: float) -> list[Interv
 
 
 def make_channel(
-    boxes: Sequence[tuple[Intervals, Region]],
-    full: CellMaker,
-    margin: float,
-    start_angle: float,
-    goal_angle: float,
+    problem: PlanningProblem, boxes: Sequence[Box], margin: float, path: FloatArray | None
 ) -> Channel:
-    """Leave out boxes that are detours and give the others their full polygons back.
+    """Join boxes to a channel and leave out those that are detours.
 
     Args:
-        boxes: Expanded intervals and the core of each box.
-        full: Cells in the workspace without margin.
+        problem: The question.
+        boxes: Free boxes, consecutive ones overlap.
         margin: The margin that the cores keep [m].
-        start_angle: Theta at the start [rad].
-        goal_angle: Theta at the goal, any turn [rad].
+        path: The path that they were laid along, if any, shape (m, 3 + n).
     """
-    turned = unwrapped([intervals for intervals, _ in boxes], start_angle)
-    cores = [
+    turned = unwrapped([box.intervals for box in boxes], float(problem.start[2]))
+    free = tuple(
         FreeBox(
-            polygon=polygon,
-            core=polygon,
+            polygon=to_polygon(box.full.section),
+            core=to_polygon(box.core.section),
             lower=np.array([lower for lower, _ in angles]),
             upper=np.array([upper for _, upper in angles]),
         )
-        for polygon, angles in zip([to_polygon(core.section) for _, core in boxes], turned, strict=True)
-    ]
-    middle = 0.5 * (cores[-1].lower[0] + cores[-1].upper[0])
-    goal = float(middle + nearest_turn(goal_angle - middle))
-    kept = {id(box) for box in without_detours(Channel(tuple(cores), margin, goal)).boxes}
-    free = [
-        replace(box, polygon=_surrounding(full, intervals, core))
-        for box, (intervals, core) in zip(cores, boxes, strict=True)
-        if id(box) in kept
-    ]
-    return Channel(tuple(free), margin, goal)
-
-
-def _surrounding(full: CellMaker, intervals: Intervals, core: Region) -> Polygon:
-    """The component of the free region at margin zero that the core lies in."""
-    inside = to_polygon(core.section)
-    candidates = [to_polygon(region.section) for region in full.under_cells(intervals) if region.meets(core)]
-    best = max(candidates, key=lambda polygon: shapely.area(shapely.intersection(polygon, inside)))
-    return best
+        for box, angles in zip(boxes, turned, strict=True)
+    )
+    middle = 0.5 * (free[-1].lower[0] + free[-1].upper[0])
+    goal = float(middle + nearest_turn(float(problem.goal_pose[2]) - middle))
+    return without_detours(Channel(free, margin, goal, path))

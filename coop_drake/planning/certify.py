@@ -16,8 +16,10 @@ from coop_drake.planning.box_kernels import BoxArrays, longest_box, padded
 from coop_drake.planning.sampler import densified
 from coop_drake.planning.walls import Walls, walls_under
 
-_LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001))
+_LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.0003))
 _RESOLUTION = 0.02
+_FINEST = 0.002
+_FINER = 4
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,8 @@ class Certifier:
     """Lays boxes along paths in one workspace.
 
     A box is sound whatever path it was laid for: its over-swept footprint touches no wall along its way and
-    no two bodies touch. Consecutive boxes share a sample of the path, padded in every angle.
+    no two bodies touch. Consecutive boxes share a sample of the path, padded in every angle. Where no box
+    holds two samples, closer ones are taken.
 
     Args:
         swept: Sweeps of the team's pieces.
@@ -80,7 +83,10 @@ class Certifier:
         while i < len(samples) - 1:
             found = self._longest(samples, i, quick)
             if found is None:
-                return None
+                if np.abs((samples[i + 1] - samples[i]) * self._scale).max() < _FINEST:
+                    return None
+                samples = _finer(samples, i)
+                continue
             i, box = found
             chain.append(box)
             if progress is not None:
@@ -102,6 +108,13 @@ class Certifier:
                 intervals = tuple((float(a), float(b)) for a, b in zip(lower, upper, strict=True))
                 return j, PathBox(intervals, part[:, :2].copy())
         return None
+
+
+def _finer(samples: FloatArray, i: int) -> FloatArray:
+    """Samples with more of them between one and the next."""
+    share = np.arange(1, _FINER)[:, None] / _FINER
+    between = samples[i] + share * (samples[i + 1] - samples[i])
+    return np.concatenate((samples[: i + 1], between, samples[i + 1 :]))
 
 
 def box_arrays(swept: SweptTree, pairs: BodyPairs) -> BoxArrays:

@@ -1,12 +1,14 @@
-"""A channel: the chain of free boxes that a search returns, before it is made ready to execute."""
+"""What a search returns: a channel, the chain of free boxes before it is made ready to execute, or none."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from shapely import Polygon
 
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning.separation import Separation
+from coop_drake.planning.undecided import MixedCell
 
 
 @dataclass(frozen=True)
@@ -34,11 +36,31 @@ class Channel:
         boxes: From the box that holds the start to the one that holds the goal.
         margin: The margin rho that the cores keep [m].
         goal_angle: The goal's theta, unwrapped along the boxes [rad].
+        path: The path that the boxes were laid along, theta unwrapped like theirs, shape (m, 3 + n); None if
+            they were not laid along any.
     """
 
     boxes: tuple[FreeBox, ...]
     margin: float
     goal_angle: float
+    path: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class NoChannel:
+    """No channel was found.
+
+    Attributes:
+        proved: True if none exists, False if the work or the resolution ended first.
+        reason: Why, in a sentence.
+        separation: The proof in a form that can be checked again, where there is one.
+        mixed: Where nothing was proved: what the last exploration left undecided, the widest first.
+    """
+
+    proved: bool
+    reason: str
+    separation: Separation | None = None
+    mixed: tuple[MixedCell, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -52,6 +74,8 @@ class SearchReport:
         mixed_cells: Undecided over-cells left in the last attempt.
         margins: Margins tried, in order, each with its verdict.
         resolution: For an undecided answer: the widest slice left on the channel, as a fraction of its axis.
+        first_plan_cpu_seconds: Processor time until a channel was certified, whatever its margin, None if
+            none was [s]. It decides nothing and makes no difference between reports.
     """
 
     slices: int
@@ -59,3 +83,4 @@ class SearchReport:
     mixed_cells: int
     margins: tuple[tuple[float, str], ...]
     resolution: float | None = None
+    first_plan_cpu_seconds: float | None = field(default=None, compare=False)

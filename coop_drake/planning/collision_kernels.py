@@ -9,7 +9,7 @@ import numpy as np
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.team_arrays import TeamArrays
-from coop_drake.planning.walls import Walls, crosses, point_segment, square_at
+from coop_drake.planning.walls import Walls, crosses, point_segment
 
 
 @numba.njit(cache=True, error_model="numpy", inline="always")

@@ -21,23 +21,30 @@ SMALLEST_MARGIN = 0.005
 
 _OCTAGON = normals(np.arange(0.5, 8.0, dtype=np.float64) * (pi / 4.0)) / np.cos(pi / 8.0)
 _SHARE = 0.2
+_CLOSE = 1.1
+_NEXT_SHARE = 0.7
 
 
 def margins(first: float) -> Iterator[float]:
-    """The margins to try: the first, halved while worth it, then 0 [m]."""
+    """The margins to try: the first, then seven tenths of each while worth it [m]."""
     margin = first
     while margin >= SMALLEST_MARGIN:
         yield margin
-        margin *= 0.5
-    yield 0.0
+        margin *= _NEXT_SHARE
 
 
 def shrunk(workspace: Polygon, margin: float) -> MultiPolygon:
     """Workspace without its points nearer than the margin to a wall, corners by an octagon about the disc."""
     if margin <= 0.0:
         return MultiPolygon([workspace])
-    section = FreeSpace(polygon_rings(workspace)).minus(margin * _OCTAGON)
+    section = FreeSpace(polygon_rings(workspace)).minus(disc_polygon(margin))
     return MultiPolygon([to_polygon(part) for part in section.decompose() if not part.is_empty()])
+
+
+def disc_polygon(radius: float) -> FloatArray:
+    """Octagon about a disc, shape (8, 2) [m]."""
+    octagon: FloatArray = radius * _OCTAGON
+    return octagon
 
 
 def marginal_workspace(problem: PlanningProblem, margin: float) -> MultiPolygon:
@@ -47,16 +54,26 @@ def marginal_workspace(problem: PlanningProblem, margin: float) -> MultiPolygon:
     start near a wall does not forbid a margin everywhere else.
     """
     result = shrunk(problem.workspace, margin)
-    for footprint in (_start_footprint(problem), _goal_footprint(problem)):
-        clearance = float(problem.workspace.exterior.distance(footprint))
-        clearance = min(
-            [clearance, *[float(ring.distance(footprint)) for ring in problem.workspace.interiors]]
-        )
-        if clearance < 1.1 * margin and problem.workspace.contains(footprint):
+    for footprint, clearance in _ends(problem):
+        if clearance < _CLOSE * margin and problem.workspace.contains(footprint):
             own = shrunk(problem.workspace, _SHARE * clearance)
             patch = own.intersection(footprint.buffer(2.0 * margin, quad_segs=2))
             result = _areas(shapely.union(result, patch))
     return result
+
+
+def is_patched(problem: PlanningProblem, margin: float) -> bool:
+    """Whether start or goal stand closer to a wall than a margin allows, so that they get a patch."""
+    return any(
+        clearance < _CLOSE * margin and problem.workspace.contains(footprint)
+        for footprint, clearance in _ends(problem)
+    )
+
+
+def _ends(problem: PlanningProblem) -> list[tuple[BaseGeometry, float]]:
+    """Footprints at start and goal with their clearance [m]."""
+    footprints = _start_footprint(problem), _goal_footprint(problem)
+    return [(footprint, float(problem.workspace.boundary.distance(footprint))) for footprint in footprints]
 
 
 def _areas(shape: BaseGeometry) -> MultiPolygon:

@@ -58,4 +58,10 @@ def plan(
 
 def _added(before: SearchReport, latest: SearchReport) -> SearchReport:
     """The latest report with the work of the earlier attempts added."""
-    return replace(latest, slices=before.slices + latest.slices, margins=before.margins + latest.margins)
+    first = before.first_plan_cpu_seconds
+    return replace(
+        latest,
+        slices=before.slices + latest.slices,
+        margins=before.margins + latest.margins,
+        first_plan_cpu_seconds=latest.first_plan_cpu_seconds if first is None else first,
+    )

@@ -1,158 +1,256 @@
-"""Candidate paths by sampling, robots added one by one: the arm ladder."""
+"""Candidate paths by sampling: a disc, the object, each robot alone, and robots added hardest first."""
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
-from shapely import MultiPolygon
+from shapely import MultiPoint, MultiPolygon, maximum_inscribed_circle
 
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape
 from coop_drake.planning.collision_kernels import is_free
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.refine import configuration_scale
 from coop_drake.planning.relaxation import relaxed
-from coop_drake.planning.team_arrays import team_arrays
-from coop_drake.planning.tree_kernels import chain_is_free, connect
-from coop_drake.planning.walls import walls_for
+from coop_drake.planning.team_arrays import TeamArrays, team_arrays
+from coop_drake.planning.tree_kernels import connect, shortened
+from coop_drake.planning.walls import Walls, walls_for
 
 _STEP = 0.03
 _SPREAD_POSITION = 0.3
 _SPREAD_ANGLE = 0.5
 _ROOTS = 24
+_SHORTCUTS = 100
+_SPACING = 0.1
 _NO_PATH = np.empty((0, 3))
+
+
+@dataclass(frozen=True)
+class Guide:
+    """A path of some of the robots to sample around.
+
+    Attributes:
+        path: Configurations, shape (m, 3 + k).
+        joints: For each of its joints the index of that joint in the whole q.
+        turned: Whether theta means anything along it.
+    """
+
+    path: FloatArray
+    joints: tuple[int, ...]
+    turned: bool = True
+
+
+class Stage:
+    """A question laid out for the kernels.
+
+    Args:
+        question: The whole question or a relaxation of it.
+        joints: For each of its joints the index of that joint in the whole q.
+    """
+
+    def __init__(self, question: PlanningProblem, joints: tuple[int, ...]) -> None:
+        self.question, self.joints = question, joints
+        self.team: TeamArrays = team_arrays(question.tree)
+        self.scale = configuration_scale(question.tree)
+        self.start = question.start.astype(float)
+
+
+class Ladder:
+    """Stages of one question, made once for all samplers."""
+
+    def __init__(self, problem: PlanningProblem) -> None:
+        self.robots = tuple(sorted({joint.robot for joint in problem.tree.joints}))
+        self._problem = problem
+        self._stages: dict[tuple[int, ...], Stage] = {}
+        self.disc = Stage(_disc_question(relaxed(problem, ())[0]), ())
+
+    def stage(self, robots: tuple[int, ...]) -> Stage:
+        """The stage with some of the robots, in ascending order."""
+        if robots not in self._stages:
+            self._stages[robots] = Stage(*relaxed(self._problem, robots))
+        return self._stages[robots]
 
 
 class Sampler:
     """Looks for a path of configurations that stay in a workspace; deterministic for a seed.
 
     Args:
-        problem: The whole question.
+        ladder: The question.
         workspace: Floor with the wanted clearance taken off [m].
         gap: Distance that pairs of bodies keep [m].
         seed: Seed of the samples.
+        progress: Called with the share of the ladder that is done.
 
     Attributes:
-        stages: Robots that the last call of ``path`` had a path for before it ended.
+        object_blocked: Whether no path was found even for the object alone.
     """
 
-    def __init__(self, problem: PlanningProblem, workspace: MultiPolygon, gap: float, seed: int) -> None:
-        self._problem, self._gap = problem, gap
-        self._walls = walls_for(workspace, team_arrays(problem.tree))
+    def __init__(
+        self,
+        ladder: Ladder,
+        workspace: MultiPolygon,
+        gap: float,
+        seed: int,
+        progress: Callable[[float], None] | None = None,
+    ) -> None:
+        self._ladder, self._gap = ladder, gap
+        self._walls: Walls = walls_for(workspace, ladder.stage(ladder.robots).team)
         self._bounds = workspace.bounds
         self._random = np.random.default_rng(seed)
-        self.stages = 0
+        self._tell = progress
+        self.object_blocked = False
 
     def path(self, samples: int) -> FloatArray:
         """Path from start to goal, theta unwrapped, shape (m, 3 + n); no rows if none was found.
 
-        The object goes first; each robot is added with samples around the path of those before.
+        A disc inside the object goes first, then the object around the disc's path, then each robot around
+        the object's; the more samples it takes the harder the robot. Robots are added hardest first, around
+        the path of those before.
 
         Args:
-            samples: Samples spent at most on each stage.
+            samples: Samples drawn at most for each stage.
         """
-        robots = sorted({joint.robot for joint in self._problem.tree.joints})
-        guide = _NO_PATH
-        known: tuple[int, ...] = ()
-        for count in range(len(robots) + 1):
-            self.stages = count
-            question, joints = relaxed(self._problem, robots[:count])
-            found = self._stage(question, joints, guide, known, samples)
-            if len(found) == 0:
-                return found
-            guide, known = found, joints
-        return guide
+        robots, stage = self._ladder.robots, self._ladder.stage
+        steps = 2 + 2 * len(robots)
+        disc, _ = self._guide(self._ladder.disc, None, samples)
+        self._told(1 / steps)
+        best, _ = self._guide(stage(()), None if disc is None else replace(disc, turned=False), samples)
+        self.object_blocked = best is None
+        alone: list[tuple[int, int, Guide]] = []
+        for robot in robots if best is not None else ():
+            self._told((2 + len(alone)) / steps)
+            guide, effort = self._guide(stage((robot,)), best, samples)
+            if guide is None:
+                return _NO_PATH
+            alone.append((-effort, robot, guide))
+        alone.sort(key=lambda entry: entry[:2])
+        added: tuple[int, ...] = ()
+        for _, robot, guide in alone:
+            added = tuple(sorted((*added, robot)))
+            self._told((1 + len(robots) + len(added)) / steps)
+            best = guide if len(added) == 1 else self._guide(stage(added), best, samples)[0]
+            if best is None:
+                return _NO_PATH
+        return _NO_PATH if best is None else best.path
 
-    def _stage(
-        self,
-        question: PlanningProblem,
-        joints: tuple[int, ...],
-        guide: FloatArray,
-        known: tuple[int, ...],
-        samples: int,
-    ) -> FloatArray:
-        tree = question.tree
-        team = team_arrays(tree)
-        scale = configuration_scale(tree)
+    def along(self, path: FloatArray, samples: int) -> FloatArray:
+        """Path of the whole team near another one; no rows if none was found.
+
+        Args:
+            path: Configurations to sample around, shape (m, 3 + n).
+            samples: Samples drawn at most.
+        """
+        stage = self._ladder.stage(self._ladder.robots)
+        found, _ = self._guide(stage, Guide(path, stage.joints), samples)
+        return _NO_PATH if found is None else found.path
+
+    def _guide(self, stage: Stage, around: Guide | None, samples: int) -> tuple[Guide | None, int]:
+        """Path of a stage, sampled around another one's, and the samples drawn for it."""
+        guide, spread = _corridor(stage, around)
+        if not is_free(stage.team, self._walls, stage.start, self._gap):
+            return None, 0
+        roots = self._goals(stage)
+        if len(roots) == 0:
+            return None, 0
+        path, drawn = self._connect(stage, roots, guide, spread, samples)
+        return (Guide(self._shortened(stage, path), stage.joints) if len(path) else None), drawn
+
+    def _connect(
+        self, stage: Stage, roots: FloatArray, guide: FloatArray, spread: FloatArray, samples: int
+    ) -> tuple[FloatArray, int]:
+        tree = stage.question.tree
         lower = np.array([*self._bounds[:2], -np.pi, *tree.joint_lower])
         upper = np.array([*self._bounds[2:], np.pi, *tree.joint_upper])
-        size = len(lower)
-        around = np.zeros((0, size))
-        spread = np.zeros(size)
-        if len(guide):
-            dense = densified(guide, np.ones(guide.shape[1]), 0.1)
-            around = np.zeros((len(dense), size))
-            around[:, :3] = dense[:, :3]
-            spread[:2], spread[2] = _SPREAD_POSITION, _SPREAD_ANGLE
-            for place, joint in enumerate(known):
-                here = 3 + joints.index(joint)
-                around[:, here] = dense[:, 3 + place]
-                spread[here] = _SPREAD_ANGLE
-        roots = self._goals(question, around)
-        if len(roots) == 0 or not is_free(team, self._walls, question.start, self._gap):
-            return np.empty((0, size))
-        uniforms = self._random.random((samples, 2 + size))
-        path: FloatArray = connect(
-            team,
+        uniforms = self._random.random((samples, 2 + len(lower)))
+        path, drawn = connect(
+            stage.team,
             self._walls,
-            question.start.astype(float),
+            stage.start,
             roots,
-            around,
+            guide,
             spread,
             lower,
             upper,
-            scale,
+            stage.scale,
             self._gap,
             _STEP,
             uniforms,
         )
-        if len(path) == 0:
-            return path
-        return self._shortened(question, path, scale)
+        return path, drawn
 
-    def _goals(self, question: PlanningProblem, around: FloatArray) -> FloatArray:
+    def _goals(self, stage: Stage) -> FloatArray:
         """Free goal configurations: fixed joints as asked, free ones at random."""
-        tree = question.tree
-        team = team_arrays(tree)
-        lower, upper = tree.joint_lower, tree.joint_upper
+        question = stage.question
+        lower, upper = question.tree.joint_lower, question.tree.joint_upper
         roots: list[FloatArray] = []
         free = [i for i, value in enumerate(question.goal_joints) if value is None]
-        for attempt in range(40 * _ROOTS if free else 1):
-            joints = np.array([0.0 if value is None else value for value in question.goal_joints])
+        fixed = [0.0 if value is None else value for value in question.goal_joints]
+        for _ in range(40 * _ROOTS if free else 1):
+            joints = np.array(fixed)
             if free:
-                u = self._random.random(len(free))
-                joints[free] = lower[free] + u * (upper - lower)[free]
-            del attempt
+                joints[free] = lower[free] + self._random.random(len(free)) * (upper - lower)[free]
             z = np.concatenate((question.goal_pose, joints))
-            if is_free(team, self._walls, z, self._gap):
+            if is_free(stage.team, self._walls, z, self._gap):
                 roots.append(z)
             if len(roots) == _ROOTS:
                 break
-        return np.array(roots).reshape(-1, 3 + len(tree.joints))
+        return np.array(roots).reshape(-1, 3 + len(lower))
 
-    def _shortened(self, question: PlanningProblem, path: FloatArray, scale: FloatArray) -> FloatArray:
-        """Straighten a path: first all axes together, then one by one."""
-        team = team_arrays(question.tree)
-        path = densified(path, scale, 0.1)
-        for attempt in range(150):
-            if len(path) < 3:
-                break
-            i, j = np.sort(self._random.integers(0, len(path), 2))
-            if j - i < 2:
-                continue
-            axes = slice(None) if attempt % 3 == 0 else [int(self._random.integers(2, path.shape[1]))]
-            part = path[i : j + 1].copy()
-            share = np.linspace(0.0, 1.0, j - i + 1)[:, None]
-            part[:, axes] = (path[i] + share * (path[j] - path[i]))[:, axes]
-            if chain_is_free(team, self._walls, part, self._gap, scale, _STEP):
-                path[i : j + 1] = part
-        return path
+    def _shortened(self, stage: Stage, path: FloatArray) -> FloatArray:
+        uniforms = self._random.random((_SHORTCUTS, 3))
+        path = densified(path, stage.scale, _SPACING)
+        better: FloatArray = shortened(stage.team, self._walls, path, stage.scale, self._gap, _STEP, uniforms)
+        return better
+
+    def _told(self, share: float) -> None:
+        if self._tell is not None:
+            self._tell(share)
+
+
+def _corridor(stage: Stage, around: Guide | None) -> tuple[FloatArray, FloatArray]:
+    """Configurations to sample around and how far, zero for axes that the guide does not know."""
+    size = 3 + len(stage.joints)
+    spread = np.zeros(size)
+    if around is None:
+        return np.zeros((0, size)), spread
+    dense = densified(around.path, np.ones(around.path.shape[1]), _SPACING)
+    guide = np.zeros((len(dense), size))
+    columns = [0, 1, 2, *[3 + stage.joints.index(joint) for joint in around.joints]]
+    guide[:, columns] = dense
+    if not around.turned:
+        columns.remove(2)
+    spread[columns] = _SPREAD_ANGLE
+    spread[:2] = _SPREAD_POSITION
+    return guide, spread
+
+
+def _disc_question(question: PlanningProblem) -> PlanningProblem:
+    """The question for the largest disc inside one piece of the object: what blocks it blocks the team."""
+    bodies = [body for body in question.tree.components[0].bodies if body.robot is None]
+    discs = [_inscribed(shape) for body in bodies for shape in body.shapes]
+    body = Body("disc", None, (max(discs, key=lambda disc: disc.radius),))
+    tree = ComponentTree((Component("disc", None, None, (body,)),), frozenset())
+    return replace(question, tree=tree)
+
+
+def _inscribed(shape: ConvexShape) -> ConvexShape:
+    """A disc inside a convex piece."""
+    hull = MultiPoint(shape.vertices).convex_hull
+    if hull.area == 0.0:
+        return ConvexShape(shape.vertices.mean(axis=0, keepdims=True), shape.radius)
+    line = maximum_inscribed_circle(hull, tolerance=1e-3 * hull.length)
+    return ConvexShape(np.array(line.coords[:1]), 0.98 * line.length + shape.radius)
 
 
 def densified(path: FloatArray, scale: FloatArray, step: float) -> FloatArray:
     """The same path with no two neighbours further apart than a step in any scaled axis; shape (m, d)."""
-    parts = [path[:1]]
-    for first, last in pairwise(path):
-        count = max(1, int(np.ceil(np.abs((last - first) * scale).max() / step)))
-        parts.append(first + (last - first) * (np.arange(1, count + 1) / count)[:, None])
-    return np.concatenate(parts)
+    if len(path) < 2:
+        return path.copy()
+    moved = np.abs(np.diff(path, axis=0) * scale).max(axis=1)
+    parts = np.maximum(1, np.ceil(moved / step)).astype(int)
+    rows = np.repeat(np.arange(len(parts)), parts)
+    share = (np.arange(len(rows)) - np.repeat(np.cumsum(parts) - parts, parts) + 1.0) / parts[rows]
+    dense: FloatArray = path[rows] + share[:, None] * (path[rows + 1] - path[rows])
+    return np.concatenate((path[:1], dense))

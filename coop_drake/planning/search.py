@@ -1,139 +1,143 @@
-"""Find a channel of free boxes from start to goal, or prove that there is none: margin first (rule 1)."""
+"""Find a channel of free boxes from start to goal, or prove that there is none; then margin first (rule 1)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from time import process_time
 
-from coop_drake.planning.attempts import SampledAttempts, explorer, refuted_relaxation
-from coop_drake.planning.channel import Channel, SearchReport
-from coop_drake.planning.exploration import Exploration, Outcome, Verdict
+from coop_drake.planning.attempts import Chain, SampledAttempts
+from coop_drake.planning.channel import Channel, NoChannel, SearchReport
+from coop_drake.planning.events import Watch
+from coop_drake.planning.exploration import Verdict
 from coop_drake.planning.goals import blocked_goal
-from coop_drake.planning.margins import margins
 from coop_drake.planning.problem import PlanningProblem
-from coop_drake.planning.relaxation import relaxed
-from coop_drake.planning.separation import Separation
+from coop_drake.planning.proofs import Proofs
 
 Progress = Callable[[str, float], None]
-_RELAXED_SHARE = 2
-_FIRST_SHARE = 500
-
-
-@dataclass(frozen=True)
-class NoChannel:
-    """No channel was found.
-
-    Attributes:
-        proved: True if none exists, False if the work or the resolution ended first.
-        reason: Why, in a sentence.
-        separation: The proof in a form that can be checked again, where there is one.
-    """
-
-    proved: bool
-    reason: str
-    separation: Separation | None = None
+_TRIES = 4
+_OBJECT_TRIES = 2
+_OBJECT_SHARE = 2
+_FIRST_SHARE = 250
 
 
 def find_channel(
-    problem: PlanningProblem, progress: Progress | None = None
+    problem: PlanningProblem, progress: Progress | None = None, watch: Watch | None = None
 ) -> tuple[Channel | NoChannel, SearchReport]:
-    """Search at the largest margin that works; if none does, explore at margin zero for an answer.
+    """Find a channel at any margin or prove that there is none, then look for a larger margin.
 
-    Sampled paths that are certified box by box come first, in workspaces shrunk by the margin. What they
-    cannot find, the exploration by cells decides; only it may answer "infeasible", and only at margin zero.
-    Budgets are counted in samples and slices, never in time, so the same question has the same answer.
+    Sampled paths that are covered with proved boxes come first, explorations by cells in turns with more of
+    them later; only these may answer "infeasible", and only at margin zero. Budgets are counted in samples
+    and slices, never in time, so the same question has the same answer.
 
     Args:
         problem: The question.
         progress: Called with a phase and the share of it that is done.
+        watch: Called with the events of explorations.
 
     Returns:
         The channel, or why there is none, and a report.
     """
-    blocked, slices = blocked_goal(problem)
-    if blocked:
-        reason = "the team collides at the goal pose whatever its free joints"
-        return NoChannel(True, reason), SearchReport(slices, 0, 0, ((0.0, Verdict.INFEASIBLE.value),))
-    attempts = SampledAttempts(problem)
-    tried: list[tuple[float, str]] = []
-    budget = problem.settings.max_slices
-    refutable = True
-    for margin in margins(problem.settings.margin):
-        told = _teller(progress, f"searching at margin {margin:.3f} m")
+    return _Search(problem, progress, watch).run()
+
+
+class _Search:
+    """One search: its two halves and what they took."""
+
+    def __init__(self, problem: PlanningProblem, progress: Progress | None, watch: Watch | None) -> None:
+        self._began = process_time()
+        self._first: float | None = None
+        self._problem, self._progress = problem, progress
+        self._attempts = SampledAttempts(problem)
+        self._proofs = Proofs(problem, watch)
+        self._tried: list[tuple[float, str]] = []
+        self._goal_slices = 0
+
+    def run(self) -> tuple[Channel | NoChannel, SearchReport]:
+        """Sample, then prove and sample in turns; see ``find_channel``."""
+        chain = self._sampled(1)
+        if chain is not None:
+            return self._with_margin(chain)
+        blocked, self._goal_slices = blocked_goal(self._problem)
+        if blocked:
+            return self._refused("the team collides at the goal pose whatever its free joints")
+        chain = self._sampled(_TRIES - 1)
+        budget = self._problem.settings.max_slices
+        if chain is None and self._attempts.object_blocked >= _OBJECT_TRIES:
+            if self._explored(budget // _OBJECT_SHARE, robots=0) is Verdict.INFEASIBLE:
+                return self._refuted()
+        share, verdict = min(_FIRST_SHARE, budget), Verdict.BUDGET
+        while chain is None:
+            verdict = self._explored(share)
+            if verdict is Verdict.INFEASIBLE:
+                return self._refuted()
+            if verdict is Verdict.FOUND:
+                return self._explored_channel()
+            chain = self._sampled(_TRIES)
+            if chain is None and (verdict is Verdict.RESOLUTION or share == budget):
+                return self._undecided(verdict)
+            share = min(2 * share, budget)
+        return self._with_margin(chain)
+
+    def _sampled(self, tries: int) -> Chain | None:
+        """Boxes along sampled paths, proved; no proof of anything if there are none."""
+        told = self._teller("sampling paths")
         told(0.0)
-        boxes = attempts.boxes(margin, progress=told)
-        tried.append((margin, "found" if boxes is not None else "not found"))
-        if boxes is not None:
-            report = SearchReport(slices + attempts.slices, len(boxes), 0, tuple(tried))
-            return attempts.channel(boxes, margin), report
-        if refutable and attempts.object_blocked:
-            refutable = False
-            outcome = explorer(relaxed(problem, ())[0]).run(budget // _RELAXED_SHARE)
-            slices += outcome.slices
-            if outcome.verdict is Verdict.INFEASIBLE:
-                tried.append((0.0, outcome.verdict.value))
-                return _refuted("the object alone", slices + attempts.slices, tried)
-    return _decided(problem, attempts, slices, tried, progress)
+        for _ in range(tries):
+            chain = self._attempts.first(told)
+            if chain is not None:
+                self._first = process_time() - self._began
+                return chain
+            if self._attempts.object_blocked >= _OBJECT_TRIES and not self._proofs.slices:
+                return None
+        return None
 
+    def _explored(self, share: int, robots: int | None = None) -> Verdict:
+        told = self._teller("exploring slices")
+        return self._proofs.run(share, robots, lambda count: told(count / self._problem.settings.max_slices))
 
-def _refuted(what: str, slices: int, tried: list[tuple[float, str]]) -> tuple[NoChannel, SearchReport]:
-    reason = f"the over-approximations of {what} separate start from goal"
-    return NoChannel(True, reason), SearchReport(slices, 0, 0, tuple(tried))
+    def _with_margin(self, chain: Chain) -> tuple[Channel | NoChannel, SearchReport]:
+        """The channel at the largest margin that is found; at none if geometry fails there."""
 
+        def told(margin: float, share: float) -> None:
+            self._teller(f"searching at margin {margin:.3f} m")(share)
 
-def _decided(
-    problem: PlanningProblem,
-    attempts: SampledAttempts,
-    slices: int,
-    tried: list[tuple[float, str]],
-    progress: Progress | None,
-) -> tuple[Channel | NoChannel, SearchReport]:
-    """Answer at margin zero: relaxations first, then the whole in turns with more samples."""
-    budget = problem.settings.max_slices
-    what, made = refuted_relaxation(problem, budget // _RELAXED_SHARE)
-    slices += made
-    if what is not None:
-        tried.append((0.0, Verdict.INFEASIBLE.value))
-        return _refuted(what, slices + attempts.slices, tried)
-    exploration = explorer(problem)
-    share, effort = min(_FIRST_SHARE, budget), 0
-    outcome = exploration.run(share, _counter(progress, budget))
-    while outcome.verdict is Verdict.BUDGET and share < budget:
-        share, effort = min(2 * share, budget), effort + 1
-        boxes = attempts.boxes(0.0, effort)
-        if boxes is not None:
-            tried.append((0.0, Verdict.FOUND.value))
-            report = _report(exploration, outcome, slices + attempts.slices + outcome.slices, tried)
-            return attempts.channel(boxes, 0.0), report
-        outcome = exploration.run(share, _counter(progress, budget))
-    tried.append((0.0, outcome.verdict.value))
-    report = _report(exploration, outcome, slices + attempts.slices + outcome.slices, tried)
-    if outcome.verdict is not Verdict.FOUND:
-        return _refusal(outcome), report
-    return attempts.channel(exploration.boxes(outcome.path), 0.0), report
+        best = self._attempts.with_margin(chain, self._tried, told)
+        channel = self._attempts.channel(best) or self._attempts.channel(chain)
+        if channel is None:
+            return self._undecided(Verdict.RESOLUTION)
+        return channel, self._report(len(channel.boxes), 0)
 
+    def _explored_channel(self) -> tuple[Channel, SearchReport]:
+        self._first = process_time() - self._began
+        self._tried.append((0.0, Verdict.FOUND.value))
+        channel = self._attempts.channel_of(self._proofs.boxes())
+        return channel, self._report(*self._proofs.counts())
 
-def _teller(progress: Progress | None, phase: str) -> Callable[[float], None]:
-    """Tell the share of a phase, or nobody."""
-    return (lambda share: None) if progress is None else (lambda share: progress(phase, share))
+    def _refuted(self) -> tuple[NoChannel, SearchReport]:
+        refutation = self._proofs.refutation
+        assert refutation is not None
+        self._tried.append((0.0, Verdict.INFEASIBLE.value))
+        return NoChannel(True, refutation.reason, refutation.separation), self._report(0, 0)
 
+    def _refused(self, reason: str) -> tuple[NoChannel, SearchReport]:
+        self._tried.append((0.0, Verdict.INFEASIBLE.value))
+        return NoChannel(True, reason), self._report(0, 0)
 
-def _counter(progress: Progress | None, budget: int) -> Callable[[int], None]:
-    """Tell the share of the budget that slices have taken."""
-    told = _teller(progress, "exploring slices")
-    return lambda count: told(count / budget)
+    def _undecided(self, verdict: Verdict) -> tuple[NoChannel, SearchReport]:
+        self._tried.append((0.0, verdict.value))
+        mixed = self._proofs.undecided()
+        resolution = max((cell.share for cell in mixed), default=None)
+        reason = f"no answer after {self._slices()} slices: {verdict.value}"
+        return NoChannel(False, reason, mixed=mixed), self._report(*self._proofs.counts(), resolution)
 
+    def _slices(self) -> int:
+        return self._goal_slices + self._attempts.slices + self._proofs.slices
 
-def _refusal(outcome: Outcome) -> NoChannel:
-    if outcome.verdict is Verdict.INFEASIBLE:
-        return NoChannel(True, f"the over-approximations of {outcome.slices} slices separate start from goal")
-    return NoChannel(False, f"no answer after {outcome.slices} slices: {outcome.verdict.value}")
+    def _report(self, free: int, mixed: int, resolution: float | None = None) -> SearchReport:
+        tried = tuple(self._tried)
+        return SearchReport(self._slices(), free, mixed, tried, resolution, self._first)
 
-
-def _report(
-    exploration: Exploration, outcome: Outcome, slices: int, tried: list[tuple[float, str]]
-) -> SearchReport:
-    free, mixed = exploration.counts()
-    undecided = outcome.verdict in (Verdict.RESOLUTION, Verdict.BUDGET)
-    resolution = exploration.widest(outcome.path) if undecided and tried[-1][1] != "found" else None
-    return SearchReport(slices, free, mixed, tuple(tried), resolution)
+    def _teller(self, phase: str) -> Callable[[float], None]:
+        """Tell the share of a phase, or nobody."""
+        progress = self._progress
+        return (lambda share: None) if progress is None else (lambda share: progress(phase, share))

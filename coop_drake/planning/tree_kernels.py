@@ -9,7 +9,7 @@ import numpy as np
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.sweep_kernels import IntArray
-from coop_drake.planning.collision_kernels import segment_is_free
+from coop_drake.planning.collision_kernels import is_free, segment_is_free
 from coop_drake.planning.team_arrays import TeamArrays
 from coop_drake.planning.walls import Walls
 
@@ -89,7 +89,7 @@ def connect(
     gap: float,
     step: float,
     uniforms: FloatArray,
-) -> FloatArray:
+) -> tuple[FloatArray, int]:
     """Grow one tree from the start and one from the goals towards samples and towards each other.
 
     Args:
@@ -107,7 +107,8 @@ def connect(
         uniforms: Random numbers in [0, 1), one row for each sample, shape (S, 2 + d).
 
     Returns:
-        Path from start to a goal, theta unwrapped, shape (m, d); no rows if none was found.
+        Path from start to a goal, theta unwrapped, shape (m, d), without rows if none was found; and the
+        number of samples drawn.
     """
     room = 2 * len(uniforms) + len(roots) + 1
     nodes = np.empty((2, room, len(start)))
@@ -129,21 +130,61 @@ def connect(
                 team, walls, nodes[other], parents[other], counts[other], z, np.inf, gap, scale, step
             )
             if met:
-                path: FloatArray = _join(nodes, parents, counts)
-                return path
+                return _join(nodes, parents, counts), row + 1
         side = other
-    return np.empty((0, len(start)))
+    return np.empty((0, len(start))), len(uniforms)
 
 
 @numba.njit(cache=True)
-def chain_is_free(
-    team: TeamArrays, walls: Walls, chain: FloatArray, gap: float, scale: FloatArray, step: float
-) -> bool:
-    """Whether all straight segments between consecutive configurations are free, shape (m, d)."""
-    for i in range(len(chain) - 1):
-        if segment_is_free(team, walls, chain[i], chain[i + 1], gap, scale, step) < 1.0:
-            return False
-    return True
+def shortened(
+    team: TeamArrays,
+    walls: Walls,
+    path: FloatArray,
+    scale: FloatArray,
+    gap: float,
+    step: float,
+    uniforms: FloatArray,
+) -> FloatArray:
+    """Straighten a path between random samples of it: all axes together, theta or one joint alone.
+
+    Args:
+        team: The team.
+        walls: The floor.
+        path: Free samples, close together, shape (m, d).
+        scale: How far a unit of each axis moves the team, shape (d,).
+        gap: Distance that pairs of bodies must keep [m].
+        step: Distance between checks [m].
+        uniforms: Random numbers in [0, 1), one row for each attempt, shape (k, 3).
+    """
+    path = path.copy()
+    count, size = path.shape
+    for row in range(len(uniforms)):
+        a, b = int(uniforms[row, 0] * count), int(uniforms[row, 1] * count)
+        i, j = min(a, b), max(a, b)
+        if j - i < 2:
+            continue
+        part = path[i : j + 1].copy()
+        only = 2 + int(uniforms[row, 2] * (size - 2))
+        for k in range(1, j - i):
+            share = k / (j - i)
+            for axis in range(size):
+                if row % 3 == 0 or axis == only:
+                    part[k, axis] = path[i, axis] + share * (path[j, axis] - path[i, axis])
+        free = True
+        stride = 8
+        while free and stride > 0:
+            for k in range(stride, j - i, 2 * stride if stride < 8 else stride):
+                if not is_free(team, walls, part[k], gap):
+                    free = False
+                    break
+            stride //= 2
+        k = 0
+        while free and k < j - i:
+            free = segment_is_free(team, walls, part[k], part[k + 1], gap, scale, step) == 1.0
+            k += 1
+        if free:
+            path[i : j + 1] = part
+    return path
 
 
 @numba.njit(cache=True)

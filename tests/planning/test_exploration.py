@@ -4,9 +4,10 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from coop_drake.planning.attempts import SampledAttempts, explorer
+from coop_drake.planning.attempts import SampledAttempts
 from coop_drake.planning.cell_graph import Kind
 from coop_drake.planning.exploration import Verdict
+from coop_drake.planning.proofs import explorer
 from coop_drake.planning.relaxation import relaxed
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case
@@ -22,7 +23,7 @@ def test_exploration_alone_finds_a_sound_channel() -> None:
     for one, other in pairwise(outcome.path):
         assert other.slice in exploration.slices.all[one.slice].neighbours
         assert one.region.meets(other.region)
-    channel = SampledAttempts(problem).channel(exploration.boxes(outcome.path), 0.0)
+    channel = SampledAttempts(problem).channel_of(exploration.boxes(outcome.path))
     assert_channel_is_sound(problem, channel)
 
 

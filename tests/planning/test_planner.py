@@ -7,7 +7,7 @@ from shapely import box
 
 from coop_drake.control import ScheduledGains
 from coop_drake.planning import Found, Infeasible, SearchReport, Undecided, planner
-from coop_drake.planning.search import NoChannel
+from coop_drake.planning.channel import NoChannel
 from tests.support.channels import bent_channel
 
 REPORT = SearchReport(10, 4, 2, ((0.1, "found"),))

@@ -6,9 +6,9 @@ from shapely import Polygon, box, union_all
 
 from coop_drake.geometry.pose import PlanarPose
 from coop_drake.geometry.tree import Body, Component, ComponentTree, TreeJoint
-from coop_drake.planning.channel import Channel
+from coop_drake.planning.channel import Channel, NoChannel
 from coop_drake.planning.problem import PlannerSettings, PlanningProblem
-from coop_drake.planning.search import NoChannel, find_channel
+from coop_drake.planning.search import find_channel
 from tests.support.cases import case, rectangle, transport
 from tests.support.soundness import assert_channel_is_sound
 
@@ -140,4 +140,4 @@ def test_progress_is_told_and_may_interrupt() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         find_channel(case("base"), stop)
-    assert told == ["searching at margin 0.100 m"]
+    assert told == ["sampling paths"]
