@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.planning.cell_graph import Kind
+from coop_drake.planning.cell_graph import Cell, Kind
 from coop_drake.planning.cells import Region
 
 
@@ -36,6 +36,17 @@ class ExplorationBegan:
 
     question: str
     robots: tuple[int, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ExplorationResumed:
+    """An exploration goes on after others have had their turn.
+
+    Attributes:
+        question: What is explored, as it was told when the exploration began.
+    """
+
+    question: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +83,11 @@ class ChannelSearched:
 
     Attributes:
         cells: The chain; empty where none exists, which is the proof of infeasibility.
+        cost: Its total weight, 0 for an empty one.
     """
 
     cells: tuple[SeenCell, ...]
+    cost: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,5 +103,10 @@ class ExplorationEnded:
     slices: int
 
 
-Event = ExplorationBegan | SliceAdded | SliceSplit | ChannelSearched | ExplorationEnded
+Event = ExplorationBegan | ExplorationResumed | SliceAdded | SliceSplit | ChannelSearched | ExplorationEnded
 Watch = Callable[[Event], None]
+
+
+def seen(cells: Sequence[Cell]) -> tuple[SeenCell, ...]:
+    """Cells as a watcher sees them."""
+    return tuple(SeenCell(cell.slice, cell.kind, cell.region) for cell in cells)

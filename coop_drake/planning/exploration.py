@@ -6,11 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-import numpy as np
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cell_graph import Cell, CellGraph, Kind
 from coop_drake.planning.cells import CellMaker, Region
@@ -18,16 +16,17 @@ from coop_drake.planning.events import (
     ChannelSearched,
     ExplorationBegan,
     ExplorationEnded,
-    SeenCell,
+    ExplorationResumed,
     SliceAdded,
     SliceSplit,
     Watch,
+    seen,
 )
 from coop_drake.planning.halves import Halves
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.slices import Slices, holds
 from coop_drake.planning.split_rules import Refinement, SplitRule
-from coop_drake.planning.undecided import MixedCell
+from coop_drake.planning.undecided import MixedCell, mixed_cells
 
 _FREE_TIME = 0.6
 _NARROW_TIME = 0.03
@@ -85,6 +84,7 @@ class Exploration:
         split: SplitRule = "strong",
     ) -> None:
         self._problem, self._watch = problem, watch
+        self._question, self._paused = question, False
         self.slices = Slices(problem.tree, problem.settings.slice_overlap)
         self.maker = CellMaker(swept, pairs, workspace)
         self.graph = CellGraph(self.slices)
@@ -105,6 +105,9 @@ class Exploration:
         split rule says. No channel at all is a proof that none exists. A spent budget may be raised: call
         again, and the exploration goes on where it stopped.
         """
+        if self._watch is not None and self._paused:
+            self._watch(ExplorationResumed(self._question))
+        self._paused = True
         outcome = self._explored(budget, progress)
         if self._watch is not None:
             self._watch(ExplorationEnded(outcome.verdict.value, outcome.slices))
@@ -114,7 +117,8 @@ class Exploration:
         while True:
             path = self._channel()
             if self._watch is not None:
-                self._watch(ChannelSearched(_seen(path or ())))
+                cost = sum(cell.weight for cell in path or ())
+                self._watch(ChannelSearched(seen(path or ()), cost))
             made = len(self.slices.all)
             if path is None:
                 return Outcome(Verdict.INFEASIBLE, (), made)
@@ -153,21 +157,7 @@ class Exploration:
 
     def undecided(self, path: Sequence[Cell]) -> tuple[MixedCell, ...]:
         """Cells of a channel that are not free, the widest first."""
-        robots = tuple(sorted({joint.robot for joint in self._problem.tree.joints}))
-        cells = [self._undecided(robots, cell) for cell in path if cell.kind is not Kind.FREE]
-        return tuple(sorted(cells, key=lambda cell: -cell.share))
-
-    def _undecided(self, robots: tuple[int, ...], cell: Cell) -> MixedCell:
-        bounds = np.array(self.slices.all[cell.slice].intervals)
-        return MixedCell(
-            robots=robots,
-            lower=bounds[:, 0].copy(),
-            upper=bounds[:, 1].copy(),
-            polygon=to_polygon(cell.region.section),
-            share=float((np.ptp(bounds, axis=1) / np.array(self.slices.axis_widths)).max()),
-            hinted=cell.kind is Kind.GUIDE,
-            finest=not self.refinement.splittable(self.slices.all[cell.slice].intervals),
-        )
+        return mixed_cells(self._problem, self.slices, self.refinement.finest, path)
 
     def widest(self, path: Sequence[Cell]) -> float:
         """Widest interval left undecided on a channel, as a fraction of its axis."""
@@ -195,7 +185,7 @@ class Exploration:
         self.graph.add(index, members)
         self._note_ends(index, intervals)
         if self._watch is not None:
-            self._watch(SliceAdded(index, intervals, _seen(self.graph.by_slice[index])))
+            self._watch(SliceAdded(index, intervals, seen(self.graph.by_slice[index])))
 
     def _note_ends(self, index: int, intervals: Intervals) -> None:
         """Remember which cells of a new leaf hold the start and which hold the goal."""
@@ -205,10 +195,6 @@ class Exploration:
             self._starts[index] = [cell for cell in cells if cell.region.holds(start[:2])]
         if holds(intervals, [float(goal[2]), *self._problem.goal_joints]):
             self._goals[index] = [cell.index for cell in cells if cell.region.holds(goal[:2])]
-
-
-def _seen(cells: Sequence[Cell]) -> tuple[SeenCell, ...]:
-    return tuple(SeenCell(cell.slice, cell.kind, cell.region) for cell in cells)
 
 
 def _free_weight(region: Region) -> float:

@@ -8,11 +8,14 @@ from coop_drake.planning.cells import CellMaker, Region
 from coop_drake.planning.margins import shrunk
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.relaxation import relaxed
+from coop_drake.planning.separation import BlockedGoal
+from coop_drake.planning.separation_making import blocked_goal_proof
+from coop_drake.planning.slices import halves
 
 _BUDGET = 128
 
 
-def blocked_goal(problem: PlanningProblem) -> tuple[bool, int]:
+def blocked_goal(problem: PlanningProblem) -> tuple[BlockedGoal | None, int]:
     """Whether no values of the free joints put the team freely at its goal; a proof, by under-sweeps.
 
     The object goes first, then each robot alone, then all: what is blocked for some is blocked for the team.
@@ -21,20 +24,23 @@ def blocked_goal(problem: PlanningProblem) -> tuple[bool, int]:
         problem: The question, whose margin is zero.
 
     Returns:
-        Whether the goal is proved to be in collision, and the slices swept for it.
+        The proof that the goal is in collision, None if there is none, and the slices swept for it.
     """
     robots = sorted({joint.robot for joint in problem.tree.joints})
     slices = 0
     for chosen in dict.fromkeys([(), *[(robot,) for robot in robots], tuple(robots)]):
-        blocked, made = _is_blocked(relaxed(problem, chosen)[0])
+        boxes, made = _blocked(relaxed(problem, chosen)[0])
         slices += made
-        if blocked:
-            return True, slices
-    return False, slices
+        if boxes:
+            return blocked_goal_proof(chosen, boxes), slices
+    return None, slices
 
 
-def _is_blocked(question: PlanningProblem) -> tuple[bool, int]:
-    """Halve the free joints' intervals until all are blocked, one is free, or the budget is spent."""
+def _blocked(question: PlanningProblem) -> tuple[list[Intervals], int]:
+    """Boxes of all free joints' values in which the team collides at the goal; none if it does not in all.
+
+    Halve the free joints' intervals until all are blocked, one is free, or the budget is spent.
+    """
     swept = SweptTree(question.tree)
     maker = CellMaker(swept, BodyPairs(swept), shrunk(question.workspace, 0.0))
     angle = float(question.goal_pose[2])
@@ -43,19 +49,20 @@ def _is_blocked(question: PlanningProblem) -> tuple[bool, int]:
         for joint, goal in zip(question.tree.joints, question.goal_joints, strict=True)
     ]
     left: list[Intervals] = [((angle, angle), *joints)]
+    blocked: list[Intervals] = []
     for made in range(1, _BUDGET + 1):
         intervals = left.pop()
         if _held(maker.over_cells(intervals), question):
             widths = [upper - lower for lower, upper in intervals]
             widest = widths.index(max(widths))
             if widths[widest] == 0.0 or _held(maker.guide_cells(intervals), question):
-                return False, made
-            lower, upper = intervals[widest]
-            halves = (lower, 0.5 * (lower + upper)), (0.5 * (lower + upper), upper)
-            left.extend((*intervals[:widest], half, *intervals[widest + 1 :]) for half in halves)
+                return [], made
+            left.extend(halves(intervals, widest))
+        else:
+            blocked.append(intervals)
         if not left:
-            return True, made
-    return False, _BUDGET
+            return blocked, made
+    return [], _BUDGET
 
 
 def _held(regions: list[Region], question: PlanningProblem) -> bool:

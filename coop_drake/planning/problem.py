@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from shapely import Polygon
 
@@ -21,6 +22,8 @@ class PlannerSettings:
         length_resolution: Slices of prismatic joints are not split below this width [m].
         max_slices: Work budget of one attempt, in slices made.
         max_transition_time: Longest estimated time of one transition that is accepted [s].
+        strategy: ``portfolio`` samples, certifies and proves; ``cells`` explores by cells alone; ``paper``
+            explores as the paper's Algorithms 1 and 2 are printed, at margin zero.
     """
 
     margin: float = 0.1
@@ -29,6 +32,7 @@ class PlannerSettings:
     length_resolution: float = 0.001
     max_slices: int = 4_000
     max_transition_time: float = 60.0
+    strategy: Literal["portfolio", "cells", "paper"] = "portfolio"
 
 
 @dataclass(frozen=True)

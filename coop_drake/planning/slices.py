@@ -39,19 +39,21 @@ class Slices:
     Args:
         tree: Gives the joints' limits.
         overlap: Overlap of neighbours as a fraction of their width, used for under-cells only.
+        printed: Whether to begin with one slice of everything and to call slices neighbours that meet in a
+            corner or an edge too, as the paper does.
     """
 
-    def __init__(self, tree: ComponentTree, overlap: float) -> None:
-        self._overlap = overlap
+    def __init__(self, tree: ComponentTree, overlap: float, *, printed: bool = False) -> None:
+        self._overlap, self._printed = overlap, printed
         self._limits = tuple((joint.lower, joint.upper) for joint in tree.joints)
         self.axis_widths = (2.0 * pi, *(upper - lower for lower, upper in self._limits))
-        quarter = 2.0 * pi / _FIRST_THETA_SLICES
+        count = 1 if printed else _FIRST_THETA_SLICES
+        part = 2.0 * pi / count
         self.all: list[Slice] = [
-            Slice((((i - 0.5) * quarter, (i + 0.5) * quarter), *self._limits), 0)
-            for i in range(_FIRST_THETA_SLICES)
+            Slice((((i - 0.5) * part, (i + 0.5) * part), *self._limits), 0) for i in range(count)
         ]
-        for i in range(_FIRST_THETA_SLICES):
-            self.all[i].neighbours |= {(i - 1) % _FIRST_THETA_SLICES, (i + 1) % _FIRST_THETA_SLICES}
+        for i in range(count):
+            self.all[i].neighbours |= {(i - 1) % count, (i + 1) % count} - {i}
 
     def leaves(self) -> list[int]:
         """Ids of all leaves in ascending order."""
@@ -68,11 +70,15 @@ class Slices:
         for other in parent.neighbours:
             self.all[other].neighbours.discard(index)
             for half in ids:
-                if share_facet(self.all[half].intervals, self.all[other].intervals):
+                if self._adjacent(self.all[half].intervals, self.all[other].intervals):
                     self.all[half].neighbours.add(other)
                     self.all[other].neighbours.add(half)
         parent.neighbours = set()
         return ids
+
+    def _adjacent(self, first: Intervals, second: Intervals) -> bool:
+        touches = _touches(first, second)
+        return touches is not None and (self._printed or touches <= 1)
 
     def expanded(self, intervals: Intervals) -> Intervals:
         """Intervals with the overlap that under-cells keep, joints clipped at their limits."""
@@ -123,10 +129,16 @@ def interval_overlap(first: Interval, second: Interval, periodic: bool = False) 
 
 def share_facet(first: Intervals, second: Intervals) -> bool:
     """Whether two boxes touch in every axis and merely touch in at most one: paths cross facets only."""
+    touches = _touches(first, second)
+    return touches is not None and touches <= 1
+
+
+def _touches(first: Intervals, second: Intervals) -> int | None:
+    """In how many axes two boxes merely touch, None if there is a gap in one."""
     touches = 0
     for axis, (a, b) in enumerate(zip(first, second, strict=True)):
         shared = interval_overlap(a, b, periodic=axis == 0)
         if shared < -_TOUCH:
-            return False
+            return None
         touches += shared <= _TOUCH
-    return touches <= 1
+    return touches

@@ -32,6 +32,9 @@ class Refinement:
         maker: Cells of slices.
         halves: Over-cells of halves.
         rule: How an axis is chosen.
+
+    Attributes:
+        finest: Resolution of every axis.
     """
 
     def __init__(
@@ -46,20 +49,13 @@ class Refinement:
         self._levers = axis_levers(problem.tree)
         self._blame = Blame(maker, slices, self._levers)
         self._branching = StrongBranching(problem, slices, halves)
-        settings = problem.settings
-        self._finest = (
-            settings.angle_resolution,
-            *(
-                settings.angle_resolution if joint.kind == "revolute" else settings.length_resolution
-                for joint in problem.tree.joints
-            ),
-        )
+        self.finest = finest_widths(problem)
 
     def splittable(self, intervals: Intervals) -> list[int]:
         """Axes that are still wider than the resolution."""
         return [
             axis
-            for axis, ((lower, upper), finest) in enumerate(zip(intervals, self._finest, strict=True))
+            for axis, ((lower, upper), finest) in enumerate(zip(intervals, self.finest, strict=True))
             if upper - lower > finest
         ]
 
@@ -110,3 +106,9 @@ class Refinement:
         if max(areas) - min(areas) <= _DECIDED * cell.region.area:
             return max(trials, key=lambda trial: (sweeps[trial.axis], -trial.axis))
         return min(trials, key=lambda trial: (trial.area, trial.axis))
+
+
+def finest_widths(problem: PlanningProblem) -> tuple[float, ...]:
+    """Resolution of every axis (theta, q...): intervals that are no wider are not halved [rad or m]."""
+    angle, length = problem.settings.angle_resolution, problem.settings.length_resolution
+    return (angle, *(angle if joint.kind == "revolute" else length for joint in problem.tree.joints))

@@ -1,0 +1,107 @@
+"""Strategies without samples: explorations by cells alone, with our split rules or as the paper has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.planning.boxes import Box, make_channel
+from coop_drake.planning.cells import CellMaker, Region
+from coop_drake.planning.channel import Channel, NoChannel, SearchReport
+from coop_drake.planning.events import Watch
+from coop_drake.planning.exploration import Exploration, Outcome, Verdict
+from coop_drake.planning.margins import marginal_workspace, margins
+from coop_drake.planning.paper import PaperExploration
+from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.separation_making import slice_separation
+
+Progress = Callable[[str, float], None]
+_MARGIN_SHARE = 8
+
+
+def explored_channel(
+    problem: PlanningProblem, progress: Progress | None = None, watch: Watch | None = None
+) -> tuple[Channel | NoChannel, SearchReport]:
+    """Search by cells alone; only an exploration at margin zero may answer "infeasible".
+
+    Args:
+        problem: The question; its strategy is ``cells``, which tries the margins first, each with an eighth
+            of the slices, or ``paper``, which knows no margin.
+        progress: Called with a phase and the share of the slices that are made.
+        watch: Called with the events of explorations.
+
+    Returns:
+        The channel, or why there is none, and a report.
+    """
+    budget = problem.settings.max_slices
+    tried: list[tuple[float, str]] = []
+    slices = 0
+    first = problem.settings.margin if problem.settings.strategy == "cells" else 0.0
+    for margin in (*margins(first), 0.0):
+        exploration = _exploration(problem, margin, watch)
+        share = budget // _MARGIN_SHARE if margin > 0.0 else budget
+        outcome = exploration.run(share, _counter(progress, margin, budget))
+        slices += outcome.slices
+        tried.append((margin, outcome.verdict.value))
+        if outcome.verdict is Verdict.FOUND:
+            boxes = _boxes(problem, exploration.boxes(outcome.path), margin)
+            report = SearchReport(slices, *exploration.counts(), tuple(tried))
+            return make_channel(problem, boxes, margin, None), report
+    return _none(problem, exploration, outcome, slices, tried)
+
+
+def _exploration(
+    problem: PlanningProblem, margin: float, watch: Watch | None
+) -> Exploration | PaperExploration:
+    swept = SweptTree(problem.tree)
+    workspace = marginal_workspace(problem, margin)
+    if problem.settings.strategy == "paper":
+        return PaperExploration(problem, workspace, swept, BodyPairs(swept), watch)
+    words = f"the whole team at margin {margin:.3f} m" if margin > 0.0 else "the whole team"
+    return Exploration(problem, workspace, swept, BodyPairs(swept), watch, words)
+
+
+def _boxes(problem: PlanningProblem, found: list[tuple[Intervals, Region]], margin: float) -> list[Box]:
+    """Cores with the positions around them that are free at no margin."""
+    if margin == 0.0:
+        return [Box(intervals, core, core) for intervals, core in found]
+    swept = SweptTree(problem.tree)
+    maker = CellMaker(swept, BodyPairs(swept), problem.workspace)
+    return [
+        Box(
+            intervals,
+            max(maker.under_cells(intervals), key=lambda full: (full.section ^ core.section).area()),
+            core,
+        )
+        for intervals, core in found
+    ]
+
+
+def _none(
+    problem: PlanningProblem,
+    exploration: Exploration | PaperExploration,
+    outcome: Outcome,
+    slices: int,
+    tried: list[tuple[float, str]],
+) -> tuple[NoChannel, SearchReport]:
+    """The answer of an exploration at margin zero that found nothing."""
+    counts = exploration.counts()
+    if outcome.verdict is Verdict.INFEASIBLE:
+        robots = sorted({joint.robot for joint in problem.tree.joints})
+        leaves = exploration.over_leaves()
+        separation = slice_separation(problem, robots, exploration.slices, leaves)
+        reason = f"the over-approximations of {outcome.slices} slices separate start from goal"
+        return NoChannel(True, reason, separation), SearchReport(slices, *counts, tuple(tried))
+    mixed = exploration.undecided(outcome.path)
+    resolution = max((cell.share for cell in mixed), default=None)
+    reason = f"no answer after {outcome.slices} slices: {outcome.verdict.value}"
+    return NoChannel(False, reason, mixed=mixed), SearchReport(slices, *counts, tuple(tried), resolution)
+
+
+def _counter(progress: Progress | None, margin: float, budget: int) -> Callable[[int], None] | None:
+    """Tell the share of the budget that slices have taken."""
+    if progress is None:
+        return None
+    phase = f"exploring slices at margin {margin:.3f} m"
+    return lambda count: progress(phase, count / budget)
