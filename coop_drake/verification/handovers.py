@@ -70,16 +70,17 @@ def check_ends(plan: Plan, problem: PlanningProblem) -> Check:
         RefusalError: Names the entry and the value.
     """
     first, last, final = plan.cells[0], plan.cells[-1], plan.transitions[-1]
+    where = f"transitions[{len(plan.transitions) - 1}]"
     _room(plan.start[:2], first.tidied, "start")
     _require_held(plan.start[2:], first.lower, first.upper, "start", "cells[0]")
     _room(plan.goal_pose[:2], last.tidied, "goal_pose")
     if not np.array_equal(final.target, plan.goal_pose[:2]):
-        raise RefusalError("transitions[-1].target", f"{final.target.tolist()} is not the goal's position")
+        raise RefusalError(f"{where}.target", f"{final.target.tolist()} is not the goal's position")
     corners = shapely.get_coordinates(final.goal_region) - plan.goal_pose[:2]
     away = float(np.hypot(*corners.T).max())
     if away > problem.position_tolerance + ROUNDING:
         raise RefusalError(
-            "transitions[-1].goal_region",
+            f"{where}.goal_region",
             f"reaches {away} m from the goal; {problem.position_tolerance} m are tolerated",
         )
     tolerances = [problem.angle_tolerance, *[problem.joint_tolerance] * len(plan.goal_joints)]
@@ -88,7 +89,7 @@ def check_ends(plan: Plan, problem: PlanningProblem) -> Check:
         low, high = final.goal_lower[axis], final.goal_upper[axis]
         if goal is not None and not goal - tolerance <= low <= goal <= high <= goal + tolerance:
             raise RefusalError(
-                "transitions[-1].goal_lower, goal_upper",
+                f"{where}.goal_lower, goal_upper",
                 f"[{low}, {high}] on axis {axis} is not about {goal} within {tolerance}",
             )
     return Check("start in the first cell, goal region and intervals within the tolerances", 2)

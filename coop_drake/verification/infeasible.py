@@ -43,9 +43,10 @@ def verify_separation(
         RefusalError: Names the first claim that does not hold.
     """
     if isinstance(separation, DiscSeparation):
-        subject = f"a disc of {separation.radius:.4f} m in {problem.tree.components[0].name}"
         checks = check_disc(separation, problem)
-        return Verified("infeasible", f"{subject} cannot get from start to goal", checks)
+        carrier = problem.tree.components[separation.component].name
+        subject = f"a disc of {separation.radius:.4f} m in {carrier} cannot get from start to goal"
+        return Verified("infeasible", subject, checks)
     robots = separation.robots
     team = f"the object with robots {list(robots)}" if robots else "the object alone"
     bodies = _check_robots(robots, problem)

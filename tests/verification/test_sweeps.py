@@ -1,4 +1,4 @@
-"""The checker's own sweeps: outer ones hold every placed copy, inner ones lie in all, both as sharp as asked."""
+"""The checker's own sweeps: outer ones hold every placed copy, inner ones lie in all, as sharp as asked."""
 
 from functools import reduce
 
@@ -58,7 +58,7 @@ def test_inner_sweeps_lie_in_every_copy(team, tolerance):
 
 
 def test_sweeps_are_as_sharp_as_asked():
-    """Between hull and intersection of many copies, turned by theta alone, no more than the tolerance lies."""
+    """Hull and intersection of many copies, turned by theta alone, are met up to the tolerance."""
     solid = team_solids(team_tree(1, 1))[0]
     lower, upper = np.array([0.2, 0.0]), np.array([0.9, 0.0])
     angles = np.linspace(0.2, 0.9, 301)

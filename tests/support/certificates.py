@@ -1,0 +1,70 @@
+"""Small questions with answers of either kind, and ways to tamper with what is written down about them."""
+
+import json
+from copy import deepcopy
+
+import numpy as np
+from shapely import Polygon, box, normalize, union_all
+
+from coop_drake.control import ScheduledGains
+from coop_drake.planning.digest import content_digest
+from coop_drake.planning.problem import PlanningProblem
+from tests.support.cases import team_tree
+
+GAINS = {"scheduled": ScheduledGains()}
+PILLAR = [(2.8, 1.0), (3.2, 1.0), (3.2, 1.4), (2.8, 1.4)]
+
+
+def room_with_pillar(robots=1, pillar=PILLAR):
+    """From one end of a room to the other past a pillar; the joint has a goal."""
+    return PlanningProblem(
+        workspace=Polygon(box(0.0, 0.0, 6.0, 5.0).exterior.coords, [pillar]),
+        tree=team_tree(robots, 1),
+        start=np.array([1.6, 2.5, 0.2, *[0.0] * robots]),
+        goal_pose=np.array([4.2, 2.6, 0.9]),
+        goal_joints=(0.3, *[None] * (robots - 1)),
+    )
+
+
+def rooms_with_door(width, robots=1):
+    """Two rooms joined by a doorway of some width in a thick wall."""
+    y0, y1 = 2.0 - 0.5 * width, 2.0 + 0.5 * width
+    floor = union_all([box(0.0, 0.0, 4.0, 4.0), box(3.9, y0, 5.1, y1), box(5.0, 0.0, 9.0, 4.0)])
+    return PlanningProblem(
+        workspace=normalize(floor),
+        tree=team_tree(robots, 1),
+        start=np.array([2.0, 2.0, 0.1, *[0.0] * robots]),
+        goal_pose=np.array([7.0, 2.0, 0.1]),
+        goal_joints=(None,) * robots,
+    )
+
+
+def number_places(value, way=()):
+    """Ways to every number of a document."""
+    if isinstance(value, dict):
+        return [place for key, entry in value.items() for place in number_places(entry, (*way, key))]
+    if isinstance(value, list):
+        return [place for k, entry in enumerate(value) for place in number_places(entry, (*way, k))]
+    return [way] if isinstance(value, int | float) and not isinstance(value, bool) else []
+
+
+def entry_at(document, way):
+    """What stands at the end of a way."""
+    for step in way:
+        document = document[step]
+    return document
+
+
+def changed(document, way, value):
+    """The document with another value at the end of a way."""
+    document = deepcopy(document)
+    entry_at(document, way[:-1])[way[-1]] = value
+    return document
+
+
+def write(document, path, *, signed):
+    """Write a document, with the digest of its content if it is to be signed again."""
+    if signed:
+        document = {**document, "digest": content_digest(document)}
+    path.write_text(json.dumps(document))
+    return path

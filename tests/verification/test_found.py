@@ -1,0 +1,170 @@
+"""Plans are verified; altered ones are refused, or are true all the same."""
+
+import json
+from copy import deepcopy
+
+import numpy as np
+import pytest
+import shapely
+
+from coop_drake.errors import PlanError, RefusalError
+from coop_drake.planning import save_plan
+from coop_drake.planning.document import Entry
+from coop_drake.planning.plan_reader import read_plan
+from coop_drake.planning.planner import plan as make
+from coop_drake.verification import verify_file
+from tests.support.certificates import GAINS, changed, entry_at, number_places, room_with_pillar, write
+from tests.support.trees import body_footprints, footprint
+
+PROBLEM = room_with_pillar()
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return make(PROBLEM, GAINS["scheduled"], gain_set_name="scheduled").plan
+
+
+@pytest.fixture(scope="module")
+def document(plan, tmp_path_factory):
+    path = save_plan(plan, tmp_path_factory.mktemp("plan") / "plan.json")
+    return json.loads(path.read_text())
+
+
+def refusal(document, tmp_path, *, signed=True):
+    """What a document is refused for, None where it is verified."""
+    try:
+        verify_file(write(document, tmp_path / "plan.json", signed=signed), PROBLEM, GAINS)
+    except (RefusalError, PlanError) as error:
+        return str(error)
+    return None
+
+
+def test_a_plan_is_verified_and_says_what_was_checked(document, tmp_path):
+    verified = verify_file(write(document, tmp_path / "plan.json", signed=False), PROBLEM, GAINS)
+    assert (verified.answer, verified.subject) == ("found", f"plan of {len(document['cells'])} cells")
+    assert all(check.count > 0 for check in verified.checks)
+    assert all(check.tightest > 0.0 for check in verified.checks if check.tightest is not None)
+
+
+def test_no_number_can_be_altered_be_it_by_a_bit(document, tmp_path):
+    places = number_places(document)
+    assert len(places) > 300
+    nudges = (lambda x: float(np.nextafter(x, np.inf)), lambda x: 1.001 * x + 1e-3, lambda x: -x - 1.0)
+    for number, way in enumerate(places):
+        value = nudges[number % 3](entry_at(document, way))
+        assert refusal(changed(document, way, value), tmp_path, signed=False), way
+
+
+def test_what_is_accepted_under_a_new_digest_is_true(document, tmp_path):
+    """Whoever signs again may only state what holds: accepted plans are sampled against exact footprints."""
+    places = [way for way in number_places(document) if way[0] != "version"][::5]
+    accepted = []
+    for number, way in enumerate(places):
+        step = (0.004, -0.004, 0.05, -0.05)[number % 4]
+        altered = changed(document, way, entry_at(document, way) + step)
+        if refusal(altered, tmp_path) is None:
+            accepted.append(way)
+            assert_true(altered, way)
+    assert 0 < len(accepted) < 0.5 * len(places)
+    assert {way[0] for way in accepted} <= {"cells", "transitions", "margin"}
+    claims = {way[2] for way in accepted if way[0] == "transitions"}
+    assert claims <= {"length", "estimated_time", "goal_region", "goal_lower", "goal_upper", "neck"}
+
+
+def assert_true(document, way):
+    """Cells hold only free configurations, at their vertices and at extreme and random angles."""
+    plan = read_plan(Entry("altered", "", document))
+    random = np.random.default_rng(0)
+    cells = [plan.cells[way[1]]] if way[0] == "cells" else []
+    for cell in cells:
+        points = shapely.get_coordinates(cell.safe)
+        for position in points[random.integers(len(points), size=6)]:
+            share = np.rint(random.random(len(cell.lower)))
+            z = np.concatenate((position, cell.lower + share * (cell.upper - cell.lower)))
+            assert PROBLEM.workspace.buffer(1e-9).contains(footprint(PROBLEM.tree, z)), way
+            bodies = body_footprints(PROBLEM.tree, z)
+            assert all(bodies[a].disjoint(bodies[b]) for a, b in PROBLEM.tree.collision_pairs)
+
+
+def put(value, *way):
+    return lambda document: changed(document, way, value)
+
+
+def moved(step, *way):
+    return lambda document: changed(document, way, entry_at(document, way) + step)
+
+
+def without(*way):
+    def change(document):
+        document = deepcopy(document)
+        del entry_at(document, way[:-1])[way[-1]]
+        return document
+
+    return change
+
+
+def doubled(*way):
+    def change(document):
+        document = deepcopy(document)
+        entries = entry_at(document, way[:-1])
+        entries.insert(way[-1], entries[way[-1]])
+        return document
+
+    return change
+
+
+def swapped(key):
+    def change(document):
+        document = deepcopy(document)
+        document[key][0], document[key][1] = document[key][1], document[key][0]
+        return document
+
+    return change
+
+
+def grown_safe(document):
+    """A safe region that is a centimetre too large."""
+    plan = read_plan(Entry("", "", document))
+    ring = shapely.get_coordinates(plan.cells[0].safe.buffer(0.01, join_style="mitre").exterior)[:-1]
+    return changed(document, ("cells", 0, "safe", "outer"), ring.tolist())
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (put(["other"], "joint_names"), r"joint_names: \['other'\] are not the scenario's"),
+        (moved(1e-9, "start", 0), r"start: .* is not the scenario's"),
+        (moved(1e-9, "goal_pose", 1), r"goal_pose: .* is not the scenario's"),
+        (put([None], "goal_joints"), r"goal_joints: \[None\] are not the scenario's"),
+        (put("0" * 64, "problem"), r"problem: '0+' is not the scenario's digest"),
+        (put("table_3", "gain_set"), r"gain_set: 'table_3' is none of scheduled"),
+        (moved(0.02, "margin"), r"cells\[\d\].core: .* or come nearer than 0.1"),
+        (put(-1.88, "cells", 0, "lower", 1), r"cells\[0\].lower, upper: .* leaves the joint's limits"),
+        (
+            moved(0.3, "cells", 0, "upper", 0),
+            r"transitions\[0\].gains|cells\[0\].safe: .* may touch the wall",
+        ),
+        (grown_safe, r"cells\[0\].safe: .* may touch the wall from"),
+        (moved(0.05, "cells", 0, "tidied", "outer", 0, 0), r"transitions|cells"),
+        (moved(1e-4, "transitions", 0, "target", 0), r"transitions\[0\].inradius: is .* expected"),
+        (moved(1e-6, "transitions", 0, "inradius"), r"transitions\[0\].inradius: is"),
+        (moved(0.05, "transitions", 0, "neck"), r"transitions\[0\].(neck: no way keeps|gains)"),
+        (put(1e-6, "transitions", 0, "length"), r"transitions\[0\].length: .* is less than"),
+        (put(True, "transitions", 0, "only_angles"), r"transitions\[0\].only_angles: True over"),
+        (moved(1e-6, "transitions", 0, "gains", "stiffness"), r"transitions\[0\].gains.stiffness: is"),
+        (moved(1e-6, "transitions", 0, "gains", "energy_bound", 1), r"transitions\[0\].gains.energy_bound"),
+        (put("exponential", "transitions", 0, "gains", "funnel"), r"transitions\[0\].gains.funnel: is"),
+        (
+            moved(0.005, "transitions", -1, "goal_upper", 1),
+            r"transitions\[\d\].(gains|goal_lower, goal_upper)",
+        ),
+        (without("cells", 0), r"transitions: has \d entries"),
+        (without("transitions", 0), r"transitions: .* is not allowed; expected a list of"),
+        (doubled("cells", 0), r"transitions: .*\d .*entries"),
+        (swapped("cells"), r"cells|transitions|start"),
+        (swapped("transitions"), r"transitions"),
+    ],
+)
+def test_refusals_under_a_new_digest_say_what_and_where(document, tmp_path, change, message):
+    with pytest.raises((RefusalError, PlanError), match=message):
+        verify_file(write(change(document), tmp_path / "plan.json", signed=True), PROBLEM, GAINS)
