@@ -6,7 +6,9 @@ from time import perf_counter
 
 import numpy as np
 
-from benchmarks.rows import Row, best_seconds
+from benchmarks.rows import Row
+from benchmarks.timing import best_seconds
+from benchmarks.transport import base_plan
 from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.planning import Plan
 from coop_drake.simulation import build_maps
@@ -17,21 +19,23 @@ _TOLERANCE = 1e-4
 _POINTS = 2000
 
 
-def bench_mapping(plan: Plan) -> tuple[list[Row], tuple[HarmonicMap, ...]]:
-    """Solve, evaluate and judge the maps of a plan; returns them, too."""
+def bench_mapping() -> list[Row]:
+    """Solve, evaluate and judge the maps of the base plan."""
+    _, plan = base_plan()
     cold, _ = _timed_maps(plan)
     warm, maps = _timed_maps(plan)
     certificates = [harmonic_map.certificate for harmonic_map in maps]
     unknowns = max(certificate.unknowns for certificate in certificates)
     dense = np.random.default_rng(0).normal(size=(unknowns, unknowns)) + unknowns * np.eye(unknowns)
     factor = best_seconds(lambda: np.linalg.solve(dense, dense[:, :2]), 1)
-    rows = [
-        Row(f"mapping {len(maps)} cells of base", warm, "s", "first time, operators cold", cold),
-        Row("mapping one cell", warm / len(maps), "s", f"dense solve, {unknowns} unknowns", factor),
-        Row("largest residual", max(c.residual for c in certificates), "-", "tolerance", _TOLERANCE),
+    residual = max(certificate.residual for certificate in certificates)
+    return [
+        Row("mapping/base/cells", len(maps), "cells"),
+        Row("mapping/base/wall_seconds", warm, "s", "first time, operators cold", cold),
+        Row("mapping/base/one_cell", warm / len(maps), "s", f"dense solve, {unknowns} unknowns", factor),
+        Row("mapping/base/largest_residual", residual, "-", "tolerance", _TOLERANCE),
         *_evaluation(plan, maps),
     ]
-    return rows, maps
 
 
 def _evaluation(plan: Plan, maps: tuple[HarmonicMap, ...]) -> list[Row]:
@@ -47,8 +51,8 @@ def _evaluation(plan: Plan, maps: tuple[HarmonicMap, ...]) -> list[Row]:
     batch = 1e6 * best_seconds(lambda: harmonic_map(many), 3) / _POINTS
     peer = f"{len(sources)} logarithms in numpy"
     return [
-        Row("velocity field at one point", single, "us", peer, logs),
-        Row("map and Jacobian, per point of many", batch, "us", peer, logs),
+        Row("mapping/base/field_at_one_point", single, "us", peer, logs),
+        Row("mapping/base/map_and_jacobian_per_point", batch, "us", peer, logs),
     ]
 
 

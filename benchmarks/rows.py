@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from time import perf_counter
 
-__all__ = ["Row", "best_seconds"]
+__all__ = ["Row"]
 
 
 @dataclass(frozen=True)
@@ -14,12 +12,11 @@ class Row:
     """A figure and what it is compared with.
 
     Attributes:
-        name: What was measured.
-        value: The figure.
-        unit: Its unit.
+        name: What was measured, as ``topic/.../item/figure``.
+        value: The figure; for an ``answer`` 1 if it is decided (found or proved), 0 if not.
+        unit: Its unit; for an ``answer`` the answer itself.
         peer: What stands beside it, empty if nothing does.
-        peer_value: The peer's figure in the same unit.
-        ratio: value / peer_value.
+        peer_value: The peer's figure in the same unit, None if it has none.
     """
 
     name: str
@@ -29,11 +26,26 @@ class Row:
     peer_value: float | None = None
 
     @property
+    def topic(self) -> str:
+        """What its table is about."""
+        return self.name.rsplit("/", 2)[0]
+
+    @property
+    def item(self) -> str:
+        """The line of its table."""
+        return self.name.rsplit("/", 2)[1]
+
+    @property
+    def figure(self) -> str:
+        """The column of its table."""
+        return self.name.rsplit("/", 2)[2]
+
+    @property
     def ratio(self) -> float | None:
         """The figure in units of its peer's."""
         return None if not self.peer_value else self.value / self.peer_value
 
-    def as_dict(self) -> dict[str, object]:
+    def as_dict(self) -> dict[str, str | float | None]:
         """The row as it goes into the JSON file."""
         return {
             "name": self.name,
@@ -43,14 +55,3 @@ class Row:
             "peer_value": self.peer_value,
             "ratio": self.ratio,
         }
-
-
-def best_seconds(work: Callable[[], object], repeats: int) -> float:
-    """Return the shortest of several wall times [s]; the first call warms caches and does not count."""
-    work()
-    times = []
-    for _ in range(repeats):
-        start = perf_counter()
-        work()
-        times.append(perf_counter() - start)
-    return min(times)

@@ -8,7 +8,7 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from benchmarks.rows import Row
-from coop_drake.fields import HarmonicMap
+from benchmarks.transport import base_transport
 from coop_drake.planning import Plan
 from coop_drake.plant import build_team_plant, set_configuration
 from coop_drake.scenario import Scenario
@@ -19,16 +19,19 @@ __all__ = ["bench_simulation"]
 _FIXED_STEP_SCHEMES = ("explicit_euler", "runge_kutta2")
 
 
-def bench_simulation(scenario: Scenario, plan: Plan, maps: tuple[HarmonicMap, ...]) -> list[Row]:
+def bench_simulation() -> list[Row]:
     """Run the closed loop, then the plant alone with as many steps over the same simulated time."""
+    scenario, plan, maps = base_transport()
     start = perf_counter()
     log = simulate(scenario, plan, maps)
     wall, simulated = perf_counter() - start, float(log.times[-1])
     steps = len(log.times) - 1
     bare = _bare_plant_seconds(scenario, plan, simulated, simulated / steps)
+    bare_step = 1e3 * bare / steps
     return [
-        Row("simulating base", wall, "s", "simulated time", simulated),
-        Row(f"one of {steps} steps of base", 1e3 * wall / steps, "ms", "bare plant", 1e3 * bare / steps),
+        Row("simulating/base/wall_seconds", wall, "s", "simulated time", simulated),
+        Row("simulating/base/steps", steps, "steps"),
+        Row("simulating/base/one_step", 1e3 * wall / steps, "ms", "bare plant", bare_step),
     ]
 
 

@@ -1,0 +1,59 @@
+"""The planner's own compiled footprint check, as a function of plain numbers, for planners of others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numba
+import numpy as np
+
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning import PlanningProblem
+from coop_drake.planning.collision_kernels import is_free
+from coop_drake.planning.team_arrays import team_arrays
+from coop_drake.planning.walls import walls_for
+
+__all__ = ["compiled_check", "free_goals"]
+
+_TRIES_PER_GOAL = 40
+
+
+def compiled_check(problem: PlanningProblem) -> Callable[..., bool]:
+    """Compile ``check(x, y, theta, q...)`` for one question: is this configuration free?
+
+    The team and the walls are constants of the compiled code. A call from Python then costs as little as
+    a call can; handing thirteen arrays over at every call would cost three times the check itself.
+    """
+    team = team_arrays(problem.tree)
+    walls = walls_for(problem.workspace, team)
+
+    @numba.njit
+    def check(*values: float) -> bool:
+        return is_free(team, walls, np.array(values), 0.0)
+
+    check(*map(float, problem.start))
+    compiled: Callable[..., bool] = check
+    return compiled
+
+
+def free_goals(problem: PlanningProblem, check: Callable[..., bool], count: int, seed: int) -> FloatArray:
+    """Free configurations at the goal: fixed joints as asked, free ones at random; shape (m <= count, 3 + n).
+
+    Args:
+        problem: The question.
+        check: Its compiled check.
+        count: How many are wanted.
+        seed: Seed of the random joints.
+    """
+    random = np.random.default_rng(seed)
+    lower, upper = problem.tree.joint_lower, problem.tree.joint_upper
+    fixed = np.array([np.nan if value is None else value for value in problem.goal_joints], dtype=float)
+    goals: list[FloatArray] = []
+    for _ in range(_TRIES_PER_GOAL * count):
+        joints = lower + random.random(len(fixed)) * (upper - lower)
+        goal = np.concatenate((problem.goal_pose, np.where(np.isnan(fixed), joints, fixed)))
+        if check(*map(float, goal)):
+            goals.append(goal)
+        if len(goals) == count or not np.isnan(fixed).any():
+            break
+    return np.array(goals).reshape(-1, 3 + len(fixed))

@@ -1,0 +1,70 @@
+"""What our planner takes for one question, in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import process_time
+
+from benchmarks.planner.family import first_question
+from coop_drake.control import ScheduledGains
+from coop_drake.planning import Found, PlanningProblem, PlanningResult
+from coop_drake.planning.planner import plan
+
+__all__ = ["Planned", "plan_once_warm", "plan_repeatedly"]
+
+
+@dataclass(frozen=True)
+class Planned:
+    """One answer and what it took.
+
+    Attributes:
+        answer: ``found``, ``infeasible`` or ``undecided``.
+        cpu_seconds: From the question to a plan that can be executed, or to the verdict [CPU s].
+        first_plan_cpu_seconds: To the first certified plan, or to the verdict [CPU s].
+        slices: Compound slices swept.
+        cells: Cells of the plan, or left undecided.
+        margin_m: Margin of the plan's cores, 0 if there is no plan [m].
+        transport_seconds: Estimated duration of the transport, 0 if there is no plan [s].
+    """
+
+    answer: str
+    cpu_seconds: float
+    first_plan_cpu_seconds: float
+    slices: int
+    cells: int
+    margin_m: float
+    transport_seconds: float
+
+
+def plan_repeatedly(problem: PlanningProblem, runs: int) -> tuple[Planned, ...]:
+    """Ask the same question several times; the first time compiled kernels are still to be loaded."""
+    return tuple(_planned(lambda: _ask(problem)) for _ in range(runs))
+
+
+def plan_once_warm(problem: PlanningProblem) -> Planned:
+    """Ask once, after a small question has loaded the compiled kernels."""
+    _ask(first_question())
+    return _planned(lambda: _ask(problem))
+
+
+def _ask(problem: PlanningProblem) -> PlanningResult:
+    return plan(problem, ScheduledGains(), gain_set_name="scheduled")
+
+
+def _planned(ask: Callable[[], PlanningResult]) -> Planned:
+    start = process_time()
+    result = ask()
+    seconds = process_time() - start
+    report = result.report
+    first = getattr(report, "first_plan_cpu_seconds", None)
+    found = result.plan if isinstance(result, Found) else None
+    return Planned(
+        answer=type(result).__name__.lower(),
+        cpu_seconds=seconds,
+        first_plan_cpu_seconds=seconds if first is None else first,
+        slices=report.slices,
+        cells=report.mixed_cells if found is None else len(found.cells),
+        margin_m=0.0 if found is None else found.margin,
+        transport_seconds=0.0 if found is None else sum(t.estimated_time for t in found.transitions),
+    )

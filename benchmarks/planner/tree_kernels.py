@@ -1,0 +1,148 @@
+"""RRT-Connect as in the textbooks, compiled: two trees, steps of fixed length, motions free or not."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numba
+import numpy as np
+
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.sweep_kernels import IntArray
+from coop_drake.planning.collision_kernels import is_free
+from coop_drake.planning.team_arrays import TeamArrays
+from coop_drake.planning.walls import Walls
+
+__all__ = ["rrt_connect"]
+
+_TRAPPED, _ADVANCED, _REACHED = 0, 1, 2
+
+
+@numba.njit(cache=True)
+def _turn(first: FloatArray, last: FloatArray) -> FloatArray:
+    """The way from one configuration to another; theta (axis 2) takes its shorter side."""
+    way = last - first
+    way[2] -= 2.0 * pi * np.rint(way[2] / (2.0 * pi))
+    return way
+
+
+@numba.njit(cache=True)
+def _nearest(nodes: FloatArray, count: int, z: FloatArray, scale: FloatArray) -> int:
+    """Index of the node nearest to z; in these spaces a k-d tree was no faster than looking at all."""
+    best, index = np.inf, 0
+    for i in range(count):
+        total = 0.0
+        for k in range(len(z)):
+            d = z[k] - nodes[i, k]
+            if k == 2:
+                d -= 2.0 * pi * np.rint(d / (2.0 * pi))
+            total += (d * scale[k]) ** 2
+            if total >= best:
+                break
+        if total < best:
+            best, index = total, i
+    return index
+
+
+@numba.njit(cache=True)
+def _extend(
+    team: TeamArrays,
+    walls: Walls,
+    nodes: FloatArray,
+    parents: IntArray,
+    count: int,
+    z: FloatArray,
+    scale: FloatArray,
+    reach: float,
+    step: float,
+) -> tuple[int, int]:
+    """Take one step towards z: what came of it, and how many configurations were checked."""
+    near = _nearest(nodes, count, z, scale)
+    way = _turn(nodes[near], z)
+    length = np.sqrt(((way * scale) ** 2).sum())
+    share = 1.0 if length <= reach else reach / length
+    motions = max(1, int(np.ceil(np.abs(way * scale).max() * share / step)))
+    for i in range(motions, 0, -1):
+        if not is_free(team, walls, nodes[near] + way * (share * i / motions), 0.0):
+            return _TRAPPED, motions - i + 1
+    nodes[count] = nodes[near] + way * share
+    parents[count] = near
+    return (_REACHED if share == 1.0 else _ADVANCED), motions
+
+
+@numba.njit(cache=True)
+def rrt_connect(
+    team: TeamArrays,
+    walls: Walls,
+    start: FloatArray,
+    goals: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    scale: FloatArray,
+    reach: float,
+    step: float,
+    random: np.random.Generator,
+    budget: int,
+) -> tuple[FloatArray, int]:
+    """Grow a tree from the start and one from the goals in turns, and join them.
+
+    Args:
+        team: The team.
+        walls: The floor.
+        start: Free configuration, shape (d,).
+        goals: Free configurations, shape (G, d).
+        lower: Lower ends of what is sampled, shape (d,).
+        upper: Upper ends, shape (d,).
+        scale: How far a unit of each axis moves the team, shape (d,).
+        reach: Longest step of a tree [m].
+        step: No axis moves the team further between two checks [m].
+        random: Source of the samples.
+        budget: Configurations that may be checked.
+
+    Returns:
+        Path from start to a goal, theta unwrapped, shape (m, d), without rows if none was found; and the
+        number of configurations checked.
+    """
+    nodes = np.empty((2, budget + len(goals) + 1, len(start)))
+    parents = np.empty((2, budget + len(goals) + 1), np.int64)
+    parents[:, : len(goals) + 1] = -1
+    counts = np.array([1, len(goals)])
+    nodes[0, 0] = start
+    nodes[1, : len(goals)] = goals
+    checks, side = 0, 0
+    while checks < budget:
+        z = lower + random.random(len(start)) * (upper - lower)
+        other = 1 - side
+        got, spent = _extend(team, walls, nodes[side], parents[side], counts[side], z, scale, reach, step)
+        checks += spent
+        if got != _TRAPPED:
+            z = nodes[side, counts[side]].copy()
+            counts[side] += 1
+            got = _ADVANCED
+            while got == _ADVANCED and checks < budget:
+                got, spent = _extend(
+                    team, walls, nodes[other], parents[other], counts[other], z, scale, reach, step
+                )
+                checks += spent
+                if got != _TRAPPED:
+                    counts[other] += 1
+            if got == _REACHED:
+                return _joined(nodes, parents, counts), checks
+        side = other
+    return np.empty((0, len(start))), checks
+
+
+@numba.njit(cache=True)
+def _joined(nodes: FloatArray, parents: IntArray, counts: IntArray) -> FloatArray:
+    """Path through the newest nodes of both trees, which stand for one configuration."""
+    chain = np.empty((counts[0] + counts[1], nodes.shape[2]))
+    size, i = 0, counts[0] - 1
+    while i >= 0:
+        chain[size] = nodes[0, i]
+        size, i = size + 1, parents[0, i]
+    chain[:size] = chain[:size][::-1].copy()
+    i = parents[1, counts[1] - 1]
+    while i >= 0:
+        chain[size] = chain[size - 1] + _turn(chain[size - 1], nodes[1, i])
+        size, i = size + 1, parents[1, i]
+    return chain[:size].copy()

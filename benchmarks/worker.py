@@ -1,0 +1,68 @@
+"""The other end of ``in_own_process``: ``python -m benchmarks.worker`` reads work and writes its result."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import resource
+import signal
+import sys
+from math import ceil
+from pathlib import Path
+from time import process_time
+from types import FrameType
+
+from benchmarks.isolated import GRACE, Isolated
+
+__all__ = ["main", "peak_memory_mb"]
+
+_STATUS = Path("/proc/self/status")
+
+
+class _OutOfTimeError(BaseException):
+    """The limit is reached; no handler of ordinary errors shall catch it."""
+
+
+def main() -> None:
+    """Do one piece of work; whatever it prints goes to standard error."""
+    with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as answer:
+        os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+        work, arguments, limit = pickle.load(sys.stdin.buffer)
+        _limit_time(ceil(process_time()) + ceil(limit))
+        start = process_time()
+        try:
+            value = work(*arguments)
+        except _OutOfTimeError:
+            value = None
+        signal.signal(signal.SIGXCPU, signal.SIG_IGN)
+        pickle.dump(Isolated(value, process_time() - start, peak_memory_mb()), answer)
+
+
+def peak_memory_mb() -> float:
+    """Largest resident memory of this process [MB].
+
+    Where the kernel keeps it for the program alone that is read: the figure of ``getrusage`` begins with
+    what the parent held when it started this process.
+    """
+    if _STATUS.exists():
+        fields = dict(line.split(":", 1) for line in _STATUS.read_text().splitlines())
+        if "VmHWM" in fields:
+            return int(fields["VmHWM"].split()[0]) * 1.024e-3
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / 1e6 if sys.platform == "darwin" else peak * 1.024e-3
+
+
+def _limit_time(seconds: int) -> None:
+    """Raise when the CPU time is used up; the kernel kills what does not heed that."""
+    signal.signal(signal.SIGXCPU, _stop)
+    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + GRACE))
+
+
+def _stop(number: int, frame: FrameType | None) -> None:
+    del frame
+    signal.signal(number, signal.SIG_IGN)
+    raise _OutOfTimeError
+
+
+if __name__ == "__main__":
+    main()
