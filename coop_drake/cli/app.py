@@ -19,6 +19,7 @@ from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import summary_rows
 from coop_drake.cli.verify import verify_command
+from coop_drake.cli.watch import watch_command
 from coop_drake.cli.why import why_command
 from coop_drake.planning import Found, Plan
 
@@ -158,6 +159,7 @@ def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
     run_guarded(reporter, command)
 
 
+app.command("watch")(watch_command)
 app.command("why")(why_command)
 app.command("verify")(verify_command)
 

@@ -5,43 +5,54 @@ from __future__ import annotations
 from math import cos, radians, sin, tan
 
 import numpy as np
+import shapely
 from shapely import Polygon
 
 from coop_drake.geometry.pose import FloatArray
 
 __all__ = ["camera_pose"]
 
-_ELEVATION = radians(62.0)
 _HALF_HEIGHT = tan(radians(75.0) / 2)  # Meshcat's vertical field of view.
 _HALF_WIDTH = _HALF_HEIGHT * 4 / 3  # Browser windows are seldom narrower than this.
-_FILL = 0.92  # Part of the picture that the floor may fill.
 
 
-def camera_pose(workspace: Polygon, height: float) -> tuple[FloatArray, FloatArray]:
+def camera_pose(
+    workspace: Polygon,
+    height: float,
+    *,
+    elevation: float = radians(62.0),
+    turn: float = 0.0,
+    fill: float = 0.92,
+) -> tuple[FloatArray, FloatArray]:
     """Return the camera's position and its target, from which the workspace just fills the picture.
-
-    The camera looks along +y from above at an angle.
 
     Args:
         workspace: The floor [m].
         height: Height up to which things stand on it [m].
+        elevation: How steeply the camera looks down [rad].
+        turn: How far round it stands, counter-clockwise, from where it looks along +y [rad].
+        fill: Part of the picture that the floor and what stands on it may fill.
 
     Returns:
         Position and target, each of shape (3,), in W [m].
     """
+    outline = shapely.get_coordinates(workspace.convex_hull)[:-1]
+    corners = np.array([[x, y, z] for x, y in outline for z in (0.0, height)])
+    right = np.array([cos(turn), sin(turn), 0.0])
+    ahead = np.array([-sin(turn), cos(turn), 0.0])
+    up = sin(elevation) * ahead + [0.0, 0.0, cos(elevation)]
+    away = np.cross(right, up)
     x_min, y_min, x_max, y_max = workspace.bounds
-    corners = np.array([[x, y, z] for x in (x_min, x_max) for y in (y_min, y_max) for z in (0.0, height)])
-    away = np.array([0.0, -cos(_ELEVATION), sin(_ELEVATION)])
-    up = np.array([0.0, sin(_ELEVATION), cos(_ELEVATION)])
     target = np.array([0.5 * (x_min + x_max), 0.5 * (y_min + y_max), 0.0])
     distance = x_max - x_min + y_max - y_min
-    for _ in range(30):
+    for _ in range(40):
         offsets = corners - target
         depth = distance - offsets @ away
         vertical = offsets @ up / depth / _HALF_HEIGHT
-        horizontal = offsets[:, 0] / depth / _HALF_WIDTH
-        centre = 0.5 * (vertical.max() + vertical.min())
-        target[1] += 0.5 * centre * _HALF_HEIGHT * distance / sin(_ELEVATION)
-        extent = max(vertical.max() - centre, float(np.abs(horizontal).max()))
-        distance *= (extent / _FILL) ** 0.5
+        horizontal = offsets @ right / depth / _HALF_WIDTH
+        rise, drift = (0.5 * float(seen.max() + seen.min()) for seen in (vertical, horizontal))
+        target += 0.5 * rise * _HALF_HEIGHT * distance / sin(elevation) * ahead
+        target += 0.5 * drift * _HALF_WIDTH * distance * right
+        extent = max(vertical.max() - rise, horizontal.max() - drift)
+        distance *= (extent / fill) ** 0.5
     return target + distance * away, target

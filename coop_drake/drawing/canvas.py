@@ -54,5 +54,11 @@ def legend_above(ax: Axes, handles: list[Patch] | None = None) -> None:
 
 
 def save_figure(figure: Figure, path: Path, *, dpi: float = 150) -> None:
-    """Write a figure as PNG of ``dpi`` points per inch; an interrupted write leaves no file behind."""
-    write_atomically(path, lambda file: figure.savefig(file, dpi=dpi, format="png"))
+    """Write a figure as PNG of ``dpi`` points per inch, or as SVG if the path ends so; whole or not at all.
+
+    The same figure gives the same bytes.
+    """
+    kind = "svg" if path.suffix == ".svg" else "png"
+    metadata = {"Date": None} if kind == "svg" else None
+    with mpl.rc_context({"svg.hashsalt": "coop_drake"}):
+        write_atomically(path, lambda file: figure.savefig(file, dpi=dpi, format=kind, metadata=metadata))

@@ -1,7 +1,8 @@
 """Watching the planner think: what it tells while it searches, as pictures and as a scene in space."""
 
-from coop_drake.watching.film import Film, film_cells
+from coop_drake.watching.film import Film, Strategy, film
 from coop_drake.watching.moments import Leaf, Link, Moment, moments
+from coop_drake.watching.scene import scene_page, write_scene
 from coop_drake.watching.sequence import write_sequence
 from coop_drake.watching.storyboard import Shot, storyboard
 
@@ -11,8 +12,11 @@ __all__ = [
     "Link",
     "Moment",
     "Shot",
-    "film_cells",
+    "Strategy",
+    "film",
     "moments",
+    "scene_page",
     "storyboard",
+    "write_scene",
     "write_sequence",
 ]

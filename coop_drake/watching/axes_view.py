@@ -13,13 +13,12 @@ from coop_drake.drawing.colours import INK
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Interval, Intervals
 from coop_drake.planning.cell_graph import Kind
-from coop_drake.planning.slices import nearest_turn
 from coop_drake.watching import look
 from coop_drake.watching.moments import Leaf, Link
+from coop_drake.watching.stack import THETA, on_turn
 from coop_drake.watching.way import Leg
 
 __all__ = [
-    "THETA",
     "cut",
     "draw_angles",
     "draw_channel_tiles",
@@ -29,8 +28,6 @@ __all__ = [
     "leaf_colour",
 ]
 
-THETA = (-pi / 4, 7 * pi / 4)
-"""The turn of theta that is drawn [rad]; coarse slices begin and end there."""
 
 _TOUCH = 1e-9
 
@@ -70,16 +67,23 @@ def draw_tiles(
     ax: Axes, leaves: Sequence[Leaf], axis: int, colours: Sequence[str], *, limits: Interval
 ) -> None:
     """Fill the rectangle of every leaf; ``axis`` 0 draws strips over the limits of a single axis."""
-    rectangles = [_rectangle(leaf.intervals, axis, limits) for leaf in leaves]
+    drawn = [
+        (_rectangle(turned, axis, limits), colour)
+        for leaf, colour in zip(leaves, colours, strict=True)
+        for turned in _into_view(leaf.intervals)
+    ]
+    rectangles, fills = [rectangle for rectangle, _ in drawn], [colour for _, colour in drawn]
     ax.add_collection(
-        PolyCollection(rectangles, facecolors=list(colours), edgecolors="white", linewidths=0.5, alpha=0.7),
+        PolyCollection(rectangles, facecolors=fills, edgecolors="white", linewidths=0.5, alpha=0.7),
         autolim=False,
     )
 
 
 def draw_hatch(ax: Axes, leaves: Sequence[Leaf], axis: int, colour: str, *, limits: Interval) -> None:
     """Hatch the rectangle of every leaf."""
-    rectangles = [_rectangle(leaf.intervals, axis, limits) for leaf in leaves]
+    rectangles = [
+        _rectangle(turned, axis, limits) for leaf in leaves for turned in _into_view(leaf.intervals)
+    ]
     hatched = PolyCollection(rectangles, facecolors="none", edgecolors=colour, linewidths=0.0, hatch="////")
     ax.add_collection(hatched, autolim=False)
 
@@ -103,8 +107,12 @@ def draw_looked_at(ax: Axes, splits: Sequence[tuple[Leaf, int]], axis: int, *, l
     """Frame the slices that were just halved, the last one boldly, with the line that halves it."""
     if not splits:
         return
-    rectangles = [_rectangle(leaf.intervals, axis, limits) for leaf, _ in splits]
-    widths = [1.0] * (len(rectangles) - 1) + [2.6]
+    drawn = [
+        (_rectangle(turned, axis, limits), 1.0 if leaf is not splits[-1][0] else 2.6)
+        for leaf, _ in splits
+        for turned in _into_view(leaf.intervals)
+    ]
+    rectangles, widths = [rectangle for rectangle, _ in drawn], [width for _, width in drawn]
     ax.add_collection(
         PolyCollection(rectangles, facecolors="none", edgecolors=look.LOOKED_AT, linewidths=widths, zorder=4),
         autolim=False,
@@ -112,7 +120,7 @@ def draw_looked_at(ax: Axes, splits: Sequence[tuple[Leaf, int]], axis: int, *, l
     leaf, halved = splits[-1]
     if halved in (0, axis):
         (x0, x1), (y0, y1) = leaf.intervals[0], leaf.intervals[axis] if axis else limits
-        x, y = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
+        x, y = THETA[0] + (0.5 * (x0 + x1) - THETA[0]) % (2 * pi), 0.5 * (y0 + y1)
         line = [(x, y0), (x, y1)] if halved == 0 else [(x0, y), (x1, y)]
         halving = LineCollection([line], colors=look.LOOKED_AT, linewidths=2.0, zorder=4)
         ax.add_collection(halving, autolim=False)
@@ -135,14 +143,5 @@ def _rectangle(intervals: Intervals, axis: int, limits: Interval) -> list[tuple[
 
 
 def _into_view(intervals: Intervals) -> list[Intervals]:
-    """The intervals with theta on the turn drawn; twice where it crosses the turn's end."""
-    lower, upper = intervals[0]
-    middle = 0.5 * (THETA[0] + THETA[1])
-    shift = middle + nearest_turn(0.5 * (lower + upper) - middle) - 0.5 * (lower + upper)
-    lower, upper = lower + shift, upper + shift
-    turned: list[Intervals] = [((lower, upper), *intervals[1:])]
-    if lower < THETA[0] - _TOUCH:
-        turned.append(((lower + 2 * pi, upper + 2 * pi), *intervals[1:]))
-    if upper > THETA[1] + _TOUCH:
-        turned.append(((lower - 2 * pi, upper - 2 * pi), *intervals[1:]))
-    return turned
+    """The intervals with theta on the turn drawn, in two where it crosses the turn's end."""
+    return [(theta, *intervals[1:]) for theta in on_turn(intervals[0])]

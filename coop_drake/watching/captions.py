@@ -41,9 +41,13 @@ def _verdict(film: Film, moment: Moment) -> str:
     if moment.verdict == Verdict.FOUND.value:
         return f"Found: {len(moment.channel)} free cells join start and goal"
     if moment.verdict == Verdict.INFEASIBLE.value:
+        if film.reason:
+            return f"Infeasible, proved: {film.reason}"
         if film.margin > 0.0:
             return f"No way keeps {film.margin:g} m from the walls: start and goal lie in separate parts"
         return "Infeasible, proved: whatever may be free falls apart between start and goal"
+    if film.reason:
+        return f"Undecided: {film.reason}"
     if moment.verdict == Verdict.BUDGET.value:
         return f"Undecided: the budget of slices is spent, {moment.undecided_links} cells to prove"
     return f"Undecided: {moment.undecided_links} cells of the channel are as fine as the resolution"

@@ -3,21 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import Enum
 
 import numpy as np
+from manifold3d import CrossSection, FillRule
 
 from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.minkowski import polygon_rings
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.events import Event
+from coop_drake.planning.cell_graph import Kind
+from coop_drake.planning.cells import Region
+from coop_drake.planning.channel import Channel
+from coop_drake.planning.events import (
+    ChannelSearched,
+    Event,
+    ExplorationBegan,
+    ExplorationEnded,
+    SeenCell,
+    SliceAdded,
+)
 from coop_drake.planning.exploration import Exploration, Verdict
 from coop_drake.planning.margins import marginal_workspace
+from coop_drake.planning.paper import PaperExploration
 from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.search import find_channel
 
-__all__ = ["Film", "film_cells"]
+__all__ = ["Film", "Strategy", "film"]
 
 Progress = Callable[[str, float], None]
+
+
+class Strategy(Enum):
+    """What is watched."""
+
+    CELLS = "cells"
+    """The exploration of the whole team by cells."""
+    PAPER = "paper"
+    """The same as the paper's Algorithms 1 and 2 are printed."""
+    PORTFOLIO = "portfolio"
+    """All that planning does: proofs, where it needs them, and the boxes along a sampled path."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,17 +52,19 @@ class Film:
 
     Attributes:
         problem: The question.
-        strategy: How it was searched: ``cells``, ``paper`` or ``portfolio``.
+        strategy: How it was searched.
         margin: Clearance from the walls that was asked for [m].
         events: What was told, in order.
         verdict: How it ended.
+        reason: Why there is no channel, in a sentence; empty if the events tell.
     """
 
     problem: PlanningProblem
-    strategy: str
+    strategy: Strategy
     margin: float
     events: tuple[Event, ...]
     verdict: Verdict
+    reason: str = ""
 
     def axes_of(self, robots: tuple[int, ...]) -> list[int]:
         """Indices into (theta, q...) of the whole team of the axes that some robots have."""
@@ -59,18 +87,23 @@ class Film:
         return ("theta", *(joint.name.replace("::", " ") for joint in self.problem.tree.joints))
 
 
-def film_cells(problem: PlanningProblem, margin: float, progress: Progress | None = None) -> Film:
-    """Explore the whole team by cells, and record it.
+def film(
+    problem: PlanningProblem, strategy: Strategy, margin: float, progress: Progress | None = None
+) -> Film:
+    """Answer a question once more, and record what is told on the way.
 
     Args:
         problem: The question; its settings give the budget of slices.
-        margin: Clearance that the cells keep from the walls [m].
-        progress: Called with a text and the share of the budget that is spent.
+        strategy: What to watch.
+        margin: Clearance to keep from the walls [m]; the portfolio takes less where there is less.
+        progress: Called with a text and the share of the work that is done.
     """
+    if strategy is Strategy.PORTFOLIO:
+        return _film_portfolio(problem, margin, progress)
     events: list[Event] = []
     swept = SweptTree(problem.tree)
-    workspace = marginal_workspace(problem, margin)
-    exploration = Exploration(problem, workspace, swept, BodyPairs(swept), watch=events.append)
+    made = Exploration if strategy is Strategy.CELLS else PaperExploration
+    exploration = made(problem, marginal_workspace(problem, margin), swept, BodyPairs(swept), events.append)
     budget = problem.settings.max_slices
 
     def count(slices: int) -> None:
@@ -78,4 +111,32 @@ def film_cells(problem: PlanningProblem, margin: float, progress: Progress | Non
             progress(f"{slices} slices", slices / budget)
 
     outcome = exploration.run(budget, count)
-    return Film(problem, "cells", margin, tuple(events), outcome.verdict)
+    return Film(problem, strategy, margin, tuple(events), outcome.verdict)
+
+
+def _film_portfolio(problem: PlanningProblem, margin: float, progress: Progress | None) -> Film:
+    """Record the proofs, then lay the boxes of the channel one by one."""
+    events: list[Event] = []
+    question = replace(problem, settings=replace(problem.settings, strategy="portfolio", margin=margin))
+    answer, _ = find_channel(question, progress, watch=events.append)
+    if isinstance(answer, Channel):
+        events += _laid(answer, tuple(sorted({joint.robot for joint in problem.tree.joints})))
+        return Film(problem, Strategy.PORTFOLIO, answer.margin, tuple(events), Verdict.FOUND)
+    verdict = Verdict.INFEASIBLE if answer.proved else Verdict.BUDGET
+    last = events[-1] if events else None
+    if not (isinstance(last, ExplorationEnded) and last.verdict == verdict.value):
+        events += [ExplorationBegan(answer.reason, ()), ExplorationEnded(verdict.value, 0)]
+    return Film(problem, Strategy.PORTFOLIO, 0.0, tuple(events), verdict, answer.reason)
+
+
+def _laid(channel: Channel, robots: tuple[int, ...]) -> list[Event]:
+    """The boxes of a channel as events: each is a slice of its own that is free."""
+    events: list[Event] = [ExplorationBegan("boxes along a sampled path", robots)]
+    chain: list[SeenCell] = []
+    for number, box in enumerate(channel.boxes):
+        section = CrossSection(polygon_rings(box.polygon), FillRule.Positive)
+        cell = SeenCell(number, Kind.FREE, Region.of(section))
+        chain.append(cell)
+        intervals = tuple((float(a), float(b)) for a, b in zip(box.lower, box.upper, strict=True))
+        events += [SliceAdded(number, intervals, (cell,)), ChannelSearched(tuple(chain), float(len(chain)))]
+    return [*events, ExplorationEnded(Verdict.FOUND.value, len(channel.boxes))]

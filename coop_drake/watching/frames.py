@@ -15,7 +15,6 @@ from coop_drake.drawing.colours import GREY, INK
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.watching import look
 from coop_drake.watching.axes_view import (
-    THETA,
     cut,
     draw_angles,
     draw_channel_tiles,
@@ -29,6 +28,7 @@ from coop_drake.watching.film import Film
 from coop_drake.watching.floor_view import DASHES, draw_ends, draw_legs, draw_outline, draw_section
 from coop_drake.watching.moments import Leaf
 from coop_drake.watching.shadows import union
+from coop_drake.watching.stack import THETA
 from coop_drake.watching.storyboard import Shot
 
 __all__ = ["frame_figure"]

@@ -16,6 +16,7 @@ from coop_drake.planning.events import (
     Event,
     ExplorationBegan,
     ExplorationEnded,
+    ExplorationResumed,
     SeenCell,
     SliceAdded,
     SliceSplit,
@@ -106,7 +107,7 @@ def moments(events: Sequence[Event], most: int) -> list[Moment]:
     """Fold events into at most ``most`` moments, spread evenly over the steps, the last one included.
 
     A step is a slice halved, a channel searched or an exploration begun or ended; steps in between are
-    merged into the next moment. The end of every exploration that had an answer is a moment of its own.
+    merged into the next moment. Where one exploration gives way to another is a moment of its own.
 
     Args:
         events: What an exploration told, in order; of several explorations one after the other.
@@ -132,17 +133,18 @@ def _stops(events: Sequence[Event]) -> list[int]:
 
 def _ends(events: Sequence[Event]) -> list[int]:
     """Indices of the last events of explorations."""
-    begun = [index for index, event in enumerate(events) if isinstance(event, ExplorationBegan)]
-    return [index - 1 for index in begun[1:]] + [len(events) - 1]
+    begun = [i for i, event in enumerate(events) if isinstance(event, ExplorationBegan | ExplorationResumed)]
+    return [i - 1 for i in begun[1:]] + [len(events) - 1]
 
 
 def _spread(stops: list[int], ends: list[int], most: int) -> set[int]:
     """At most ``most`` of the stops, evenly; ends take the place of their nearest neighbours."""
     places = np.linspace(0, len(stops) - 1, min(most, len(stops))).round().astype(int)
     chosen = {stops[place] for place in places}
-    for end in ends[-most:]:
-        if end not in chosen:
-            chosen.discard(min(chosen - set(ends), key=lambda stop: (abs(stop - end), stop), default=end))
+    for end in ends:
+        spare = chosen - set(ends)
+        if end not in chosen and spare:
+            chosen.remove(min(spare, key=lambda stop: (abs(stop - end), stop)))
             chosen.add(end)
     return chosen
 
@@ -197,10 +199,13 @@ class _State:
 
 
 def _folded(events: Sequence[Event], chosen: set[int]) -> Iterator[Moment]:
+    states: dict[str, _State] = {}
     state = _State()
     for index, event in enumerate(events):
         if isinstance(event, ExplorationBegan):
-            state = _State(event.question, event.robots)
+            state = states[event.question] = _State(event.question, event.robots)
+        elif isinstance(event, ExplorationResumed):
+            state = states[event.question]
         else:
             state.take(event)
         if index in chosen:

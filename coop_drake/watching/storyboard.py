@@ -45,11 +45,10 @@ class Shot:
 def storyboard(film: Film, most: int) -> list[Shot]:
     """Choose at most ``most`` moments of a film and work out what to draw at each."""
     shots: list[Shot] = []
-    shadows, question = Shadows(), None
+    shadows: dict[str, Shadows] = {}
     for moment in moments(film.events, most):
-        if question != moment.question:
-            question, shadows = moment.question, Shadows()
-        shots.append(_shot(film, moment, shadows, shots[-1] if shots else None))
+        own = shadows.setdefault(moment.question, Shadows())
+        shots.append(_shot(film, moment, own, shots[-1] if shots else None))
     return shots
 
 

@@ -1,0 +1,124 @@
+"""Watching the planner: search with a recorder on, and draw what it saw."""
+
+from __future__ import annotations
+
+from math import isfinite
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+from rich.markup import escape
+
+from coop_drake.cli.chain import load_task
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.reporter import Reporter
+from coop_drake.planning.exploration import Verdict
+from coop_drake.planning.problem import PlanningProblem
+
+__all__ = ["watch_command"]
+
+_FEWEST, _MOST = 2, 500  # Frames.
+_OURS = ("think_[0-9][0-9][0-9][0-9].png", "think.png", "think.gif", "think.html")
+
+
+def _checked_margin(value: float | None) -> float | None:
+    if value is not None and not isfinite(value):
+        raise typer.BadParameter(f"{value} is not a length in metres.")
+    return value
+
+
+def watch_command(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")],
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "--output",
+            "--out",
+            metavar="DIR",
+            file_okay=False,
+            help="Where pictures go; out/<scenario>/think by default.",
+        ),
+    ] = None,
+    frames: Annotated[
+        int,
+        typer.Option(
+            "--frames", metavar="N", min=_FEWEST, max=_MOST, help="Moments to show at most; 48 by default."
+        ),
+    ] = 48,
+    strategy: Annotated[
+        Literal["cells", "paper", "portfolio"],
+        typer.Option("--strategy", help="Exploration by cells, as the paper prints it, or all of planning."),
+    ] = "cells",
+    margin: Annotated[
+        float | None,
+        typer.Option(
+            "--margin",
+            metavar="M",
+            min=0.0,
+            callback=_checked_margin,
+            help="Clearance to keep from the walls [m]; cells: 0 by default, else 'no way' is no proof.",
+        ),
+    ] = None,
+    machine: Annotated[
+        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+) -> None:
+    """Watch the planner think: pictures, a moving picture and a page to turn in space."""
+    reporter = Reporter(machine=machine, quiet=quiet)
+
+    def command() -> ExitCode:
+        task = load_task(scenario, None)
+        directory = output if output is not None else Path("out") / task.scenario.name / "think"
+        return _watch(task.problem, directory, frames, strategy, margin, reporter)
+
+    run_guarded(reporter, command)
+
+
+def _watch(
+    problem: PlanningProblem,
+    directory: Path,
+    frames: int,
+    strategy: str,
+    margin: float | None,
+    reporter: Reporter,
+) -> ExitCode:
+    """Record, then draw."""
+    # Here and not above: it brings in the pictures' libraries, which no other command should wait for.
+    from coop_drake import watching
+
+    chosen = watching.Strategy(strategy)
+    if margin is None:
+        margin = problem.settings.margin if chosen is watching.Strategy.PORTFOLIO else 0.0
+    with reporter.stage("searching") as progress:
+        film = watching.film(problem, chosen, margin, progress)
+        shots = watching.storyboard(film, frames)
+    reporter.facts.update(
+        answer=film.verdict.value, slices=shots[-1].moment.slices, events=len(film.events), frames=len(shots)
+    )
+    _forget(directory)
+    with reporter.stage("drawing") as progress:
+        written = watching.write_sequence(film, shots, directory, progress)
+    with reporter.stage("scene") as progress:
+        written.append(watching.write_scene(film, shots, directory / "think.html", progress))
+    reporter.facts["bytes"] = {path.name: path.stat().st_size for path in written}
+    reporter.say(f"[bold]{escape(shots[-1].headline)}[/]")
+    reporter.say(
+        f"{len(shots)} pictures are in {escape(str(directory))}; open {escape(str(written[-1]))} in a browser"
+    )
+    return _code(film.verdict, film.margin)
+
+
+def _forget(directory: Path) -> None:
+    """Remove an older recording, so that the folder never mixes two."""
+    for pattern in _OURS:
+        for path in directory.glob(pattern):
+            path.unlink()
+
+
+def _code(verdict: Verdict, margin: float) -> ExitCode:
+    """What the answer is worth: that there is no way with a margin proves nothing about the question."""
+    if verdict is Verdict.FOUND:
+        return ExitCode.DONE
+    return ExitCode.INFEASIBLE if verdict is Verdict.INFEASIBLE and margin == 0.0 else ExitCode.UNDECIDED

@@ -1,0 +1,68 @@
+"""A Meshcat window without server, socket or browser: it keeps what is sent and writes it into a page."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import meshcat
+from meshcat.visualizer import ViewerWindow, Visualizer
+
+__all__ = ["OfflineWindow", "offline_visualizer"]
+
+_PAGE = Path(__file__).with_name("page.html")
+_MARKS = re.compile(r"<!--title-->|/\*(viewer|lengths|commands|story)\*/")
+_VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
+
+
+class _Shelf:
+    """Stands in for the socket: keeps messages in the order in which they come."""
+
+    def __init__(self) -> None:
+        self.messages: list[bytes] = []
+
+    def send_multipart(self, frames: list[bytes]) -> None:
+        """Keep a message: its kind, its path, and the packed command that the viewer takes."""
+        self.messages.append(frames[2])
+
+    def recv(self) -> bytes:
+        """Answer as a server does."""
+        return b"ok"
+
+
+class OfflineWindow(ViewerWindow):
+    """Takes the place of Meshcat's window, which would start a server process and wait for ports.
+
+    Args:
+        title: Title of the page.
+        story: What the page's own script shows beside the scene; anything that JSON can say.
+    """
+
+    def __init__(self, title: str, story: Mapping[str, Any]) -> None:
+        self.zmq_socket = _Shelf()
+        self._title, self._story = title, story
+
+    def get_scene(self) -> str:
+        """The page: viewer, scene and player in one file that needs no network."""
+        messages = self.zmq_socket.messages
+        packed = gzip.compress(b"".join(messages), mtime=0)
+        parts = {
+            "<!--title-->": escape(self._title),
+            "/*viewer*/": _VIEWER.read_text(encoding="utf-8"),
+            "/*lengths*/": json.dumps([len(message) for message in messages]),
+            "/*commands*/": base64.b64encode(packed).decode(),
+            "/*story*/": json.dumps(self._story).replace("</", "<\\/"),
+        }
+        page = _PAGE.read_text(encoding="utf-8")
+        return _MARKS.sub(lambda mark: parts[mark[0]], page)
+
+
+def offline_visualizer(title: str, story: Mapping[str, Any]) -> Any:
+    """A Meshcat visualizer whose ``static_html()`` gives the page."""
+    return Visualizer(window=OfflineWindow(title, story))
