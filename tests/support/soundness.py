@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
+import shapely
 from shapely import Point, maximum_inscribed_circle
 
 from coop_drake.planning.channel import Channel, FreeBox
 from coop_drake.planning.problem import PlanningProblem
-from tests.support.trees import body_footprints, footprint
+from tests.support.free_positions import FreePositions
+
+_POSITIONS = 200
 
 
 def assert_channel_is_sound(problem: PlanningProblem, channel: Channel, samples: int = 6) -> None:
@@ -32,21 +35,14 @@ def assert_channel_is_sound(problem: PlanningProblem, channel: Channel, samples:
 
 
 def assert_box_is_free(problem: PlanningProblem, box: FreeBox, samples: int, seed: int) -> None:
-    """Sampled configurations touch no wall and no other body; angles favour the box's corners."""
+    """Nothing is touched at the box's corners, along its rim or inside, at angles that favour its ends."""
     random = np.random.default_rng(seed)
-    ring = np.asarray(box.polygon.exterior.coords)
+    shapely.prepare(box.polygon)
+    inside = random.uniform(box.polygon.bounds[:2], box.polygon.bounds[2:], (_POSITIONS, 2))
+    positions = np.concatenate(
+        (shapely.get_coordinates(box.polygon), inside[shapely.contains_xy(box.polygon, inside)])
+    )
     for k in range(samples):
         share = random.random(len(box.lower))
         angles = box.lower + (np.rint(share) if k % 2 else share) * (box.upper - box.lower)
-        if k % 3 == 0:
-            position = ring[random.integers(len(ring))]
-        else:
-            a, b = random.random(2)
-            x_min, y_min, x_max, y_max = box.polygon.bounds
-            position = np.array([x_min + a * (x_max - x_min), y_min + b * (y_max - y_min)])
-            if not box.polygon.contains(Point(position)):
-                continue
-        z = np.concatenate((position, angles))
-        assert problem.workspace.contains_properly(footprint(problem.tree, z))
-        bodies = body_footprints(problem.tree, z)
-        assert all(bodies[a].disjoint(bodies[b]) for a, b in problem.tree.collision_pairs)
+        assert FreePositions(problem.tree, problem.workspace, angles).free(positions).all()
