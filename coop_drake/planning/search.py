@@ -1,4 +1,4 @@
-"""Find a channel of free boxes from start to goal, or prove that there is none; then margin first (rule 1)."""
+"""Find a channel of free boxes from start to goal, or prove that there is none; margin first (rule 1)."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from coop_drake.planning.exploration import Verdict
 from coop_drake.planning.goals import blocked_goal
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.proofs import Proofs
+from coop_drake.planning.separation import Separation
+from coop_drake.planning.strategies import explored_channel
 
 Progress = Callable[[str, float], None]
 _TRIES = 4
@@ -37,6 +39,10 @@ def find_channel(
     Returns:
         The channel, or why there is none, and a report.
     """
+    if problem.settings.strategy != "portfolio":
+        return explored_channel(problem, progress, watch)
+    if problem.settings.strategy != "portfolio":
+        return explored_channel(problem, progress, watch)
     return _Search(problem, progress, watch).run()
 
 
@@ -59,17 +65,18 @@ class _Search:
             return self._with_margin(chain)
         blocked, self._goal_slices = blocked_goal(self._problem)
         if blocked:
-            return self._refused("the team collides at the goal pose whatever its free joints")
+            return self._refused("the team collides at the goal pose whatever its free joints", blocked)
         chain = self._sampled(_TRIES - 1)
         budget = self._problem.settings.max_slices
-        if chain is None and self._attempts.object_blocked >= _OBJECT_TRIES:
-            if self._explored(budget // _OBJECT_SHARE, robots=0) is Verdict.INFEASIBLE:
-                return self._refuted()
-        share, verdict = min(_FIRST_SHARE, budget), Verdict.BUDGET
+        doubted = chain is None and self._attempts.object_blocked >= _OBJECT_TRIES
+        if doubted:
+            self._explored(budget // _OBJECT_SHARE, robots=0)
+        share = min(_FIRST_SHARE, budget)
         while chain is None:
             verdict = self._explored(share)
-            if verdict is Verdict.INFEASIBLE:
-                return self._refuted()
+            refutation = self._proofs.refutation
+            if refutation is not None:
+                return self._refuted(refutation.reason, refutation.separation)
             if verdict is Verdict.FOUND:
                 return self._explored_channel()
             chain = self._sampled(_TRIES)
@@ -113,15 +120,9 @@ class _Search:
         channel = self._attempts.channel_of(self._proofs.boxes())
         return channel, self._report(*self._proofs.counts())
 
-    def _refuted(self) -> tuple[NoChannel, SearchReport]:
-        refutation = self._proofs.refutation
-        assert refutation is not None
+    def _refuted(self, reason: str, separation: Separation | None) -> tuple[NoChannel, SearchReport]:
         self._tried.append((0.0, Verdict.INFEASIBLE.value))
-        return NoChannel(True, refutation.reason, refutation.separation), self._report(0, 0)
-
-    def _refused(self, reason: str) -> tuple[NoChannel, SearchReport]:
-        self._tried.append((0.0, Verdict.INFEASIBLE.value))
-        return NoChannel(True, reason), self._report(0, 0)
+        return NoChannel(True, reason, separation), self._report(0, 0)
 
     def _undecided(self, verdict: Verdict) -> tuple[NoChannel, SearchReport]:
         self._tried.append((0.0, verdict.value))

@@ -26,29 +26,51 @@ def explored_channel(
     """Search by cells alone; only an exploration at margin zero may answer "infeasible".
 
     Args:
-        problem: The question; its strategy is ``cells``, which tries the margins first, each with an eighth
-            of the slices, or ``paper``, which knows no margin.
+        problem: The question; its strategy is ``cells``, which tries margins once there is a channel at
+            none, each with an eighth of the slices, or ``paper``, which knows no margin.
         progress: Called with a phase and the share of the slices that are made.
         watch: Called with the events of explorations.
 
     Returns:
         The channel, or why there is none, and a report.
     """
-    budget = problem.settings.max_slices
-    tried: list[tuple[float, str]] = []
-    slices = 0
+    search = _Cells(problem, progress, watch)
+    exploration, outcome = search.at(0.0)
+    if outcome.verdict is not Verdict.FOUND:
+        return _none(problem, exploration, outcome, search)
     first = problem.settings.margin if problem.settings.strategy == "cells" else 0.0
-    for margin in (*margins(first), 0.0):
-        exploration = _exploration(problem, margin, watch)
+    for margin in margins(first):
+        wider, found = search.at(margin)
+        if found.verdict is Verdict.FOUND:
+            boxes = _boxes(problem, wider.boxes(found.path), margin)
+            return make_channel(problem, boxes, margin, None), search.report(wider)
+    boxes = _boxes(problem, exploration.boxes(outcome.path), 0.0)
+    return make_channel(problem, boxes, 0.0, None), search.report(exploration)
+
+
+class _Cells:
+    """Explorations of one question at several margins, and what they took."""
+
+    def __init__(self, problem: PlanningProblem, progress: Progress | None, watch: Watch | None) -> None:
+        self._problem, self._progress, self._watch = problem, progress, watch
+        self._tried: list[tuple[float, str]] = []
+        self._slices = 0
+
+    def at(self, margin: float) -> tuple[Exploration | PaperExploration, Outcome]:
+        """Explore at a margin, with all slices at none and with a share of them at others."""
+        budget = self._problem.settings.max_slices
+        exploration = _exploration(self._problem, margin, self._watch)
         share = budget // _MARGIN_SHARE if margin > 0.0 else budget
-        outcome = exploration.run(share, _counter(progress, margin, budget))
-        slices += outcome.slices
-        tried.append((margin, outcome.verdict.value))
-        if outcome.verdict is Verdict.FOUND:
-            boxes = _boxes(problem, exploration.boxes(outcome.path), margin)
-            report = SearchReport(slices, *exploration.counts(), tuple(tried))
-            return make_channel(problem, boxes, margin, None), report
-    return _none(problem, exploration, outcome, slices, tried)
+        outcome = exploration.run(share, _counter(self._progress, margin, budget))
+        self._slices += outcome.slices
+        self._tried.append((margin, outcome.verdict.value))
+        return exploration, outcome
+
+    def report(
+        self, exploration: Exploration | PaperExploration, resolution: float | None = None
+    ) -> SearchReport:
+        """What the search did, with the cells of the exploration that answered."""
+        return SearchReport(self._slices, *exploration.counts(), tuple(self._tried), resolution)
 
 
 def _exploration(
@@ -79,24 +101,19 @@ def _boxes(problem: PlanningProblem, found: list[tuple[Intervals, Region]], marg
 
 
 def _none(
-    problem: PlanningProblem,
-    exploration: Exploration | PaperExploration,
-    outcome: Outcome,
-    slices: int,
-    tried: list[tuple[float, str]],
+    problem: PlanningProblem, exploration: Exploration | PaperExploration, outcome: Outcome, search: _Cells
 ) -> tuple[NoChannel, SearchReport]:
     """The answer of an exploration at margin zero that found nothing."""
-    counts = exploration.counts()
     if outcome.verdict is Verdict.INFEASIBLE:
         robots = sorted({joint.robot for joint in problem.tree.joints})
         leaves = exploration.over_leaves()
         separation = slice_separation(problem, robots, exploration.slices, leaves)
         reason = f"the over-approximations of {outcome.slices} slices separate start from goal"
-        return NoChannel(True, reason, separation), SearchReport(slices, *counts, tuple(tried))
+        return NoChannel(True, reason, separation), search.report(exploration)
     mixed = exploration.undecided(outcome.path)
     resolution = max((cell.share for cell in mixed), default=None)
     reason = f"no answer after {outcome.slices} slices: {outcome.verdict.value}"
-    return NoChannel(False, reason, mixed=mixed), SearchReport(slices, *counts, tuple(tried), resolution)
+    return NoChannel(False, reason, mixed=mixed), search.report(exploration, resolution)
 
 
 def _counter(progress: Progress | None, margin: float, budget: int) -> Callable[[int], None] | None:
