@@ -14,6 +14,7 @@ from coop_drake.planning import PlanningProblem
 __all__ = ["Passage", "blocking_passages"]
 
 _MOST = 4
+_ROOMS = (1.0, 2.0, 4.0)
 
 
 @dataclass(frozen=True)
@@ -68,9 +69,10 @@ def blocking_passages(
     ranked = sorted(range(len(found)), key=lambda k: (-found[k].bodies[0].depth, k))
     for count in range(1, min(len(ranked), _MOST) + 1):
         chosen = [found[k] for k in sorted(ranked[:count])]
-        if choice.is_enough(chosen):
-            return choice.passages(chosen), True
-    return [Passage(stretch, choice.amount(stretch), None) for stretch in found], False
+        amounts = choice.enough(chosen)
+        if amounts is not None:
+            return choice.passages(chosen, amounts), True
+    return [Passage(stretch, everywhere.enough, None) for stretch in found], False
 
 
 class _Choice:
@@ -80,36 +82,34 @@ class _Choice:
         self._problem, self._growth = problem, growth
         self._everywhere, self._trials = everywhere, trials
 
-    def amount(self, stretch: Stretch) -> float:
-        """What a stretch needs, and the same room for the boxes as the worst one has."""
-        room = self._everywhere.enough - self._everywhere.needed
-        return min(self._everywhere.enough, stretch.bodies[0].depth + room)
+    def enough(self, chosen: Sequence[Stretch]) -> list[float] | None:
+        """Amounts with which a channel is found, along the known way or anywhere; None if none are."""
+        most = self._everywhere.enough
+        room = most - self._everywhere.needed
+        for share in _ROOMS:
+            amounts = [min(most, stretch.bodies[0].depth + share * room) for stretch in chosen]
+            laid = self._trials.lay(self._widened(chosen, amounts), self._everywhere.way)
+            if laid.answer is Answer.FOUND:
+                return amounts
+        amounts = [most] * len(chosen)
+        return amounts if self._ask(self._widened(chosen, amounts)).answer is Answer.FOUND else None
 
-    def is_enough(self, chosen: Sequence[Stretch]) -> bool:
-        """Whether a channel is found if these are widened; along the known way, else anywhere."""
-        question = self._widened(chosen)
-        laid = self._trials.lay(question, self._everywhere.way, "widening the passage")
-        if laid.answer is Answer.FOUND:
-            return True
-        return self._ask(question).answer is Answer.FOUND
-
-    def passages(self, chosen: Sequence[Stretch]) -> list[Passage]:
+    def passages(self, chosen: Sequence[Stretch], amounts: Sequence[float]) -> list[Passage]:
         """The stretches that remain when those are left out that the others do without."""
         if len(chosen) == 1:
-            return [Passage(chosen[0], self.amount(chosen[0]), self._everywhere.refuted)]
+            return [Passage(chosen[0], amounts[0], self._everywhere.refuted)]
         passages = []
-        for stretch in chosen:
-            others = [other for other in chosen if other is not stretch]
-            answer = self._ask(self._widened(others)).answer
+        for k, (stretch, amount) in enumerate(zip(chosen, amounts, strict=True)):
+            others = [*chosen[:k], *chosen[k + 1 :]], [*amounts[:k], *amounts[k + 1 :]]
+            answer = self._ask(self._widened(*others)).answer
             if answer is Answer.FOUND:
-                return self.passages(others)
-            proved = answer is Answer.INFEASIBLE
-            passages.append(Passage(stretch, self.amount(stretch), 0.0 if proved else None))
+                return self.passages(*others)
+            passages.append(Passage(stretch, amount, 0.0 if answer is Answer.INFEASIBLE else None))
         return passages
 
     def _ask(self, question: PlanningProblem) -> Trial:
-        return self._trials.ask(question, "widening the passage")
+        return self._trials.ask(question, "widening the passages")
 
-    def _widened(self, chosen: Sequence[Stretch]) -> PlanningProblem:
-        zones = [(stretch.zone, self.amount(stretch)) for stretch in chosen]
+    def _widened(self, chosen: Sequence[Stretch], amounts: Sequence[float]) -> PlanningProblem:
+        zones = [(stretch.zone, amount) for stretch, amount in zip(chosen, amounts, strict=True)]
         return replace(self._problem, workspace=self._growth.around(zones))

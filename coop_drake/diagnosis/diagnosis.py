@@ -10,6 +10,7 @@ from coop_drake.diagnosis.contacts import Contact, Overlap
 from coop_drake.diagnosis.relaxations import Relaxation
 from coop_drake.diagnosis.trials import Answer
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning.undecided import MixedCell
 
 __all__ = ["BlockedPose", "Diagnosis", "PassageFindings"]
 
@@ -61,6 +62,7 @@ class Diagnosis:
         passages: What blocks the way, None if nothing does or the goal itself is blocked.
         goal: What blocks the goal, None if nothing does.
         relaxations: Changes to the team that were tried.
+        mixed: For an undecided question what remained neither free nor blocked, the widest first.
         slices: Slices that the whole diagnosis took.
     """
 
@@ -70,4 +72,5 @@ class Diagnosis:
     passages: PassageFindings | None = None
     goal: BlockedPose | None = None
     relaxations: tuple[Relaxation, ...] = ()
+    mixed: tuple[MixedCell, ...] = ()
     slices: int = 0

@@ -16,16 +16,11 @@ from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning import PlanningProblem
 from coop_drake.planning.goals import blocked_goal
 
-__all__ = ["blocked_pose", "is_blocked"]
+__all__ = ["blocked_pose"]
 
 _TRIED = 256
 _REFINED = 120
 _RESOLUTION = 0.002
-
-
-def is_blocked(problem: PlanningProblem) -> bool:
-    """Whether the team is proved to collide at the goal pose whatever its free joints."""
-    return blocked_goal(problem)[0]
 
 
 def blocked_pose(problem: PlanningProblem, growth: Growth, trials: Trials) -> BlockedPose:

@@ -19,7 +19,7 @@ from coop_drake.planning.margins import exact_footprint
 
 __all__ = ["BodyAtFault", "Stretch", "stretches"]
 
-_NOTICED = 1e-3
+_NOTICED = 0.05
 _APART = 0.3
 _LEAD = 0.15
 _ROOM = 0.15
@@ -70,6 +70,8 @@ class Stretch:
 def stretches(problem: PlanningProblem, way: FloatArray) -> list[Stretch]:
     """The stretches of a way on which the team sticks out of the floor, in the way's order.
 
+    What sticks out by less than a twentieth of the worst is left out.
+
     Args:
         problem: The question, with the floor as it is.
         way: Configurations from start to goal, shape (m, 3 + n) [m, rad].
@@ -77,7 +79,9 @@ def stretches(problem: PlanningProblem, way: FloatArray) -> list[Stretch]:
     found = [contacts(problem.workspace, problem.tree, z) for z in way]
     out = np.array([max((contact.depth for contact in here), default=0.0) for here in found])
     along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way[:, :2], axis=0).T))))
-    return [_stretch(problem, way, found, rows, along) for rows in _runs(out > _NOTICED, along)]
+    least = _NOTICED * float(out.max())
+    found = [[contact for contact in here if contact.depth > least] for here in found]
+    return [_stretch(problem, way, found, rows, along) for rows in _runs(out > least, along)]
 
 
 def _runs(noticed: NDArray[np.bool_], along: FloatArray) -> list[list[int]]:
@@ -98,7 +102,7 @@ def _stretch(
 ) -> Stretch:
     squeezes = [_squeeze(found[row]) for row in rows]
     tightest = rows[squeezes.index(max(squeezes))]
-    touched = [contact.wall for contact in found[tightest] if contact.depth > _NOTICED]
+    touched = [contact.wall for contact in found[tightest]]
     lead = (along >= along[rows[0]] - _LEAD) & (along <= along[rows[-1]] + _LEAD)
     taken = shapely.union_all([exact_footprint(problem.tree, z) for z in way[lead]])
     return Stretch(
@@ -130,10 +134,9 @@ def _bodies(
     worst: dict[str, Contact] = {}
     for row in rows:
         for contact in found[row]:
-            if contact.depth > _NOTICED:
-                places.setdefault(contact.body, []).append(row)
-                if contact.depth > getattr(worst.get(contact.body), "depth", 0.0):
-                    worst[contact.body] = contact
+            places.setdefault(contact.body, []).append(row)
+            if contact.body not in worst or contact.depth > worst[contact.body].depth:
+                worst[contact.body] = contact
     bodies = []
     for name, contact in worst.items():
         columns, axes = _axes(problem, name)

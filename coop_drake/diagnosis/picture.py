@@ -22,6 +22,7 @@ _OUT = "#8b0000"
 _CALM = "#b9c4cc"
 _MOST_PANELS = 3
 _ROOM = 0.35
+_SIDE = 4.8  # Height of every part [in].
 
 
 def diagnosis_figure(problem: PlanningProblem, diagnosis: Diagnosis) -> Figure | None:
@@ -38,8 +39,10 @@ def diagnosis_figure(problem: PlanningProblem, diagnosis: Diagnosis) -> Figure |
     if not places:
         return None
     places = places[:_MOST_PANELS]
-    figure = new_figure(5.0 + 5.0 * len(places), 5.8, _caption(diagnosis))
-    axes = figure.subplots(1, 1 + len(places), squeeze=False)[0]
+    x_min, y_min, x_max, y_max = problem.workspace.bounds
+    wide = min(2.0, max(0.5, (x_max - x_min + 0.6) / (y_max - y_min + 0.6)))
+    figure = new_figure(_SIDE * (wide + len(places)) + 1.0, _SIDE + 0.9, _caption(diagnosis))
+    axes = figure.subplots(1, 1 + len(places), squeeze=False, width_ratios=[wide, *[1.0] * len(places)])[0]
     _overview(axes[0], problem, diagnosis, [configuration for configuration, _, _ in places])
     for number, (ax, (configuration, bodies, passage)) in enumerate(
         zip(axes[1:], places, strict=True), start=1

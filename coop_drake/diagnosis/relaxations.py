@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from math import pi
 
 from coop_drake.diagnosis.bracket import Bracket, Steps, bracketed
+from coop_drake.diagnosis.squeeze import squeezed
 from coop_drake.diagnosis.team_changes import base_bodies, object_bodies, shrunk_bodies, widened_joints
 from coop_drake.diagnosis.trials import Trial, Trials
 from coop_drake.geometry.tree import ComponentTree
@@ -18,7 +19,7 @@ _MOST_SHRINKAGE = 0.7
 _SHRINKAGE_RESOLUTION = 0.02
 _MOST_WIDENING = pi / 2
 _WIDENING_RESOLUTION = 0.05
-_TRIALS = 7
+_TRIALS = 3
 
 
 @dataclass(frozen=True)
@@ -95,8 +96,13 @@ def try_changes(problem: PlanningProblem, trials: Trials, *, refuted: bool) -> l
 
 
 def _bracket(problem: PlanningProblem, change: Change, trials: Trials, refuted: float | None) -> Bracket:
-    def ask(amount: float) -> Trial:
-        return trials.ask(replace(problem, tree=change.tree(amount)), change.name)
+    def varied(amount: float) -> PlanningProblem:
+        return replace(problem, tree=change.tree(amount))
+
+    def improve(amount: float, trial: Trial) -> tuple[float, Trial]:
+        return squeezed(varied, amount, trial, trials, change.resolution)
 
     steps = Steps(change.most, change.most, change.resolution, trials=_TRIALS)
-    return bracketed(ask, steps, refuted=refuted)
+    return bracketed(
+        lambda amount: trials.ask(varied(amount), change.name), steps, refuted=refuted, improve=improve
+    )

@@ -74,9 +74,8 @@ class Trials:
             return Trial(problem, Answer.FOUND, way_through(problem, answer, _STEP))
         return Trial(problem, Answer.INFEASIBLE if answer.proved else Answer.UNDECIDED)
 
-    def lay(self, problem: PlanningProblem, way: FloatArray, stage: str) -> Trial:
+    def lay(self, problem: PlanningProblem, way: FloatArray) -> Trial:
         """Prove a given way free; a failure proves nothing."""
-        self._tell(stage)
         free, tried = is_free_along(problem, way)
         self.spent += tried // _BOXES_PER_SLICE
         return Trial(problem, Answer.FOUND if free else Answer.UNDECIDED, way if free else None)

@@ -5,13 +5,14 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+import shapely
+from shapely import Polygon
 
-from coop_drake.geometry.passage import PassageFinder
+from coop_drake.geometry.passage import PassageFinder, pole
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning import Channel, PlanningProblem
 from coop_drake.planning.refine import configuration_scale
 from coop_drake.planning.sampler import densified
-from coop_drake.planning.targets import choose_targets
 
 __all__ = ["way_through"]
 
@@ -19,7 +20,8 @@ __all__ = ["way_through"]
 def way_through(problem: PlanningProblem, channel: Channel, step: float) -> FloatArray:
     """Configurations from start to goal, each of them inside a box of the channel.
 
-    Inside a box the position follows the widest passage, and the angles turn evenly along it.
+    It is the path that the boxes were laid along, if there is one. Else, inside a box, the position follows
+    the widest passage and the angles turn evenly along it.
 
     Args:
         problem: The question that the channel answers.
@@ -29,7 +31,9 @@ def way_through(problem: PlanningProblem, channel: Channel, step: float) -> Floa
     Returns:
         Configurations with theta unwrapped, shape (m, 3 + n) [m, rad].
     """
-    targets = choose_targets(channel, problem.start[:2], problem.goal_pose[:2])
+    if channel.path is not None:
+        return densified(channel.path, configuration_scale(problem.tree), step)
+    targets = [*_handovers(channel), problem.goal_pose[:2]]
     corners = [problem.start]
     for place, (box, target) in enumerate(zip(channel.boxes, targets, strict=True)):
         angles = _angles(problem, channel, place)
@@ -42,6 +46,16 @@ def way_through(problem: PlanningProblem, channel: Channel, step: float) -> Floa
     path = np.array(corners)
     moved = np.concatenate(([True], [bool((a != b).any()) for a, b in pairwise(path)]))
     return densified(path[moved], configuration_scale(problem.tree), step)
+
+
+def _handovers(channel: Channel) -> list[FloatArray]:
+    """A point with much room in every overlap of consecutive boxes."""
+    points = []
+    for one, other in pairwise(channel.boxes):
+        shared = shapely.get_parts(shapely.intersection(one.polygon, other.polygon))
+        areas = [part for part in shared if isinstance(part, Polygon)]
+        points.append(max((pole(area) for area in areas), key=lambda found: found[1])[0])
+    return points
 
 
 def _angles(problem: PlanningProblem, channel: Channel, place: int) -> FloatArray:

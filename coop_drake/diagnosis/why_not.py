@@ -6,13 +6,15 @@ from dataclasses import replace
 
 from coop_drake.diagnosis.blocking import Growths, blocking_passages
 from coop_drake.diagnosis.bracket import Steps, bracketed
+from coop_drake.diagnosis.contacts import deepest
 from coop_drake.diagnosis.diagnosis import Diagnosis, PassageFindings
-from coop_drake.diagnosis.goal import blocked_pose, is_blocked
+from coop_drake.diagnosis.goal import blocked_pose
 from coop_drake.diagnosis.growth import Growth
 from coop_drake.diagnosis.relaxations import try_changes
-from coop_drake.diagnosis.squeeze import drawn_way, squeezed
+from coop_drake.diagnosis.squeeze import relieved, squeezed
 from coop_drake.diagnosis.trials import Answer, Progress, Trial, Trials
 from coop_drake.planning import Channel, PlanningProblem, find_channel
+from coop_drake.planning.separation import BlockedGoal
 
 __all__ = ["diagnose"]
 
@@ -41,9 +43,11 @@ def diagnose(problem: PlanningProblem, progress: Progress | None = None) -> Diag
     if isinstance(answer, Channel):
         return Diagnosis(Answer.FOUND, "", margin=answer.margin, slices=report.slices)
     trials = Trials(_SLICES, _TOTAL, progress)
-    first = Diagnosis(Answer.INFEASIBLE if answer.proved else Answer.UNDECIDED, answer.reason)
+    first = Diagnosis(
+        Answer.INFEASIBLE if answer.proved else Answer.UNDECIDED, answer.reason, mixed=answer.mixed
+    )
     growth = Growth(problem.workspace, problem.start[:2], _MOST_OF_REACH * problem.tree.reach)
-    if answer.proved and is_blocked(problem):
+    if isinstance(answer.separation, BlockedGoal):
         made = replace(first, goal=blocked_pose(problem, growth, trials))
     else:
         findings = _passages(problem, growth, trials, refuted=answer.proved)
@@ -59,7 +63,7 @@ def _passages(problem: PlanningProblem, growth: Growth, trials: Trials, *, refut
         return replace(problem, workspace=growth.everywhere(amount))
 
     def improve(amount: float, trial: Trial) -> tuple[float, Trial]:
-        return squeezed(varied, amount, trial, trials)
+        return squeezed(varied, amount, trial, trials, _RESOLUTION)
 
     steps = Steps(_FIRST, _MOST_OF_REACH * problem.tree.reach, _RESOLUTION, trials=_TRIALS)
     bracket = bracketed(
@@ -70,7 +74,8 @@ def _passages(problem: PlanningProblem, growth: Growth, trials: Trials, *, refut
     )
     if bracket.found is None or bracket.trial is None or bracket.trial.way is None:
         return PassageFindings(bracket)
-    way, needed = drawn_way(varied, bracket.trial.way)
+    way = relieved(varied, bracket.trial.way, bracket.found)
+    needed = max(deepest(problem.workspace, problem.tree, z) for z in way)
     growths = Growths(bracket.refuted, bracket.found, way, needed)
     passages, enough = blocking_passages(problem, growth, growths, trials)
     return PassageFindings(bracket, way, needed, tuple(passages), enough)
