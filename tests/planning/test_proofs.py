@@ -1,0 +1,117 @@
+"""Relaxations in turns: proofs where there are proofs, none of a feasible case, covers without a gap."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from shapely import Point, Polygon
+
+from coop_drake.geometry.tree import ConvexShape
+from coop_drake.planning.exploration import Verdict
+from coop_drake.planning.free_flyer import disc_refuted, inscribed_disc
+from coop_drake.planning.goals import blocked_goal
+from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.proofs import Proofs, explorer
+from coop_drake.planning.relaxation import relaxed
+from coop_drake.planning.separation import BlockedGoal, DiscSeparation, SliceSeparation
+from coop_drake.planning.split_rules import SplitRule
+from tests.planning.test_search import rod_problem
+from tests.support.cases import case, transport
+
+
+def covered(problem: PlanningProblem, lower: np.ndarray, upper: np.ndarray) -> bool:
+    """Whether boxes fill theta's turn and the joints' limits: their volumes add up and none overlap."""
+    limits = zip(problem.tree.joint_lower, problem.tree.joint_upper, strict=True)
+    whole = 2.0 * np.pi * np.prod([b - a for a, b in limits])
+    middle = 0.5 * (lower + upper)
+    apart = True
+    for i, j in combinations(range(len(lower)), 2):
+        gap = np.abs(middle[i] - middle[j])
+        gap[0] = abs((gap[0] + np.pi) % (2.0 * np.pi) - np.pi)
+        apart &= bool((gap >= 0.5 * (upper[i] - lower[i] + upper[j] - lower[j]) - 1e-9).any())
+    return apart and bool(np.isclose(np.prod(upper - lower, axis=1).sum(), whole))
+
+
+@pytest.mark.parametrize("split", ["strong", "blame", "longest"])
+def test_an_ended_proof_covers_every_angle(split: SplitRule) -> None:
+    question, _ = relaxed(case("closed"), (1,) if split == "strong" else ())
+    exploration = explorer(question, split=split)
+    assert exploration.run(1500).verdict is Verdict.INFEASIBLE
+    leaves = [exploration.slices.all[index].intervals for index in exploration.over_leaves()]
+    lower, upper = np.moveaxis(np.array(leaves), 2, 0)
+    assert covered(question, lower, upper)
+
+
+def test_strong_branching_needs_a_fraction_of_the_slices() -> None:
+    question, _ = relaxed(case("closed"), (1,))
+    strong, blame = (explorer(question, split=rule).run(1500) for rule in ("strong", "blame"))
+    assert strong.verdict is Verdict.INFEASIBLE
+    assert 2 * strong.slices < blame.slices
+
+
+def test_a_relaxation_refutes_the_whole() -> None:
+    proofs = Proofs(transport(0.95, 1.5, 3, 1))
+    share = 64
+    while proofs.run(share) is Verdict.BUDGET:
+        share *= 2
+    assert proofs.refutation is not None
+    assert proofs.refutation.robots == (2,)
+    assert isinstance(proofs.refutation.separation, SliceSeparation)
+    assert proofs.slices < 600
+
+
+@pytest.mark.parametrize("name", ["base", "tight", "three", "elbow"])
+def test_nothing_is_refuted_that_is_feasible(name: str) -> None:
+    proofs = Proofs(case(name))
+    assert proofs.run(48) in (Verdict.BUDGET, Verdict.FOUND)
+    assert proofs.run(96, robots=1) in (Verdict.BUDGET, Verdict.FOUND)
+    assert proofs.refutation is None
+
+
+def test_runs_go_on_where_they_stopped() -> None:
+    problem = rod_problem(0.23)
+    alone, stepped = Proofs(problem), Proofs(problem)
+    assert alone.run(800) is Verdict.FOUND
+    for share in (10, 40, 800):
+        verdict = stepped.run(share)
+    assert verdict is Verdict.FOUND
+    assert [intervals for intervals, _ in stepped.boxes()] == [intervals for intervals, _ in alone.boxes()]
+
+
+def test_a_disc_that_cannot_pass_refutes_at_once() -> None:
+    proofs = Proofs(transport(0.45))
+    assert proofs.run(1) is Verdict.INFEASIBLE
+    assert proofs.refutation is not None
+    assert isinstance(proofs.refutation.separation, DiscSeparation)
+    assert proofs.slices == 0
+
+
+@pytest.mark.parametrize("name", ["base", "tight", "three", "elbow"])
+def test_no_disc_of_a_feasible_team_is_stuck(name: str) -> None:
+    assert disc_refuted(case(name)) is None
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.1])
+@pytest.mark.parametrize("ring", [[(0, 0), (2, 0), (2, 1), (0, 1)], [(0, 0), (3, 0), (0, 1)], [(1, 1)]])
+def test_inscribed_discs_lie_inside(ring: list[tuple[float, float]], radius: float) -> None:
+    shape = ConvexShape(np.array(ring, dtype=float), radius)
+    disc = inscribed_disc(shape)
+    if len(ring) < 3:
+        assert disc.radius == radius
+    else:
+        hull = Polygon(ring).buffer(radius, quad_segs=64)
+        assert hull.buffer(1e-3).contains(Point(disc.vertices[0]).buffer(disc.radius))
+        assert disc.radius > 0.3 + radius
+
+
+def test_a_goal_in_collision_is_stated() -> None:
+    problem = case("base")
+    separation, slices = blocked_goal(
+        PlanningProblem(
+            problem.workspace, problem.tree, problem.start, np.array([6.2, 4.5, 0.0]), (None, None)
+        )
+    )
+    assert isinstance(separation, BlockedGoal)
+    assert slices <= 128
+    assert {len(part.lower) for part in separation.slices} == {1 + len(separation.robots)}
+    assert blocked_goal(problem)[0] is None
