@@ -33,7 +33,8 @@ def counters(moment: Moment) -> str:
         f"{free} free and {mixed} undecided cells",
     ]
     if moment.channel:
-        parts.append(f"channel of {len(moment.channel)} cells, {moment.undecided_links} undecided")
+        undecided = f"{moment.undecided_links} undecided" if moment.undecided_links else "all free"
+        parts.append(f"channel of {len(moment.channel)} cells, {undecided}, cost {moment.cost:.0f}")
     return "  ·  ".join(parts)
 
 

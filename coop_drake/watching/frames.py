@@ -118,7 +118,7 @@ def _draw_floor(ax: Axes, film: Film, shot: Shot) -> None:
     draw_section(ax, shot.shadow.guide, look.GUIDE, 0.45)
     draw_section(ax, shot.shadow.free, look.FREE, 0.5)
     draw_legs(ax, shot.legs)
-    if shot.moment.splits:
+    if shot.moment.splits and shot.moment.verdict is None:
         last = shot.moment.splits[-1][0].slice
         for link in shot.moment.channel:
             if link.slice == last:
@@ -162,7 +162,8 @@ def _draw_panel(ax: Axes, film: Film, shot: Shot, axis: int, *, last: bool) -> N
     if shot.parts is not None:
         draw_hatch(ax, _in_both_parts(shot.parts, shown), own, look.OTHERS, limits=limits)
         return
-    draw_looked_at(ax, shot.moment.splits, own, limits=limits)
+    if shot.moment.verdict is None:
+        draw_looked_at(ax, shot.moment.splits, own, limits=limits)
     draw_channel_tiles(ax, shot.moment.channel, own, limits=limits)
     draw_angles(ax, shot.legs, own)
 

@@ -77,6 +77,7 @@ class Moment:
         leaves: Leaves of the subdivision by their ids.
         splits: Slices halved since the moment before, with the axis that each was halved along.
         channel: The last channel searched, empty before the first search and where none exists.
+        cost: Total weight of that channel's cells, undecided ones the heaviest.
         searched: Whether the last event is a search.
         slices: Slices made.
         verdict: Verdict of the exploration, None while it runs.
@@ -88,6 +89,7 @@ class Moment:
     leaves: Mapping[int, Leaf]
     splits: tuple[tuple[Leaf, int], ...]
     channel: tuple[Link, ...]
+    cost: float
     searched: bool
     slices: int
     verdict: str | None
@@ -159,6 +161,7 @@ class _State:
     intervals: dict[int, Intervals] = field(default_factory=dict)
     splits: list[tuple[Leaf, int]] = field(default_factory=list)
     channel: tuple[Link, ...] = ()
+    cost: float = 0.0
     verdict: str | None = None
     open_links: list[tuple[int, int]] = field(default_factory=list)
 
@@ -176,6 +179,7 @@ class _State:
                     Link(cell.slice, cell.kind, cell.region, self.intervals[cell.slice])
                     for cell in event.cells
                 )
+                self.cost = event.cost
                 undecided = sum(cell.kind is not Kind.FREE for cell in event.cells)
                 self.open_links.append((len(self.intervals), undecided))
             case ExplorationEnded():
@@ -189,6 +193,7 @@ class _State:
             leaves=dict(self.leaves),
             splits=tuple(self.splits),
             channel=self.channel,
+            cost=self.cost,
             searched=isinstance(last, ChannelSearched),
             slices=len(self.intervals),
             verdict=self.verdict,

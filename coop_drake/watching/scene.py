@@ -174,6 +174,6 @@ def _put_frames(vis: Any, shots: Sequence[Shot], space: Space, seen: _Seen) -> N
         heights = space.layer(theta, 0.0)
         rings = [np.column_stack([outline, np.full(len(outline), height)]) for height in heights]
         posts = [np.array([[*corner, height] for height in heights]) for corner in outline[:-1]]
-        own = vis[f"looked_at/{number + 1:03d}"]
+        own = vis[f"looked_at/{number + 1:03d}-{number + 1:03d}"]
         place(own, joined(tube(line, radius) for line in (*rings, *posts)), Paint(look.LOOKED_AT))
         seen.during(own, number, number)

@@ -1,0 +1,98 @@
+"""Moments are the exploration itself, step by step, only merged."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import pytest
+
+from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.planning.cell_graph import Kind
+from coop_drake.planning.events import (
+    ChannelSearched,
+    ExplorationBegan,
+    ExplorationEnded,
+    ExplorationResumed,
+    SliceAdded,
+    SliceSplit,
+)
+from coop_drake.planning.exploration import Exploration
+from coop_drake.planning.margins import shrunk
+from coop_drake.watching import moments
+from tests.planning.test_search import rod_problem
+from tests.watching.rods import NARROW, WIDE, rod_film
+
+
+@pytest.mark.parametrize("corridor", [WIDE, NARROW])
+def test_events_replayed_give_the_leaves_cells_and_channel_of_the_exploration(corridor):
+    problem, events = rod_problem(corridor), []
+    swept = SweptTree(problem.tree)
+    exploration = Exploration(
+        problem, shrunk(problem.workspace, 0.0), swept, BodyPairs(swept), watch=events.append
+    )
+    outcome = exploration.run(500)
+    last = moments(events, 7)[-1]
+    assert sorted(last.leaves) == exploration.slices.leaves()
+    for index, leaf in last.leaves.items():
+        assert leaf.intervals == exploration.slices.all[index].intervals
+        assert [cell.region for cell in leaf.cells] == [
+            cell.region for cell in exploration.graph.by_slice[index]
+        ]
+    assert (last.count(Kind.FREE), last.count(Kind.MIXED)) == exploration.counts()
+    assert [link.region for link in last.channel] == [cell.region for cell in outcome.path]
+    assert last.cost == sum(cell.weight for cell in outcome.path)
+    assert (last.slices, last.verdict) == (outcome.slices, outcome.verdict.value)
+
+
+@pytest.mark.parametrize("most", [2, 3, 10, 10_000])
+def test_no_more_moments_than_asked_for_the_last_one_the_verdict_no_split_lost(most):
+    recorded = rod_film().events
+    found = moments(recorded, most)
+    assert 2 <= len(found) <= most
+    assert found[-1].verdict == "found"
+    assert all(moment.verdict is None for moment in found[:-1])
+    slices = [moment.slices for moment in found]
+    assert slices == sorted(slices)
+    told = [(event.slice, event.axis) for event in recorded if isinstance(event, SliceSplit)]
+    assert [(leaf.slice, axis) for moment in found for leaf, axis in moment.splits] == told
+    assert len(found[-1].open_links) == sum(isinstance(event, ChannelSearched) for event in recorded)
+
+
+def test_moments_lie_evenly_over_the_steps():
+    recorded = rod_film().events
+    every = moments(recorded, 10_000)
+    few = moments(recorded, 6)
+    steps = [[moment.slices for moment in every].index(moment.slices) for moment in few]
+    gaps = [second - first for first, second in pairwise(steps)]
+    assert max(gaps) - min(gaps) <= 3
+
+
+def test_a_single_moment_is_refused():
+    with pytest.raises(ValueError, match="2 moments or more, got 1"):
+        moments(rod_film().events, 1)
+
+
+def test_explorations_that_take_turns_are_kept_apart():
+    events = [
+        ExplorationBegan("first", (0,)),
+        SliceAdded(0, ((0.0, 1.0),), ()),
+        ExplorationEnded("budget spent", 1),
+        ExplorationBegan("second", ()),
+        SliceAdded(0, ((2.0, 3.0),), ()),
+        ExplorationEnded("budget spent", 1),
+        ExplorationResumed("first"),
+        SliceSplit(0, 0),
+        SliceAdded(1, ((0.0, 0.5),), ()),
+        SliceAdded(2, ((0.5, 1.0),), ()),
+        ExplorationEnded("infeasible", 3),
+    ]
+    found = moments(events, 50)
+    assert [moment.question for moment in found] == [*["first"] * 2, *["second"] * 2, *["first"] * 2]
+    middle = next(moment for moment in reversed(found) if moment.question == "second")
+    assert {leaf.intervals for leaf in middle.leaves.values()} == {((2.0, 3.0),)}
+    assert (middle.robots, middle.verdict) == ((), "budget spent")
+    last = found[-1]
+    assert (last.question, last.robots, last.slices, last.verdict) == ("first", (0,), 3, "infeasible")
+    assert sorted(last.leaves) == [1, 2]
+    assert [moment.question for moment in moments(events, 3)] == ["first", "second", "first"]

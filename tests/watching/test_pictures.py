@@ -1,0 +1,121 @@
+"""The figure sequence and the page: which files, what is in them, how large they are."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import json
+import re
+
+import numpy as np
+import pytest
+import umsgpack
+from matplotlib.colors import to_rgba
+from PIL import Image
+
+from coop_drake.watching import look, scene_page, storyboard, write_sequence
+from coop_drake.watching.frames import frame_figure
+from coop_drake.watching.sequence import telling
+from tests.watching.rods import NARROW, WIDE, rod_film
+
+
+def commands(page):
+    """The commands that a page gives to Meshcat's viewer."""
+    (packed,) = re.findall(r'atob\("([A-Za-z0-9+/=]+)"\)', page)
+    (lengths,) = re.findall(r"for \(const length of (\[[0-9, ]*\])\)", page)
+    plain, start, decoded = gzip.decompress(base64.b64decode(packed)), 0, []
+    for length in json.loads(lengths):
+        decoded.append(umsgpack.unpackb(plain[start : start + length]))
+        start += length
+    assert start == len(plain)
+    return decoded
+
+
+@pytest.fixture(scope="module")
+def shown():
+    recorded = rod_film(WIDE)
+    shots = storyboard(recorded, 5)
+    return recorded, shots, scene_page(recorded, shots)
+
+
+def test_one_picture_a_moment_a_sheet_and_a_moving_picture(shown, tmp_path):
+    recorded, shots, _ = shown
+    written = write_sequence(recorded, shots, tmp_path)
+    assert [path.name for path in written] == [
+        *(f"think_{number:04d}.png" for number in range(1, len(shots) + 1)),
+        "think.png",
+        "think.gif",
+    ]
+    assert sorted(tmp_path.iterdir()) == sorted(written)
+    for path in written[:-1]:
+        with Image.open(path) as image:
+            assert np.ptp(np.asarray(image.convert("L"))) > 100
+    with Image.open(tmp_path / "think.gif") as moving:
+        assert moving.n_frames == len(shots)
+    assert (tmp_path / "think.gif").stat().st_size < 6e6
+
+
+def test_the_sheet_shows_the_first_and_the_last_moment(shown):
+    _, shots, _ = shown
+    chosen = telling(shots)
+    assert (chosen[0], chosen[-1]) == (0, len(shots) - 1)
+    assert len(chosen) <= 6
+
+
+def test_the_last_picture_of_a_proof_shows_the_two_parts_in_two_colours():
+    recorded = rod_film(NARROW)
+    *_, last = storyboard(recorded, 3)
+    figure = frame_figure(recorded, last, last.moment.open_links)
+    fills = {tuple(patch.get_facecolor()[:3]) for patch in figure.axes[0].patches}
+    assert {to_rgba(look.REACHED)[:3], to_rgba(look.OTHERS)[:3]} <= fills
+    assert to_rgba(look.MIXED)[:3] not in fills
+    assert figure.texts[0].get_text().startswith("Infeasible, proved")
+
+
+def test_the_page_holds_stage_slabs_channel_and_frames_by_name(shown):
+    _, shots, page = shown
+    names = {command["path"] for command in commands(page) if command["type"] == "set_object"}
+    for name in ("floor", "walls", "theta", "start/footprint", "start/pole", "goal/footprint", "goal/pole"):
+        assert f"/think/{name}" in names
+    assert any(name.startswith("/think/undecided/") for name in names)
+    assert any(name.startswith("/think/looked_at/") for name in names)
+    last = f"{len(shots):03d}-{len(shots):03d}"
+    assert f"/think/channel/{last}" in names
+    assert f"/think/channel/proved/{last}" in names
+
+
+def test_what_a_moment_shows_is_visible_then_and_never_else(shown):
+    _, shots, page = shown
+    (animation,) = [command for command in commands(page) if command["type"] == "set_animation"]
+    moving = {command["path"] for command in commands(page) if command["type"] == "set_object"}
+    for entry in animation["animations"]:
+        assert entry["path"] in moving
+        (track,) = entry["clip"]["tracks"]
+        keys = {key["time"]: key["value"] for key in track["keys"]}
+        first, last = (int(part) - 1 for part in entry["path"].rsplit("/", 1)[1].split("-"))
+        shown_at = []
+        value = None
+        for number in range(len(shots)):
+            value = keys.get(number, value)
+            if value:
+                shown_at.append(number)
+        assert shown_at == list(range(first, last + 1))
+        assert max(keys) == len(shots)
+
+
+def test_the_page_is_small_needs_no_network_and_repeats(shown):
+    recorded, shots, page = shown
+    assert len(page) < 6e6
+    fetched = re.findall(r"""<(?:script|link|img|iframe)\b[^>]*?\b(?:src|href)=["']?([^"'>\s]+)""", page)
+    assert all(address.startswith("data:") for address in fetched)
+    assert page == scene_page(recorded, shots)
+    for shot in shots:
+        assert json.dumps(shot.headline)[1:-1] in page
+
+
+def test_outlines_are_coarser_where_a_page_would_be_large(shown, monkeypatch):
+    recorded, shots, page = shown
+    monkeypatch.setattr("coop_drake.watching.scene._MOST_BYTES", len(page) - 1)
+    smaller = scene_page(recorded, shots)
+    assert len(smaller) < len(page)
+    assert len(commands(smaller)) == len(commands(page))

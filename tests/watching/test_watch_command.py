@@ -1,0 +1,89 @@
+"""coop-drake watch: files, answers, exit codes, and no half recordings."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from coop_drake import watching
+from coop_drake.cli import app
+from tests.support.scenarios import ROOM, write_scenario
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory):
+    return write_scenario(tmp_path_factory.mktemp("scenario") / "room.scenario.yaml")
+
+
+def test_a_recording_leaves_pictures_and_a_page_and_none_of_an_older_one(room, tmp_path):
+    (tmp_path / "think_0099.png").write_bytes(b"of an older recording")
+    (tmp_path / "notes.txt").write_text("not ours")
+    result = invoke("watch", room, "--output", tmp_path, "--frames", 3, "--json")
+    assert result.exit_code == 0, result.stderr
+    facts = json.loads(result.stdout)
+    assert (facts["answer"], facts["frames"]) == ("found", 3)
+    names = ["notes.txt", "think.gif", "think.html", "think.png"]
+    pictures = [f"think_{number:04d}.png" for number in (1, 2, 3)]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names + pictures)
+    assert facts["bytes"] == {name: (tmp_path / name).stat().st_size for name in facts["bytes"]}
+    assert facts["bytes"].keys() == {*pictures, *names[1:]}
+
+
+def test_no_way_is_told_by_the_exit_code_and_a_margin_proves_nothing(tmp_path):
+    below, above = [[4, 0], [4, 1.8], [5, 1.8], [5, 0]], [[5, 4], [5, 2.2], [4, 2.2], [4, 4]]
+    outer = [[0, 0], *below, [9, 0], [9, 4], *above, [0, 4]]
+    path = write_scenario(
+        tmp_path / "gap.scenario.yaml",
+        workspace={"outer": outer},
+        start={"object": {"x": 2.0, "y": 2.0, "theta": 0.0}, "joints": ROOM["start"]["joints"]},
+        goal={"object": {"x": 7.0, "y": 2.0, "theta": 0.0}},
+    )
+    for margin, code in (("0", 3), ("0.05", 4)):
+        result = invoke("watch", path, "--output", tmp_path / margin, "--frames", 2, "--margin", margin, "-q")
+        assert result.exit_code == code, result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--frames", "1"], "--frames"),
+        (["--frames", "many"], "--frames"),
+        (["--margin", "-0.1"], "--margin"),
+        (["--margin", "nan"], "--margin"),
+        (["--margin", "inf"], "inf"),
+        (["--strategy", "magic"], "--strategy"),
+    ],
+)
+def test_a_mistake_is_answered_with_what_is_allowed_and_leaves_nothing(room, tmp_path, arguments, said):
+    result = invoke("watch", room, "--output", tmp_path / "out", *arguments)
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_scenario_that_is_not_there_is_bad_input(tmp_path):
+    result = invoke("watch", tmp_path / "none.scenario.yaml", "--output", tmp_path / "out")
+    assert result.exit_code == 2
+    assert "none.scenario.yaml" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_interruption_leaves_whole_files_only(room, tmp_path, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(watching, "write_scene", interrupted)
+    result = invoke("watch", room, "--output", tmp_path, "--frames", 2)
+    assert result.exit_code == 130
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "think_0001.png",
+        "think_0002.png",
+        "think.png",
+        "think.gif",
+    }
