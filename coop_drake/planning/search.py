@@ -65,7 +65,7 @@ class _Search:
             return self._with_margin(chain)
         blocked, self._goal_slices = blocked_goal(self._problem)
         if blocked:
-            return self._refused("the team collides at the goal pose whatever its free joints", blocked)
+            return self._refuted("the team collides at the goal pose whatever its free joints", blocked)
         chain = self._sampled(_TRIES - 1)
         budget = self._problem.settings.max_slices
         doubted = chain is None and self._attempts.object_blocked >= _OBJECT_TRIES
