@@ -27,7 +27,10 @@ def answer_of(result: PlanningResult) -> str:
 
 def planning_measures(result: PlanningResult) -> dict[str, Any]:
     """Return what the planner answered and what it took."""
-    facts: dict[str, Any] = {"answer": answer_of(result), "cells": 0, "slices": result.report.slices}
+    report = result.report
+    facts: dict[str, Any] = {"answer": answer_of(result), "cells": 0, "slices": report.slices}
+    first = report.first_plan_cpu_seconds
+    facts["first_plan_cpu_seconds"] = None if first is None else round(first, 4)
     if isinstance(result, Found):
         facts.update(plan_measures(result.plan))
     else:

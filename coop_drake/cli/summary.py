@@ -14,6 +14,8 @@ _ROWS: tuple[tuple[str, str, str], ...] = (
     ("margin kept", "margin_m", "{:.3f} m"),
     ("narrowest neck", "narrowest_neck_m", "{:.3f} m"),
     ("gains", "gains", "{}"),
+    ("estimated transport", "estimated_seconds", "{:.1f} s"),
+    ("first plan certified after", "first_plan_cpu_seconds", "{:.2f} s"),
     ("planning took", "planning_wall_seconds", "{:.2f} s"),
     ("mapping took", "mapping_wall_seconds", "{:.2f} s"),
     ("largest map residual", "max_map_residual", "{:.1e}"),
@@ -33,4 +35,4 @@ _ROWS: tuple[tuple[str, str, str], ...] = (
 
 def summary_rows(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return label and value of every fact that is known, in the table's order."""
-    return [(label, form.format(facts[key])) for label, key, form in _ROWS if key in facts]
+    return [(label, form.format(facts[key])) for label, key, form in _ROWS if facts.get(key) is not None]

@@ -6,7 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from shapely import MultiPolygon
+from shapely.errors import ShapelyError
 
+from coop_drake.errors import GeometryError
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
@@ -15,7 +18,7 @@ from coop_drake.planning.boxes import Box, Regions, make_channel
 from coop_drake.planning.cells import Region
 from coop_drake.planning.certify import Certifier, PathBox
 from coop_drake.planning.channel import Channel
-from coop_drake.planning.margins import exact_footprint, margins, marginal_workspace
+from coop_drake.planning.margins import exact_footprint, marginal_workspace, margins
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.refine import configuration_scale
 from coop_drake.planning.sampler import Ladder, Sampler
@@ -24,8 +27,11 @@ _CLEARANCES = (0.015, 0.002)
 _CLEARANCE_SHARE = 1.3
 _SAMPLES = 4_000
 _GAP = 0.01
-_FEW_MOVES, _MOVES = 600, 3_000
-_FRESH = 2
+_FIRST_BANDS = (0.05, 600), (0.05, 3_000)
+_BANDS = (0.1, 3_000), (0.05, 1_000)
+_MORE_SAMPLES = 8_000
+_FRESH = 3
+_MARGIN_SEED = 1
 _STEPS_UP = (1.2, 1.1)
 _STEPS_DOWN = (0.9, 0.8)
 
@@ -75,19 +81,22 @@ class SampledAttempts:
         Args:
             progress: Called with the share of the sampling that is done.
         """
-        if not self._inside:
-            return None
-        number = self._tries
         self._tries += 1
-        clearance = _CLEARANCES[number % len(_CLEARANCES)]
+        try:
+            return self._first(self._tries, progress) if self._inside else None
+        except (GeometryError, ShapelyError):
+            return None
+
+    def _first(self, number: int, progress: Progress | None) -> Chain | None:
+        clearance = _CLEARANCES[(number - 1) % len(_CLEARANCES)]
         workspace = marginal_workspace(self._problem, clearance)
-        sampler = Sampler(self._ladder, workspace, _GAP, number, progress)
-        path = sampler.path(_SAMPLES * luby(number + 1))
+        sampler = Sampler(self._ladder, workspace, _GAP, number - 1, progress)
+        path = sampler.path(_SAMPLES * luby(number))
         self.object_blocked = self.object_blocked + 1 if sampler.object_blocked else 0
         if len(path) == 0:
             return None
-        for moves in (_FEW_MOVES, _MOVES):
-            path = drawn_tight(self._problem, path, clearance, 0.0, _GAP, moves)
+        for spacing, moves in _FIRST_BANDS:
+            path = drawn_tight(self._problem, path, clearance, 0.0, _GAP, spacing, moves)
             chain = self._chain(path, 0.0, quick=True)
             if chain is not None:
                 return chain
@@ -106,30 +115,31 @@ class SampledAttempts:
         Returns:
             A chain at the margin, or at none if that is all there is.
         """
-        for count, margin in enumerate(margins(self._problem.settings.margin)):
+        for margin in margins(self._problem.settings.margin):
             progress(margin, 0.0)
-            found = self._at(margin, chain.path, fresh=count < _FRESH, progress=progress)
+            try:
+                found = self._at(margin, chain.path, progress)
+            except (GeometryError, ShapelyError):
+                found = None
             tried.append(
                 (margin if found is None else found.margin, "not found" if found is None else "found")
             )
             if found is not None:
                 return found
-        path = drawn_tight(self._problem, chain.path, _CLEARANCES[-1], 0.0, _GAP, _MOVES)
+        path = chain.path
+        for spacing, moves in _BANDS:
+            path = drawn_tight(self._problem, path, _CLEARANCES[-1], 0.0, _GAP, spacing, moves)
         tried.append((0.0, "found"))
         return self._chain(path, 0.0) or self._chain(chain.path, 0.0) or chain
 
-    def _at(
-        self, margin: float, near: FloatArray, *, fresh: bool, progress: Callable[[float, float], None]
-    ) -> Chain | None:
-        """A chain at a margin or not far from it, along a path near another one or, if asked, anywhere."""
+    def _at(self, margin: float, near: FloatArray, progress: Callable[[float, float], None]) -> Chain | None:
+        """A chain at a margin or not far from it, along the shortest of some sampled paths."""
         clearance = _CLEARANCE_SHARE * margin
-        sampler = Sampler(self._ladder, marginal_workspace(self._problem, clearance), _GAP, 0)
-        path = sampler.along(near, _SAMPLES)
-        if len(path) == 0 and fresh:
-            path = sampler.path(_SAMPLES)
-        if len(path) == 0:
+        path = self._shortest(marginal_workspace(self._problem, clearance), near)
+        if path is None:
             return None
-        path = drawn_tight(self._problem, path, clearance, margin, _GAP, _MOVES)
+        for spacing, moves in _BANDS:
+            path = drawn_tight(self._problem, path, clearance, margin, _GAP, spacing, moves)
         chain = self._chain(path, margin, progress)
         if chain is None:
             smaller = (self._chain(path, share * margin, progress) for share in _STEPS_DOWN)
@@ -138,6 +148,23 @@ class SampledAttempts:
             larger = (self._chain(path, share * margin, progress) for share in _STEPS_UP)
             return next((more for more in larger if more is not None), chain)
         return chain
+
+    def _shortest(self, workspace: MultiPolygon, near: FloatArray) -> FloatArray | None:
+        """The shortest of a path sampled near another one and of some sampled anywhere; None without any.
+
+        Those sampled anywhere end with the first failure if there is no path yet: more would fail, too.
+        """
+        sampler = Sampler(self._ladder, workspace, _GAP, _MARGIN_SEED)
+        paths = [sampler.along(near, _SAMPLES)]
+        for _ in range(_FRESH):
+            paths.append(sampler.path(_MORE_SAMPLES))
+            if not any(map(len, paths)):
+                break
+        return min((path for path in paths if len(path)), key=self._length, default=None)
+
+    def _length(self, path: FloatArray) -> float:
+        """Length of a path in the sum of all scaled axes [m]."""
+        return float((np.abs(np.diff(path, axis=0)) * self._scale).sum())
 
     def _chain(
         self,

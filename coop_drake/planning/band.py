@@ -14,8 +14,8 @@ from coop_drake.planning.team_arrays import team_arrays
 from coop_drake.planning.walls import FAR, walls_for
 
 _LEAST_ROOM = 0.005
-_SPACING = 0.05
-_PRICE = 0.006
+_PRICE = 0.12
+"""Price per length of the path, times the clearance there [m]."""
 
 
 def drawn_tight(
@@ -24,6 +24,7 @@ def drawn_tight(
     clearance: float,
     margin: float,
     gap: float,
+    spacing: float = 0.05,
     moves: int = 4_000,
 ) -> FloatArray:
     """Improve a path; start and goal stay, joints that are free at the goal may end elsewhere.
@@ -34,6 +35,7 @@ def drawn_tight(
         clearance: Distance from the walls that the path keeps and will keep [m].
         margin: Margin that the boxes must keep; clearance above it is what they can use [m].
         gap: Distance that pairs of bodies keep [m].
+        spacing: Distance between samples of the path in any scaled axis [m].
         moves: Changes that are tried.
     """
     tree = problem.tree
@@ -44,8 +46,8 @@ def drawn_tight(
     better: FloatArray = improve(
         team,
         walls,
-        np.array([_PRICE, max(clearance - margin, 0.0) + _LEAST_ROOM, FAR]),
-        densified(path, scale, _SPACING),
+        np.array([_PRICE * spacing, max(clearance - margin, 0.0) + _LEAST_ROOM, FAR]),
+        densified(path, scale, spacing),
         np.concatenate((-unbounded, tree.joint_lower)),
         np.concatenate((unbounded, tree.joint_upper)),
         scale,

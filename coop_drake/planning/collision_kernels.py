@@ -56,7 +56,8 @@ def _segment_gap(team: TeamArrays, piece: int, ax: float, ay: float, bx: float, 
         best = min(best, point_segment(bx, by, ux, uy, wx, wy))
         if j - i == 2 and crosses(ax, ay, bx, by, ux, uy, wx, wy):
             return 0.0
-    return max(sqrt(best) - team.radius[piece], 0.0)
+    gap: float = max(sqrt(best) - team.radius[piece], 0.0)
+    return gap
 
 
 @numba.njit(cache=True, error_model="numpy", inline="always")
@@ -84,7 +85,8 @@ def _segment_meets(team: TeamArrays, piece: int, ax: float, ay: float, bx: float
                 return False
         if r == 0.0 or (j - i > 2 and deep_enter <= deep_leave):
             return True
-    return _segment_gap(team, piece, ax, ay, bx, by) <= 0.0
+    meets: bool = _segment_gap(team, piece, ax, ay, bx, by) <= 0.0
+    return meets
 
 
 @numba.njit(cache=True, error_model="numpy", inline="always")
@@ -164,7 +166,8 @@ def _far(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> boo
     dx = poses[A, 0] + poses[A, 2] * ax - poses[A, 3] * ay - poses[B, 0] - poses[B, 2] * bx + poses[B, 3] * by
     dy = poses[A, 1] + poses[A, 3] * ax + poses[A, 2] * ay - poses[B, 1] - poses[B, 3] * bx - poses[B, 2] * by
     reach = team.disc[a, 2] + team.disc[b, 2] + gap
-    return dx * dx + dy * dy > reach * reach
+    far: bool = dx * dx + dy * dy > reach * reach
+    return far
 
 
 @numba.njit(cache=True, error_model="numpy", inline="always")
@@ -208,7 +211,8 @@ def is_free(team: TeamArrays, walls: Walls, z: FloatArray, gap: float) -> bool:
         gap: Distance that pairs of bodies must keep [m].
     """
     poses = place(team, z)
-    return wall_clearance(team, walls, poses, 0.0) >= 0.0 and bodies_apart(team, poses, gap)
+    free: bool = wall_clearance(team, walls, poses, 0.0) >= 0.0 and bodies_apart(team, poses, gap)
+    return free
 
 
 @numba.njit(cache=True, error_model="numpy")

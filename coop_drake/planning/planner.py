@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from shapely.errors import ShapelyError
+
 from coop_drake.control import GainSet
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.planning.channel import Channel, SearchReport
@@ -46,7 +48,7 @@ def plan(
             return Undecided(stall or answer.reason, report)
         try:
             made = make_plan(question, answer, gain_set, gain_set_name=gain_set_name, progress=progress)
-        except (GeometryError, PlanError, StallError) as error:
+        except (GeometryError, PlanError, StallError, ShapelyError) as error:
             stall = f"a channel exists but cannot be executed: {error}"
             if answer.margin == 0.0:
                 break

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from shapely import MultiPoint, MultiPolygon, maximum_inscribed_circle
+from shapely import MultiPoint, MultiPolygon, Polygon, maximum_inscribed_circle
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape
@@ -238,7 +238,7 @@ def _disc_question(question: PlanningProblem) -> PlanningProblem:
 def _inscribed(shape: ConvexShape) -> ConvexShape:
     """A disc inside a convex piece."""
     hull = MultiPoint(shape.vertices).convex_hull
-    if hull.area == 0.0:
+    if not isinstance(hull, Polygon):
         return ConvexShape(shape.vertices.mean(axis=0, keepdims=True), shape.radius)
     line = maximum_inscribed_circle(hull, tolerance=1e-3 * hull.length)
     return ConvexShape(np.array(line.coords[:1]), 0.98 * line.length + shape.radius)

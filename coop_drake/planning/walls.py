@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import hypot, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 import numba
@@ -106,7 +106,8 @@ def crosses(ax: float, ay: float, bx: float, by: float, ux: float, uy: float, wx
     if (first > 0.0) == (last > 0.0):
         return False
     ex, ey = wx - ux, wy - uy
-    return (ex * (ay - uy) - ey * (ax - ux) > 0.0) != (ex * (by - uy) - ey * (bx - ux) > 0.0)
+    apart: bool = (ex * (ay - uy) - ey * (ax - ux) > 0.0) != (ex * (by - uy) - ey * (bx - ux) > 0.0)
+    return apart
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -167,26 +168,6 @@ def _insides(edges: FloatArray, corner: FloatArray, side: float, rows: int, colu
                     inside[column * rows + row] ^= 1
                 else:
                     break
-    return inside
-
-
-@numba.njit(cache=True, error_model="numpy")
-def is_inside(walls: Walls, x: float, y: float) -> bool:
-    """Whether a point lies on the floor: as the middle of its square, but for the walls between the two."""
-    square = square_at(walls, x, y)
-    if square < 0:
-        return False
-    mx = walls.corner[0] + (square // walls.rows + 0.5) * walls.side
-    my = walls.corner[1] + (square % walls.rows + 0.5) * walls.side
-    off = hypot(x - mx, y - my)
-    inside = walls.inside[square] == 1
-    for k in range(walls.first[square], walls.first[square + 1]):
-        if walls.away[k] > off:
-            break
-        e = walls.listed[k]
-        u, v, w, t = walls.edges[e, 0], walls.edges[e, 1], walls.edges[e, 2], walls.edges[e, 3]
-        if crosses(mx, my, x, y, u, v, w, t):
-            inside = not inside
     return inside
 
 
