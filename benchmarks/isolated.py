@@ -14,7 +14,7 @@ from typing import Any, Generic, TypeVar
 
 from coop_drake.errors import CoopDrakeError
 
-__all__ = ["Isolated", "WorkerError", "in_own_process"]
+__all__ = ["Isolated", "WorkerError", "in_own_process", "stop_all"]
 
 T = TypeVar("T")
 
@@ -23,6 +23,7 @@ GRACE = 15
 _ROOT = Path(__file__).resolve().parents[1]
 _KILLED = (-signal.SIGKILL, -signal.SIGXCPU)
 _LAST_LINES = 12
+_running: set[subprocess.Popen[bytes]] = set()
 
 
 class WorkerError(CoopDrakeError):
@@ -55,20 +56,31 @@ def in_own_process(work: Callable[..., T], *arguments: Any, limit: float) -> Iso
     Raises:
         WorkerError: The function raised, or its process died of anything but the limit.
     """
-    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
-    done = subprocess.run(
+    with subprocess.Popen(
         [sys.executable, "-m", "benchmarks.worker"],
-        input=pickle.dumps((work, arguments, limit)),
-        capture_output=True,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         cwd=_ROOT,
-        env=environment,
+        env={**os.environ, "OMP_NUM_THREADS": "1"},
         start_new_session=True,  # Ctrl-C is answered here, where results are kept.
-        check=False,
-    )
-    if done.returncode in _KILLED:
+    ) as process:
+        _running.add(process)
+        try:
+            answer, complaints = process.communicate(pickle.dumps((work, arguments, limit)))
+        finally:
+            process.kill()
+            _running.discard(process)
+    if process.returncode in _KILLED:
         return Isolated(None, limit + GRACE, None)
-    if done.returncode != 0:
-        last = done.stderr.decode(errors="replace").splitlines()[-_LAST_LINES:]
+    if process.returncode != 0:
+        last = complaints.decode(errors="replace").splitlines()[-_LAST_LINES:]
         raise WorkerError(f"{work.__module__}.{work.__qualname__} failed:\n" + "\n".join(last))
-    result: Isolated[T] = pickle.loads(done.stdout)
+    result: Isolated[T] = pickle.loads(answer)
     return result
+
+
+def stop_all() -> None:
+    """Kill every process that is at work; whoever waits for one sees it as out of time."""
+    for process in tuple(_running):
+        process.kill()

@@ -27,7 +27,8 @@ def show(rows: Sequence[Row], console: Console | None = None) -> None:
     screen = console or Console(width=max(_WIDTH, Console().width))
     for topic, members in groupby(sorted(rows, key=lambda row: _place(rows, row)), key=lambda row: row.topic):
         topical = list(members)
-        screen.print(_table(topic, topical))
+        screen.print(f"\n[bold]{topic}[/]", highlight=False)
+        screen.print(_table(topical))
         for line in dict.fromkeys(
             f"  {row.item}/{row.figure}: beside {row.peer}"
             + ("" if row.peer_value is None else f", {_number(row.peer_value)} {row.unit}")
@@ -41,9 +42,9 @@ def _place(rows: Sequence[Row], row: Row) -> int:
     return [other.topic for other in rows].index(row.topic)
 
 
-def _table(topic: str, rows: Sequence[Row]) -> Table:
+def _table(rows: Sequence[Row]) -> Table:
     figures = list(dict.fromkeys(row.figure for row in rows))
-    table = Table(title=topic, title_justify="left")
+    table = Table()
     table.add_column("")
     for figure in figures:
         units = {row.unit for row in rows if row.figure == figure}

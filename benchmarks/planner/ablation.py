@@ -1,12 +1,139 @@
-"""What our planner's own parts are worth: cells alone, and cells split by other rules."""
+"""What our planner's own parts are worth: without samples, by cells alone, and split by other rules.
+
+Every variant is asked at margin zero for a free channel or a proof that there is none: only searches are
+compared. ``everything`` is the planner's own; ``proofs`` leaves the sampled ladder out; ``cells_strong``
+leaves the relaxations out, too; ``cells_blame`` and ``cells_longest`` split by other rules; ``paper`` is the
+paper's Algorithms 1 and 2.
+"""
 
 from __future__ import annotations
 
-from benchmarks.tasks import Task
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from time import process_time
+from typing import Literal
 
-__all__ = ["ablation_tasks"]
+from benchmarks.isolated import in_own_process
+from benchmarks.planner.family import corridor_problem, first_question
+from benchmarks.rows import Row
+from benchmarks.tasks import Task
+from coop_drake.planning import PlanningProblem, find_channel
+from coop_drake.planning.channel import Channel
+from coop_drake.planning.exploration import Verdict
+from coop_drake.planning.proofs import Proofs, explorer
+from coop_drake.planning.split_rules import SplitRule
+
+__all__ = ["VARIANTS", "Answered", "ablation_rows", "ablation_tasks", "answer"]
+
+_SLICES = 50_000
+"""Slices that a variant may make; the CPU time ends most of them sooner."""
+_FIRST_SHARE = 64
+
+
+@dataclass(frozen=True)
+class Answered:
+    """What a variant came to.
+
+    Attributes:
+        answer: ``found``, ``infeasible`` or ``undecided``.
+        cpu_seconds: What it took [CPU s].
+        slices: Compound slices made, boxes along sampled paths included.
+    """
+
+    answer: str
+    cpu_seconds: float
+    slices: int
 
 
 def ablation_tasks(limit: float) -> list[Task]:
-    """Stub."""
-    return []
+    """One task for every case.
+
+    Args:
+        limit: CPU time of every variant [s].
+    """
+    cases = {
+        "base": corridor_problem(1.2),
+        "tight": corridor_problem(0.9),
+        "closed": corridor_problem(0.77),
+        "three_closed": corridor_problem(0.95, 1.5, robots=3),
+        "elbow_closed": corridor_problem(0.6, joints_per_arm=2),
+    }
+    return [_task(name, problem, limit) for name, problem in cases.items()]
+
+
+def _task(name: str, problem: PlanningProblem, limit: float) -> Task:
+    return Task(f"planner/ablation/{name}", lambda rows: ablation_rows(name, problem, limit))
+
+
+def ablation_rows(name: str, problem: PlanningProblem, limit: float) -> list[Row]:
+    """Ask every variant, each in a process of its own; ratios are to the whole planner's search."""
+    rows, whole = [], None
+    for variant in VARIANTS:
+        done = in_own_process(answer, problem, variant, limit=limit)
+        what, answered = f"planner/ablation/{name}/{variant}", done.value
+        if answered is None:
+            rows.append(Row(f"{what}/answer", 0.0, f"none within {limit:g} CPU s"))
+            continue
+        whole = answered.cpu_seconds if variant == "everything" else whole
+        peer = "" if variant == "everything" else "everything"
+        rows += [
+            Row(f"{what}/answer", float(answered.answer != "undecided"), answered.answer),
+            Row(f"{what}/cpu_seconds", answered.cpu_seconds, "s", peer, whole if peer else None),
+            Row(f"{what}/slices", answered.slices, "slices"),
+        ]
+    return rows
+
+
+def answer(problem: PlanningProblem, variant: str) -> Answered:
+    """Ask one variant, after a small question has loaded the compiled kernels."""
+    ask = VARIANTS[variant]
+    ask(_at_margin_zero(first_question()))
+    question = _at_margin_zero(problem)
+    start = process_time()
+    word, slices = ask(question)
+    return Answered(word, process_time() - start, slices)
+
+
+def _at_margin_zero(problem: PlanningProblem) -> PlanningProblem:
+    return replace(problem, settings=replace(problem.settings, margin=0.0, max_slices=_SLICES))
+
+
+def _searched(strategy: Literal["portfolio", "paper"]) -> Callable[[PlanningProblem], tuple[str, int]]:
+    def ask(problem: PlanningProblem) -> tuple[str, int]:
+        settings = replace(problem.settings, strategy=strategy)
+        channel, report = find_channel(replace(problem, settings=settings))
+        if isinstance(channel, Channel):
+            return "found", report.slices
+        return "infeasible" if channel.proved else "undecided", report.slices
+
+    return ask
+
+
+def _proved(problem: PlanningProblem) -> tuple[str, int]:
+    proofs, share, verdict = Proofs(problem), _FIRST_SHARE, Verdict.BUDGET
+    while verdict is Verdict.BUDGET and share <= problem.settings.max_slices:
+        verdict, share = proofs.run(share), 2 * share
+    return _word(verdict), proofs.slices
+
+
+def _explored(split: SplitRule) -> Callable[[PlanningProblem], tuple[str, int]]:
+    def ask(problem: PlanningProblem) -> tuple[str, int]:
+        outcome = explorer(problem, split=split).run(problem.settings.max_slices)
+        return _word(outcome.verdict), outcome.slices
+
+    return ask
+
+
+def _word(verdict: Verdict) -> str:
+    decided = {Verdict.FOUND: "found", Verdict.INFEASIBLE: "infeasible"}
+    return decided.get(verdict, "undecided")
+
+
+VARIANTS: dict[str, Callable[[PlanningProblem], tuple[str, int]]] = {
+    "everything": _searched("portfolio"),
+    "proofs": _proved,
+    "cells_strong": _explored("strong"),
+    "cells_blame": _explored("blame"),
+    "cells_longest": _explored("longest"),
+    "paper": _searched("paper"),
+}

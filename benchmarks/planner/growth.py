@@ -36,7 +36,7 @@ def growth_tasks(limit: float) -> list[Task]:
 
 
 def _task(name: str, problem: PlanningProblem, limit: float) -> Task:
-    return Task(name, lambda: growth_rows(name, problem, limit))
+    return Task(name, lambda rows: growth_rows(name, problem, limit))
 
 
 def growth_rows(name: str, problem: PlanningProblem, limit: float) -> list[Row]:

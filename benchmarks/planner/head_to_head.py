@@ -1,4 +1,4 @@
-"""Our planner, OMPL and our own bare trees on one scenario file, in one run."""
+"""Our planner, OMPL and bare trees on the same scenario files, in one run."""
 
 from __future__ import annotations
 
@@ -6,21 +6,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from statistics import median
 
-from benchmarks.isolated import Isolated, in_own_process
-from benchmarks.planner.cases import Case
+from benchmarks.isolated import in_own_process
+from benchmarks.planner.cases import CASES, Case
 from benchmarks.planner.ompl_peer import has_ompl, run_ompl
-from benchmarks.planner.ours import Planned, plan_repeatedly
+from benchmarks.planner.ours import plan_repeatedly
 from benchmarks.planner.path_check import fault_of
 from benchmarks.planner.peer import PeerRun
 from benchmarks.planner.trees_peer import CHECKS, run_trees
 from benchmarks.rows import Row
+from benchmarks.tasks import Rows, Task
 from coop_drake.planning import PlanningProblem
 
-__all__ = ["Effort", "compare"]
+__all__ = ["Effort", "head_to_head_tasks", "judged"]
 
 _IMPASSABLE_RUNS = 2
-_START_UP = 30.0
+_START_UP = 60.0
 _MOST_PER_FLOOR = 20.0
+_PATIENCE = 10.0
 
 
 @dataclass(frozen=True)
@@ -36,104 +38,117 @@ class Effort:
 
     seeds: int = 10
     budget: float = 10.0
-    limit: float = 60.0
+    limit: float = 20.0
     repeats: int = 3
 
 
-@dataclass(frozen=True)
-class _Standing:
-    """What a peer came to on a case: in words, and its median with failures counted as they ended [CPU s]."""
-
-    text: str
-    seconds: float | None
-
-
-def compare(case: Case, effort: Effort) -> list[Row]:
-    """Measure everybody on a case.
+def head_to_head_tasks(effort: Effort) -> list[Task]:
+    """For every case a task for each peer, and ours once the peers are through.
 
     Peers cannot answer "no": where there is no way they run twice only, to show what they do about it.
 
     Args:
-        case: The scenario file.
         effort: How much to spend.
     """
-    problem = case.problem()
-    seeds = range(1, 1 + (effort.seeds if case.passable else min(_IMPASSABLE_RUNS, effort.seeds)))
-    floor, rows = _floor(case, problem, seeds)
-    standings = [floor]
-    if has_ompl():
-        ompl, more = _ompl(case, problem, seeds, effort.budget)
-        standings, rows = [floor, ompl], rows + more
-    return _ours(case, problem, effort, standings) + rows
+    tasks = []
+    for case in CASES:
+        seeds = range(1, 1 + (effort.seeds if case.passable else min(_IMPASSABLE_RUNS, effort.seeds)))
+        tasks.append(_trees_task(case, seeds))
+        if has_ompl():
+            tasks.append(_ompl_task(case, seeds, effort.budget))
+        tasks.append(_our_task(case, effort))
+    return tasks
 
 
-def _ours(case: Case, problem: PlanningProblem, effort: Effort, standings: Sequence[_Standing]) -> list[Row]:
-    """Rows of our planner beside all peers; the last one is OMPL's, if it ran."""
-    name, runs = f"planner/{case.name}", 1 + effort.repeats
-    done: Isolated[tuple[Planned, ...]] = in_own_process(
-        plan_repeatedly, problem, runs, limit=runs * effort.limit
-    )
-    if done.value is None:
-        return [Row(f"{name}/answer", 0.0, f"none within {effort.limit:g} CPU s")]
-    cold, *warm = done.value
-    first = median(run.first_plan_cpu_seconds for run in warm)
-    floor, peer = standings[0], standings[-1]
-    memory = [] if done.peak_mb is None else [Row(f"{name}/peak_memory", done.peak_mb, "MB")]
-    return [
-        Row(f"{name}/answer", float(cold.answer != "undecided"), cold.answer),
-        Row(f"{name}/first_plan_cpu_seconds", first, "s", peer.text, peer.seconds),
-        Row(f"{name}/first_plan_beside_floor", first, "s", floor.text, floor.seconds),
-        Row(f"{name}/cpu_seconds", median(r.cpu_seconds for r in warm), "s", peer.text, peer.seconds),
-        Row(f"{name}/cold_cpu_seconds", cold.cpu_seconds, "s"),
-        *memory,
-        Row(f"{name}/slices", cold.slices, "slices"),
-        Row(f"{name}/cells", cold.cells, "cells"),
-        Row(f"{name}/margin", 1e3 * cold.margin_m, "mm"),
-        Row(f"{name}/transport", cold.transport_seconds, "s"),
-    ]
+def _trees_task(case: Case, seeds: Sequence[int]) -> Task:
+    name = f"planner/rrt_connect/{case.name}"
+
+    def measure(rows: Rows) -> Rows:
+        problem = case.problem()
+        limit = _START_UP + _MOST_PER_FLOOR * len(seeds)
+        runs = in_own_process(run_trees, problem, tuple(seeds), limit=limit).value or ()
+        return judged(name, problem, runs, f"{CHECKS:,} checks")
+
+    return Task(name, measure)
 
 
-def _floor(case: Case, problem: PlanningProblem, seeds: Sequence[int]) -> tuple[_Standing, list[Row]]:
-    limit = _START_UP + _MOST_PER_FLOOR * len(seeds)
-    runs = in_own_process(run_trees, problem, tuple(seeds), limit=limit).value or ()
-    allowed = f"{CHECKS:,} checks"
-    return _judged(f"planner/rrt_connect/{case.name}", "own RRT-Connect", problem, runs, allowed)
-
-
-def _ompl(
-    case: Case, problem: PlanningProblem, seeds: Sequence[int], budget: float
-) -> tuple[_Standing, list[Row]]:
-    limit = _START_UP + (budget + 1.0) * len(seeds)
-    runs = in_own_process(run_ompl, problem, tuple(seeds), budget, limit=limit).value or ()
+def _ompl_task(case: Case, seeds: Sequence[int], budget: float) -> Task:
     name = f"planner/ompl/{case.name}"
-    standing, rows = _judged(name, "OMPL RRT-Connect", problem, runs, f"{budget:g} CPU s")
-    if not runs:
-        return standing, rows
-    checks = median(run.checks for run in runs)
-    share = median((run.check_seconds or 0.0) / run.cpu_seconds for run in runs)
-    return standing, [
-        *rows,
-        Row(f"{name}/checks", checks, "checks"),
-        Row(f"{name}/check_share", share, "of time"),
-    ]
+
+    def measure(rows: Rows) -> Rows:
+        problem = case.problem()
+        limit = _START_UP + (budget + 1.0) * len(seeds)
+        runs = in_own_process(run_ompl, problem, tuple(seeds), budget, limit=limit).value or ()
+        shares = [run.check_seconds / run.cpu_seconds for run in runs if run.check_seconds is not None]
+        share = [Row(f"{name}/check_share", median(shares), "of time")] if shares else []
+        return [*judged(name, problem, runs, f"{budget:g} CPU s"), *share]
+
+    return Task(name, measure)
 
 
-def _judged(
-    name: str, peer: str, problem: PlanningProblem, runs: Sequence[PeerRun], allowed: str
-) -> tuple[_Standing, list[Row]]:
-    """Rows of a peer; a path counts only if it stands the dense check."""
+def judged(name: str, problem: PlanningProblem, runs: Sequence[PeerRun], allowed: str) -> list[Row]:
+    """Rows of a peer; a path counts only if it stands the dense check.
+
+    The median is over all runs, failures counted as they ended; without any path there is none.
+
+    Args:
+        name: What the rows' names begin with.
+        problem: The question.
+        runs: Its runs; none if it ran out of all limits.
+        allowed: What each run might spend, in words.
+    """
     claims = [run for run in runs if run.found]
     good = [run for run in claims if not fault_of(problem, run.path)]
-    wrong = len(claims) - len(good)
-    count = [Row(f"{name}/found", len(good), f"of {len(runs)}"), Row(f"{name}/wrong", wrong, "paths")]
+    count = [
+        Row(f"{name}/found", len(good), f"of {len(runs)} within {allowed}"),
+        Row(f"{name}/wrong", len(claims) - len(good), "paths"),
+    ]
     if not good:
-        return _Standing(f"{peer}: no path in {len(runs)} runs of {allowed}", None), count
-    middle = median(run.cpu_seconds for run in runs)
+        return count
     times = [run.cpu_seconds for run in good]
-    text = f"{peer}: median of {len(runs)}, {len(good)} found within {allowed}"
-    return _Standing(text, middle), [
-        Row(f"{name}/cpu_seconds", middle, "s"),
+    return [
+        *count,
+        Row(f"{name}/cpu_seconds", median(run.cpu_seconds for run in runs), "s"),
         Row(f"{name}/fastest", min(times), "s"),
         Row(f"{name}/slowest", max(times), "s"),
-        *count,
+        Row(f"{name}/checks", median(run.checks for run in runs), "checks"),
     ]
+
+
+def _our_task(case: Case, effort: Effort) -> Task:
+    name, runs = f"planner/{case.name}", 1 + effort.repeats
+
+    def measure(rows: Rows) -> Rows:
+        limit = effort.limit + runs * _PATIENCE
+        done = in_own_process(plan_repeatedly, case.problem(), runs, _PATIENCE, limit=limit)
+        if done.value is None:
+            return [Row(f"{name}/answer", 0.0, f"none within {limit:g} CPU s")]
+        cold, *warm = done.value
+        warm = warm or [cold]
+        first = median(run.first_plan_cpu_seconds for run in warm)
+        total = median(run.cpu_seconds for run in warm)
+        floor, ompl = (_standing(peer, case, rows) for peer in ("rrt_connect", "ompl"))
+        memory = [] if done.peak_mb is None else [Row(f"{name}/peak_memory", done.peak_mb, "MB")]
+        return [
+            Row(f"{name}/answer", float(cold.answer != "undecided"), cold.answer),
+            Row(f"{name}/first_plan_cpu_seconds", first, "s", *ompl),
+            Row(f"{name}/first_plan_beside_floor", first, "s", *floor),
+            Row(f"{name}/cpu_seconds", total, "s", *ompl),
+            Row(f"{name}/cold_cpu_seconds", cold.cpu_seconds, "s"),
+            *memory,
+            Row(f"{name}/slices", cold.slices, "slices"),
+            Row(f"{name}/cells", cold.cells, "cells"),
+            Row(f"{name}/margin", 1e3 * cold.margin_m, "mm"),
+            Row(f"{name}/transport", cold.transport_seconds, "s"),
+        ]
+
+    return Task(name, measure, alone=True)
+
+
+def _standing(peer: str, case: Case, rows: Rows) -> tuple[str, float | None]:
+    """What a peer came to on a case, in words and as its median CPU time [s]."""
+    figures = {row.figure: row for row in rows if row.name.startswith(f"planner/{peer}/{case.name}/")}
+    if "found" not in figures:
+        return "", None
+    found, seconds = figures["found"], figures.get("cpu_seconds")
+    return f"{peer}: {found.value:g} found {found.unit}", None if seconds is None else seconds.value
