@@ -91,7 +91,7 @@ def _halved(
     fails: Callable[[FloatArray, FloatArray], str],
     where: str,
 ) -> None:
-    """Test a slice; halve it where it fails, and refuse what still fails when it is small."""
+    """Test a slice; halve it where it fails, and refuse what fails when small or at its very middle."""
     moving = {stage.axis for solid in free.solids for stage in solid.stages}
     axes = sorted(axis for axis in moving if upper[axis] > lower[axis])
     left = [(lower - WIDENING, upper + WIDENING, 0)]
@@ -100,11 +100,11 @@ def _halved(
         finding = fails(low, high)
         if not finding:
             continue
-        if depth == HALVINGS or not axes:
+        middle = 0.5 * (low + high)
+        if depth == HALVINGS or not axes or fails(middle, middle):
             raise RefusalError(where, finding)
         axis = max(axes, key=lambda axis: (high[axis] - low[axis], -axis))
-        middle = 0.5 * (low[axis] + high[axis])
-        for begin, end in ((low[axis], middle), (middle, high[axis])):
+        for begin, end in ((low[axis], middle[axis]), (middle[axis], high[axis])):
             part_low, part_high = low.copy(), high.copy()
             part_low[axis], part_high[axis] = begin, end
             left.append((part_low, part_high, depth + 1))

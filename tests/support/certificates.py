@@ -26,15 +26,15 @@ def room_with_pillar(robots=1, pillar=PILLAR):
     )
 
 
-def rooms_with_door(width, robots=1):
-    """Two rooms joined by a doorway of some width in a thick wall."""
-    y0, y1 = 2.0 - 0.5 * width, 2.0 + 0.5 * width
-    floor = union_all([box(0.0, 0.0, 4.0, 4.0), box(3.9, y0, 5.1, y1), box(5.0, 0.0, 9.0, 4.0)])
+def bent_corridor(width, goal=(5.1, 5.0, 0.1), robots=1):
+    """Two rooms joined by a corridor of some width with a right-angled bend."""
+    up, right = box(0.9, 2.3, 0.9 + width, 5.3), box(0.9, 5.3 - width, 4.0, 5.3)
+    floor = union_all([box(0.0, 0.0, 2.6, 2.4), up, right, box(3.9, 3.8, 6.3, 6.2)])
     return PlanningProblem(
         workspace=normalize(floor),
         tree=team_tree(robots, 1),
-        start=np.array([2.0, 2.0, 0.1, *[0.0] * robots]),
-        goal_pose=np.array([7.0, 2.0, 0.1]),
+        start=np.array([0.9, 1.1, 0.0, *[0.0] * robots]),
+        goal_pose=np.array(goal),
         goal_joints=(None,) * robots,
     )
 

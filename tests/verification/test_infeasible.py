@@ -1,0 +1,213 @@
+"""Proofs of infeasibility are verified; altered and forged ones are refused."""
+
+import json
+from copy import deepcopy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from shapely import Polygon
+
+from coop_drake.errors import PlanError, RefusalError
+from coop_drake.planning import find_channel
+from coop_drake.planning.digest import problem_digest
+from coop_drake.planning.proofs import explorer
+from coop_drake.planning.relaxation import relaxed
+from coop_drake.planning.separation import BlockedGoal, DiscSeparation, SliceSeparation
+from coop_drake.planning.separation_file import load_separation, save_separation
+from coop_drake.planning.separation_making import slice_separation
+from coop_drake.verification import verify_file, verify_separation
+from tests.support.certificates import (
+    GAINS,
+    bent_corridor,
+    changed,
+    entry_at,
+    number_places,
+    write,
+)
+from tests.support.free_positions import FreePositions
+
+PROBLEM = bent_corridor(0.62)
+BY_DISC = bent_corridor(0.45)
+AT_GOAL = bent_corridor(1.2, goal=(5.6, 5.0, 0.1))
+KINDS = {SliceSeparation: PROBLEM, DiscSeparation: BY_DISC, BlockedGoal: AT_GOAL}
+
+
+def proof_of(problem):
+    answer, _ = find_channel(problem)
+    return answer.separation
+
+
+@pytest.fixture(scope="module")
+def proofs():
+    return {kind: proof_of(problem) for kind, problem in KINDS.items()}
+
+
+@pytest.fixture(scope="module")
+def documents(proofs, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("proofs")
+    paths = {kind: save_separation(proofs[kind], KINDS[kind], folder / kind.__name__) for kind in KINDS}
+    return {kind: json.loads(path.read_text()) for kind, path in paths.items()}
+
+
+def refusal(document, tmp_path, problem, *, signed=True):
+    """What a document is refused for, None where it is verified."""
+    try:
+        verify_file(write(document, tmp_path / "certificate.json", signed=signed), problem, GAINS)
+    except (RefusalError, PlanError) as error:
+        return str(error)
+    return None
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_proofs_are_stated_saved_and_verified(proofs, documents, tmp_path, kind):
+    assert isinstance(proofs[kind], kind)
+    path = save_separation(proofs[kind], KINDS[kind], tmp_path / "certificate.json")
+    again = save_separation(load_separation(path).separation, KINDS[kind], tmp_path / "again.json")
+    assert again.read_bytes() == path.read_bytes()
+    verified = verify_file(path, KINDS[kind], GAINS)
+    assert verified.answer == "infeasible"
+    assert all(check.count > 0 for check in verified.checks)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_number_can_be_altered_be_it_by_a_bit(documents, tmp_path, kind):
+    document = documents[kind]
+    nudges = (lambda x: float(np.nextafter(x, np.inf)), lambda x: 1.001 * x + 1e-3, lambda x: -x - 1.0)
+    for number, way in enumerate(number_places(document)[::4]):
+        value = nudges[number % 3](entry_at(document, way))
+        assert refusal(changed(document, way, value), tmp_path, KINDS[kind], signed=False), way
+
+
+def test_bounds_and_labels_are_refused_under_a_new_digest(documents, tmp_path):
+    """Every label, and every end by one bit; where the turn closes, by more than 2 pi is rounded."""
+    document = documents[SliceSeparation]
+    lower, upper = ([part[end][0] for part in document["slices"]] for end in ("lower", "upper"))
+    closing = (min(lower), max(upper))
+    for k, part in enumerate(document["slices"]):
+        for end in ("lower", "upper"):
+            way, value = ("slices", k, end, 0), part[end][0]
+            value = value + 1e-9 if value in closing else float(np.nextafter(value, 9.0))
+            assert "slices" in refusal(changed(document, way, value), tmp_path, PROBLEM), way
+        for i, cell in enumerate(part["cells"]):
+            flipped = changed(document, ("slices", k, "cells", i, "reached"), not cell["reached"])
+            assert f"slices[{k}].cells[{i}].reached: is" in refusal(flipped, tmp_path, PROBLEM)
+
+
+def test_cells_that_are_accepted_under_a_new_digest_still_cover(documents, tmp_path):
+    document = documents[SliceSeparation]
+    places = [way for way in number_places(document) if "cells" in way][::61]
+    accepted = 0
+    for number, way in enumerate(places):
+        step = (0.004, -0.004, 0.05, -0.05)[number % 4]
+        altered = changed(document, way, entry_at(document, way) + step)
+        if refusal(altered, tmp_path, PROBLEM) is None:
+            accepted += 1
+            assert_covers(altered["slices"][way[1]])
+    assert 0 < accepted < 0.75 * len(places)
+
+
+def assert_covers(part):
+    """Exactly free positions at angles of a slice lie in its cells."""
+    question, _ = relaxed(PROBLEM, ())
+    random = np.random.default_rng(0)
+    x_min, y_min, x_max, y_max = PROBLEM.workspace.bounds
+    rings = [(cell["polygon"]["outer"], cell["polygon"]["holes"]) for cell in part["cells"]]
+    cells = shapely.union_all([Polygon(*pair) for pair in rings])
+    for share in (0.0, 0.5, 1.0):
+        angle = part["lower"][0] + share * (part["upper"][0] - part["lower"][0])
+        points = random.uniform((x_min, y_min), (x_max, y_max), (400, 2))
+        free = points[FreePositions(question.tree, PROBLEM.workspace, [angle]).free(points)]
+        assert shapely.intersects_xy(cells, free).all()
+
+
+def test_no_slice_and_no_cell_can_be_left_out_doubled_or_moved(documents, tmp_path):
+    document = documents[SliceSeparation]
+    for k, part in list(enumerate(document["slices"]))[::4]:
+        for change in ("drop", "double"):
+            altered = deepcopy(document)
+            altered["slices"][k : k + 1] = [] if change == "drop" else [part, part]
+            assert "slices" in refusal(altered, tmp_path, PROBLEM)
+        if part["cells"]:
+            altered = deepcopy(document)
+            del altered["slices"][k]["cells"][0]
+            assert f"slices[{k}]: no cell covers" in refusal(altered, tmp_path, PROBLEM)
+    altered = deepcopy(document)
+    first, second = altered["slices"][0], altered["slices"][-1]
+    first["cells"], second["cells"] = second["cells"], first["cells"]
+    assert "no cell covers" in refusal(altered, tmp_path, PROBLEM)
+
+
+def test_a_proof_about_one_floor_does_not_hold_on_a_wider_one(documents, tmp_path):
+    wider = bent_corridor(0.9)
+    assert "problem: " in refusal(documents[SliceSeparation], tmp_path, wider)
+    forged = {**documents[SliceSeparation], "problem": problem_digest(wider)}
+    assert "no cell covers" in refusal(forged, tmp_path, wider)
+    forged = {**documents[DiscSeparation], "problem": problem_digest(wider)}
+    assert "none covers" in refusal(forged, tmp_path, wider)
+
+
+def test_a_cut_through_free_space_is_refused():
+    """Where there is a way, no choice of labels makes a proof: over-cells of an unfinished exploration."""
+    feasible = bent_corridor(1.2)
+    question, _ = relaxed(feasible, ())
+    exploration = explorer(question)
+    exploration.run(24)
+    assert slice_separation(question, (), exploration.slices, exploration.over_leaves()) is None
+    far = replace(question, goal_pose=np.array([50.0, 50.0, 0.0]))
+    stated = slice_separation(far, (), exploration.slices, exploration.over_leaves())
+    with pytest.raises(RefusalError, match="holds the goal and touching cells join it to the start"):
+        verify_separation(stated, feasible)
+    unlabelled = replace(stated, slices=tuple(without_label(part, feasible) for part in stated.slices))
+    with pytest.raises(RefusalError, match="touching cells"):
+        verify_separation(unlabelled, feasible)
+
+
+def without_label(part, problem):
+    """A slice whose cells about the goal are called not reached."""
+    goal = shapely.Point(problem.goal_pose[:2])
+    labels = [cell.reached and not cell.polygon.covers(goal) for cell in part.cells]
+    cells = tuple(replace(cell, reached=label) for cell, label in zip(part.cells, labels, strict=True))
+    return replace(part, cells=cells)
+
+
+@pytest.mark.parametrize(
+    ("kind", "way", "value", "message"),
+    [
+        (SliceSeparation, ("robots",), [3], r"robots: \[3\] are not some of \[0\]"),
+        (SliceSeparation, ("robots",), [0], r"slices\[0\]: has 1 axes; the kept bodies have 2"),
+        (SliceSeparation, ("robots",), [0.5], r"robots\[0\]: 0.5 is not allowed; expected a whole number"),
+        (SliceSeparation, ("kind",), "guess", r"kind: 'guess' is not allowed"),
+        (
+            SliceSeparation,
+            ("format",),
+            "song",
+            r"format: 'song' is not allowed; expected 'coop_drake plan'",
+        ),
+        (SliceSeparation, ("slices", 0, "lower", 0), 9.0, r"slices\[0\].upper\[0\]: .* 9.0 or more"),
+        (DiscSeparation, ("component",), 7, r"component: 7 is not below"),
+        (DiscSeparation, ("component",), 1, r"the disc leaves every shape|none covers|holds the goal"),
+        (DiscSeparation, ("radius",), 0.26, r"radius: the disc leaves every shape of its component by 0.01"),
+        (DiscSeparation, ("radius",), 0.2, r"cells: none covers"),
+        (DiscSeparation, ("centre", 1), 0.01, r"radius: the disc leaves every shape"),
+        (
+            DiscSeparation,
+            ("cells", 0, "reached"),
+            None,
+            r"reached: None is not allowed; expected True",
+        ),
+        (BlockedGoal, ("slices", 0, "upper", 0), 0.2, r"slices: are about theta in \[0.1, 0.2\]"),
+        (BlockedGoal, ("robots",), [0, 0], r"robots: \[0, 0\] are not some of"),
+    ],
+)
+def test_refusals_under_a_new_digest_say_what_and_where(documents, tmp_path, kind, way, value, message):
+    document = changed(documents[kind], way, value)
+    with pytest.raises((RefusalError, PlanError), match=message):
+        verify_file(write(document, tmp_path / "certificate.json", signed=True), KINDS[kind], GAINS)
+
+
+def test_a_goal_is_not_blocked_where_the_team_fits(proofs):
+    fits = bent_corridor(1.2)
+    with pytest.raises(RefusalError, match=r"slices\[0\]: the team may be free at \(5.1, 5.0\)"):
+        verify_separation(proofs[BlockedGoal], fits)
