@@ -99,6 +99,8 @@ def _measure(tasks: list[Task], ledger: Ledger, jobs: int, console: Console) -> 
                     bars.print(f"[bold red]Error:[/] {escape(str(done.error))}", soft_wrap=True)
                     code = _FAILED
                 bars.update(bar, advance=1, description=done.task.name)
+                if not console.is_terminal:
+                    bars.print(done.task.name)
         except KeyboardInterrupt:
             bars.print("Interrupted: what was measured until now is kept.")
             return _INTERRUPTED

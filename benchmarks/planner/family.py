@@ -7,6 +7,7 @@ from math import ceil, pi, sqrt
 
 import numpy as np
 from shapely import Polygon, affinity, box, normalize, union_all
+from shapely.geometry.base import BaseGeometry
 
 from coop_drake.geometry.pose import FloatArray, PlanarPose
 from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
@@ -179,7 +180,7 @@ def _placed(shape: ConvexShape, X_PC: PlanarPose) -> ConvexShape:
     return ConvexShape(X_PC.apply(shape.vertices), shape.radius)
 
 
-def _one_floor(floor: object) -> Polygon:
+def _one_floor(floor: BaseGeometry) -> Polygon:
     tidy = normalize(floor.simplify(0.0))
     assert isinstance(tidy, Polygon)
     return tidy

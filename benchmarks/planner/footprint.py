@@ -29,7 +29,8 @@ def compiled_check(problem: PlanningProblem) -> Callable[..., bool]:
 
     @numba.njit
     def check(*values: float) -> bool:
-        return is_free(team, walls, np.array(values), 0.0)
+        free: bool = is_free(team, walls, np.array(values), 0.0)
+        return free
 
     check(*map(float, problem.start))
     compiled: Callable[..., bool] = check

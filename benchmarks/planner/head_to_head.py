@@ -127,12 +127,12 @@ def _our_task(case: Case, effort: Effort) -> Task:
         warm = warm or [cold]
         first = median(run.first_plan_cpu_seconds for run in warm)
         total = median(run.cpu_seconds for run in warm)
-        floor, ompl = (_standing(peer, case, rows) for peer in ("rrt_connect", "ompl"))
+        trees, ompl = (_standing(peer, case, rows) for peer in ("rrt_connect", "ompl"))
         memory = [] if done.peak_mb is None else [Row(f"{name}/peak_memory", done.peak_mb, "MB")]
         return [
             Row(f"{name}/answer", float(cold.answer != "undecided"), cold.answer),
             Row(f"{name}/first_plan_cpu_seconds", first, "s", *ompl),
-            Row(f"{name}/first_plan_beside_floor", first, "s", *floor),
+            Row(f"{name}/first_plan_beside_rrt_connect", first, "s", *trees),
             Row(f"{name}/cpu_seconds", total, "s", *ompl),
             Row(f"{name}/cold_cpu_seconds", cold.cpu_seconds, "s"),
             *memory,

@@ -5,8 +5,8 @@ the team, so that distances are those of our sampler and motions are checked as 
 with OMPL's own choice, a fifth of the space, it finds far fewer paths in corridors. The check is compiled for
 the question and takes plain numbers, but OMPL calls it through Python: reading a state and crossing over to
 the compiled code cost more than the check itself. That is why the rows state the number of checks and their
-share of the time, and why a compiled RRT-Connect stands beside OMPL, the floor that a pure C++ program would
-come near to.
+share of the time, and why a compiled RRT-Connect stands beside OMPL, which a pure C++ program would come
+near to.
 
 CPU time is that of ``solve`` alone: no set-up, no compiling, no smoothing.
 """
