@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 import shapely
 from shapely import Point, Polygon
+from shapely.geometry.base import BaseGeometry
 
 from coop_drake.drawing import BodyFootprint, team_footprints
 from coop_drake.geometry.pose import FloatArray
@@ -17,6 +18,10 @@ __all__ = ["Contact", "Overlap", "contacts", "deepest", "overlaps"]
 
 NEGLIGIBLE = 1e-4
 """Arcs are drawn as polygons: less than this is no contact [m]."""
+
+_HAIR = 1e-9
+
+Depth = tuple[float, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -74,15 +79,38 @@ def deepest(workspace: Polygon, tree: ComponentTree, configuration: FloatArray) 
 
 
 def _outside(workspace: Polygon, footprint: BodyFootprint) -> list[Contact]:
+    """One contact for every part of a body outside the floor, measured where it is deepest."""
     found = []
     for part in shapely.get_parts(shapely.difference(footprint.shape, workspace)):
-        corners = shapely.get_coordinates(part)
-        depths = np.array([workspace.distance(Point(corner)) for corner in corners])
-        worst = int(np.argmax(depths))
-        if depths[worst] > NEGLIGIBLE:
-            ends = shapely.get_coordinates(shapely.shortest_line(Point(corners[worst]), workspace.boundary))
-            found.append(Contact(footprint.name, footprint.robot, float(depths[worst]), ends[0], ends[-1]))
+        depth, point, wall = max(
+            [_sticking_out(workspace, part), *_pierced(workspace, footprint, part)],
+            key=lambda entry: entry[0],
+        )
+        if depth > NEGLIGIBLE:
+            found.append(Contact(footprint.name, footprint.robot, depth, point, wall))
     return found
+
+
+def _sticking_out(workspace: Polygon, part: BaseGeometry) -> Depth:
+    """The corner of a part that is farthest from the floor, and the point of the wall nearest to it."""
+    corners = shapely.get_coordinates(part)
+    depths = [workspace.distance(Point(corner)) for corner in corners]
+    worst = depths.index(max(depths))
+    ends = shapely.get_coordinates(shapely.shortest_line(Point(corners[worst]), workspace.boundary))
+    return depths[worst], ends[0], ends[-1]
+
+
+def _pierced(workspace: Polygon, footprint: BodyFootprint, part: BaseGeometry) -> list[Depth]:
+    """Corners of the walls inside a body: how far each is from the body's outline, and where."""
+    near = part.buffer(_HAIR)
+    entries = []
+    for corner in shapely.get_coordinates(workspace):
+        place = Point(corner)
+        if near.contains(place) and footprint.shape.contains(place):
+            ends = shapely.get_coordinates(shapely.shortest_line(place, part.boundary.difference(workspace)))
+            if len(ends):
+                entries.append((float(np.hypot(*(ends[-1] - corner))), ends[-1], corner))
+    return entries
 
 
 def overlaps(tree: ComponentTree, configuration: FloatArray) -> list[Overlap]:

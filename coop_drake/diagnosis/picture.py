@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Circle
 from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
@@ -12,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.diagnosis.blocking import Passage
 from coop_drake.diagnosis.diagnosis import Diagnosis
 from coop_drake.drawing import draw_polygon, draw_workspace, new_figure, team_footprints
-from coop_drake.drawing.colours import BLUE, GREY, INK, VERMILLION
+from coop_drake.drawing.colours import BLUE, GREY, INK, VERMILLION, WALL
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning import PlanningProblem
 
@@ -42,6 +43,9 @@ def diagnosis_figure(problem: PlanningProblem, diagnosis: Diagnosis) -> Figure |
     x_min, y_min, x_max, y_max = problem.workspace.bounds
     wide = min(2.0, max(0.5, (x_max - x_min + 0.6) / (y_max - y_min + 0.6)))
     figure = new_figure(_SIDE * (wide + len(places)) + 1.0, _SIDE + 0.9, _caption(diagnosis))
+    engine = figure.get_layout_engine()
+    if isinstance(engine, ConstrainedLayoutEngine):
+        engine.set(rect=(0.01, 0.09, 0.98, 0.88))
     axes = figure.subplots(1, 1 + len(places), squeeze=False, width_ratios=[wide, *[1.0] * len(places)])[0]
     _overview(axes[0], problem, diagnosis, [configuration for configuration, _, _ in places])
     for number, (ax, (configuration, bodies, passage)) in enumerate(
@@ -105,6 +109,7 @@ def _ring(z: FloatArray, radius: float) -> Circle:
 
 def _enlarged(ax: Axes, problem: PlanningProblem, z: FloatArray, bodies: frozenset[str]) -> None:
     draw_workspace(ax, problem.workspace)
+    ax.set_facecolor(WALL)
     for footprint in team_footprints(problem.tree, z):
         faulty = footprint.name in bodies
         fill, edge = (VERMILLION, VERMILLION) if faulty else (_CALM, GREY)
@@ -145,7 +150,7 @@ def _mark_gap(ax: Axes, passage: Passage) -> str:
     )
     ax.plot(*np.array([gap.first, gap.second]).T, "o", color=_OUT, markersize=7, zorder=8)
     ax.annotate(
-        f"{gap.width:.3f} m",
+        f"{gap.width:.3f} m\n+ {2.0 * passage.enough:.3f} m",
         _xy(0.5 * (gap.first + gap.second)),
         ha="center",
         va="center",

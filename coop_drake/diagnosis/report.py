@@ -8,6 +8,7 @@ from typing import Any
 from coop_drake.diagnosis.blocking import Passage
 from coop_drake.diagnosis.bracket import Bracket
 from coop_drake.diagnosis.diagnosis import BlockedPose, Diagnosis, PassageFindings
+from coop_drake.diagnosis.mixed import mixed_facts, mixed_sentences
 from coop_drake.diagnosis.passages import BodyAtFault
 from coop_drake.diagnosis.relaxations import Relaxation
 from coop_drake.diagnosis.trials import Answer
@@ -24,6 +25,8 @@ def sentences_of(diagnosis: Diagnosis) -> list[str]:
         return [f"Feasible: a channel was found that keeps {diagnosis.margin:.3f} m from the walls."]
     known = "Infeasible, proved" if diagnosis.answer is Answer.INFEASIBLE else "Undecided"
     sentences = [f"{known}: {diagnosis.reason}."]
+    if diagnosis.mixed:
+        sentences += mixed_sentences(diagnosis.mixed)
     if diagnosis.goal is not None:
         sentences += _goal_sentences(diagnosis.goal)
     if diagnosis.passages is not None:
@@ -149,6 +152,8 @@ def facts_of(diagnosis: Diagnosis) -> dict[str, Any]:
         facts["passages"] = [_passage_facts(passage) for passage in findings.passages]
     if diagnosis.goal is not None:
         facts["goal"] = _goal_facts(diagnosis.goal)
+    if diagnosis.mixed:
+        facts["mixed"] = [mixed_facts(cell) for cell in diagnosis.mixed]
     facts["relaxations"] = [
         {"name": r.change.name, "unit": r.change.unit, **_bracket_facts(r.bracket)}
         for r in diagnosis.relaxations

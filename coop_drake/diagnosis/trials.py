@@ -8,6 +8,7 @@ from enum import Enum
 
 from coop_drake.diagnosis.along import is_free_along
 from coop_drake.diagnosis.way import way_through
+from coop_drake.errors import GeometryError
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning import Channel, PlanningProblem, find_channel
 
@@ -34,7 +35,7 @@ class Trial:
     Attributes:
         problem: The question.
         answer: What was computed; INFEASIBLE is a proof.
-        way: Configurations from start to goal that are proved free, shape (m, 3 + n); None if none was found.
+        way: Configurations from start to goal that are proved free, shape (m, 3 + n); None if there are none.
     """
 
     problem: PlanningProblem
@@ -71,8 +72,15 @@ class Trials:
         answer, report = find_channel(question, lambda _, __: self._tell(stage))
         self.spent += max(report.slices, 1)
         if isinstance(answer, Channel):
-            return Trial(problem, Answer.FOUND, way_through(problem, answer, _STEP))
+            return Trial(problem, Answer.FOUND, self._way(problem, answer))
         return Trial(problem, Answer.INFEASIBLE if answer.proved else Answer.UNDECIDED)
+
+    @staticmethod
+    def _way(problem: PlanningProblem, channel: Channel) -> FloatArray | None:
+        try:
+            return way_through(problem, channel, _STEP)
+        except GeometryError:  # A cell with a cusp: the channel is proved all the same.
+            return None
 
     def lay(self, problem: PlanningProblem, way: FloatArray) -> Trial:
         """Prove a given way free; a failure proves nothing."""

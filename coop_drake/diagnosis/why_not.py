@@ -23,7 +23,7 @@ _TOTAL = 30_000
 _FIRST = 0.05
 _MOST_OF_REACH = 0.5
 _RESOLUTION = 0.0025
-_TRIALS = 8
+_TRIALS = 6
 
 
 def diagnose(problem: PlanningProblem, progress: Progress | None = None) -> Diagnosis:

@@ -1,0 +1,54 @@
+"""What an undecided search left neither free nor blocked, and what to change."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from coop_drake.planning.undecided import MixedCell
+
+__all__ = ["mixed_facts", "mixed_sentences"]
+
+_SHOWN = 3
+
+
+def mixed_sentences(cells: Sequence[MixedCell]) -> list[str]:
+    """Where cells remained mixed, at which resolution, and which keys of ``planner`` to change.
+
+    Args:
+        cells: The cells of the last channel that are not free, the widest first.
+    """
+    sentences = [
+        f"{len(cells)} cells on the last channel remained neither free nor blocked; "
+        f"the widest spans {100.0 * cells[0].share:.2g} % of an axis."
+    ]
+    for cell in cells[:_SHOWN]:
+        x_min, y_min, x_max, y_max = cell.polygon.bounds
+        sentences.append(
+            f"Mixed: x {x_min:.3f} to {x_max:.3f} m, y {y_min:.3f} to {y_max:.3f} m, {_intervals(cell)}."
+        )
+    if all(cell.finest for cell in cells):
+        sentences.append(
+            "They are below the resolution: lower planner.angle_resolution and planner.length_resolution."
+        )
+    else:
+        sentences.append("They could be halved further: raise planner.max_slices.")
+    return sentences
+
+
+def _intervals(cell: MixedCell) -> str:
+    robots = f" of robots {', '.join(map(str, cell.robots))}" if cell.robots else ""
+    theta, *joints = (f"{low:.4f} to {high:.4f}" for low, high in zip(cell.lower, cell.upper, strict=True))
+    return f"theta {theta} rad" + (f", joints{robots} {', '.join(joints)}" if joints else "")
+
+
+def mixed_facts(cell: MixedCell) -> dict[str, Any]:
+    """A mixed cell in plain numbers."""
+    return {
+        "robots": list(cell.robots),
+        "bounds": [float(value) for value in cell.polygon.bounds],
+        "lower": [float(value) for value in cell.lower],
+        "upper": [float(value) for value in cell.upper],
+        "share_of_axis": cell.share,
+        "below_resolution": cell.finest,
+    }

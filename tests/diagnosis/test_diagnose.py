@@ -1,0 +1,156 @@
+"""Diagnoses of questions whose answer is known exactly."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapely import box, union_all
+
+from coop_drake.diagnosis import Answer, diagnose, diagnosis_figure, facts_of, rows_of, sentences_of
+from coop_drake.drawing import save_figure
+from coop_drake.geometry.pose import PlanarPose
+from coop_drake.geometry.tree import Body, Component, ComponentTree, TreeJoint
+from coop_drake.planning import Channel, PlannerSettings, PlanningProblem, find_channel
+from tests.support.cases import case, rectangle
+
+ROD = 0.2
+CORRIDOR = 0.15
+
+
+def two_rooms(width: float, tree: ComponentTree, joints: tuple[float, ...] = ()) -> PlanningProblem:
+    """Two rooms joined by a corridor along x, from x = -1 to 1, in whose middle line y is 0."""
+    half = 0.5 * width
+    floor = union_all([box(-4, -1.2, -1, 1.2), box(-1.1, -half, 1.1, half), box(1, -1.2, 4, 1.2)])
+    free = (None,) * len(joints)
+    start, goal = np.array([-2.5, 0.0, 0.4, *joints]), np.array([2.5, 0.0, 0.4])
+    return PlanningProblem(floor, tree, start, goal, free, settings=PlannerSettings(max_slices=800))
+
+
+def rod_tree() -> ComponentTree:
+    rod = Body("rod", None, (rectangle(-0.5, 0.5, -0.5 * ROD, 0.5 * ROD),))
+    return ComponentTree((Component("rod", None, None, (rod,)),), frozenset())
+
+
+def bent_tree(lower: float = 0.9, upper: float = 1.3) -> ComponentTree:
+    """Two bars of 0.6 x 0.1 m with a hinge between them that cannot be straightened."""
+    bar = rectangle(0.0, 0.6, -0.05, 0.05)
+    joint = TreeJoint("arm::hinge", "revolute", 0, 0, PlanarPose(0.6), 1.0, (1.0, 0.0), lower, upper)
+    components = (
+        Component("bar", None, None, (Body("bar", None, (bar,)),)),
+        Component("arm", 0, joint, (Body("arm", 0, (bar,)),)),
+    )
+    return ComponentTree(components, frozenset({("bar", "arm")}))
+
+
+@pytest.fixture(scope="module")
+def rod():
+    problem = two_rooms(CORRIDOR, rod_tree())
+    return problem, diagnose(problem)
+
+
+@pytest.fixture(scope="module")
+def bent():
+    problem = two_rooms(0.3, bent_tree(), (1.1,))
+    return problem, diagnose(problem)
+
+
+def test_the_missing_width_of_a_corridor_is_bracketed_closely(rod):
+    _, diagnosis = rod
+    assert diagnosis.answer is Answer.INFEASIBLE
+    (passage,) = diagnosis.passages.passages
+    assert 2.0 * passage.refuted <= ROD - CORRIDOR <= 2.0 * passage.enough
+    assert 2.0 * (passage.enough - passage.refuted) < 0.03
+    assert diagnosis.passages.are_enough
+
+
+def test_the_pinching_walls_are_those_of_the_corridor(rod):
+    _, diagnosis = rod
+    gap = diagnosis.passages.passages[0].stretch.gap
+    assert gap.width == pytest.approx(CORRIDOR)
+    assert sorted([gap.first[1], gap.second[1]]) == pytest.approx([-CORRIDOR / 2, CORRIDOR / 2])
+    assert -1.0 <= gap.first[0] <= 1.0
+
+
+def test_the_body_at_fault_is_named_with_its_angles(rod):
+    _, diagnosis = rod
+    (body,) = diagnosis.passages.passages[0].stretch.bodies
+    assert (body.name, body.robot, body.axes) == ("rod", None, ("theta",))
+    # It goes through along the corridor, whichever end first.
+    lower, upper = body.intervals[0]
+    assert abs(np.sin(lower)) < 0.3
+    assert abs(np.sin(upper)) < 0.3
+
+
+def test_a_smaller_object_is_bracketed_and_holds_when_planned_again(rod):
+    problem, diagnosis = rod
+    (relaxation,) = diagnosis.relaxations
+    bracket = relaxation.bracket
+    assert relaxation.change.name == "smaller object"
+    assert bracket.refuted <= 1.0 - CORRIDOR / ROD <= bracket.found
+    answer, _ = find_channel(replace(problem, tree=relaxation.change.tree(bracket.found + 0.02)))
+    assert isinstance(answer, Channel)
+    answer, _ = find_channel(replace(problem, tree=relaxation.change.tree(0.8 * bracket.refuted)))
+    assert not isinstance(answer, Channel)
+
+
+def test_a_joint_range_at_fault_is_found_out(bent):
+    problem, diagnosis = bent
+    assert diagnosis.answer is Answer.INFEASIBLE
+    wider = {relaxation.change.name: relaxation for relaxation in diagnosis.relaxations}["wider joint range"]
+    assert 0.0 <= wider.bracket.refuted < wider.bracket.found < 1.0
+    answer, _ = find_channel(replace(problem, tree=wider.change.tree(wider.bracket.found + 0.05)))
+    assert isinstance(answer, Channel)
+    bodies = {body.name: body for passage in diagnosis.passages.passages for body in passage.stretch.bodies}
+    assert bodies["arm"].axes == ("theta", "arm::hinge")
+    assert 0.9 <= bodies["arm"].intervals[1][0] <= bodies["arm"].intervals[1][1] <= 1.3
+    assert any("wider joint range" in label and "enough" in text for label, text in rows_of(diagnosis))
+
+
+def test_a_feasible_question_is_said_to_be_so_with_its_margin():
+    diagnosis = diagnose(two_rooms(0.6, rod_tree()))
+    assert diagnosis.answer is Answer.FOUND
+    assert diagnosis.margin > 0.0
+    assert f"{diagnosis.margin:.3f} m" in sentences_of(diagnosis)[0]
+    assert diagnosis_figure(two_rooms(0.6, rod_tree()), diagnosis) is None
+
+
+def test_a_blocked_goal_names_the_body_the_wall_and_the_depth():
+    problem = replace(case("base"), goal_pose=np.array([6.2, 4.5, 0.0]))
+    diagnosis = diagnose(problem)
+    assert diagnosis.answer is Answer.INFEASIBLE
+    goal = diagnosis.goal
+    # The hand reaches to x = 7, where the wall is, and the base of that arm stands behind it.
+    assert {contact.robot for contact in goal.contacts} == {0}
+    assert all(contact.wall[0] == pytest.approx(7.0) for contact in goal.contacts)
+    assert goal.retreat.refuted <= goal.contacts[0].depth <= goal.retreat.found + 1e-3
+    assert any("At the goal robot_0" in sentence for sentence in sentences_of(diagnosis))
+
+
+def test_an_undecided_question_says_what_remained_mixed():
+    problem = two_rooms(0.2001, rod_tree())
+    tiny = replace(problem, settings=PlannerSettings(max_slices=8))
+    diagnosis = diagnose(tiny)
+    assert diagnosis.answer is Answer.UNDECIDED
+    assert diagnosis.mixed
+    said = " ".join(sentences_of(diagnosis))
+    assert "neither free nor blocked" in said
+    assert "planner.max_slices" in said
+    assert facts_of(diagnosis)["mixed"][0]["share_of_axis"] == diagnosis.mixed[0].share
+
+
+def test_the_same_question_has_the_same_diagnosis_and_picture(rod, tmp_path):
+    problem, first = rod
+    second = diagnose(problem)
+    assert json.dumps(facts_of(first)) == json.dumps(facts_of(second))
+    for number, diagnosis in enumerate((first, second)):
+        save_figure(diagnosis_figure(problem, diagnosis), tmp_path / f"{number}.svg")
+    assert (tmp_path / "0.svg").read_bytes() == (tmp_path / "1.svg").read_bytes()
+
+
+def test_an_interrupt_comes_through():
+    def stop(stage, share):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        diagnose(two_rooms(CORRIDOR, rod_tree()), stop)

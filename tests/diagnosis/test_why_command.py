@@ -1,0 +1,61 @@
+"""The command why: answers, exit codes, pictures, and no traceback for a user's mistake."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from coop_drake.cli import app
+from tests.support.scenarios import write_scenario
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def blocked(tmp_path):
+    """A goal at which a hand just fits before the wall, but not the base behind it."""
+    goal = {"object": {"x": 5.2, "y": 2.0, "theta": 0.0}}
+    return write_scenario(tmp_path / "blocked.scenario.yaml", goal=goal)
+
+
+def test_a_blocked_goal_gets_its_sentences_its_pictures_and_exit_code_3(blocked, tmp_path):
+    out = tmp_path / "out"
+    result = invoke("why", blocked, "--out", out, "--json")
+    assert result.exit_code == 3, result.stderr
+    facts = json.loads(result.stdout)
+    assert facts["answer"] == "infeasible"
+    assert {contact["body"].split("::")[0] for contact in facts["goal"]["contacts"]} == {"robot_0"}
+    assert facts["goal"]["walls_moved_back_m"]["found_enough"] > 0.1
+    assert facts["diagnosis_cpu_seconds"] > 0.0
+    assert facts["sentences"][0] in " ".join(result.stderr.split())
+    assert sorted(path.name for path in out.iterdir()) == ["why.png", "why.svg"]
+    assert (out / "why.svg").read_text().lstrip().startswith("<?xml")
+
+
+def test_a_feasible_scenario_is_said_to_be_so_and_an_older_picture_goes(tmp_path):
+    path, out = write_scenario(tmp_path / "room.scenario.yaml"), tmp_path / "out"
+    out.mkdir()
+    (out / "why.png").write_bytes(b"of an older diagnosis")
+    result = invoke("why", path, "--out", out)
+    assert result.exit_code == 0, result.output
+    assert "Feasible" in result.output
+    assert list(out.iterdir()) == []
+
+
+def test_plan_points_to_why(blocked, tmp_path):
+    result = invoke("plan", blocked, "--out", tmp_path / "out")
+    assert result.exit_code == 3
+    assert f"coop-drake why {blocked}" in result.output.replace("\n", "")
+
+
+def test_bad_input_is_answered_like_everywhere(tmp_path):
+    missing = invoke("why", tmp_path / "nowhere.yaml", "--json")
+    assert missing.exit_code == 2
+    assert "nowhere.yaml" in json.loads(missing.stdout)["error"]
+    path = write_scenario(tmp_path / "wrong.scenario.yaml", planner={"margin": "wide"})
+    wrong = invoke("why", path, "--json", "--out", tmp_path / "out")
+    assert wrong.exit_code == 2
+    assert "planner.margin" in json.loads(wrong.stdout)["key"]
+    assert not (tmp_path / "out").exists()
