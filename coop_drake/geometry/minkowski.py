@@ -12,6 +12,7 @@ from shapely.geometry.polygon import orient
 from coop_drake.geometry.convex import following
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.safeguards import checked_buffer, second_opinion
+from coop_drake.geometry.sum_kernels import edge_sums
 
 SAFE_SIDE = 1e-6
 """How far a workspace is shrunk or grown once [m]: a hundred times the clipping library's grid."""
@@ -40,11 +41,13 @@ class FreeSpace:
         self.rings, self._over = tuple(rings), over
         self.region = CrossSection(list(self.rings), FillRule.Positive)
         tails = [following(ring) for ring in self.rings]
-        self._from = np.concatenate(self.rings) if self.rings else np.empty((0, 2))
-        self._to = np.concatenate(tails) if tails else np.empty((0, 2))
-        self.edges = np.hstack((self._from, self._to))
-        along = self._to - self._from
-        doubled = float((self._from[:, 0] * along[:, 1] - self._from[:, 1] * along[:, 0]).sum())
+        starts = np.concatenate(self.rings) if self.rings else np.empty((0, 2))
+        ends = np.concatenate(tails) if tails else np.empty((0, 2))
+        self.edges = np.hstack((starts, ends))
+        self._lower = starts.min(axis=0, initial=np.inf)
+        self._upper = starts.max(axis=0, initial=-np.inf)
+        along = ends - starts
+        doubled = float((starts[:, 0] * along[:, 1] - starts[:, 1] * along[:, 0]).sum())
         self._most_area = 0.5 * doubled + SAFE_SIDE * float(np.hypot(*along.T).sum())
 
     @classmethod
@@ -73,7 +76,7 @@ class FreeSpace:
 
     def _clipped(self, footprint: FloatArray) -> CrossSection:
         contours = [ring - footprint[0] for ring in self.rings]
-        contours.extend(self._edge_sums(-footprint))
+        contours.extend(edge_sums(self.edges, -footprint))
         return CrossSection(contours, FillRule.Positive)
 
     def _plausible(self, found: CrossSection, start: FloatArray) -> bool:
@@ -81,30 +84,14 @@ class FreeSpace:
         if found.is_empty():
             return not self._over
         x_min, y_min, x_max, y_max = found.bounds()
-        lower, upper = self._from.min(axis=0) - start, self._from.max(axis=0) - start
+        lower, upper = self._lower - start, self._upper - start
         beyond = max(lower[0] - x_min, lower[1] - y_min, x_max - upper[0], y_max - upper[1])
         return bool(beyond <= SAFE_SIDE and 0.0 <= found.area() <= self._most_area)
 
     def _stand_in(self, footprint: FloatArray) -> CrossSection:
         """The difference as another library sees it, or a box that holds every position there can be."""
-        rings = second_opinion(self.rings, np.stack((self._from, self._to), axis=1), footprint)
+        rings = second_opinion(self.rings, self.edges.reshape(-1, 2, 2), footprint)
         return CrossSection(rings, FillRule.Positive)
-
-    def _edge_sums(self, convex: FloatArray) -> FloatArray:
-        """Sums of every edge with a convex ring, clockwise, shape (edges, 2 n, 2).
-
-        Vertices between two edges that lead the same way along e shift to the same end of e; at the two
-        others the ring opens and takes e in. Repeated vertices do no harm.
-        """
-        sides = following(convex) - convex
-        along = self._to - self._from
-        ahead = along[:, None, 0] * sides[:, 1] - along[:, None, 1] * sides[:, 0] > 0.0
-        ends = np.where(ahead[..., None], self._to[:, None, :], self._from[:, None, :])
-        sums = np.empty((len(along), 2 * len(convex), 2))
-        sums[:, 0::2] = convex + np.concatenate((ends[:, -1:], ends[:, :-1]), axis=1)
-        sums[:, 1::2] = convex + ends
-        clockwise: FloatArray = sums[:, ::-1]
-        return clockwise
 
 
 def polygon_rings(shape: Polygon | MultiPolygon) -> list[FloatArray]:

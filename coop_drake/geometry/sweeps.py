@@ -6,49 +6,29 @@ enclosed by every placed copy. Rigid motions are bijections, so stages nest over
 
 from __future__ import annotations
 
-from math import pi
-
 import numpy as np
 
-from coop_drake.geometry.convex import edge_angles, half_planes_polygon, normals, preceding
+from coop_drake.geometry import under_kernels
+from coop_drake.geometry.convex import edge_angles, normals, preceding
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.sweep_kernels import arc_parts, closed_directions
+from coop_drake.geometry.sweep_kernels import closed_directions
 
 _NUDGE = 1e-6
 
 
 def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> FloatArray | None:
-    """Find points that a convex polygon covers at every angle of an interval about the origin.
-
-    Every half-plane becomes its two extreme turns and, where it holds the pivot, chords of the circle that
-    it envelops. A half-plane without the pivot and a turn by pi or more leave nothing.
-
-    Returns:
-        Vertices of an enclosed convex polygon, shape (m, 2), or None where none was found.
-    """
-    angles = edge_angles(vertices)
-    offsets = np.einsum("ij,ij->i", normals(angles), vertices)
-    if half_width >= 0.5 * pi and (offsets <= 0.0).any():
-        return None
-    parts = arc_parts(half_width)
-    half_chord = half_width / parts
-    middles = half_chord * (2.0 * np.arange(parts) + 1.0 - parts)
-    around = offsets > 0.0
-    return half_planes_polygon(
-        np.concatenate(
-            (angles - half_width, angles + half_width, (angles[around][:, None] + middles).ravel())
-        )
-        + centre,
-        np.concatenate((offsets, offsets, np.repeat(offsets[around] * np.cos(half_chord), parts))),
-    )
+    """Points that a convex polygon covers at every angle of an interval about the origin, None if none."""
+    return _or_none(under_kernels.under_revolute(vertices, centre, half_width))
 
 
 def under_prismatic(vertices: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray | None:
-    """Find points that a convex polygon covers at every displacement of a segment: both ends' overlap."""
-    angles = edge_angles(vertices)
-    n = normals(angles)
-    offsets = np.einsum("ij,ij->i", n, vertices)
-    return half_planes_polygon(angles, offsets + np.minimum(n @ first, n @ last))
+    """Points that a convex polygon covers at every displacement of a segment, None if none."""
+    return _or_none(under_kernels.under_prismatic(vertices, first, last))
+
+
+def common_disc(centres: FloatArray, radius: float, largest_turn: float) -> FloatArray | None:
+    """Polygon inside every disc of one radius whose centre lies in a convex polygon, None if none."""
+    return _or_none(under_kernels.common_disc(centres, radius, largest_turn))
 
 
 def inscribed(vertices: FloatArray, radius: float, largest_turn: float) -> FloatArray:
@@ -63,24 +43,5 @@ def inscribed(vertices: FloatArray, radius: float, largest_turn: float) -> Float
     return distinct
 
 
-def common_disc(centres: FloatArray, radius: float, largest_turn: float) -> FloatArray | None:
-    """Polygon inside every disc of one radius whose centre lies in a convex polygon.
-
-    A point is within the radius of every centre if it is of every vertex; from their middle each ray leaves
-    the common part at the nearest exit.
-
-    Args:
-        centres: Vertices that enclose the centres, shape (n, 2) [m].
-        radius: Radius of all discs [m].
-        largest_turn: Angle between neighbouring vertices of the result [rad].
-    """
-    middle = 0.5 * (centres.min(axis=0) + centres.max(axis=0))
-    away = middle - centres
-    room = radius**2 - np.einsum("ij,ij->i", away, away)
-    if (room <= 0.0).any():
-        return None
-    rays = normals(closed_directions(np.empty(0), largest_turn))
-    along = rays @ away.T
-    reach = (np.sqrt(along**2 + room) - along).min(axis=1) * (1.0 - 1e-9)
-    ring: FloatArray = middle + reach[:, None] * rays
-    return ring
+def _or_none(ring: FloatArray) -> FloatArray | None:
+    return ring if len(ring) else None

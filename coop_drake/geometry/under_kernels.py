@@ -1,0 +1,145 @@
+"""Compiled under-sweeps: intersections of half-planes or discs, a hair inside; no rows where none is."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin, sqrt
+
+import numba
+import numpy as np
+
+from coop_drake.geometry.convex import SLACK
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.sweep_kernels import arc_parts, closed_directions, edge_directions, support
+
+_TURN = 2.0 * pi
+_SAME_ANGLE = 1e-12
+_PARALLEL = 1e-12
+_SHORTEST = 1e-9
+
+
+@numba.njit(cache=True)
+def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray:
+    """Intersection of half-planes that bound a polygon, a hair inside.
+
+    Line i keeps the stretch between the largest of its lower and the smallest of its upper crossings with
+    all the others.
+
+    Args:
+        angles: Directions of the outward normals, shape (k,) [rad].
+        offsets: Signed distances of the lines from the origin, shape (k,) [m].
+
+    Returns:
+        Vertices, counter-clockwise, shape (m, 2); no rows where the intersection has no interior.
+    """
+    turned = angles - _TURN * np.floor(angles / _TURN)
+    x, y, h = np.empty(len(angles)), np.empty(len(angles)), np.empty(len(angles))
+    count, last = 0, -1.0
+    for i in np.argsort(turned):
+        if count > 0 and turned[i] - last <= _SAME_ANGLE:
+            h[count - 1] = min(h[count - 1], offsets[i] - SLACK)
+            continue
+        last = turned[i]
+        x[count], y[count], h[count] = cos(last), sin(last), offsets[i] - SLACK
+        count += 1
+    vertices = np.empty((count, 2))
+    size = 0
+    for i in range(count):
+        lower, upper = -np.inf, np.inf
+        for j in range(count):
+            sine = x[i] * y[j] - y[i] * x[j]
+            room = h[j] - h[i] * (x[i] * x[j] + y[i] * y[j])
+            if abs(sine) < _PARALLEL:
+                if room < -_PARALLEL:
+                    upper = -np.inf
+            elif sine > 0.0:
+                upper = min(upper, room / sine)
+            else:
+                lower = max(lower, room / sine)
+        if upper - lower > _SHORTEST:
+            vertices[size, 0], vertices[size, 1] = h[i] * x[i] - upper * y[i], h[i] * y[i] + upper * x[i]
+            size += 1
+    return vertices[:size].copy() if size >= 3 else np.empty((0, 2))
+
+
+@numba.njit(cache=True)
+def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> FloatArray:
+    """Find points that a convex polygon covers at every angle of an interval about the origin.
+
+    Every half-plane becomes its two extreme turns and, where it holds the pivot, chords of the circle that
+    it envelops. A half-plane without the pivot and a turn by pi or more leave nothing.
+
+    Args:
+        vertices: Convex ring, counter-clockwise, shape (n, 2) [m].
+        centre: Middle of the interval [rad].
+        half_width: Half of its width [rad].
+
+    Returns:
+        Vertices of an enclosed convex polygon, shape (m, 2); no rows where none was found.
+    """
+    edges = edge_directions(vertices)
+    offsets = support(vertices, edges)
+    parts = arc_parts(half_width)
+    half_chord = half_width / parts
+    angles, distances = np.empty(len(edges) * (2 + parts)), np.empty(len(edges) * (2 + parts))
+    size = 0
+    for angle, offset in zip(edges, offsets):  # noqa: B905
+        if offset <= 0.0 and half_width >= 0.5 * pi:
+            return np.empty((0, 2))
+        for side in (-1.0, 1.0):
+            angles[size], distances[size] = centre + angle + side * half_width, offset
+            size += 1
+        for part in range(parts if offset > 0.0 else 0):
+            angles[size] = centre + angle + half_chord * (2.0 * part + 1.0 - parts)
+            distances[size] = offset * cos(half_chord)
+            size += 1
+    found: FloatArray = half_planes_polygon(angles[:size], distances[:size])
+    return found
+
+
+@numba.njit(cache=True)
+def under_prismatic(vertices: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray:
+    """Find points that a convex polygon covers at every displacement of a segment: both ends' overlap.
+
+    Args:
+        vertices: Convex ring, counter-clockwise, shape (n, 2) [m].
+        first: Displacement at the interval's lower end, shape (2,) [m].
+        last: Displacement at its upper end, shape (2,) [m].
+    """
+    angles = edge_directions(vertices)
+    offsets = support(vertices, angles)
+    for k in range(len(angles)):
+        x, y = cos(angles[k]), sin(angles[k])
+        offsets[k] += min(x * first[0] + y * first[1], x * last[0] + y * last[1])
+    found: FloatArray = half_planes_polygon(angles, offsets)
+    return found
+
+
+@numba.njit(cache=True)
+def common_disc(centres: FloatArray, radius: float, largest_turn: float) -> FloatArray:
+    """Polygon inside every disc of one radius whose centre lies in a convex polygon.
+
+    A point is within the radius of every centre if it is of every vertex; from their middle each ray leaves
+    the common part at the nearest exit.
+
+    Args:
+        centres: Vertices that enclose the centres, shape (n, 2) [m].
+        radius: Radius of all discs [m].
+        largest_turn: Angle between neighbouring vertices of the result [rad].
+    """
+    x = 0.5 * (centres[:, 0].min() + centres[:, 0].max())
+    y = 0.5 * (centres[:, 1].min() + centres[:, 1].max())
+    directions = closed_directions(np.empty(0), largest_turn)
+    ring = np.empty((len(directions), 2))
+    for k in range(len(directions)):
+        u, v = cos(directions[k]), sin(directions[k])
+        reach = np.inf
+        for i in range(len(centres)):
+            dx, dy = x - centres[i, 0], y - centres[i, 1]
+            room = radius * radius - dx * dx - dy * dy
+            if room <= 0.0:
+                return np.empty((0, 2))
+            along = u * dx + v * dy
+            reach = min(reach, sqrt(along * along + room) - along)
+        reach *= 1.0 - 1e-9
+        ring[k, 0], ring[k, 1] = x + reach * u, y + reach * v
+    return ring
