@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from coop_drake.planning.cell_graph import Kind
 from coop_drake.planning.exploration import Verdict
-from coop_drake.watching.film import Film
+from coop_drake.watching.film import BOXES, Film
 from coop_drake.watching.moments import Moment
 
 __all__ = ["counters", "headline"]
@@ -14,6 +14,8 @@ def headline(film: Film, moment: Moment) -> str:
     """What happened since the moment before, or how the search ended."""
     if moment.verdict is not None:
         return _verdict(film, moment)
+    if moment.question == BOXES:
+        return f"Box {len(moment.channel)} is laid: all of it is free"
     if moment.splits:
         leaf, axis = moment.splits[-1]
         along = film.axis_names[film.axes_of(moment.robots)[axis]]
@@ -27,6 +29,8 @@ def headline(film: Film, moment: Moment) -> str:
 
 def counters(moment: Moment) -> str:
     """How far the search is, in numbers."""
+    if moment.question == BOXES:
+        return f"{len(moment.channel)} boxes, each overlaps the one before"
     free, mixed = moment.count(Kind.FREE), moment.count(Kind.MIXED)
     parts = [
         f"{moment.slices} slices made, {len(moment.leaves)} in use",

@@ -30,9 +30,12 @@ from coop_drake.planning.paper import PaperExploration
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.search import find_channel
 
-__all__ = ["Film", "Strategy", "film"]
+__all__ = ["BOXES", "Film", "Strategy", "film"]
 
 Progress = Callable[[str, float], None]
+
+BOXES = "boxes along a sampled path"
+"""The question under which the boxes of a channel are laid one by one."""
 
 
 class Strategy(Enum):
@@ -131,7 +134,7 @@ def _film_portfolio(problem: PlanningProblem, margin: float, progress: Progress 
 
 def _laid(channel: Channel, robots: tuple[int, ...]) -> list[Event]:
     """The boxes of a channel as events: each is a slice of its own that is free."""
-    events: list[Event] = [ExplorationBegan("boxes along a sampled path", robots)]
+    events: list[Event] = [ExplorationBegan(BOXES, robots)]
     chain: list[SeenCell] = []
     for number, box in enumerate(channel.boxes):
         section = CrossSection(polygon_rings(box.polygon), FillRule.Positive)

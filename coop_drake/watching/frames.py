@@ -10,6 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from coop_drake.drawing.colours import GREY, INK
 from coop_drake.geometry.pose import FloatArray
@@ -36,7 +37,7 @@ __all__ = ["frame_figure"]
 _SIZE = (12.8, 7.2)  # Inches, a hundred points each.
 _SINGLE = (0.0, 1.0)  # Where strips are drawn if theta is the only axis.
 _FLOOR = "The floor: positions of the object, for some choice of the angles"
-_ANGLES = "The angles: slices of theta and each joint, through where it looks"
+_ANGLES = "The angles: slices of theta and of each joint, cut where it looks"
 _TICKS = ((0.0, "0"), (np.pi / 2, "π/2"), (np.pi, "π"), (3 * np.pi / 2, "3π/2"))
 
 
@@ -56,12 +57,12 @@ def frame_figure(film: Film, shot: Shot, story: Sequence[tuple[int, int]]) -> Fi
     below = f"{shot.moment.question}{asked}  ·  {shot.counters}"
     figure.text(0.02, 0.915, below, fontsize=10, va="center", color=GREY)
     _draw_floor(figure.add_axes((0.05, 0.175, 0.43, 0.68)), film, shot)
-    count = len(film.problem.tree.joints)
-    panels = max(1, count)
-    height = (0.855 - 0.265) / panels
-    for row in range(panels):
+    axes = film.axes_of(shot.moment.robots)
+    panels = range(1, len(axes)) or range(1)  # Theta against every joint, or theta alone.
+    height = (0.855 - 0.265) / len(panels)
+    for row, own in enumerate(panels):
         ax = figure.add_axes((0.57, 0.855 - (row + 1) * height + 0.012, 0.41, height - 0.024))
-        _draw_panel(ax, film, shot, row + 1 if count else 0, last=row == panels - 1)
+        _draw_panel(ax, film, shot, own, last=own == panels[-1])
     _draw_story(figure.add_axes((0.57, 0.075, 0.41, 0.11)), shot, story)
     figure.text(0.57, 0.867, _ANGLES, fontsize=10)
     figure.legend(
@@ -135,20 +136,14 @@ def _goal_joints(film: Film, shot: Shot) -> FloatArray:
     return np.array([q if goal is None else goal for q, goal in zip(joints, fixed, strict=True)])
 
 
-def _draw_panel(ax: Axes, film: Film, shot: Shot, axis: int, *, last: bool) -> None:
-    """Draw the cut through the subdivision along theta and one of the team's axes (0 for theta alone)."""
-    axes = film.axes_of(shot.moment.robots)
+def _draw_panel(ax: Axes, film: Film, shot: Shot, own: int, *, last: bool) -> None:
+    """Draw the cut through the subdivision along theta and one of the question's axes (0: theta alone)."""
+    axis = film.axes_of(shot.moment.robots)[own]
     ax.set_xlim(*THETA)
     ax.set_xticks([value for value, _ in _TICKS], [label if last else "" for _, label in _TICKS])
     ax.tick_params(labelsize=8)
     if last:
         ax.set_xlabel("theta [rad]", labelpad=0)
-    if axis not in axes:
-        ax.set_yticks([])
-        ax.set_ylabel(film.axis_names[axis].replace(" ", "\n", 1), fontsize=9)
-        ax.text(0.5, 0.5, "left out of this question", transform=ax.transAxes, ha="center", color=GREY)
-        return
-    own = axes.index(axis)
     limits = _SINGLE
     if axis:
         joint = film.problem.tree.joints[axis - 1]
@@ -194,7 +189,8 @@ def _draw_story(ax: Axes, shot: Shot, story: Sequence[tuple[int, int]]) -> None:
         return
     made, undecided = np.array(story).T
     ax.step(made, undecided, where="post", color=look.MIXED, alpha=0.35, linewidth=1.5)
-    ax.set_ylim(bottom=0)
+    ax.set_ylim(0, max(1.0, 1.05 * float(undecided.max())))
+    ax.yaxis.set_major_locator(MaxNLocator(3, integer=True))
     past = shot.moment.open_links
     if past:
         ax.step(*np.array(past).T, where="post", color=look.OPEN_CHANNEL, linewidth=1.8)

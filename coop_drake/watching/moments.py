@@ -44,10 +44,12 @@ class Leaf:
     @cached_property
     def free_share(self) -> float | None:
         """Share of what may be free that is proved free, by area; None where all of it is blocked."""
-        undecided = sum(region.area for region in self.regions(Kind.MIXED))
-        if undecided <= 0.0:
+        free, possible = (
+            sum(region.area for region in self.regions(kind)) for kind in (Kind.FREE, Kind.MIXED)
+        )
+        if free == possible == 0.0:
             return None
-        return min(1.0, sum(region.area for region in self.regions(Kind.FREE)) / undecided)
+        return free / max(free, possible)
 
 
 @dataclass(frozen=True, eq=False)

@@ -50,7 +50,9 @@ def legs_through(channel: Sequence[Link], start: FloatArray, goal: FloatArray) -
     polygons = [_coarse(to_polygon(link.region.section)) for link in channel]
     here, angles = np.asarray(start[:2]), np.asarray(start[2:])
     for number, link in enumerate(channel):
-        if number + 1 < len(channel):
+        if number + 1 == len(channel) and not link.region.holds(goal[:2]):
+            there, then = here, angles  # A channel that is still being laid.
+        elif number + 1 < len(channel):
             there = _crossing(polygons[number], polygons[number + 1], here)
             then = _shared_angles(link, channel[number + 1], angles)
         else:

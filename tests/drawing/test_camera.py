@@ -7,11 +7,12 @@ from shapely import box
 from coop_drake.drawing.camera import camera_pose
 
 
+@pytest.mark.parametrize("turn", [0.0, 0.7])
 @pytest.mark.parametrize("floor", [box(0, 0, 7, 10), box(-20, 3, 20, 6), box(0, 0, 1, 30)])
-def test_every_corner_is_in_the_picture_and_the_picture_is_filled(floor):
-    position, target = camera_pose(floor, 0.5)
+def test_every_corner_is_in_the_picture_and_the_picture_is_filled(floor, turn):
+    position, target = camera_pose(floor, 0.5, turn=turn)
     forward = (target - position) / np.linalg.norm(target - position)
-    right = np.array([1.0, 0.0, 0.0])
+    right = np.array([np.cos(turn), np.sin(turn), 0.0])
     up = np.cross(right, forward)
     x_min, y_min, x_max, y_max = floor.bounds
     corners = (

@@ -14,6 +14,7 @@ from coop_drake.planning.cell_graph import Kind
 from coop_drake.planning.slices import holds, nearest_turn, share_facet
 from coop_drake.watching import Strategy, film, storyboard
 from coop_drake.watching.axes_view import cut
+from coop_drake.watching.film import BOXES
 from coop_drake.watching.shadows import Shadows
 from coop_drake.watching.stack import THETA, Matter, on_turn, stack
 from tests.watching.rods import NARROW, WIDE, jointed_rod, rod_film
@@ -175,7 +176,14 @@ def test_the_papers_algorithms_and_the_whole_portfolio_can_be_watched():
     printed = storyboard(rod_film(WIDE, Strategy.PAPER), 6)
     assert printed[0].moment.slices < printed[-1].moment.slices
     assert printed[-1].moment.verdict in {"found", "below resolution", "budget spent"}
-    boxes = storyboard(rod_film(WIDE, Strategy.PORTFOLIO, 0.02), 6)
+    boxes = storyboard(rod_film(0.6, Strategy.PORTFOLIO, 0.02), 500)
+    laying = [shot for shot in boxes if shot.moment.question == BOXES]
+    assert len(laying) > 2
+    for laid, shot in enumerate(laying):
+        assert all(leaf.free_share == 1.0 for leaf in shot.moment.leaves.values())
+        line = LineString(np.concatenate([leg.positions for leg in shot.legs] or [np.zeros((2, 2))]))
+        free = union_all([to_polygon(link.region.section) for link in shot.moment.channel])
+        assert laid == 0 or free.buffer(0.011).covers(line)
     assert boxes[-1].headline.startswith("Found")
     assert all(link.kind is Kind.FREE for link in boxes[-1].moment.channel)
     refuted = storyboard(rod_film(NARROW, Strategy.PORTFOLIO, 0.02), 6)
