@@ -23,10 +23,11 @@ from coop_drake.planning.events import (
     seen,
 )
 from coop_drake.planning.halves import Halves
+from coop_drake.planning.mixed_cells import mixed_cells
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.slices import Slices, holds
 from coop_drake.planning.split_rules import Refinement, SplitRule
-from coop_drake.planning.undecided import MixedCell, mixed_cells
+from coop_drake.planning.undecided import MixedCell
 
 _FREE_TIME = 0.6
 _NARROW_TIME = 0.03

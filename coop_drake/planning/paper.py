@@ -22,10 +22,11 @@ from coop_drake.planning.events import (
     seen,
 )
 from coop_drake.planning.exploration import Outcome, Verdict
+from coop_drake.planning.mixed_cells import mixed_cells
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.slices import Slices
 from coop_drake.planning.split_rules import finest_widths
-from coop_drake.planning.undecided import MixedCell, mixed_cells
+from coop_drake.planning.undecided import MixedCell
 
 End = tuple[list[float | None], FloatArray]
 
