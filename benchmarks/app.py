@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from benchmarks.isolated import in_own_process
+from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.ledger import Ledger, LedgerError
 from benchmarks.mapping import bench_mapping
 from benchmarks.planner.ablation import ablation_tasks
@@ -92,15 +93,18 @@ def _measure(tasks: list[Task], ledger: Ledger, jobs: int, console: Console) -> 
         bar = bars.add_task("compiling", total=len(tasks))
         try:
             in_own_process(compile_kernels, limit=_COMPILING_LIMIT)
-            for done in worked(tasks, lambda: ledger.rows, jobs):
-                if done.error is None:
+            with closing(worked(tasks, lambda: ledger.rows, jobs)) as outcomes:
+                for done in outcomes:
+                    bars.update(bar, advance=1, description=done.task.name)
+                    if not console.is_terminal:
+                        bars.print(done.task.name)
+                    if done.error is not None:
+                        bars.print(f"[bold red]Error:[/] {escape(str(done.error))}", soft_wrap=True)
+                        code = _FAILED
                     ledger.add(done.rows)
-                else:
-                    bars.print(f"[bold red]Error:[/] {escape(str(done.error))}", soft_wrap=True)
-                    code = _FAILED
-                bars.update(bar, advance=1, description=done.task.name)
-                if not console.is_terminal:
-                    bars.print(done.task.name)
+        except WorkerError as error:
+            bars.print(f"[bold red]Error:[/] {escape(str(error))}", soft_wrap=True)
+            return _FAILED
         except KeyboardInterrupt:
             bars.print("Interrupted: what was measured until now is kept.")
             return _INTERRUPTED

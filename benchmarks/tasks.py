@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed, wait
 from dataclasses import dataclass
 
@@ -63,7 +63,7 @@ def chosen(tasks: Sequence[Task], topics: Sequence[str], only: Sequence[str]) ->
     ]
 
 
-def worked(tasks: Sequence[Task], rows: Callable[[], Rows], jobs: int) -> Iterator[Done]:
+def worked(tasks: Sequence[Task], rows: Callable[[], Rows], jobs: int) -> Generator[Done, None, None]:
     """Work through tasks: first those that may share the machine, then one by one those that may not.
 
     Args:
