@@ -96,6 +96,9 @@ def _separated(
     if not turn_is_whole(low[0], high[0]):
         raise RefusalError("slices", f"cover theta from {low[0]} to {high[0]}, not a whole turn of {TURN}")
     check_tiling(lower, upper, (low, high))
+    goals = [problem.goal_joints[joint] for joint in kept]
+    starts = [float(problem.start[2 + axis]) for axis in axes]
+    labels = check_labels(separation.slices, starts, [float(problem.goal_pose[2]), *goals], problem)
     free = FreePositions(problem.tree, separation.robots, problem.workspace)
     finest = float("inf")
     for k, part in enumerate(separation.slices):
@@ -104,9 +107,6 @@ def _separated(
         finest = min(finest, check_cover(free, *ends, polygons, f"slices[{k}]"))
         if progress is not None:
             progress("checking slices", (k + 1) / len(lower))
-    goals = [problem.goal_joints[joint] for joint in kept]
-    starts = [float(problem.start[2 + axis]) for axis in axes]
-    labels = check_labels(separation.slices, starts, [float(problem.goal_pose[2]), *goals], problem)
     return (
         Check("slices tile a turn of theta and the limits of all kept joints", len(lower)),
         Check("cells hold all positions that may be free", len(lower), finest, "m, finest sweep needed"),

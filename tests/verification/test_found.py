@@ -13,6 +13,7 @@ from coop_drake.planning.document import Entry
 from coop_drake.planning.plan_reader import read_plan
 from coop_drake.planning.planner import plan as make
 from coop_drake.verification import verify_file
+from tests.support.cases import case
 from tests.support.certificates import GAINS, changed, entry_at, number_places, room_with_pillar, write
 from tests.support.trees import body_footprints, footprint
 
@@ -44,6 +45,16 @@ def test_a_plan_is_verified_and_says_what_was_checked(document, tmp_path):
     assert (verified.answer, verified.subject) == ("found", f"plan of {len(document['cells'])} cells")
     assert all(check.count > 0 for check in verified.checks)
     assert all(check.tightest > 0.0 for check in verified.checks if check.tightest is not None)
+
+
+def test_the_plan_of_the_base_case_is_verified(tmp_path):
+    problem = case("base")
+    path = save_plan(
+        make(problem, GAINS["scheduled"], gain_set_name="scheduled").plan, tmp_path / "plan.json"
+    )
+    checks = {check.name: check for check in verify_file(path, problem, GAINS).checks}
+    assert checks["bodies stay apart in every cell"].tightest > 0.0
+    assert checks["cores keep the margin"].tightest == 0.1
 
 
 def test_no_number_can_be_altered_be_it_by_a_bit(document, tmp_path):

@@ -132,11 +132,13 @@ def test_no_slice_and_no_cell_can_be_left_out_doubled_or_moved(documents, tmp_pa
         if part["cells"]:
             altered = deepcopy(document)
             del altered["slices"][k]["cells"][0]
-            assert f"slices[{k}]: no cell covers" in refusal(altered, tmp_path, PROBLEM)
+            found = refusal(altered, tmp_path, PROBLEM)
+            assert f"slices[{k}]: no cell covers" in found or "touching cells say" in found
     altered = deepcopy(document)
     first, second = altered["slices"][0], altered["slices"][-1]
     first["cells"], second["cells"] = second["cells"], first["cells"]
-    assert "no cell covers" in refusal(altered, tmp_path, PROBLEM)
+    found = refusal(altered, tmp_path, PROBLEM)
+    assert "no cell covers" in found or "touching cells say" in found
 
 
 def test_a_proof_about_one_floor_does_not_hold_on_a_wider_one(documents, tmp_path):
