@@ -92,7 +92,7 @@ def _watch(
     if margin is None:
         margin = problem.settings.margin if chosen is watching.Strategy.PORTFOLIO else 0.0
     with reporter.stage("searching") as progress:
-        film = watching.film(problem, chosen, margin, progress)
+        film = watching.record(problem, chosen, margin, progress)
         shots = watching.storyboard(film, frames)
     reporter.facts.update(
         answer=film.verdict.value, slices=shots[-1].moment.slices, events=len(film.events), frames=len(shots)

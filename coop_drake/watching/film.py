@@ -30,7 +30,7 @@ from coop_drake.planning.paper import PaperExploration
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.search import find_channel
 
-__all__ = ["BOXES", "Film", "Strategy", "film"]
+__all__ = ["BOXES", "Film", "Strategy", "record"]
 
 Progress = Callable[[str, float], None]
 
@@ -90,7 +90,7 @@ class Film:
         return ("theta", *(joint.name.replace("::", " ") for joint in self.problem.tree.joints))
 
 
-def film(
+def record(
     problem: PlanningProblem, strategy: Strategy, margin: float, progress: Progress | None = None
 ) -> Film:
     """Answer a question once more, and record what is told on the way.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
@@ -44,7 +44,7 @@ def tube(points: FloatArray, radius: float) -> Triangles:
     return joined(pieces)
 
 
-def joined(meshes: Iterable[Triangles] | Sequence[Triangles]) -> Triangles:
+def joined(meshes: Iterable[Triangles]) -> Triangles:
     """Several meshes as one."""
     vertices, faces, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)], 0
     for points, triangles in meshes:

@@ -9,7 +9,7 @@ import numpy as np
 from coop_drake.geometry.pose import PlanarPose
 from coop_drake.geometry.tree import Component, ComponentTree, TreeJoint
 from coop_drake.planning.problem import PlanningProblem
-from coop_drake.watching import Film, Strategy, film
+from coop_drake.watching import Film, Strategy, record
 from tests.planning.test_search import rod_problem
 
 WIDE, NARROW = 0.22, 0.198
@@ -18,7 +18,7 @@ WIDE, NARROW = 0.22, 0.198
 
 def rod_film(corridor: float = WIDE, strategy: Strategy = Strategy.CELLS, margin: float = 0.0) -> Film:
     """Record the search for the rod's way."""
-    return film(rod_problem(corridor), strategy, margin)
+    return record(rod_problem(corridor), strategy, margin)
 
 
 def jointed_rod() -> PlanningProblem:

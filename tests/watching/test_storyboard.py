@@ -12,7 +12,7 @@ from shapely import LineString, union_all
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.planning.cell_graph import Kind
 from coop_drake.planning.slices import holds, nearest_turn, share_facet
-from coop_drake.watching import Strategy, film, storyboard
+from coop_drake.watching import Strategy, record, storyboard
 from coop_drake.watching.axes_view import cut
 from coop_drake.watching.film import BOXES
 from coop_drake.watching.shadows import Shadows
@@ -150,7 +150,7 @@ def test_intervals_of_theta_are_brought_onto_the_turn_drawn(interval, parts):
 
 
 def test_a_cut_tiles_theta_and_the_joint_without_gap_or_overlap():
-    recorded = film(jointed_rod(), Strategy.CELLS, 0.0)
+    recorded = record(jointed_rod(), Strategy.CELLS, 0.0)
     for shot in storyboard(recorded, 8):
         tiles = cut(shot.moment.leaves.values(), 1, shot.looked_at)
         total = sum((b - a) * (d - c) for (a, b), (c, d) in (leaf.intervals for leaf in tiles))
