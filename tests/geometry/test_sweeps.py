@@ -41,6 +41,21 @@ def test_the_under_sweep_lies_in_every_turned_copy(
 
 
 @COMPILING
+@given(st.integers(3, 24), st.integers(1, 12), st.floats(-0.2, 0.2), st.sampled_from((0.0, 0.1, 0.25)))
+def test_lines_that_coincide_but_for_rounding_are_taken_at_the_innermost(
+    corners: int, steps: int, turn: float, aside: float
+) -> None:
+    """Turned by a multiple of its own symmetry a ring's lines meet others of another offset."""
+    bearings = turn + 2.0 * np.pi / corners * np.arange(corners)
+    ring = 0.3 * np.column_stack((np.cos(bearings), np.sin(bearings))) + np.array([aside, 0.0])
+    half = steps * np.pi / corners
+    sweep = under_revolute(ring, 0.25 * np.pi, half)
+    if sweep is not None:
+        for share in (-1.0, 0.0, 1.0):
+            assert turned(ring, 0.25 * np.pi + share * half).covers(Polygon(sweep))
+
+
+@COMPILING
 @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), ANGLES, HALVES, st.floats(-1.0, 1.0))
 def test_a_point_sweeps_an_arc(x: float, y: float, centre: float, half: float, share: float) -> None:
     sweep = MultiPoint(over_revolute(np.array([[x, y]]), centre, half)).convex_hull

@@ -108,15 +108,31 @@ def _joints(draw: st.DrawFn, name: str, robot: int, index: int, X_PJ: PlanarPose
 
 @st.composite
 def slices_of(draw: st.DrawFn, tree: ComponentTree) -> tuple[tuple[float, float], ...]:
-    """A compound slice inside the joints' limits, from a single configuration to wide ones."""
+    """A compound slice inside the joints' limits, from a single configuration to the whole circle.
+
+    Half of them are as halving makes them: their ends are round, and sides of swept bodies become parallel.
+    """
+    limits = [(-0.25 * pi, 1.75 * pi), *[(joint.lower, joint.upper) for joint in tree.joints]]
+    if draw(st.booleans()):
+        return tuple(_halved(*ends, draw(st.integers(0, 10)), draw(st.floats(0.0, 0.999))) for ends in limits)
     widest = draw(st.sampled_from((0.0, 1e-4, 0.02, 0.2, 0.8, 3.0, 2.0 * pi)))
-    intervals = [(-pi, pi), *[(joint.lower, joint.upper) for joint in tree.joints]]
     result = []
-    for lower, upper in intervals:
+    for lower, upper in limits:
         width = min(widest, upper - lower) * draw(st.floats(0.0, 1.0))
         start = lower + (upper - lower - width) * draw(st.floats(0.0, 1.0))
         result.append((float(start), float(start + width)))
     return tuple(result)
+
+
+def _halved(lower: float, upper: float, times: int, share: float) -> tuple[float, float]:
+    """The interval that holds a share of another one after so many halvings."""
+    for _ in range(times):
+        middle = 0.5 * (lower + upper)
+        if share < 0.5:
+            upper, share = middle, 2.0 * share
+        else:
+            lower, share = middle, 2.0 * share - 1.0
+    return lower, upper
 
 
 def configurations(
