@@ -7,6 +7,7 @@ from time import process_time
 
 from coop_drake.planning.attempts import Chain, SampledAttempts
 from coop_drake.planning.channel import Channel, NoChannel, SearchReport
+from coop_drake.planning.clearance_bound import clearance_bound
 from coop_drake.planning.events import Watch
 from coop_drake.planning.exploration import Verdict
 from coop_drake.planning.goals import blocked_goal
@@ -56,7 +57,7 @@ class _Search:
         self._attempts = SampledAttempts(problem)
         self._proofs = Proofs(problem, watch)
         self._tried: list[tuple[float, str]] = []
-        self._goal_slices = 0
+        self._goal_slices = self._bound_slices = 0
 
     def run(self) -> tuple[Channel | NoChannel, SearchReport]:
         """Sample, then prove and sample in turns; see ``find_channel``."""
@@ -128,11 +129,14 @@ class _Search:
         self._tried.append((0.0, verdict.value))
         mixed = self._proofs.undecided()
         resolution = max((cell.share for cell in mixed), default=None)
+        bound, self._bound_slices = clearance_bound(self._problem)
         reason = f"no answer after {self._slices()} slices: {verdict.value}"
+        if bound is not None:
+            reason += f"; it is proved that no way keeps {bound:g} m from the walls"
         return NoChannel(False, reason, mixed=mixed), self._report(*self._proofs.counts(), resolution)
 
     def _slices(self) -> int:
-        return self._goal_slices + self._attempts.slices + self._proofs.slices
+        return self._goal_slices + self._bound_slices + self._attempts.slices + self._proofs.slices
 
     def _report(self, free: int, mixed: int, resolution: float | None = None) -> SearchReport:
         tried = tuple(self._tried)

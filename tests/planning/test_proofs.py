@@ -7,6 +7,7 @@ import pytest
 from shapely import Point, Polygon
 
 from coop_drake.geometry.tree import ConvexShape
+from coop_drake.planning.clearance_bound import clearance_bound
 from coop_drake.planning.exploration import Verdict
 from coop_drake.planning.free_flyer import disc_refuted, inscribed_disc
 from coop_drake.planning.goals import blocked_goal
@@ -115,3 +116,8 @@ def test_a_goal_in_collision_is_stated() -> None:
     assert slices <= 128
     assert {len(part.lower) for part in separation.slices} == {1 + len(separation.robots)}
     assert blocked_goal(problem)[0] is None
+
+
+@pytest.mark.parametrize(("corridor", "bound"), [(0.21, 0.01), (0.3, 0.08), (1.0, None)])
+def test_the_room_of_a_way_is_bounded(corridor: float, bound: float | None) -> None:
+    assert clearance_bound(rod_problem(corridor))[0] == bound
