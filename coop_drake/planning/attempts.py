@@ -13,7 +13,7 @@ from coop_drake.errors import GeometryError
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.band import drawn_tight
+from coop_drake.planning.band import drawn_tight, hurried_time
 from coop_drake.planning.boxes import Box, Regions, make_channel
 from coop_drake.planning.cells import Region
 from coop_drake.planning.certify import Certifier, PathBox
@@ -28,9 +28,13 @@ _CLEARANCE_SHARE = 1.3
 _SAMPLES = 4_000
 _GAP = 0.01
 _FIRST_BANDS = (0.05, 600), (0.05, 3_000)
+_BRIEF_BAND = 0.1, 1_500
 _BANDS = (0.1, 3_000), (0.05, 1_000)
+_LIGHT_TRIES = 4
+_HEAVY_SAMPLES = 32_000
 _MORE_SAMPLES = 8_000
-_FRESH = 3
+_OTHERS, _FRESH = 3, 1
+_DETOUR = 1.5
 _MARGIN_SEED = 1
 _STEPS_UP = (1.2, 1.1)
 _STEPS_DOWN = (0.9, 0.8)
@@ -91,7 +95,7 @@ class SampledAttempts:
         clearance = _CLEARANCES[(number - 1) % len(_CLEARANCES)]
         workspace = marginal_workspace(self._problem, clearance)
         sampler = Sampler(self._ladder, workspace, _GAP, number - 1, progress)
-        path = sampler.path(_SAMPLES * luby(number))
+        path = sampler.path(_samples(number))
         self.object_blocked = self.object_blocked + 1 if sampler.object_blocked else 0
         if len(path) == 0:
             return None
@@ -115,10 +119,12 @@ class SampledAttempts:
         Returns:
             A chain at the margin, or at none if that is all there is.
         """
+        progress(0.0, 0.0)
+        near = self._quickest(chain.path)
         for margin in margins(self._problem.settings.margin):
             progress(margin, 0.0)
             try:
-                found = self._at(margin, chain.path, progress)
+                found = self._at(margin, near, progress)
             except (GeometryError, ShapelyError):
                 found = None
             tried.append(
@@ -126,16 +132,16 @@ class SampledAttempts:
             )
             if found is not None:
                 return found
-        path = chain.path
+        path = near
         for spacing, moves in _BANDS:
             path = drawn_tight(self._problem, path, _CLEARANCES[-1], 0.0, _GAP, spacing, moves)
         tried.append((0.0, "found"))
         return self._chain(path, 0.0) or self._chain(chain.path, 0.0) or chain
 
     def _at(self, margin: float, near: FloatArray, progress: Callable[[float, float], None]) -> Chain | None:
-        """A chain at a margin or not far from it, along the shortest of some sampled paths."""
+        """A chain at a margin or not far from it, along the quickest of some sampled paths."""
         clearance = _CLEARANCE_SHARE * margin
-        path = self._shortest(marginal_workspace(self._problem, clearance), near)
+        path = self._sampled(marginal_workspace(self._problem, clearance), near)
         if path is None:
             return None
         for spacing, moves in _BANDS:
@@ -149,10 +155,23 @@ class SampledAttempts:
             return next((more for more in larger if more is not None), chain)
         return chain
 
-    def _shortest(self, workspace: MultiPolygon, near: FloatArray) -> FloatArray | None:
-        """The shortest of a path sampled near another one and of some sampled anywhere; None without any.
+    def _quickest(self, known: FloatArray) -> FloatArray:
+        """The quickest of a known path and of some more: they may turn another way."""
+        workspace = marginal_workspace(self._problem, _CLEARANCES[0])
+        sampler = Sampler(self._ladder, workspace, _GAP, _MARGIN_SEED)
+        sampled = [known, *(sampler.path(_MORE_SAMPLES) for _ in range(_OTHERS))]
+        tight = [
+            drawn_tight(self._problem, path, _CLEARANCES[-1], 0.0, _GAP, *_BRIEF_BAND)
+            for path in sampled
+            if len(path)
+        ]
+        return min(tight, key=hurried_time)
 
-        Those sampled anywhere end with the first failure if there is no path yet: more would fail, too.
+    def _sampled(self, workspace: MultiPolygon, near: FloatArray) -> FloatArray | None:
+        """The quickest of a path sampled near another one and of some sampled anywhere.
+
+        None if there is none that is nearly as quick as that other one. Those sampled anywhere end with the
+        first failure if there is no path yet: more would fail, too.
         """
         sampler = Sampler(self._ladder, workspace, _GAP, _MARGIN_SEED)
         paths = [sampler.along(near, _SAMPLES)]
@@ -160,11 +179,8 @@ class SampledAttempts:
             paths.append(sampler.path(_MORE_SAMPLES))
             if not any(map(len, paths)):
                 break
-        return min((path for path in paths if len(path)), key=self._length, default=None)
-
-    def _length(self, path: FloatArray) -> float:
-        """Length of a path in the sum of all scaled axes [m]."""
-        return float((np.abs(np.diff(path, axis=0)) * self._scale).sum())
+        best = min((path for path in paths if len(path)), key=hurried_time, default=None)
+        return None if best is None or hurried_time(best) > _DETOUR * hurried_time(near) else best
 
     def _chain(
         self,
@@ -194,6 +210,13 @@ class SampledAttempts:
     def channel_of(self, boxes: Sequence[tuple[Intervals, Region]]) -> Channel:
         """The channel of boxes that an exploration found, at no margin."""
         return make_channel(self._problem, [Box(*box, core=box[1]) for box in boxes], 0.0, None)
+
+
+def _samples(number: int) -> int:
+    """Samples for each stage of a try, counted from 1: few at first, then many."""
+    if number <= _LIGHT_TRIES:
+        return _SAMPLES * luby(number)
+    return _HEAVY_SAMPLES * luby(number - _LIGHT_TRIES)
 
 
 def luby(number: int) -> int:

@@ -31,13 +31,14 @@ def improve(
     lower: FloatArray,
     upper: FloatArray,
     scale: FloatArray,
+    weights: FloatArray,
     gap: float,
     free_end: bool,
     uniforms: FloatArray,
 ) -> FloatArray:
     """Lower the cost of a path move by move: bumps and straightenings of one axis over a window.
 
-    The cost is the length in the sum of all scaled axes plus a price for every sample by its clearance.
+    The cost is the length in the sum of all weighted axes plus a price for every sample by its clearance.
 
     Args:
         team: The team.
@@ -47,6 +48,7 @@ def improve(
         lower: Lower limits, shape (d,); minus infinity where there is none.
         upper: Upper limits, shape (d,).
         scale: How far a unit of each axis moves the team, shape (d,).
+        weights: What a unit of each axis costs, shape (d,).
         gap: Distance that pairs of bodies must keep [m].
         free_end: Whether the joints of the last sample may move.
         uniforms: Random numbers in [0, 1), one row for each move, shape (k, 5).
@@ -84,12 +86,12 @@ def improve(
                 value += shift * min(1.0, 3.0 * min(share, 1.0 - share))
             fresh[k] = path[k]
             fresh[k, axis] = min(upper[axis], max(lower[axis], value))
-            change += scale[axis] * abs(
+            change += weights[axis] * abs(
                 fresh[k, axis] - (path[k - 1, axis] if k == i + 1 else fresh[k - 1, axis])
             )
-            change -= scale[axis] * abs(path[k, axis] - path[k - 1, axis])
+            change -= weights[axis] * abs(path[k, axis] - path[k - 1, axis])
         if j < count:
-            change += scale[axis] * (
+            change += weights[axis] * (
                 abs(path[j, axis] - fresh[j - 1, axis]) - abs(path[j, axis] - path[j - 1, axis])
             )
         for k in range(i + 1, j):

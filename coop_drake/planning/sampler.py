@@ -115,13 +115,17 @@ class Sampler:
         robots, stage = self._ladder.robots, self._ladder.stage
         steps = 2 + 2 * len(robots)
         disc, _ = self._guide(self._ladder.disc, None, samples)
+        disc = None if disc is None else replace(disc, turned=False)
         self._told(1 / steps)
-        best, _ = self._guide(stage(()), None if disc is None else replace(disc, turned=False), samples)
+        best, _ = self._guide(stage(()), disc, samples)
         self.object_blocked = best is None
         alone: list[tuple[int, int, Guide]] = []
         for robot in robots if best is not None else ():
             self._told((2 + len(alone)) / steps)
             guide, effort = self._guide(stage((robot,)), best, samples)
+            if guide is None:
+                guide, more = self._guide(stage((robot,)), disc, samples)
+                effort += more
             if guide is None:
                 return _NO_PATH
             alone.append((-effort, robot, guide))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import pi
+from math import floor, pi
 
 import numba
 import numpy as np
@@ -23,7 +23,7 @@ def _nearest(nodes: FloatArray, count: int, z: FloatArray, scale: FloatArray) ->
         for k in range(len(z)):
             d = z[k] - nodes[i, k]
             if k == 2:
-                d -= 2.0 * pi * np.rint(d / (2.0 * pi))
+                d -= 2.0 * pi * floor(d / (2.0 * pi) + 0.5)
             total += (d * scale[k]) ** 2
             if total >= best:
                 break

@@ -9,7 +9,10 @@ from coop_drake.geometry.convex import normals
 from coop_drake.geometry.pose import PlanarPose
 from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.planning.problem import PlannerSettings, PlanningProblem
+from coop_drake.planning.proofs import Proofs
 from coop_drake.planning.search import find_channel
+
+_SLICES = 8
 
 
 def main() -> None:
@@ -20,16 +23,16 @@ def main() -> None:
     tree = ComponentTree(
         (Component("object", None, None, (square,)), Component("base", 0, joint, (base,))), frozenset()
     )
-    find_channel(
-        PlanningProblem(
-            box(-2.0, -2.0, 2.0, 2.0),
-            tree,
-            np.zeros(4),
-            np.array([0.5, 0.2, 0.3]),
-            (None,),
-            settings=PlannerSettings(margin=0.1),
-        )
+    question = PlanningProblem(
+        box(-2.0, -2.0, 2.0, 2.0),
+        tree,
+        np.zeros(4),
+        np.array([0.5, 0.2, 0.3]),
+        (None,),
+        settings=PlannerSettings(margin=0.1),
     )
+    find_channel(question)
+    Proofs(question).run(_SLICES)
 
 
 if __name__ == "__main__":
