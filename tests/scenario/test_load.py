@@ -91,7 +91,7 @@ def test_settings_of_every_section_are_read(tmp_path):
         ("  selected: scheduled", "  selected: gentle"),
         (
             "gains:",
-            "planner: {margin: 0.05, max_slices: 77}\n"
+            "planner: {margin: 0.05, max_slices: 77, strategy: paper}\n"
             "simulator: {max_time: 12, integration_scheme: runge_kutta2}\n"
             "visualization: {wall_height: 1, show_collision: true}\ngains:",
         ),
@@ -99,7 +99,7 @@ def test_settings_of_every_section_are_read(tmp_path):
         ("angle: 0.02}", "angle: 0.03}\n  joints: {robot_1: [null]}"),
     )
     scenario = load_scenario(path)
-    assert scenario.planner == PlannerSettings(margin=0.05, max_slices=77)
+    assert scenario.planner == PlannerSettings(margin=0.05, max_slices=77, strategy="paper")
     assert scenario.simulator == SimulatorSettings(max_time=12.0, integration_scheme="runge_kutta2")
     assert scenario.visualization.wall_height == 1.0
     assert scenario.visualization.show_collision

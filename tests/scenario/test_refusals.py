@@ -102,6 +102,12 @@ CASES = {
         2.0,
         "at most 1",
     ),
+    "unknown strategy": (
+        ("gains:", "planner: {strategy: random}\ngains:"),
+        "planner.strategy",
+        "random",
+        "portfolio",
+    ),
     "no time": (
         ("gains:", "simulator: {max_time: 0}\ngains:"),
         "simulator.max_time",
