@@ -43,9 +43,9 @@ def watch_command(
     frames: Annotated[
         int,
         typer.Option(
-            "--frames", metavar="N", min=_FEWEST, max=_MOST, help="Moments to show at most; 48 by default."
+            "--frames", metavar="N", min=_FEWEST, max=_MOST, help="Moments to show at most; 36 by default."
         ),
-    ] = 48,
+    ] = 36,
     strategy: Annotated[
         Literal["cells", "paper", "portfolio"],
         typer.Option("--strategy", help="Exploration by cells, as the paper prints it, or all of planning."),
