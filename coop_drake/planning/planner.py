@@ -11,8 +11,9 @@ from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.planning.channel import Channel, SearchReport
 from coop_drake.planning.plan import Found, Infeasible, PlanningResult, Undecided
 from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.quickest import quickest_plan
 from coop_drake.planning.search import find_channel
-from coop_drake.planning.transitions import Progress, make_plan
+from coop_drake.planning.transitions import Progress
 
 __all__ = ["plan"]
 
@@ -47,7 +48,7 @@ def plan(
                 return Infeasible(answer.reason, report, answer.separation)
             return Undecided(stall or answer.reason, report)
         try:
-            made = make_plan(question, answer, gain_set, gain_set_name=gain_set_name, progress=progress)
+            made = quickest_plan(question, answer, gain_set, gain_set_name=gain_set_name, progress=progress)
         except (GeometryError, PlanError, StallError, ShapelyError) as error:
             stall = f"a channel exists but cannot be executed: {error}"
             if answer.margin == 0.0:

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from math import cos, pi, sin, tau
+from math import cos, pi, sin
 
 import numpy as np
 from shapely import Point, Polygon
 
 from coop_drake.control import GainSet, TransitionGains, transition_gains
-from coop_drake.errors import GeometryError, PlanError, StallError
+from coop_drake.errors import GeometryError, StallError
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.passage import Passage, PassageFinder
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.slits import component_at
 from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.planning.channel import Channel, FreeBox
+from coop_drake.planning.channel_ends import check_ends, goal_intervals, turned_to_start
 from coop_drake.planning.digest import problem_digest
 from coop_drake.planning.estimate import timed, travel_time
 from coop_drake.planning.plan import Cell, Plan, Transition
@@ -28,9 +29,6 @@ __all__ = ["make_plan", "reschedule"]
 
 NARROWEST = 1e-3
 """Necks and goal regions below this clearance are refused: the governor would crawl [m]."""
-
-GOAL_SHARE = 0.9
-"""Share of a tolerance that a goal interval takes: arriving in it is arriving within tolerance [-]."""
 
 DISC_VERTICES = 32
 """Vertices of the last goal region, inscribed in the disc of the position tolerance."""
@@ -48,6 +46,7 @@ def make_plan(
     gain_set: GainSet,
     *,
     gain_set_name: str,
+    targets: Sequence[FloatArray] | None = None,
     progress: Progress | None = None,
 ) -> Plan:
     """Make a channel ready to be executed.
@@ -57,16 +56,20 @@ def make_plan(
         channel: The boxes that a search found.
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
+        targets: Where to hand over from each box to the next, the last one the goal; if not given, they are
+            chosen, and boxes that are detours are left out.
         progress: Called with a stage and the share of it that is done.
 
     Raises:
         PlanError: If the channel does not join the start to the goal.
         StallError: If a passage is too narrow or too slow to be executed; names it.
     """
-    channel = without_detours(_turned_to_start(channel, problem.start[2]))
-    _check_ends(problem, channel)
+    channel = turned_to_start(channel, problem.start[2])
     start, goal = problem.start[:2], problem.goal_pose[:2]
-    targets = choose_targets(channel, start, goal)
+    check_ends(problem, channel)
+    if targets is None:
+        channel = without_detours(channel)
+        targets = choose_targets(channel, start, goal)
     entries = (start, *targets[:-1])
     cells = []
     for index, (box, entry, target) in enumerate(zip(channel.boxes, entries, targets, strict=True)):
@@ -75,10 +78,9 @@ def make_plan(
             progress("tidying", (index + 1) / len(targets))
     ways, transitions, resting = [], [], problem.start[2:]
     for index, (entry, target) in enumerate(zip(entries, targets, strict=True)):
-        goals = _goal_intervals(problem, channel, index)
-        way = _way(problem, cells[index : index + 2], entry, target, index)
-        ways.append(way)
-        transitions.append(_transition(gain_set, cells[index], way, goals, resting))
+        goals = goal_intervals(problem, channel, index)
+        ways.append(_way(problem, cells[index : index + 2], entry, target, index))
+        transitions.append(_transition(gain_set, cells[index], ways[-1], goals, resting))
         resting = 0.5 * (goals[0] + goals[1])
     made = Plan(
         cells=tuple(cells),
@@ -91,11 +93,7 @@ def make_plan(
         gain_set=gain_set_name,
         problem=problem_digest(problem),
     )
-    made = timed(made, [way.passage.path for way in ways])
-    for index, (way, transition) in enumerate(zip(ways, made.transitions, strict=True)):
-        if transition.estimated_time > problem.settings.max_transition_time:
-            raise StallError(_stall(problem, index, way, transition.estimated_time))
-    return made
+    return _timed(problem, made, ways)
 
 
 def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
@@ -141,6 +139,15 @@ def _way(
         seconds = travel_time(way.passage.length, way.passage.neck)
         raise StallError(_stall(problem, index, way, seconds))
     return way
+
+
+def _timed(problem: PlanningProblem, plan: Plan, ways: Sequence[_Way]) -> Plan:
+    """The plan with estimated times, if all of them are accepted."""
+    plan = timed(plan, [way.passage.path for way in ways])
+    for index, (way, transition) in enumerate(zip(ways, plan.transitions, strict=True)):
+        if transition.estimated_time > problem.settings.max_transition_time:
+            raise StallError(_stall(problem, index, way, transition.estimated_time))
+    return plan
 
 
 def _transition(
@@ -193,59 +200,6 @@ def _gains(
         goal_upper=goal[1],
         resting=resting,
     )
-
-
-def _goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Intervals:
-    """Intervals of (theta, q...) that must be reached in a box: those of the next box too, or the goal's."""
-    lower, upper = channel.boxes[index].lower.copy(), channel.boxes[index].upper.copy()
-    if index + 1 < len(channel.boxes):
-        following = channel.boxes[index + 1]
-        lower, upper = np.maximum(lower, following.lower), np.minimum(upper, following.upper)
-    else:
-        goals: list[tuple[float | None, float]] = [(channel.goal_angle, problem.angle_tolerance)]
-        goals += [(goal, problem.joint_tolerance) for goal in problem.goal_joints]
-        for axis, (goal, tolerance) in enumerate(goals):
-            if goal is not None:
-                lower[axis] = max(lower[axis], goal - GOAL_SHARE * tolerance)
-                upper[axis] = min(upper[axis], goal + GOAL_SHARE * tolerance)
-    if not (lower < upper).all():
-        axis = int(np.argmin(lower < upper))
-        raise PlanError(
-            f"cell {index}: axis {axis} has no interval to leave in: [{lower[axis]}, {upper[axis]}]"
-        )
-    return lower, upper
-
-
-def _turned_to_start(channel: Channel, start_angle: float) -> Channel:
-    """Shift theta of all boxes by full turns so that the first one holds the start's angle."""
-    first = channel.boxes[0]
-    turns = round((start_angle - 0.5 * (first.lower[0] + first.upper[0])) / tau)
-    shift = np.zeros_like(first.lower)
-    shift[0] = turns * tau
-    boxes = tuple(replace(box, lower=box.lower + shift, upper=box.upper + shift) for box in channel.boxes)
-    return replace(channel, boxes=boxes, goal_angle=channel.goal_angle + shift[0])
-
-
-def _check_ends(problem: PlanningProblem, channel: Channel) -> None:
-    """Refuse a channel whose first box does not hold the start, or whose last one does not hold the goal.
-
-    Raises:
-        PlanError: Names the end and the box.
-    """
-    first, last = channel.boxes[0], channel.boxes[-1]
-    start, goal = problem.start[2:], channel.goal_angle
-    if not first.polygon.contains(Point(problem.start[:2])):
-        raise PlanError("the start's position lies outside the first cell")
-    if not ((first.lower < start) & (start < first.upper)).all():
-        raise PlanError(
-            f"the start's angles {start} lie outside the first cell's [{first.lower}, {first.upper}]"
-        )
-    if not last.polygon.contains(Point(problem.goal_pose[:2])):
-        raise PlanError("the goal's position lies outside the last cell")
-    if not last.lower[0] <= goal <= last.upper[0]:
-        raise PlanError(
-            f"the goal's angle {goal} lies outside the last cell's [{last.lower[0]}, {last.upper[0]}]"
-        )
 
 
 def _disc(centre: FloatArray, radius: float) -> Polygon:

@@ -1,0 +1,131 @@
+"""Boxes laid anew along a channel's way: free, joined, quicker, and never argued free."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapely import Point
+
+from coop_drake.control import FixedGains, ScheduledGains, transition_gains
+from coop_drake.planning import make_plan, plan_time
+from coop_drake.planning.box_crossing import cross_box, scheduled_laws
+from coop_drake.planning.cells import CellMaker
+from coop_drake.planning.channel_ends import turned_to_start
+from coop_drake.planning.estimate import speed_per_clearance
+from coop_drake.planning.plan_checks import check_plan
+from coop_drake.planning.quickest import quickest_plan, way_through
+from coop_drake.planning.reslicing import resliced, schedule_of
+from coop_drake.planning.search import find_channel
+from tests.support.cases import case
+from tests.support.free_positions import FreePositions
+
+
+@pytest.fixture(scope="module")
+def base():
+    problem = case("base")
+    channel, _ = find_channel(problem)
+    return problem, turned_to_start(channel, problem.start[2])
+
+
+@pytest.fixture(scope="module")
+def quick(base):
+    return quickest_plan(*base, ScheduledGains(), gain_set_name="scheduled")
+
+
+def test_every_configuration_of_the_new_boxes_is_free(base, quick):
+    problem, _ = base
+    rng = np.random.default_rng(3)
+    for cell in quick.cells:
+        low, high = np.array(cell.safe.bounds).reshape(2, 2)
+        for corner in rng.integers(0, 2, (6, len(cell.lower))):
+            angles = np.where(corner == 1, cell.upper, cell.lower)
+            inside = rng.uniform(low, high, (60, 2))
+            inside = inside[[cell.safe.buffer(-1e-6).contains(Point(point)) for point in inside]]
+            assert FreePositions(problem.tree, problem.workspace, angles).free(inside).all()
+
+
+def test_the_plan_is_executable_and_quicker_than_the_channels_own_boxes(base, quick):
+    check_plan(quick, "quick")
+    own = make_plan(*base, ScheduledGains(), gain_set_name="scheduled")
+    assert plan_time(quick) < plan_time(own)
+    assert len(quick.cells) < len(own.cells)
+
+
+def test_fixed_gains_get_boxes_of_their_own(base):
+    fixed = quickest_plan(*base, FixedGains(), gain_set_name="paper")
+    own = make_plan(*base, FixedGains(), gain_set_name="paper")
+    assert plan_time(fixed) < plan_time(own)
+
+
+def test_the_same_channel_gives_the_same_boxes(base, quick):
+    again = quickest_plan(*base, ScheduledGains(), gain_set_name="scheduled")
+    for first, second in zip(quick.cells, again.cells, strict=True):
+        assert first.safe.wkb == second.safe.wkb
+        np.testing.assert_array_equal(first.lower, second.lower)
+
+
+def test_targets_lie_in_the_cores_of_both_boxes_and_cores_inside(base):
+    problem, channel = base
+    found = resliced(problem, channel, channel.path, ScheduledGains())
+    assert found is not None
+    assert 0.0 < found.channel.margin < channel.margin
+    for index, (here, after) in enumerate(zip(found.channel.boxes, found.channel.boxes[1:], strict=False)):
+        assert here.core.contains(Point(found.targets[index]))
+        assert after.core.contains(Point(found.targets[index]))
+        assert here.polygon.covers(here.core)
+        assert here.polygon.boundary.distance(here.core) >= found.channel.margin - 1e-7
+        assert (np.maximum(here.lower, after.lower) < np.minimum(here.upper, after.upper)).all()
+
+
+def test_a_way_can_be_had_from_the_boxes_alone(base):
+    problem, channel = base
+    way = way_through(problem, channel)
+    np.testing.assert_array_equal(way[0], problem.start)
+    np.testing.assert_allclose(way[-1, :3], [*problem.goal_pose[:2], channel.goal_angle])
+    plan = quickest_plan(problem, replace(channel, path=None), ScheduledGains(), gain_set_name="scheduled")
+    check_plan(plan, "plan")
+    for z in way:
+        assert FreePositions(problem.tree, problem.workspace, z[2:]).free(z[None, :2]).all()
+
+
+def test_what_cannot_be_proved_is_not_used(base, monkeypatch):
+    own = make_plan(*base, ScheduledGains(), gain_set_name="scheduled")
+    monkeypatch.setattr(CellMaker, "under_cells", lambda self, expanded: [])
+    assert resliced(*base, base[1].path, ScheduledGains()) is None
+    plan = quickest_plan(*base, ScheduledGains(), gain_set_name="scheduled")
+    assert [cell.safe.wkb for cell in plan.cells] == [cell.safe.wkb for cell in own.cells]
+
+
+@pytest.mark.parametrize("gain_set", [FixedGains(), ScheduledGains()])
+def test_a_schedule_holds_the_rules_of_the_gains(gain_set):
+    schedule = schedule_of(gain_set)
+    lower, upper = np.array([-0.3, -0.2]), np.array([0.5, 0.4])
+    goal_lower, goal_upper, resting = np.array([0.2, 0.0]), np.array([0.4, 0.3]), np.array([-0.1, 0.2])
+    gains = transition_gains(
+        gain_set, neck=0.12, slice_lower=lower, slice_upper=upper, goal_lower=goal_lower,
+        goal_upper=goal_upper, resting=resting,
+    )  # fmt: skip
+    stiffness, rates, log_gains = scheduled_laws(
+        schedule, 0.12, lower, upper, goal_lower, goal_upper, resting
+    )
+    assert stiffness == pytest.approx(gains.stiffness)
+    assert schedule.damping * np.sqrt(stiffness) == pytest.approx(gains.damping)
+    assert schedule.governor * np.sqrt(stiffness) == pytest.approx(gains.governor_gain)
+    np.testing.assert_allclose(rates, gains.decay_rate)
+    np.testing.assert_allclose(log_gains, gains.log_gain)
+
+
+def test_a_long_aisle_is_crossed_at_the_governors_speed():
+    schedule = schedule_of(ScheduledGains())
+    places, room = np.linspace(0.0, 10.0, 6), np.full(6, 0.2)
+    lower, upper = np.array([-0.1]), np.array([0.1])
+    state = np.zeros(5)
+    seconds = cross_box(
+        state, places, room, lower, upper, np.array([lower, upper]), np.zeros(1), schedule, 0.0, 60.0
+    )
+    gains = transition_gains(
+        ScheduledGains(), neck=0.2, slice_lower=lower, slice_upper=upper, goal_lower=lower, goal_upper=upper,
+        resting=np.zeros(1),
+    )  # fmt: skip
+    assert seconds == pytest.approx(10.0 / (speed_per_clearance(gains) * 0.2), rel=0.1)
+    assert 9.8 < state[2] <= 10.0
