@@ -160,10 +160,6 @@ class Exploration:
         """Cells of a channel that are not free, the widest first."""
         return mixed_cells(self._problem, self.slices, self.refinement.finest, path)
 
-    def widest(self, path: Sequence[Cell]) -> float:
-        """Widest interval left undecided on a channel, as a fraction of its axis."""
-        return max(cell.share for cell in self.undecided(path))
-
     def _split(self, index: int, axis: int) -> None:
         if self._watch is not None:
             self._watch(SliceSplit(index, axis))

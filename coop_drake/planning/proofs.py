@@ -22,6 +22,7 @@ from coop_drake.planning.split_rules import SplitRule
 from coop_drake.planning.undecided import MixedCell
 
 _WHOLE_SHARE = 2
+_MOST_ROBOTS = 2
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,8 @@ class Refutation:
 class Proofs:
     """Explorations of one question at margin zero; the same work gives the same answer.
 
-    The free-flyer goes first. Then relaxations for which sampling finds no path, and the whole with half the
-    slices of each, are explored in turns: whichever is refuted refutes the question.
+    The free-flyer goes first. Then relaxations to two robots at most for which sampling finds no path, and
+    the whole with half the slices of each, are explored in turns: whichever is refuted refutes the question.
 
     Args:
         problem: The question.
@@ -66,11 +67,6 @@ class Proofs:
     def slices(self) -> int:
         """Compound slices made so far."""
         return sum(outcome.slices for outcome in self._outcomes.values())
-
-    @property
-    def whole(self) -> Exploration:
-        """The exploration of the whole question."""
-        return self._exploration(self._all)
 
     def run(
         self, share: int, robots: int | None = None, progress: Callable[[int], None] | None = None
@@ -95,8 +91,7 @@ class Proofs:
                 self.refutation = Refutation(reason, (), disc)
         for chosen in self._questions(robots):
             if self.refutation is None and self._goes_on(chosen, asked=robots is not None):
-                most = share // _WHOLE_SHARE if chosen == self._all else share
-                outcome = self._exploration(chosen).run(most, progress)
+                outcome = self._exploration(chosen).run(self._most(chosen, share), progress)
                 self._outcomes[chosen] = outcome
                 if outcome.verdict is Verdict.INFEASIBLE:
                     self._refute(chosen)
@@ -107,21 +102,30 @@ class Proofs:
 
     def boxes(self) -> list[tuple[Intervals, Region]]:
         """Expanded intervals and regions of the whole question's free channel."""
-        return self.whole.boxes(self._outcomes[self._all].path)
+        return self._exploration(self._all).boxes(self._outcomes[self._all].path)
 
     def undecided(self) -> tuple[MixedCell, ...]:
-        """What the whole question's last channel left undecided, the widest first."""
-        return self.whole.undecided(self._outcomes[self._all].path)
+        """What the whole question's last channel left undecided, the widest first; nothing before a run."""
+        latest = self._outcomes.get(self._all)
+        return () if latest is None else self._exploration(self._all).undecided(latest.path)
 
     def counts(self) -> tuple[int, int]:
-        """Numbers of FREE and of MIXED cells of the whole question."""
-        return self.whole.counts()
+        """Numbers of FREE and of MIXED cells of the whole question; none before a run."""
+        return self._exploration(self._all).counts() if self._all in self._explorations else (0, 0)
 
     def _questions(self, most: int | None) -> list[tuple[int, ...]]:
         """Robots of the explorations, fewest first, the whole last."""
-        counts = range(len(self._all)) if most is None else range(min(1 + most, len(self._all)))
+        kept = _MOST_ROBOTS if most is None else most
+        counts = range(min(1 + kept, len(self._all)))
         parts = [chosen for count in counts for chosen in combinations(self._all, count)]
         return [*parts, self._all] if most is None else parts
+
+    def _most(self, chosen: tuple[int, ...], share: int) -> int:
+        """Slices for one exploration: the whole has half of the share while parts of it go on, too."""
+        waits = any(
+            outcome.verdict is Verdict.BUDGET for part, outcome in self._outcomes.items() if part != chosen
+        )
+        return share // _WHOLE_SHARE if chosen == self._all and waits else share
 
     def _goes_on(self, chosen: tuple[int, ...], *, asked: bool) -> bool:
         """Whether to explore a question now: the whole always, a part if it is in doubt and no less is."""

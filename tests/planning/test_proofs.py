@@ -69,6 +69,15 @@ def test_nothing_is_refuted_that_is_feasible(name: str) -> None:
     assert proofs.refutation is None
 
 
+def test_before_a_run_nothing_is_known() -> None:
+    proofs = Proofs(rod_problem(0.23))
+    assert proofs.undecided() == ()
+    assert proofs.counts() == (0, 0)
+    assert proofs.run(10) is Verdict.BUDGET
+    assert proofs.undecided()
+    assert sum(proofs.counts()) > 0
+
+
 def test_runs_go_on_where_they_stopped() -> None:
     problem = rod_problem(0.23)
     alone, stepped = Proofs(problem), Proofs(problem)
