@@ -44,9 +44,13 @@ def second_opinion(rings: Sequence[FloatArray], edges: FloatArray, footprint: Fl
     Returns:
         Rings, outer ones counter-clockwise, holes clockwise.
     """
+    if not rings:
+        return []
     start = footprint[0]
     try:
-        floor = shapely.symmetric_difference_all([Polygon(ring) for ring in rings])
+        floor: BaseGeometry = Polygon()
+        for ring in rings:
+            floor = shapely.symmetric_difference(floor, Polygon(ring))
         sums = (edges[:, :, None, :] - footprint).reshape(len(edges), -1, 2)
         walls = shapely.union_all(shapely.convex_hull(shapely.linestrings(sums)))
         left = shapely.transform(floor, lambda points: points - start).difference(walls)

@@ -185,6 +185,7 @@ class ComponentTree:
         for ancestor in self.ancestors[index]:
             joint = self.components[ancestor].joint
             if joint is not None:
-                slide = max(abs(joint.lower), abs(joint.upper)) if joint.kind == "prismatic" else 0.0
+                slide = hypot(*joint.axis) * max(abs(joint.lower), abs(joint.upper))
+                slide = slide if joint.kind == "prismatic" else 0.0
                 own += hypot(joint.X_PJ.x, joint.X_PJ.y) + slide
         return own

@@ -93,7 +93,7 @@ def test_no_exploration_errs_however_often_clipping_fails(failure, every: int, c
 @pytest.mark.parametrize("corridor", [0.19, 0.3])
 def test_a_search_without_clipping_answers_nothing(monkeypatch, corridor: float) -> None:
     monkeypatch.setattr(FreeSpace, "_clipped", raising)
-    monkeypatch.setattr(shapely, "symmetric_difference_all", topology_fails)
+    monkeypatch.setattr(shapely, "symmetric_difference", topology_fails)
     channel, _ = find_channel(rod_problem(corridor, PlannerSettings(max_slices=32)))
     assert isinstance(channel, NoChannel)
     assert not channel.proved
