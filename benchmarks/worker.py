@@ -11,6 +11,7 @@ from math import ceil
 from pathlib import Path
 from time import process_time
 from types import FrameType
+from typing import IO
 
 from benchmarks.isolated import GRACE, Isolated
 
@@ -19,23 +20,20 @@ __all__ = ["main", "peak_memory_mb"]
 _STATUS = Path("/proc/self/status")
 
 
-class _OutOfTimeError(BaseException):
-    """The limit is reached; no handler of ordinary errors shall catch it."""
-
-
 def main() -> None:
     """Do one piece of work; whatever it prints goes to standard error."""
     with os.fdopen(os.dup(sys.stdout.fileno()), "wb") as answer:
         os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
         work, arguments, limit = pickle.load(sys.stdin.buffer)
-        _limit_time(ceil(process_time()) + ceil(limit))
         start = process_time()
-        try:
-            value = work(*arguments)
-        except _OutOfTimeError:
-            value = None
+        _limit_time(ceil(start + limit), start, answer)
+        value = work(*arguments)
         signal.signal(signal.SIGXCPU, signal.SIG_IGN)
-        pickle.dump(Isolated(value, process_time() - start, peak_memory_mb()), answer)
+        pickle.dump(_cost(value, start), answer)
+
+
+def _cost(value: object, start: float) -> Isolated[object]:
+    return Isolated(value, process_time() - start, peak_memory_mb())
 
 
 def peak_memory_mb() -> float:
@@ -52,16 +50,20 @@ def peak_memory_mb() -> float:
     return peak / 1e6 if sys.platform == "darwin" else peak * 1.024e-3
 
 
-def _limit_time(seconds: int) -> None:
-    """Raise when the CPU time is used up; the kernel kills what does not heed that."""
-    signal.signal(signal.SIGXCPU, _stop)
-    resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds + GRACE))
+def _limit_time(seconds: int, start: float, answer: IO[bytes]) -> None:
+    """Answer and end when the CPU time is used up; the kernel kills what does not get to it.
 
+    Nothing is raised: amid compiled code, or while compiling, an exception would be taken for another one.
+    """
 
-def _stop(number: int, frame: FrameType | None) -> None:
-    del frame
-    signal.signal(number, signal.SIG_IGN)
-    raise _OutOfTimeError
+    def stop(number: int, frame: FrameType | None) -> None:
+        signal.signal(number, signal.SIG_IGN)
+        pickle.dump(_cost(None, start), answer)
+        answer.flush()
+        os._exit(0)
+
+    signal.signal(signal.SIGXCPU, stop)
+    resource.setrlimit(resource.RLIMIT_CPU, (max(1, seconds), max(1, seconds) + GRACE))
 
 
 if __name__ == "__main__":

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from time import process_time
 
-from benchmarks.planner.family import first_question
+from benchmarks.planner.family import corridor_problem, first_question
 from benchmarks.planner.trees_peer import run_trees
 from coop_drake.control import ScheduledGains
-from coop_drake.planning import Found, PlanningProblem, PlanningResult
+from coop_drake.planning import Found, PlanningProblem, PlanningResult, warm_up
 from coop_drake.planning.planner import plan
 
 __all__ = ["Planned", "compile_kernels", "plan_once_warm", "plan_repeatedly"]
@@ -53,14 +53,16 @@ def plan_repeatedly(problem: PlanningProblem, runs: int, patience: float) -> tup
 
 
 def plan_once_warm(problem: PlanningProblem) -> Planned:
-    """Ask once, after a small question has loaded the compiled kernels."""
+    """Ask once, after small questions have loaded the compiled kernels."""
+    warm_up.main()
     _ask(first_question())
     return _planned(lambda: _ask(problem))
 
 
 def compile_kernels() -> None:
     """Have every compiled kernel in numba's cache, so that no figure holds the time of compiling."""
-    _ask(first_question())
+    for question in (first_question(), corridor_problem(), corridor_problem(0.77)):
+        _ask(question)
     run_trees(first_question(), (1,), 100)
 
 

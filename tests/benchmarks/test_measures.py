@@ -1,0 +1,43 @@
+"""What the planner, its variants and its growth are measured by: rows with the right names and answers."""
+
+import pytest
+
+from benchmarks.planner import growth
+from benchmarks.planner.ablation import VARIANTS, answer
+from benchmarks.planner.family import first_question
+from benchmarks.planner.ours import plan_repeatedly
+
+EASY = first_question()
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_every_variant_answers_an_easy_question(variant):
+    answered = answer(EASY, variant)
+    assert answered.answer == "found"
+    assert answered.slices > 0
+
+
+def test_growth_is_told_in_rows():
+    rows = {row.figure: row for row in growth.growth_rows("planner/growth/none/1", EASY, limit=60)}
+    assert set(rows) == {"answer", "first_plan_cpu_seconds", "cpu_seconds", "slices", "cells", "peak_memory"}
+    assert (rows["answer"].value, rows["answer"].unit) == (1.0, "found")
+    assert all(row.name.startswith("planner/growth/none/1/") for row in rows.values())
+    assert 0.0 < rows["first_plan_cpu_seconds"].value <= rows["cpu_seconds"].value
+
+
+def test_out_of_time_is_no_answer(monkeypatch):
+    monkeypatch.setattr(growth, "plan_once_warm", _think_forever)
+    rows = growth.growth_rows("planner/growth/none/1", EASY, limit=1)
+    assert [row.figure for row in rows] == ["answer", "peak_memory"]
+    assert (rows[0].value, rows[0].unit) == (0.0, "none within 1 CPU s")
+
+
+def _think_forever(problem):
+    while True:
+        pass
+
+
+def test_the_same_question_has_the_same_answer_and_is_not_asked_again_without_patience():
+    first, second = plan_repeatedly(EASY, 2, patience=100.0)
+    assert (first.answer, first.slices, first.cells) == (second.answer, second.slices, second.cells)
+    assert len(plan_repeatedly(EASY, 5, patience=0.0)) == 1
