@@ -10,7 +10,7 @@ import numpy as np
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.sweep_kernels import IntArray, over_piece
 from coop_drake.planning.box_crossing import Schedule, cross_box
-from coop_drake.planning.box_kernels import BoxArrays, _bodies_apart, _disc, ring_clearance
+from coop_drake.planning.box_kernels import BoxArrays, bodies_apart, enclosing_disc, ring_clearance
 from coop_drake.planning.walls import Walls
 
 __all__ = ["Course", "choose_boxes", "fits"]
@@ -68,12 +68,12 @@ def _clearances(
     for piece in range(len(boxes.sweeps.radius) - 1, -1, -1):
         stages = boxes.sweeps.first_stage[piece + 1] - boxes.sweeps.first_stage[piece]
         ring = over_piece(boxes.sweeps, piece, lower, upper, stages, True)
-        disc = _disc(ring)
+        disc = enclosing_disc(ring)
         for k in range(len(way)):
             result[k] = ring_clearance(ring, disc, walls, way[k, 0], way[k, 1], result[k])
             if result[k] < 0.0:
                 return nothing
-    return result if _bodies_apart(boxes, lower, upper) else nothing
+    return result if bodies_apart(boxes, lower, upper) else nothing
 
 
 @numba.njit(cache=True, error_model="numpy")

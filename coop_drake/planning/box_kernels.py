@@ -116,7 +116,7 @@ def ring_clearance(
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _disc(ring: FloatArray) -> FloatArray:
+def enclosing_disc(ring: FloatArray) -> FloatArray:
     """A disc (x, y, radius) that holds a ring."""
     disc = np.zeros(3)
     for i in range(len(ring)):
@@ -128,13 +128,13 @@ def _disc(ring: FloatArray) -> FloatArray:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _bodies_apart(boxes: BoxArrays, lower: FloatArray, upper: FloatArray) -> bool:
+def bodies_apart(boxes: BoxArrays, lower: FloatArray, upper: FloatArray) -> bool:
     """Whether no two bodies touch anywhere in a box."""
     rings = [
         over_piece(boxes.sweeps, boxes.frames[k, 0], lower, upper, boxes.frames[k, 1], True)
         for k in range(len(boxes.frames))
     ]
-    discs = [_disc(ring) for ring in rings]
+    discs = [enclosing_disc(ring) for ring in rings]
     for k in range(len(boxes.pairs)):
         i, j = boxes.pairs[k, 0], boxes.pairs[k, 1]
         far = hypot(discs[i][0] - discs[j][0], discs[i][1] - discs[j][1])
@@ -168,13 +168,13 @@ def box_clearance(
     for piece in range(count - 1, -1, -1):
         stages = boxes.sweeps.first_stage[piece + 1] - boxes.sweeps.first_stage[piece]
         ring = over_piece(boxes.sweeps, piece, lower, upper, stages, True)
-        disc = _disc(ring)
+        disc = enclosing_disc(ring)
         for k in (0, len(way) - 1):
             if ring_clearance(ring, disc, walls, way[k, 0], way[k, 1], 2.0 * enough) <= enough:
                 return -1.0
         rings.append(ring)
         discs.append(disc)
-    if not _bodies_apart(boxes, lower, upper):
+    if not bodies_apart(boxes, lower, upper):
         return -1.0
     least, passed = np.inf, 0.0
     for k in range(len(way)):

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from shapely import box
 
+from coop_drake.control import ScheduledGains
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.pose import PlanarPose
 from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.planning.planner import plan
 from coop_drake.planning.problem import PlannerSettings, PlanningProblem
 from coop_drake.planning.proofs import Proofs
-from coop_drake.planning.search import find_channel
 
 _SLICES = 8
 
@@ -31,7 +32,7 @@ def main() -> None:
         (None,),
         settings=PlannerSettings(margin=0.1),
     )
-    find_channel(question)
+    plan(question, ScheduledGains(), gain_set_name="scheduled")
     Proofs(question).run(_SLICES)
 
 
