@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
 
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
@@ -18,6 +20,9 @@ from coop_drake.planning.margins import disc_polygon, is_patched, marginal_works
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.shortcuts import without_detours
 from coop_drake.planning.slices import nearest_turn
+
+_MANY_VERTICES = 150
+_ELBOW_ROOM = 1.0
 
 
 @dataclass(frozen=True)
@@ -46,25 +51,54 @@ class Regions:
     """
 
     def __init__(self, problem: PlanningProblem, swept: SweptTree, pairs: BodyPairs, margin: float) -> None:
-        self._margin = margin
-        self._full = CellMaker(swept, pairs, problem.workspace)
-        self._core: CellMaker | None = None
-        if margin > 0.0 and is_patched(problem, margin):
-            self._core = CellMaker(swept, pairs, marginal_workspace(problem, margin))
+        self._swept, self._pairs, self._margin = swept, pairs, margin
+        self._floor: Polygon | MultiPolygon = problem.workspace
+        patched = margin > 0.0 and is_patched(problem, margin)
+        self._narrow = marginal_workspace(problem, margin) if patched else None
+        self._large = shapely.get_num_coordinates(problem.workspace) > _MANY_VERTICES
+        self._full = None if self._large else self._maker(self._floor)
+        self._core = None if self._large or self._narrow is None else self._maker(self._narrow)
 
     def around(self, box: PathBox) -> Box | None:
-        """The positions that are joined to those of a box's way; None if geometry fails."""
-        full = _joined(self._full.under_cells(box.intervals), box)
+        """The positions that are joined to those of a box's way; None if geometry fails.
+
+        On a large floor only the part near the way is looked at: a smaller set is as free.
+        """
+        full = _joined(self._cells(self._full, self._floor, box), box)
         if full is None:
             return None
         if self._margin == 0.0:
             return Box(box.intervals, full, full)
-        if self._core is not None:
-            core = _joined(self._core.under_cells(box.intervals), box)
+        if self._narrow is not None:
+            core = _joined(self._cells(self._core, self._narrow, box), box)
         else:
             section = FreeSpace(full.rings).minus(disc_polygon(self._margin))
             core = _joined([Region.of(part) for part in section.decompose()], box)
         return None if core is None else Box(box.intervals, full, core)
+
+    def _cells(
+        self, maker: CellMaker | None, floor: Polygon | MultiPolygon, box: PathBox
+    ) -> Sequence[Region]:
+        if maker is None:
+            near = nearby(floor, box.way, self._swept.tree.reach)
+            maker = None if near.is_empty else self._maker(near)
+        return [] if maker is None else maker.under_cells(box.intervals)
+
+    def _maker(self, floor: Polygon | MultiPolygon) -> CellMaker:
+        return CellMaker(self._swept, self._pairs, floor)
+
+
+def nearby(floor: Polygon | MultiPolygon, way: FloatArray, reach: float) -> MultiPolygon:
+    """The part of a floor that a team on its way can touch, and some more to both sides.
+
+    Args:
+        floor: Polygons with holes [m].
+        way: Positions p_WL, shape (k, 2) [m].
+        reach: Distance of the team's furthest point from p_WL [m].
+    """
+    lower, upper = way.min(axis=0) - reach - _ELBOW_ROOM, way.max(axis=0) + reach + _ELBOW_ROOM
+    parts = shapely.get_parts(floor.intersection(shapely.box(*lower, *upper)))
+    return MultiPolygon([part for part in parts if isinstance(part, Polygon)])
 
 
 def _joined(regions: Sequence[Region], box: PathBox) -> Region | None:
