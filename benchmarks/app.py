@@ -29,7 +29,7 @@ __all__ = ["app"]
 _RESULTS = Path("out/bench.json")
 _FAILED, _BAD_USE, _INTERRUPTED = 1, 2, 130
 _LIMIT = 20.0
-_ABLATION_LIMIT = 6.0
+_ABLATION_LIMIT = 5.0
 _COMPILING_LIMIT = 600.0
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -46,7 +46,7 @@ def main(
         typer.Option(help="A case, peer or group: base, ompl, growth, robots, ablation; may be repeated."),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Runs of every peer.")] = 10,
-    budget: Annotated[float, typer.Option(min=0.1, help="CPU seconds of every run of OMPL.")] = 10.0,
+    budget: Annotated[float, typer.Option(min=0.1, help="CPU seconds of every run of OMPL.")] = 8.0,
     limit: Annotated[float, typer.Option(min=1.0, help="CPU seconds of every answer of ours.")] = _LIMIT,
     jobs: Annotated[
         int, typer.Option(min=1, help="Processes at the same time, where figures stand that.")

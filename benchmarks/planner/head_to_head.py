@@ -22,7 +22,7 @@ __all__ = ["Effort", "head_to_head_tasks", "judged"]
 _IMPASSABLE_RUNS = 2
 _START_UP = 60.0
 _MOST_PER_FLOOR = 20.0
-_PATIENCE = 10.0
+_PATIENCE = 5.0
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Effort:
     """
 
     seeds: int = 10
-    budget: float = 10.0
+    budget: float = 8.0
     limit: float = 20.0
     repeats: int = 3
 
