@@ -18,6 +18,7 @@ SplitRule = Literal["strong", "blame", "longest"]
 
 _BALANCE = 16.0
 _DECIDED = 1e-3
+_CHARGED = 2.0
 
 
 class Refinement:
@@ -45,7 +46,7 @@ class Refinement:
         halves: Halves,
         rule: SplitRule = "strong",
     ) -> None:
-        self._slices, self._rule = slices, rule
+        self._slices, self._maker, self._rule = slices, maker, rule
         self._levers = axis_levers(problem.tree)
         self._blame = Blame(maker, slices, self._levers)
         self._branching = StrongBranching(problem, slices, halves)
@@ -88,7 +89,10 @@ class Refinement:
         return cutting or [(index, trial.axis) for index, trial in best]
 
     def _best(self, channel: Sequence[Cell], place: int) -> Trial:
-        """The halving that cuts, or that leaves least of the cell; where none takes anything, the widest."""
+        """The halving that cuts; else one that may part bodies in each other's way; else what leaves least.
+
+        Where no halving takes anything of the cell it is the widest.
+        """
         cell = channel[place]
         intervals = self._slices.all[cell.slice].intervals
         sweeps = {
@@ -101,11 +105,28 @@ class Refinement:
             for axis, sweep in sweeps.items()
             if sweep * _BALANCE >= widest
         ]
-        trials = [trial for trial in trials if trial.cuts] or trials
+        cutting = [trial for trial in trials if trial.cuts]
+        charged = None if cutting else self._charged(cell, intervals, sweeps)
+        if charged is not None:
+            return self._branching.trial(channel, place, charged)
+        trials = cutting or trials
         areas = [trial.area for trial in trials]
         if max(areas) - min(areas) <= _DECIDED * cell.region.area:
             return max(trials, key=lambda trial: (sweeps[trial.axis], -trial.axis))
         return min(trials, key=lambda trial: (trial.area, trial.axis))
+
+    def _charged(self, cell: Cell, intervals: Intervals, sweeps: dict[int, float]) -> int | None:
+        """Axis to halve because two bodies are in each other's way; None if none are, or it is narrow.
+
+        In a cell without a free middle that is so if they touch in the middle: walls may be to blame as well.
+        In one with a free middle it is so if they touch anywhere, for then no under-cell comes of the slice.
+        """
+        middle = tuple((0.5 * (lower + upper), 0.5 * (lower + upper)) for lower, upper in intervals)
+        probe = self._slices.expanded(intervals) if cell.kind is Kind.GUIDE else middle
+        pair = self._maker.blocked_pair(probe)
+        involved = [axis for axis in pair.axes if axis in sweeps] if pair is not None else []
+        axis = max(involved, key=lambda axis: (sweeps[axis], -axis), default=None)
+        return None if axis is None or _CHARGED * sweeps[axis] < max(sweeps.values()) else axis
 
 
 def finest_widths(problem: PlanningProblem) -> tuple[float, ...]:

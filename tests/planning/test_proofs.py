@@ -4,9 +4,10 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from shapely import Point, Polygon
+from shapely import Point, Polygon, box
 
-from coop_drake.geometry.tree import ConvexShape
+from coop_drake.geometry.pose import PlanarPose
+from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.planning.clearance_bound import clearance_bound
 from coop_drake.planning.exploration import Verdict
 from coop_drake.planning.free_flyer import disc_refuted, inscribed_disc
@@ -17,7 +18,7 @@ from coop_drake.planning.relaxation import relaxed
 from coop_drake.planning.separation import BlockedGoal, DiscSeparation, SliceSeparation
 from coop_drake.planning.split_rules import SplitRule
 from tests.planning.test_search import rod_problem
-from tests.support.cases import case, transport
+from tests.support.cases import case, rectangle, transport
 
 
 def covered(problem: PlanningProblem, lower: np.ndarray, upper: np.ndarray) -> bool:
@@ -48,6 +49,18 @@ def test_strong_branching_needs_a_fraction_of_the_slices() -> None:
     strong, blame = (explorer(question, split=rule).run(1500) for rule in ("strong", "blame"))
     assert strong.verdict is Verdict.INFEASIBLE
     assert 2 * strong.slices < blame.slices
+
+
+def test_bodies_in_each_others_way_are_parted_along_their_own_axis() -> None:
+    block = Body("block", None, (rectangle(-0.1, 0.1, -0.3, 0.3),))
+    arm = Body("arm", 0, (rectangle(-0.3, 0.3, -0.05, 0.05),))
+    slide = TreeJoint("slide", "prismatic", 0, 0, PlanarPose(), 1.0, (1.0, 0.0), -1.0, 1.0)
+    tree = ComponentTree(
+        (Component("block", None, None, (block,)), Component("arm", 0, slide, (arm,))), frozenset()
+    )
+    start, goal = np.array([0.0, 0.0, 0.0, -0.6]), np.array([0.5, 0.0, 0.0])
+    problem = PlanningProblem(box(-3.0, -3.0, 3.0, 3.0), tree, start, goal, (0.6,))
+    assert explorer(problem).run(200).verdict is Verdict.INFEASIBLE
 
 
 def test_a_relaxation_refutes_the_whole() -> None:
