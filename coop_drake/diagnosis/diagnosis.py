@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from coop_drake.diagnosis.blocking import Passage
+from coop_drake.diagnosis.bodies import WithoutWalls
 from coop_drake.diagnosis.bracket import Bracket
 from coop_drake.diagnosis.contacts import Contact, Overlap
 from coop_drake.diagnosis.relaxations import Relaxation
@@ -25,6 +26,7 @@ class PassageFindings:
         needed: How far that way sticks out of the floor as it is, sampled, not proved [m].
         passages: The passages that block, in the order of the way.
         are_enough: Whether widening these passages alone was found enough.
+        bare: What is known without walls, asked where no growth was found enough.
     """
 
     growth: Bracket
@@ -32,6 +34,7 @@ class PassageFindings:
     needed: float | None = None
     passages: tuple[Passage, ...] = ()
     are_enough: bool = False
+    bare: WithoutWalls | None = None
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from math import degrees
 from typing import Any
 
 from coop_drake.diagnosis.blocking import Passage
+from coop_drake.diagnosis.bodies import WithoutWalls
 from coop_drake.diagnosis.bracket import Bracket
 from coop_drake.diagnosis.diagnosis import BlockedPose, Diagnosis, PassageFindings
 from coop_drake.diagnosis.mixed import mixed_facts, mixed_sentences
@@ -37,17 +38,33 @@ def sentences_of(diagnosis: Diagnosis) -> list[str]:
 def _passage_sentences(findings: PassageFindings) -> list[str]:
     growth = findings.growth
     if growth.found is None:
-        known = "is proved not to help" if growth.is_refuted else "was not found to help"
-        return [f"Moving every wall back by up to {growth.most:.3f} m {known}: the walls are not the cause."]
+        known = "proved not to be" if growth.is_refuted else "not found"
+        back = f"Moving every wall back by up to {growth.most:.3f} m was {known} enough."
+        return [back, *_bare_sentences(findings.bare)]
+    back = f"Moving every wall back by {growth.found:.3f} m was found enough"
+    back += f", by {growth.refuted:.3f} m proved too little." if growth.refuted else "."
     if not findings.passages:
-        return [f"A way was found with every wall moved back by {growth.found:.3f} m."]
+        return [back]
     count = len(findings.passages)
     many = "One passage blocks" if count == 1 else f"{count} passages block"
     alone = "widening it alone" if count == 1 else "widening these alone"
     enough = f"{alone} was found enough" if findings.are_enough else f"{alone} was not found enough"
-    sentences = [f"{many}; {enough}."]
+    sentences = [back, f"{many}; {enough}."]
     for number, passage in enumerate(findings.passages, start=1):
         sentences.append(f"Passage {number}: {_where(passage)}, {_missing(passage)}.")
+    return sentences
+
+
+def _bare_sentences(bare: WithoutWalls | None) -> list[str]:
+    if bare is None:
+        return []
+    if bare.answer is Answer.FOUND:
+        return ["Without any walls there is a way: the walls block by more than was tried."]
+    known = "exists, proved" if bare.answer is Answer.INFEASIBLE else "was found"
+    sentences = [f"Even without walls no way {known}: the bodies may be in each other's way."]
+    sentences += [
+        f"If {first} and {second} could overlap, there would be one." for first, second in bare.pairs
+    ]
     return sentences
 
 
@@ -149,6 +166,9 @@ def facts_of(diagnosis: Diagnosis) -> dict[str, Any]:
         facts["walls_moved_back_m"] = _bracket_facts(findings.growth)
         facts["way_sticks_out_m"] = findings.needed
         facts["widening_passages_is_enough"] = findings.are_enough
+        if findings.bare is not None:
+            pairs = [list(pair) for pair in findings.bare.pairs]
+            facts["without_walls"] = {"answer": findings.bare.answer.value, "pairs_in_the_way": pairs}
         facts["passages"] = [_passage_facts(passage) for passage in findings.passages]
     if diagnosis.goal is not None:
         facts["goal"] = _goal_facts(diagnosis.goal)

@@ -108,6 +108,7 @@ def _drawn(problem: PlanningProblem, way: FloatArray, seed: int, *, free_end: bo
         np.concatenate((-unbounded, tree.joint_lower)),
         np.concatenate((unbounded, tree.joint_upper)),
         scale,
+        scale,
         _GAP,
         free_end and all(value is None for value in problem.goal_joints),
         np.random.default_rng(seed).random((_MOVES, 5)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from coop_drake.diagnosis.blocking import Growths, blocking_passages
+from coop_drake.diagnosis.bodies import without_walls
 from coop_drake.diagnosis.bracket import Steps, bracketed
 from coop_drake.diagnosis.contacts import deepest
 from coop_drake.diagnosis.diagnosis import Diagnosis, PassageFindings
@@ -72,7 +73,9 @@ def _passages(problem: PlanningProblem, growth: Growth, trials: Trials, *, refut
         refuted=0.0 if refuted else None,
         improve=improve,
     )
-    if bracket.found is None or bracket.trial is None or bracket.trial.way is None:
+    if bracket.found is None or bracket.trial is None:
+        return PassageFindings(bracket, bare=without_walls(problem, trials))
+    if bracket.trial.way is None:
         return PassageFindings(bracket)
     way = relieved(varied, bracket.trial.way, bracket.found)
     needed = max(deepest(problem.workspace, problem.tree, z) for z in way)
