@@ -8,20 +8,18 @@ from itertools import pairwise
 from math import ceil, sqrt
 
 import numpy as np
-from shapely import Point
 
 from coop_drake.control import FixedGains, GainSet
 from coop_drake.control.governor import ATTRACTION_RATE
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.slits import component_at
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.box_choice import Course, choose_boxes, fits
 from coop_drake.planning.box_crossing import Schedule
 from coop_drake.planning.box_kernels import BoxArrays, padded
-from coop_drake.planning.cells import CellMaker
-from coop_drake.planning.certify import box_arrays
+from coop_drake.planning.boxes import Regions
+from coop_drake.planning.certify import PathBox, box_arrays
 from coop_drake.planning.channel import Channel, FreeBox
 from coop_drake.planning.channel_ends import final_intervals
 from coop_drake.planning.margins import shrunk
@@ -86,7 +84,6 @@ def resliced(
     swept = SweptTree(problem.tree)
     pairs = BodyPairs(swept)
     floor = shrunk(problem.workspace, 0.0)
-    maker = CellMaker(swept, pairs, floor)
     boxes, walls = box_arrays(swept, pairs), walls_under(floor, problem.tree.reach)
     for share in MARGIN_SHARES:
         least = max(share * channel.margin, LEAST)
@@ -97,7 +94,7 @@ def resliced(
             boxes, walls, points, places, np.array(PADS), goals, schedule_of(gain_set), least,
             problem.position_tolerance,
         )  # fmt: skip
-        found = _chain(course, maker)
+        found = _chain(course, Regions(problem, swept, pairs, CORE_SHARE * least))
         if found is not None:
             free, ends = found
             targets = (*(points[j, :2] for j in ends[:-1]), problem.goal_pose[:2])
@@ -130,7 +127,7 @@ def _waypoints(boxes: BoxArrays, walls: Walls, way: FloatArray, least: float) ->
     return np.array(points)
 
 
-def _chain(course: Course, maker: CellMaker) -> tuple[list[FreeBox], list[int]] | None:
+def _chain(course: Course, regions: Regions) -> tuple[list[FreeBox], list[int]] | None:
     """The quickest chain of which every box is proved, and the waypoint where each ends."""
     n = len(course.way)
     banned = np.zeros((n, n, len(course.pads)))
@@ -138,7 +135,7 @@ def _chain(course: Course, maker: CellMaker) -> tuple[list[FreeBox], list[int]] 
         _, rows = choose_boxes(course, banned)
         if not len(rows):
             return None
-        free = [_proved(course, maker, first, last, pad) for first, last, pad in rows]
+        free = [_proved(course, regions, first, last, pad) for first, last, pad in rows]
         proved = [box for box in free if box is not None]
         if len(proved) == len(rows):
             return proved, rows[:, 1].tolist()
@@ -147,21 +144,16 @@ def _chain(course: Course, maker: CellMaker) -> tuple[list[FreeBox], list[int]] 
     return None
 
 
-def _proved(course: Course, maker: CellMaker, first: int, last: int, pad: int) -> FreeBox | None:
+def _proved(course: Course, regions: Regions, first: int, last: int, pad: int) -> FreeBox | None:
     """The box of a stretch of the way if over-sweeps prove a region free that holds both its ends."""
     part, width = course.way[first : last + 1], course.pads[pad]
     lower = np.maximum(course.boxes.lower, part[:, 2:].min(axis=0) - width)
     upper = np.minimum(course.boxes.upper, part[:, 2:].max(axis=0) + width)
     intervals = tuple(zip(lower.tolist(), upper.tolist(), strict=True))
-    ends = part[[0, -1], :2]
-    for region in maker.under_cells(intervals):
-        if region.depths(ends).min() > 0.0:
-            polygon = to_polygon(region.section)
-            core = component_at(
-                polygon.buffer(-CORE_SHARE * course.least, join_style="mitre"), Point(ends[0])
-            )
-            return FreeBox(polygon, core, lower, upper) if core.contains(Point(ends[1])) else None
-    return None
+    box = regions.around(PathBox(intervals, part[:, :2].copy()))
+    if box is None:
+        return None
+    return FreeBox(to_polygon(box.full.section), to_polygon(box.core.section), lower, upper)
 
 
 def schedule_of(gain_set: GainSet) -> Schedule:
