@@ -10,11 +10,17 @@ from coop_drake.diagnosis.along import is_free_along
 from coop_drake.diagnosis.way import way_through
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import Channel, PlanningProblem, find_channel
+from coop_drake.planning import Channel, PlanningProblem
+from coop_drake.planning.attempts import SampledAttempts
+from coop_drake.planning.exploration import Verdict
+from coop_drake.planning.proofs import Proofs
+from coop_drake.planning.refine import configuration_scale
+from coop_drake.planning.sampler import densified
 
 __all__ = ["Answer", "Trial", "Trials"]
 
 _STEP = 0.05
+_PATHS = 2
 _BOXES_PER_SLICE = 20
 
 Progress = Callable[[str, float], None]
@@ -67,13 +73,27 @@ class Trials:
         if self.spent >= self._total:
             return Trial(problem, Answer.UNDECIDED)
         self.asked += 1
-        settings = replace(problem.settings, margin=0.0, max_slices=self._slices)
-        question = replace(problem, settings=settings)
-        answer, report = find_channel(question, lambda _, __: self._tell(stage))
-        self.spent += max(report.slices, 1)
-        if isinstance(answer, Channel):
-            return Trial(problem, Answer.FOUND, self._way(problem, answer))
-        return Trial(problem, Answer.INFEASIBLE if answer.proved else Answer.UNDECIDED)
+        question = replace(problem, settings=replace(problem.settings, margin=0.0, max_slices=self._slices))
+        attempts, proofs = SampledAttempts(question), Proofs(question)
+        trial = self._asked(question, attempts, proofs, stage)
+        self.spent += max(1, attempts.slices // _BOXES_PER_SLICE + proofs.slices)
+        return trial
+
+    def _asked(
+        self, question: PlanningProblem, attempts: SampledAttempts, proofs: Proofs, stage: str
+    ) -> Trial:
+        """Sample some paths and explore once: a part of what the planner does, hence as sound."""
+        for _ in range(_PATHS):
+            chain = attempts.first(lambda _: self._tell(stage))
+            if chain is not None:
+                way = densified(chain.path, configuration_scale(question.tree), _STEP)
+                return Trial(question, Answer.FOUND, way)
+        verdict = proofs.run(self._slices, progress=lambda _: self._tell(stage))
+        if verdict is Verdict.INFEASIBLE:
+            return Trial(question, Answer.INFEASIBLE)
+        if verdict is Verdict.FOUND:
+            return Trial(question, Answer.FOUND, self._way(question, attempts.channel_of(proofs.boxes())))
+        return Trial(question, Answer.UNDECIDED)
 
     @staticmethod
     def _way(problem: PlanningProblem, channel: Channel) -> FloatArray | None:
