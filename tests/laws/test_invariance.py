@@ -25,7 +25,7 @@ SIMILARITIES = st.builds(
 )
 
 
-@settings(max_examples=14)
+@settings(max_examples=9)
 @given(st.sampled_from(PASSAGES), st.sampled_from((0.02, -0.02)), SIMILARITIES)
 def test_a_passage_is_passed_or_blocked_wherever_it_stands(
     passage, offset: float, similarity: Similarity

@@ -13,10 +13,10 @@ from tests.support.free_positions import FreePositions
 from tests.support.layers import is_joined
 from tests.support.shapes import floors
 
-LAYERS = 90
+LAYERS = 60
 
 
-@settings(max_examples=10, suppress_health_check=list(HealthCheck))
+@settings(max_examples=8, suppress_health_check=list(HealthCheck))
 @given(floors(), st.integers(0, 1_000_000))
 def test_no_answer_contradicts_the_exact_one(floor: Polygon, seed: int) -> None:
     random = np.random.default_rng(seed)
