@@ -23,7 +23,11 @@ _SPREAD_POSITION = 0.3
 _SPREAD_ANGLE = 0.5
 _ROOTS = 24
 _SHORTCUTS = 100
+_DISC_SHARE = 2
 _SPACING = 0.1
+_SAMPLED_LENGTH = 20.0
+"""Length of a guide that one budget of samples is meant for [m]."""
+
 _NO_PATH = np.empty((0, 3))
 
 
@@ -114,7 +118,7 @@ class Sampler:
         """
         robots, stage = self._ladder.robots, self._ladder.stage
         steps = 2 + 2 * len(robots)
-        disc, _ = self._guide(self._ladder.disc, None, samples)
+        disc, _ = self._guide(self._ladder.disc, None, _DISC_SHARE * samples)
         disc = None if disc is None else replace(disc, turned=False)
         self._told(1 / steps)
         best, _ = self._guide(stage(()), disc, samples)
@@ -158,6 +162,8 @@ class Sampler:
         roots = self._goals(stage)
         if len(roots) == 0:
             return None, 0
+        length = 0.0 if around is None else np.hypot(*np.diff(around.path[:, :2], axis=0).T).sum()
+        samples *= max(1, int(length / _SAMPLED_LENGTH))
         path, drawn = self._connect(stage, roots, guide, spread, samples)
         return (Guide(self._shortened(stage, path), stage.joints) if len(path) else None), drawn
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from math import floor, pi
+from math import floor, pi, sqrt
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -13,22 +14,91 @@ from coop_drake.planning.collision_kernels import is_free, segment_is_free
 from coop_drake.planning.team_arrays import TeamArrays
 from coop_drake.planning.walls import Walls
 
+_SQUARES = 2_500
+
+
+class _Tree(NamedTuple):
+    """Nodes of a random tree, found again by the square of a grid that their position lies in.
+
+    Attributes:
+        nodes: Configurations, shape (N, d).
+        parents: Their parents, -1 for roots, shape (N,).
+        latest: The latest node in each square, -1 if there is none, squares along y first, shape (S,).
+        before: For each node the one before it in its square, -1 if there is none, shape (N,).
+        frame: Lower corner of the grid and the side of a square, shape (3,) [m].
+        rows: Number of squares along y.
+    """
+
+    nodes: FloatArray
+    parents: IntArray
+    latest: IntArray
+    before: IntArray
+    frame: FloatArray
+    rows: int
+
 
 @numba.njit(cache=True)
-def _nearest(nodes: FloatArray, count: int, z: FloatArray, scale: FloatArray) -> int:
-    """Index of the node nearest to z; theta (axis 2) is periodic."""
+def _empty_tree(room: int, lower: FloatArray, upper: FloatArray) -> _Tree:
+    """A tree without nodes on a floor between two corners."""
+    width, height = upper[0] - lower[0], upper[1] - lower[1]
+    side = max(sqrt(width * height / _SQUARES), 1e-9)
+    rows, columns = int(height / side) + 1, int(width / side) + 1
+    return _Tree(
+        np.empty((room, len(lower))),
+        np.full(room, -1),
+        np.full(rows * columns, -1),
+        np.full(room, -1),
+        np.array([lower[0], lower[1], side]),
+        rows,
+    )
+
+
+@numba.njit(cache=True)
+def _place_of(tree: _Tree, z: FloatArray) -> tuple[int, int]:
+    """Column and row of the square that a configuration's position lies in, or of the nearest one."""
+    columns = len(tree.latest) // tree.rows
+    column = min(max(int((z[0] - tree.frame[0]) / tree.frame[2]), 0), columns - 1)
+    row = min(max(int((z[1] - tree.frame[1]) / tree.frame[2]), 0), tree.rows - 1)
+    return column, row
+
+
+@numba.njit(cache=True)
+def _add(tree: _Tree, index: int, z: FloatArray, parent: int) -> None:
+    """Store a node."""
+    column, row = _place_of(tree, z)
+    square = column * tree.rows + row
+    tree.nodes[index] = z
+    tree.parents[index] = parent
+    tree.before[index] = tree.latest[square]
+    tree.latest[square] = index
+
+
+@numba.njit(cache=True)
+def _nearest(tree: _Tree, z: FloatArray, scale: FloatArray) -> int:
+    """Index of the node nearest to z; theta (axis 2) is periodic. Squares are searched in growing rings."""
     best, index = np.inf, 0
-    for i in range(count):
-        total = 0.0
-        for k in range(len(z)):
-            d = z[k] - nodes[i, k]
-            if k == 2:
-                d -= 2.0 * pi * floor(d / (2.0 * pi) + 0.5)
-            total += (d * scale[k]) ** 2
-            if total >= best:
-                break
-        if total < best:
-            best, index = total, i
+    column, row = _place_of(tree, z)
+    columns = len(tree.latest) // tree.rows
+    unit = min(scale[0], scale[1]) * tree.frame[2]
+    for ring in range(max(columns, tree.rows) + 1):
+        if ring > 1 and best <= ((ring - 1) * unit) ** 2:
+            break
+        for i in range(max(column - ring, 0), min(column + ring + 1, columns)):
+            step = 1 if abs(i - column) == ring else 2 * ring
+            for j in range(row - ring, row + ring + 1, max(step, 1)):
+                node = tree.latest[i * tree.rows + j] if 0 <= j < tree.rows else -1
+                while node >= 0:
+                    total = 0.0
+                    for k in range(len(z)):
+                        d = z[k] - tree.nodes[node, k]
+                        if k == 2:
+                            d -= 2.0 * pi * floor(d / (2.0 * pi) + 0.5)
+                        total += (d * scale[k]) ** 2
+                        if total >= best:
+                            break
+                    if total < best:
+                        best, index = total, node
+                    node = tree.before[node]
     return index
 
 
@@ -36,8 +106,7 @@ def _nearest(nodes: FloatArray, count: int, z: FloatArray, scale: FloatArray) ->
 def _grow(
     team: TeamArrays,
     walls: Walls,
-    nodes: FloatArray,
-    parents: IntArray,
+    tree: _Tree,
     count: int,
     z: FloatArray,
     reach: float,
@@ -46,16 +115,15 @@ def _grow(
     step: float,
 ) -> tuple[int, bool]:
     """Add a node on the way from the nearest one to z; returns the new count and whether z was reached."""
-    near = _nearest(nodes, count, z, scale)
-    turn = z - nodes[near]
-    turn[2] -= 2.0 * pi * np.rint(turn[2] / (2.0 * pi))
+    near = _nearest(tree, z, scale)
+    turn = z - tree.nodes[near]
+    turn[2] -= 2.0 * pi * floor(turn[2] / (2.0 * pi) + 0.5)
     length = np.sqrt(((turn * scale) ** 2).sum())
     share = 1.0 if length <= reach else reach / length
-    passed = segment_is_free(team, walls, nodes[near], nodes[near] + share * turn, gap, scale, step)
+    passed = segment_is_free(team, walls, tree.nodes[near], tree.nodes[near] + share * turn, gap, scale, step)
     if passed * share * length < 0.5 * step and passed < 1.0:
         return count, False
-    nodes[count] = nodes[near] + passed * share * turn
-    parents[count] = near
+    _add(tree, count, tree.nodes[near] + passed * share * turn, near)
     return count + 1, passed == 1.0 and share == 1.0
 
 
@@ -111,26 +179,22 @@ def connect(
         number of samples drawn.
     """
     room = 2 * len(uniforms) + len(roots) + 1
-    nodes = np.empty((2, room, len(start)))
-    parents = np.full((2, room), -1)
+    trees = (_empty_tree(room, lower, upper), _empty_tree(room, lower, upper))
+    _add(trees[0], 0, start, -1)
+    for k in range(len(roots)):
+        _add(trees[1], k, roots[k], -1)
     counts = np.array([1, len(roots)])
-    nodes[0, 0] = start
-    nodes[1, : len(roots)] = roots
     side = 0
     for row in range(len(uniforms)):
         z = _draw(uniforms[row], guide, spread, lower, upper)
-        before = counts[side]
-        counts[side], _ = _grow(
-            team, walls, nodes[side], parents[side], before, z, 40.0 * step, gap, scale, step
-        )
         other = 1 - side
+        before = counts[side]
+        counts[side], _ = _grow(team, walls, trees[side], before, z, 40.0 * step, gap, scale, step)
         if counts[side] > before:
-            z = nodes[side, before].copy()
-            counts[other], met = _grow(
-                team, walls, nodes[other], parents[other], counts[other], z, np.inf, gap, scale, step
-            )
+            z = trees[side].nodes[before].copy()
+            counts[other], met = _grow(team, walls, trees[other], counts[other], z, np.inf, gap, scale, step)
             if met:
-                return _join(nodes, parents, counts), row + 1
+                return _join(trees[0], trees[1], counts), row + 1
         side = other
     return np.empty((0, len(start))), len(uniforms)
 
@@ -188,21 +252,21 @@ def shortened(
 
 
 @numba.njit(cache=True)
-def _join(nodes: FloatArray, parents: IntArray, counts: IntArray) -> FloatArray:
+def _join(first: _Tree, last: _Tree, counts: IntArray) -> FloatArray:
     """Path through the newest nodes of both trees, which stand for one configuration."""
-    chain = np.empty((counts[0] + counts[1], nodes.shape[2]))
+    chain = np.empty((counts[0] + counts[1], first.nodes.shape[1]))
     size = 0
     i = counts[0] - 1
     while i >= 0:
-        chain[size] = nodes[0, i]
+        chain[size] = first.nodes[i]
         size += 1
-        i = parents[0, i]
+        i = first.parents[i]
     chain[:size] = chain[:size][::-1].copy()
-    i = parents[1, counts[1] - 1]
+    i = last.parents[counts[1] - 1]
     while i >= 0:
-        turn = nodes[1, i, 2] - chain[size - 1, 2]
-        chain[size] = nodes[1, i]
-        chain[size, 2] = chain[size - 1, 2] + turn - 2.0 * pi * np.rint(turn / (2.0 * pi))
+        turn = last.nodes[i, 2] - chain[size - 1, 2]
+        chain[size] = last.nodes[i]
+        chain[size, 2] = chain[size - 1, 2] + turn - 2.0 * pi * floor(turn / (2.0 * pi) + 0.5)
         size += 1
-        i = parents[1, i]
+        i = last.parents[i]
     return chain[:size].copy()
