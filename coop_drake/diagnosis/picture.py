@@ -56,9 +56,15 @@ def diagnosis_figure(problem: PlanningProblem, diagnosis: Diagnosis) -> Figure |
         if passage is not None:
             title += _mark_gap(ax, passage)
         else:
-            title += "the goal is blocked"
+            title += _goal_title(diagnosis)
         ax.set_title(title, color=_OUT, fontweight="bold")
     return figure
+
+
+def _goal_title(diagnosis: Diagnosis) -> str:
+    goal = diagnosis.goal
+    depths = [] if goal is None else [c.depth for c in goal.contacts] + [o.depth for o in goal.overlaps]
+    return "the goal is blocked" + (f", by {max(depths):.3f} m" if depths else "")
 
 
 def _places(diagnosis: Diagnosis) -> list[tuple[FloatArray, frozenset[str], Passage | None]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from shapely import MultiPolygon
@@ -22,11 +23,13 @@ from coop_drake.planning.margins import exact_footprint, marginal_workspace, mar
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.refine import configuration_scale
 from coop_drake.planning.sampler import Ladder, Sampler
+from coop_drake.planning.tightening import fitted, widened
 
 _CLEARANCES = (0.015, 0.002)
 _CLEARANCE_SHARE = 1.3
 _SAMPLES = 4_000
 _GAP = 0.01
+_GROWTHS, _GROWTH_SEEDS = (0.06, 0.1, 0.03), 2
 _FIRST_BANDS = (0.05, 600), (0.05, 3_000)
 _BRIEF_BAND = 0.1, 1_500
 _BANDS = (0.1, 3_000), (0.05, 1_000)
@@ -104,6 +107,26 @@ class SampledAttempts:
             chain = self._chain(path, 0.0, quick=True)
             if chain is not None:
                 return chain
+        return None
+
+    def squeezed(self, progress: Progress | None = None) -> Chain | None:
+        """Sample paths on floors a little larger, and draw them tight until they fit, at no margin.
+
+        It finds what is too narrow for samples; whether it fits is proved by boxes on the floor as it is.
+
+        Args:
+            progress: Called with the share of the sampling that is done.
+        """
+        try:
+            for seed, growth in product(range(_GROWTH_SEEDS), _GROWTHS if self._inside else ()):
+                larger = widened(self._problem.workspace, growth)
+                path = Sampler(self._ladder, larger, _GAP, seed, progress).path(_SAMPLES)
+                close = fitted(self._problem, path, growth) if len(path) else None
+                chain = None if close is None else self._chain(close, 0.0, quick=True)
+                if chain is not None:
+                    return chain
+        except (GeometryError, ShapelyError):
+            pass
         return None
 
     def with_margin(

@@ -20,6 +20,7 @@ Progress = Callable[[str, float], None]
 _TRIES = 4
 _OBJECT_TRIES = 2
 _OBJECT_SHARE = 2
+_SHORT_SHARE = 120
 _FIRST_SHARE = 250
 
 
@@ -40,8 +41,6 @@ def find_channel(
     Returns:
         The channel, or why there is none, and a report.
     """
-    if problem.settings.strategy != "portfolio":
-        return explored_channel(problem, progress, watch)
     if problem.settings.strategy != "portfolio":
         return explored_channel(problem, progress, watch)
     return _Search(problem, progress, watch).run()
@@ -70,9 +69,11 @@ class _Search:
         chain = self._sampled(_TRIES - 1)
         budget = self._problem.settings.max_slices
         doubted = chain is None and self._attempts.object_blocked >= _OBJECT_TRIES
-        if doubted:
-            self._explored(budget // _OBJECT_SHARE, robots=0)
         share = min(_FIRST_SHARE, budget)
+        if chain is None:
+            chain = self._squeezed(min(_SHORT_SHARE, budget), robots=0 if doubted else None)
+        if chain is None and doubted:
+            self._explored(budget // _OBJECT_SHARE, robots=0)
         while chain is None:
             verdict = self._explored(share)
             refutation = self._proofs.refutation
@@ -98,6 +99,16 @@ class _Search:
             if self._attempts.object_blocked >= _OBJECT_TRIES and not self._proofs.slices:
                 return None
         return None
+
+    def _squeezed(self, share: int, robots: int | None) -> Chain | None:
+        """A chain near one for a larger floor, unless a short exploration answers the question."""
+        verdict = self._explored(share, robots)
+        if verdict in (Verdict.INFEASIBLE, Verdict.FOUND):
+            return None
+        chain = self._attempts.squeezed(self._teller("squeezing paths through"))
+        if chain is not None:
+            self._first = process_time() - self._began
+        return chain
 
     def _explored(self, share: int, robots: int | None = None) -> Verdict:
         told = self._teller("exploring slices")
