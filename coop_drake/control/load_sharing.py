@@ -1,4 +1,4 @@
-"""Equal shares of the wrench that moves the object, equations (21) and (31).
+"""Shares of the wrench that moves the object, equations (21) and (31).
 
 All vectors are in W, planar order (x, y, rotation). ``offset`` is the position of a grasp E_k from the
 object's origin L, ``com_offset`` that of its centre of mass. In the paper L is the centre of mass; here
@@ -66,12 +66,13 @@ def wrench_share(
     com_offset: FloatArray,
     mass: float,
     inertia: float,
-    robots: int,
+    share: float,
 ) -> FloatArray:
     """Return the wrench tau_e that one of N robots applies at its grasp, (21) and (31), erratum E21.
 
-    tau_e = (M a_com, I theta'' + P^perp . M a_com) / N, with P = com_offset - offset, the centre of mass from
-    the contact. N of them sum to M a_com and I theta'' about the centre of mass, wherever the grasps are.
+    tau_e = w (M a_com, I theta'' + P^perp . M a_com), with P = com_offset - offset, the centre of mass from
+    the contact; w = 1 / N in the paper. Wrenches whose w sum to one sum to M a_com and I theta'' about the
+    centre of mass, wherever the grasps are.
 
     Args:
         acceleration: Desired (p'', theta'') of the object's origin, shape (3,) [m/s^2, rad/s^2].
@@ -80,15 +81,15 @@ def wrench_share(
         com_offset: Centre of mass from the object's origin, shape (2,) [m].
         mass: M [kg].
         inertia: I about the centre of mass [kg m^2].
-        robots: N.
+        share: w, the robot's part of the work, in [0, 1].
 
     Returns:
         (force, torque about the grasp) on the object, shape (3,) [N, N m].
     """
     ax, ay, alpha = acceleration_at(acceleration, angular_rate, com_offset)
-    fx, fy = mass * ax / robots, mass * ay / robots
+    fx, fy = share * mass * ax, share * mass * ay
     px, py = com_offset[0] - offset[0], com_offset[1] - offset[1]
-    return np.array([fx, fy, inertia * alpha / robots - py * fx + px * fy])
+    return np.array([fx, fy, share * inertia * alpha - py * fx + px * fy])
 
 
 def total_wrench(wrenches: FloatArray, offsets: FloatArray, *, com_offset: FloatArray) -> FloatArray:

@@ -112,7 +112,7 @@ def _knowledge(
             X_LE=robot.X_LE,
             joints=robot.q_slice,
             object_inertia=team.object_inertia,
-            robots=len(team.robots),
+            load_share=scenario.load_share(robot.name, len(team.robots)),
             plan=plan,
             cells=cells,
             position_tolerance=scenario.goal.tolerances.position,

@@ -47,7 +47,7 @@ class RobotKnowledge:
         X_LE: Its grasp in L.
         joints: Where its joints stand in q.
         object_inertia: Mass properties of the object.
-        robots: Size of the team N.
+        load_share: Its part of the work, in [0, 1].
         plan: The plan.
         cells: What the governor needs of every cell.
         position_tolerance: How close to the goal counts as arrived [m].
@@ -57,7 +57,7 @@ class RobotKnowledge:
     X_LE: PlanarPose
     joints: slice
     object_inertia: ObjectInertia
-    robots: int
+    load_share: float
     plan: Plan
     cells: Sequence[GovernedCell]
     position_tolerance: float
@@ -108,7 +108,7 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
             p_LLcm=inertia.p_LLcm,
             mass=inertia.mass,
             inertia=inertia.inertia_about_com,
-            robots=knowledge.robots,
+            share=knowledge.load_share,
         ),
         "robot_effort": RobotEffort(knowledge.robot),
         "ready_monitor": ReadyMonitor(

@@ -156,6 +156,7 @@ class Scenario:
         start: Pose and joints at the beginning.
         goal: Pose, and joints if any, at the end.
         object: Name of the object's model.
+        load_shares: What part of the work each robot takes; they sum to one. Empty for equal parts.
         planner: How hard the planner tries.
         gains: The gain sets.
         simulator: How the closed loop is integrated.
@@ -168,6 +169,7 @@ class Scenario:
     start: Start
     goal: Goal
     object: str = "object"
+    load_shares: dict[str, float] = field(default_factory=dict)
     planner: PlannerSettings = field(default_factory=PlannerSettings)
     gains: Gains = field(default_factory=Gains)
     simulator: SimulatorSettings = field(default_factory=SimulatorSettings)
@@ -178,6 +180,10 @@ class Scenario:
     def name(self) -> str:
         """The file's name without ``.scenario.yaml``."""
         return self.path.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario")
+
+    def load_share(self, robot: str, robots: int) -> float:
+        """What part of the work a robot takes, one of ``robots`` [-]."""
+        return self.load_shares.get(robot, 1.0 / robots)
 
     @property
     def gain_sets(self) -> dict[str, GainSet]:

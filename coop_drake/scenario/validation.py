@@ -10,6 +10,7 @@ from coop_drake.scenario.directives import check_directive
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.rings import check_workspace
 
+_ROUNDING = 1e-9
 _MAY_BE_ZERO = frozenset({"planner.margin", "planner.slice_overlap"})
 
 
@@ -34,7 +35,23 @@ def validate(scenario: Scenario) -> None:
         raise ScenarioError(file, "gains.selected", scenario.gains.selected, f"a gain set, one of {known}")
     for index, directive in enumerate(scenario.directives):
         check_directive(file, f"directives[{index}]", directive)
-    assemble(scenario)
+    _check_load_shares(scenario, [robot.name for robot in assemble(scenario).robots])
+
+
+def _check_load_shares(scenario: Scenario, robots: list[str]) -> None:
+    file, shares = str(scenario.path), scenario.load_shares
+    for name, share in shares.items():
+        if name not in robots:
+            raise ScenarioError(file, f"load_shares.{name}", name, "a robot, one of " + ", ".join(robots))
+        if not 0.0 <= share <= 1.0:
+            raise ScenarioError(file, f"load_shares.{name}", share, "a number between 0 and 1")
+    if not shares:
+        return
+    if missing := [name for name in robots if name not in shares]:
+        raise ScenarioError(file, f"load_shares.{missing[0]}", None, "a share for every robot, or for none")
+    total = sum(shares.values())
+    if abs(total - 1.0) > _ROUNDING:
+        raise ScenarioError(file, "load_shares", dict(shares), f"shares that sum to 1, not to {total:.10g}")
 
 
 def _positive_numbers(scenario: Scenario) -> Iterator[tuple[str, float]]:

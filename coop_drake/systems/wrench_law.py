@@ -30,22 +30,22 @@ class WrenchLaw(LeafSystem):
         p_LLcm: The object's centre of mass in L, shape (2,) [m].
         mass: M_L [kg].
         inertia: I_L about the centre of mass [kg m^2].
-        robots: Number of robots that share the wrench.
+        share: The robot's part of the work, in [0, 1]; the team's sum to one.
 
     Raises:
-        ValueError: Mass, inertia or the number of robots is not positive.
+        ValueError: Mass or inertia is not positive, or the share is not in [0, 1].
     """
 
     def __init__(
-        self, p_LE: FloatArray, *, p_LLcm: FloatArray, mass: float, inertia: float, robots: int
+        self, p_LE: FloatArray, *, p_LLcm: FloatArray, mass: float, inertia: float, share: float
     ) -> None:
         super().__init__()
-        if not (mass > 0.0 and inertia > 0.0 and robots > 0):
-            raise ValueError(
-                f"WrenchLaw needs positive mass, inertia and robots, not {mass}, {inertia} and {robots}"
-            )
+        if not (mass > 0.0 and inertia > 0.0):
+            raise ValueError(f"WrenchLaw needs positive mass and inertia, not {mass} and {inertia}")
+        if not 0.0 <= share <= 1.0:
+            raise ValueError(f"WrenchLaw's share must lie in [0, 1], not {share}")
         self._p_LE, self._p_LLcm = np.array(p_LE, dtype=float), np.array(p_LLcm, dtype=float)
-        self._mass, self._inertia, self._robots = mass, inertia, robots
+        self._mass, self._inertia, self._share = mass, inertia, share
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._linear = self.DeclareVectorInputPort("position_acceleration", 2)
         self._angular = self.DeclareVectorInputPort("angle_acceleration", 1)
@@ -62,13 +62,13 @@ class WrenchLaw(LeafSystem):
         state, acceleration = self._object.Eval(context), self._object_acceleration(context)
         angle, rate = state[2], state[5]
         offset = rotate(angle, self._p_LE)
-        share = wrench_share(
+        wrench = wrench_share(
             acceleration,
             rate,
             offset,
             com_offset=rotate(angle, self._p_LLcm),
             mass=self._mass,
             inertia=self._inertia,
-            robots=self._robots,
+            share=self._share,
         )
-        output.SetFromVector(np.concatenate([acceleration_at(acceleration, rate, offset), share]))
+        output.SetFromVector(np.concatenate([acceleration_at(acceleration, rate, offset), wrench]))

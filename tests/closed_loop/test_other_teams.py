@@ -64,3 +64,14 @@ def test_an_object_whose_centre_of_mass_is_off_its_origin(tmp_path):
     inertia = build_team_plant(scenario, DiagramBuilder()).object_inertia
     assert abs(inertia.p_LLcm).max() > 0.05
     assert_exact_arrival(log)
+
+
+def test_robots_that_share_the_load_unequally(tmp_path):
+    path = write_edited(
+        tmp_path, ("object: object\n", "object: object\nload_shares: {robot_0: 0.8, robot_1: 0.2}\n")
+    )
+    _, log = run(path)
+    assert_exact_arrival(log)
+    first, second = log.measured_wrenches[:, 0, :2], log.measured_wrenches[:, 1, :2]
+    assert abs(first).max() > 1.0
+    assert first == pytest.approx(4.0 * second, abs=1e-8)

@@ -34,7 +34,7 @@ def test_acceleration_at_a_point_is_the_second_derivative_of_its_path():
 
 def test_an_object_spinning_about_its_origin_needs_a_force_when_its_mass_is_elsewhere():
     share = wrench_share(
-        np.zeros(3), 2.0, np.zeros(2), com_offset=np.array([0.1, 0.0]), mass=3.0, inertia=1.0, robots=2
+        np.zeros(3), 2.0, np.zeros(2), com_offset=np.array([0.1, 0.0]), mass=3.0, inertia=1.0, share=0.5
     )
     assert share == pytest.approx([-0.6, 0.0, 0.0])
 

@@ -50,7 +50,7 @@ def test_any_invertible_base_and_memory_layout_will_do():
 
 
 @pytest.mark.parametrize("joints", [(1, 1), (2, 1, 3), (1, 0, 2, 1, 2)])
-def test_the_team_moves_the_object_as_commanded_and_loads_every_grasp_equally(joints):
+def test_the_team_moves_the_object_as_commanded_and_loads_every_grasp_by_its_share(joints):
     """Solve the team's constrained dynamics, (2) and (27), and find what every robot meant to happen."""
     rng = np.random.default_rng(sum(joints))
     mass, inertia, com_offset = 1.7, 0.6, np.array([0.05, -0.12])
@@ -64,6 +64,7 @@ def test_the_team_moves_the_object_as_commanded_and_loads_every_grasp_equally(jo
     system[:3, :3] = body @ grasp_matrix(com_offset)
     right[:3] = body @ np.array([*(rate**2 * com_offset), 0.0])
     row, wrench_at = 3, 3 + sum(sizes)
+    shares = rng.dirichlet(np.ones(robots))
     commanded = []
     for k, n in enumerate(joints):
         arm = random_arm(rng, n)
@@ -77,7 +78,7 @@ def test_the_team_moves_the_object_as_commanded_and_loads_every_grasp_equally(jo
         mass_matrix, bias = arm.dynamics(z, v)
         joint_wanted = rng.normal(size=n)
         share = wrench_share(
-            wanted, rate, offset, com_offset=com_offset, mass=mass, inertia=inertia, robots=robots
+            wanted, rate, offset, com_offset=com_offset, mass=mass, inertia=inertia, share=shares[k]
         )
         at_grasp = acceleration_at(wanted, rate, offset)
         z_wanted = robot_acceleration(at_grasp, joint_wanted, jacobian=jacobian, jacobian_rate_term=rate_term)

@@ -21,8 +21,13 @@ law = settings(max_examples=200, deadline=None, derandomize=True)
     st.floats(-5.0, 5.0),
     st.floats(0.1, 20.0),
     st.floats(0.01, 10.0),
+    st.data(),
 )
-def test_shares_sum_to_the_command(offsets, com_offset, acceleration, rate, mass, inertia):
+def test_shares_sum_to_the_command(offsets, com_offset, acceleration, rate, mass, inertia, data):
+    weights = np.array(
+        data.draw(st.lists(st.floats(0.01, 1.0), min_size=len(offsets), max_size=len(offsets)))
+    )
+    weights /= weights.sum()
     shares = np.array(
         [
             wrench_share(
@@ -32,15 +37,15 @@ def test_shares_sum_to_the_command(offsets, com_offset, acceleration, rate, mass
                 com_offset=com_offset,
                 mass=mass,
                 inertia=inertia,
-                robots=len(offsets),
+                share=weight,
             )
-            for offset in offsets
+            for offset, weight in zip(offsets, weights, strict=True)
         ]
     )
-    # No robot carries more of the force than another.
-    assert np.ptp(shares[:, :2], axis=0).tolist() == [0.0, 0.0]
     of_com = acceleration_at(acceleration, rate, com_offset)
     commanded = np.array([mass * of_com[0], mass * of_com[1], inertia * of_com[2]])
+    # Every robot carries its part of the force.
+    assert shares[:, :2] == pytest.approx(weights[:, None] * commanded[:2], rel=1e-12, abs=1e-12)
     total = total_wrench(shares, np.array(offsets), com_offset=com_offset)
     assert total == pytest.approx(commanded, rel=1e-12, abs=1e-10)
 

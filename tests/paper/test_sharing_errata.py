@@ -27,7 +27,7 @@ def total_as_corrected(offsets):
             com_offset=NO_COM_OFFSET,
             mass=1.0,
             inertia=1.0,
-            robots=len(offsets),
+            share=1.0 / len(offsets),
         )
         for offset in offsets
     ]

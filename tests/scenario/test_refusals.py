@@ -120,6 +120,30 @@ CASES = {
         "euler",
         "one of runge_kutta5, runge_kutta3",
     ),
+    "share of a stranger": (
+        ("object: object\n", "load_shares: {robot_7: 1.0}\n"),
+        "load_shares.robot_7",
+        "robot_7",
+        "a robot, one of robot_0, robot_1",
+    ),
+    "negative share": (
+        ("object: object\n", "load_shares: {robot_0: -0.5, robot_1: 1.5}\n"),
+        "load_shares.robot_0",
+        -0.5,
+        "between 0 and 1",
+    ),
+    "share left out": (
+        ("object: object\n", "load_shares: {robot_0: 1.0}\n"),
+        "load_shares.robot_1",
+        None,
+        "a share for every robot, or for none",
+    ),
+    "shares of more than all": (
+        ("object: object\n", "load_shares: {robot_0: 0.5, robot_1: 0.6}\n"),
+        "load_shares",
+        {"robot_0": 0.5, "robot_1": 0.6},
+        "shares that sum to 1, not to 1.1",
+    ),
     "gain set": (
         ("selected: scheduled", "selected: fast"),
         "gains.selected",

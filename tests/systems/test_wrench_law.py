@@ -16,7 +16,7 @@ DESIRED = np.array([1.2, -0.4, 2.0])
 
 @pytest.fixture
 def law():
-    return WrenchLaw(P_LE, p_LLcm=P_LLCM, mass=3.0, inertia=0.7, robots=3)
+    return WrenchLaw(P_LE, p_LLcm=P_LLCM, mass=3.0, inertia=0.7, share=0.25)
 
 
 def test_ports(law):
@@ -42,7 +42,7 @@ def test_outputs_are_the_laws(law):
             com_offset=rotate(0.7, P_LLCM),
             mass=3.0,
             inertia=0.7,
-            robots=3,
+            share=0.25,
         ),
     )
 
@@ -60,8 +60,16 @@ def test_inputs_are_required(law):
 
 
 @pytest.mark.parametrize(
-    ("mass", "inertia", "robots"), [(0.0, 1.0, 2), (1.0, -1.0, 2), (1.0, 1.0, 0), (np.nan, 1.0, 2)]
+    ("mass", "inertia", "share", "complaint"),
+    [
+        (0.0, 1.0, 0.5, "needs positive mass and inertia, not"),
+        (1.0, -1.0, 0.5, "needs positive mass and inertia, not"),
+        (np.nan, 1.0, 0.5, "needs positive mass and inertia, not"),
+        (1.0, 1.0, -0.1, "share must lie in"),
+        (1.0, 1.0, 1.1, "share must lie in"),
+        (1.0, 1.0, np.nan, "share must lie in"),
+    ],
 )
-def test_bad_parameters_are_refused(mass, inertia, robots):
-    with pytest.raises(ValueError, match="needs positive mass, inertia and robots, not"):
-        WrenchLaw(P_LE, p_LLcm=P_LLCM, mass=mass, inertia=inertia, robots=robots)
+def test_bad_parameters_are_refused(mass, inertia, share, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        WrenchLaw(P_LE, p_LLcm=P_LLCM, mass=mass, inertia=inertia, share=share)
