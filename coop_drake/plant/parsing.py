@@ -97,7 +97,7 @@ def _subject(assembly: Assembly, index: int) -> str:
 
 @contextmanager
 def _warnings() -> Iterator[list[str]]:
-    """Collect what Drake warns about meanwhile, also while its logger is told to keep silent."""
+    """Collect what Drake warns about meanwhile, also while its logger keeps silent or is switched off."""
     records: list[logging.LogRecord] = []
     said: list[str] = []
 
@@ -107,14 +107,17 @@ def _warnings() -> Iterator[list[str]]:
             said.append(record.getMessage())
 
     logger = logging.getLogger("drake")
-    level, handlers, propagate = logger.level, logger.handlers, logger.propagate
-    logger.handlers, logger.propagate = [Collector(logging.WARNING)], False
+    ours = {"handlers": [Collector()], "filters": [], "propagate": False, "disabled": False}
+    theirs = {name: getattr(logger, name) for name in (*ours, "level")}
+    switched_off = logging.root.manager.disable
+    vars(logger).update(ours)
+    logging.disable(logging.NOTSET)
     logger.setLevel(logging.WARNING)
     try:
         yield said
     finally:
-        logger.handlers, logger.propagate = handlers, propagate
-        logger.setLevel(level)
+        vars(logger).update(theirs)
+        logging.disable(switched_off)  # This lets Drake know of the level put back, too.
         for record in records:
             if logger.isEnabledFor(record.levelno) and not _REPLACED.search(record.getMessage()):
                 logger.handle(record)

@@ -115,11 +115,13 @@ BROKEN = {
 
 @pytest.fixture
 def drake_logger():
-    """Drake's logger; its level is put back."""
+    """Drake's logger; its state and that of all logging is put back."""
     logger = logging.getLogger("drake")
-    level = logger.level
+    level, disabled, switched_off = logger.level, logger.disabled, logging.root.manager.disable
     yield logger
+    logger.disabled = disabled
     logger.setLevel(level)
+    logging.disable(switched_off)
 
 
 @pytest.mark.parametrize("level", [logging.WARNING, logging.ERROR])
@@ -134,6 +136,25 @@ def test_files_that_drake_cannot_read_are_refused(name, level, tmp_path, drake_l
     assert caught.value.key == "directives[1]"
     assert caught.value.value == str(tmp_path / "other.sdf")
     assert drake_logger.level == level
+
+
+@pytest.mark.parametrize(
+    "silence", ["logger switched off", "all logging switched off", "filter that refuses"]
+)
+def test_masses_that_drake_would_replace_are_refused_whatever_was_done_to_its_logger(
+    silence, tmp_path, drake_logger, monkeypatch
+):
+    if silence == "logger switched off":
+        drake_logger.disabled = True
+    elif silence == "all logging switched off":
+        logging.disable(logging.CRITICAL)
+    else:
+        monkeypatch.setattr(drake_logger, "filters", [lambda _: False])
+    before = (drake_logger.disabled, drake_logger.filters, logging.root.manager.disable)
+    text, complaint = BROKEN["no size"]
+    with pytest.raises(ScenarioError, match=re.escape(complaint)):
+        team_of(load_scenario(write_with_robot(tmp_path, text)))
+    assert (drake_logger.disabled, drake_logger.filters, logging.root.manager.disable) == before
 
 
 @pytest.mark.parametrize(
