@@ -10,6 +10,7 @@ __all__ = [
     "RefusalError",
     "ScenarioError",
     "StallError",
+    "UnmappableError",
 ]
 
 
@@ -42,6 +43,28 @@ class PlanError(CoopDrakeError):
 
 class FieldError(CoopDrakeError):
     """A harmonic map cannot be built or its certificate failed; the message names the corner or gap."""
+
+
+class UnmappableError(FieldError):
+    """A shape that no map within the tolerance was found for: says which corner or gap is at fault.
+
+    Args:
+        message: What is wrong, in words that name the place.
+        place: Where, in W, (x, y) [m].
+        angle: Interior angle of the corner at fault [degrees], None for a gap.
+        width: Width of the gap at fault [m], None for a corner.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        place: tuple[float, float],
+        *,
+        angle: float | None = None,
+        width: float | None = None,
+    ) -> None:
+        self.place, self.angle, self.width = place, angle, width
+        super().__init__(message)
 
 
 class StallError(CoopDrakeError):
