@@ -33,6 +33,7 @@ class SimulationLog:
         joints: Every joint, shape (T, n) [rad or m].
         joint_rates: Their rates, shape (T, n) [rad/s or m/s].
         governor_position: p_G as robot 0 keeps it, shape (T, 2) [m].
+        governor_spread: Largest difference of a coordinate of p_G between robots, shape (T,) [m].
         funnel_lower: Lower funnel bound per axis, shape (T, 1 + n) [rad or m].
         funnel_upper: Upper funnel bound per axis, shape (T, 1 + n) [rad or m].
         energy_margin: Delta E of (15), smallest over the robots' copies, shape (T,) [m^2/s^2].
@@ -64,6 +65,7 @@ class SimulationLog:
     joints: FloatArray
     joint_rates: FloatArray
     governor_position: FloatArray
+    governor_spread: FloatArray
     funnel_lower: FloatArray
     funnel_upper: FloatArray
     energy_margin: FloatArray

@@ -43,6 +43,7 @@ class Recorder:
             joints=z[:, 3:],
             joint_rates=rates[:, 3:],
             governor_position=self._samples("governor_position"),
+            governor_spread=self._samples("governor_spread"),
             funnel_lower=self._samples("funnel_lower"),
             funnel_upper=self._samples("funnel_upper"),
             energy_margin=self._samples("energy_margin"),

@@ -29,6 +29,7 @@ class Sample:
         rates: Rates of z, shape (3 + n,).
         base_poses: Shape (N, 3).
         governor_position: As robot 0 keeps it, shape (2,).
+        governor_spread: Largest difference to the other robots' copies.
         funnel_lower: Shape (1 + n,).
         funnel_upper: Shape (1 + n,).
         energy_margin: Smallest over the robots.
@@ -48,6 +49,7 @@ class Sample:
     rates: FloatArray
     base_poses: FloatArray
     governor_position: FloatArray
+    governor_spread: float
     funnel_lower: FloatArray
     funnel_upper: FloatArray
     energy_margin: float
@@ -88,6 +90,7 @@ class Telemetry:
         cell, entry = self._current_cell()
         efforts, hands = self._from_robots("robot_effort"), np.array(self._from_robots("hand_command"))
         lower, upper = self._funnels()
+        governors = np.array(self._from_robots("governor_position"))
         offsets = np.array([rotate(z[2], grasp) for grasp in self._grasps])
         com_offset = rotate(z[2], team.object_inertia.p_LLcm)
         return Sample(
@@ -97,7 +100,8 @@ class Telemetry:
             z=z,
             rates=plant.GetVelocities(self._plant_context)[team.velocity_index],
             base_poses=base_poses(team, self._plant_context),
-            governor_position=self._from_robots("governor_position")[0],
+            governor_position=governors[0],
+            governor_spread=float(np.abs(governors - governors[0]).max()),
             funnel_lower=lower,
             funnel_upper=upper,
             energy_margin=float(min(self._from_robots("energy_margin"))[0]),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from coop_drake.control.gains import TransitionGains
@@ -16,6 +17,10 @@ from coop_drake.control.governor import (
 )
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
+
+#: The energy is computed from a velocity in steps of this size [m/s]. Every robot knows the velocity through
+#: its own arm, with its own rounding; in steps they have the same number, and so the same p_G, bit by bit.
+VELOCITY_STEP = 2.0**-26
 
 __all__ = ["GovernedCell", "ReferenceGovernor"]
 
@@ -105,4 +110,5 @@ class ReferenceGovernor(LeafSystem):
 
     def _write_margin(self, context: Context, output: BasicVector) -> None:
         cell, state = self._cell(context), self._object.Eval(context)
-        output.SetFromVector([cell.energy_margin(state[:2], state[3:5], self._governor.Eval(context))])
+        velocity = np.round(state[3:5] / VELOCITY_STEP) * VELOCITY_STEP
+        output.SetFromVector([cell.energy_margin(state[:2], velocity, self._governor.Eval(context))])

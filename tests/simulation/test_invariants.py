@@ -18,6 +18,7 @@ GOOD = Sample(
     rates=np.zeros(5),
     base_poses=np.zeros((2, 3)),
     governor_position=Z[:2],
+    governor_spread=0.0,
     funnel_lower=np.array([0.1, -0.2, -0.2]),
     funnel_upper=np.array([0.3, 0.2, 0.25]),
     energy_margin=0.4,

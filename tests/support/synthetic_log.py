@@ -56,6 +56,7 @@ def synthetic_log(problem: PlanningProblem, *, samples: int = 400) -> Simulation
         joints=joints,
         joint_rates=np.gradient(joints, times, axis=0),
         governor_position=pose[:, :2] + 0.02,
+        governor_spread=np.zeros(samples),
         funnel_lower=axes - width,
         funnel_upper=axes + width,
         energy_margin=margin,

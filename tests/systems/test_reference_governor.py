@@ -7,6 +7,7 @@ from coop_drake.control import governed_acceleration, governor_velocity
 from coop_drake.control.governor import energy_margin, tracking_energy
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.systems import GovernedCell, ReferenceGovernor
+from coop_drake.systems.reference_governor import VELOCITY_STEP
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
 
@@ -32,6 +33,7 @@ def cells():
 
 def expected_margin(cell, inputs):
     state, governor = np.array(inputs["object_state"]), np.array(inputs["governor_position"])
+    state[3:5] = np.round(state[3:5] / VELOCITY_STEP) * VELOCITY_STEP
     stiffness = cell.gains.stiffness
     energy = tracking_energy(state[:2], state[3:5], governor, stiffness=stiffness)
     return energy_margin(energy, cell.clearance(governor), stiffness=stiffness)
@@ -79,6 +81,18 @@ def test_the_governor_waits_while_the_energy_margin_is_not_positive(cells):
     inputs = {**INPUTS, "object_state": [3.1, 3.2, 0.3, 9.0, 0.0, 0.0]}
     assert evaluate(ReferenceGovernor(cells), inputs, "energy_margin")[0] < 0.0
     np.testing.assert_array_equal(evaluate(ReferenceGovernor(cells), inputs, "governor_velocity"), [0.0, 0.0])
+
+
+def test_rounding_in_the_velocity_does_not_reach_the_governor(cells):
+    """Robots compute it through different arms; their copies of p_G must stay alike."""
+    system = ReferenceGovernor(cells)
+    state = np.array(INPUTS["object_state"])
+    other = state * (1.0 + 1e-14 * np.array([0, 0, 0, 1, -1, 1]))
+    velocities = [
+        evaluate(system, {**INPUTS, "object_state": s}, "governor_velocity") for s in (state, other)
+    ]
+    assert np.any(other != state)
+    np.testing.assert_array_equal(*velocities)
 
 
 def test_inputs_are_required(cells):
