@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike
 from shapely import Point, Polygon
@@ -11,17 +13,37 @@ from coop_drake.fields.certificate import MapCertificate, certify, describe_plac
 from coop_drake.fields.corners import leg_panels
 from coop_drake.fields.density import solve_density
 from coop_drake.fields.evaluation import evaluate_many
+from coop_drake.fields.goals import region_to_map
 from coop_drake.fields.layers import MapArrays, pack_layers
-from coop_drake.fields.outline import Outline, outline_of, region_to_map
+from coop_drake.fields.outline import Outline, outline_of
 from coop_drake.fields.panels import Panels, lay_panels
+from coop_drake.fields.points import as_points
 from coop_drake.fields.quadrature import FloatArray
 
-__all__ = ["HarmonicMap"]
+__all__ = ["HarmonicMap", "Solution"]
 
 _ATTEMPTS = ((10, 1.5), (12, 1.5), (16, 1.0), (16, 0.5))  # nodes a panel, longest panel per distance
 _FEWER = (8, 1.5)  # before these, where ten nodes a panel take seconds
 _MANY_UNKNOWNS = 4_000
 _MAX_UNKNOWNS = 9_000  # 0.7 GB and some ten seconds
+
+
+class Solution(NamedTuple):
+    """What solving leaves behind: all that evaluating a map takes, as plain arrays and numbers.
+
+    Attributes:
+        arrays: The layers, for the kernels that evaluate them.
+        centre: Origin of their coordinates in W [m], shape (2,).
+        rounding: How far outside still counts as on the wall [m].
+        goal_image: q_d, the goal's image in the disk, shape (2,).
+        certificate: How far the map can be from the true one.
+    """
+
+    arrays: MapArrays
+    centre: FloatArray
+    rounding: float
+    goal_image: FloatArray
+    certificate: MapCertificate
 
 
 class HarmonicMap:
@@ -58,13 +80,19 @@ class HarmonicMap:
         inside: Point | None = None,
     ) -> None:
         self._goal = goal
-        self._region = region_to_map(domain, goal, inside)
-        outline = outline_of(self._region, goal)
-        self._centre = np.array([outline.centre.real, outline.centre.imag])
-        # Coordinates come rounded: what lies outside by less than this counts as on the wall.
-        self._rounding = 8.0 * np.finfo(float).eps * (abs(outline.centre) + outline.diameter)
-        self._arrays, hole_images, self._certificate = _solve(outline, tolerance, self._rounding)
-        self._goal_image = self._find_goal_image(outline, hole_images)
+        self._region, target = region_to_map(domain, goal, inside)
+        self._solution = _solve(outline_of(self._region, target), target, tolerance)
+
+    @classmethod
+    def from_solution(
+        cls, domain: Polygon, goal: Point | Polygon, solution: Solution, *, inside: Point | None = None
+    ) -> HarmonicMap:
+        """The map that was solved before with these arguments, without solving it again."""
+        harmonic_map = cls.__new__(cls)
+        harmonic_map._goal = goal
+        harmonic_map._region, _ = region_to_map(domain, goal, inside)
+        harmonic_map._solution = solution
+        return harmonic_map
 
     def __call__(self, points: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """T and its Jacobian.
@@ -78,9 +106,9 @@ class HarmonicMap:
         Returns:
             T, shape (..., 2), and J = dT/dp, shape (..., 2, 2) [1/m].
         """
-        p = np.asarray(points, dtype=float)
-        flat = np.ascontiguousarray(p.reshape(-1, 2) - self._centre)
-        T, J = evaluate_many(self._arrays, flat, self._rounding)
+        p = as_points(points)
+        flat = np.ascontiguousarray(p.reshape(-1, 2) - self._solution.centre)
+        T, J = evaluate_many(self._solution.arrays, flat, self._solution.rounding)
         return T.reshape(p.shape), J.reshape(*p.shape, 2)
 
     @property
@@ -96,32 +124,29 @@ class HarmonicMap:
     @property
     def goal_image(self) -> FloatArray:
         """q_d, the goal's image in the disk, shape (2,)."""
-        return self._goal_image.copy()
+        return self._solution.goal_image.copy()
 
     @property
     def certificate(self) -> MapCertificate:
         """How far the map can be from the true one."""
-        return self._certificate
+        return self._solution.certificate
+
+    @property
+    def solution(self) -> Solution:
+        """What solving left behind, see `from_solution`."""
+        return self._solution
 
     @property
     def kernel_arguments(self) -> tuple[MapArrays, FloatArray, float]:
         """Arrays, centre (2,) in W [m] and rounding [m], for kernels that evaluate the map themselves."""
-        return self._arrays, self._centre, self._rounding
-
-    def _find_goal_image(self, outline: Outline, hole_images: FloatArray) -> FloatArray:
-        if outline.goal_angle is not None:
-            return np.array([np.cos(outline.goal_angle), np.sin(outline.goal_angle)])
-        if outline.goal_ring is not None:
-            image: FloatArray = hole_images[outline.goal_ring - 1].copy()
-        else:
-            image, _ = self(self._goal.coords[0])
-        return image
+        return self._solution[:3]
 
 
-def _solve(
-    outline: Outline, tolerance: float, rounding: float
-) -> tuple[MapArrays, FloatArray, MapCertificate]:
+def _solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solution:
     """Solve with more and more nodes until the certificate is good enough."""
+    centre = np.array([outline.centre.real, outline.centre.imag])
+    # Coordinates come rounded: what lies outside by less than this counts as on the wall.
+    rounding = 8.0 * float(np.finfo(float).eps) * (abs(outline.centre) + outline.diameter)
     # Corner operators are cached by angle: rounded angles hit the cache and change nothing beyond rounding.
     angles = np.round(outline.corner_angles, 12)
     best: MapCertificate | None = None
@@ -139,7 +164,8 @@ def _solve(
         arrays = pack_layers(outline, panels, angles, density, closeness)
         certificate = certify(outline, panels, arrays, density.hole_images, density.condition, rounding)
         if certificate.error_bound <= tolerance:
-            return arrays, density.hole_images, certificate
+            image = _goal_image(outline, goal, density.hole_images, arrays, rounding)
+            return Solution(arrays, centre, rounding, image, certificate)
         if best is None or certificate.error_bound < best.error_bound:
             best = certificate
     assert best is not None
@@ -147,6 +173,22 @@ def _solve(
         f"the harmonic map is certified to {best.error_bound:.2g} only, {tolerance:.2g} was asked for; "
         f"at fault is {best.worst_place_description}"
     )
+
+
+def _goal_image(
+    outline: Outline, goal: Point | Polygon, hole_images: FloatArray, arrays: MapArrays, rounding: float
+) -> FloatArray:
+    """Where the goal goes: a point of the circle, a hole's image, or the image of a point."""
+    image: FloatArray
+    if outline.goal_angle is not None:
+        return np.array([np.cos(outline.goal_angle), np.sin(outline.goal_angle)])
+    if outline.goal_ring is not None:
+        image = hole_images[outline.goal_ring - 1].copy()
+        return image
+    point = np.array(goal.coords) - [outline.centre.real, outline.centre.imag]
+    images, _ = evaluate_many(arrays, point, rounding)
+    image = images[0]
+    return image
 
 
 def _refuse_size(outline: Outline, panels: Panels, unknowns: int) -> MapCertificate:
