@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated
@@ -54,7 +53,6 @@ def main(
     out: Annotated[Path, typer.Option(help="Where the rows go.")] = _RESULTS,
 ) -> None:
     """Measure what exists on this machine, each figure beside a peer of the same run."""
-    logging.getLogger("drake").setLevel(logging.ERROR)
     console = Console(stderr=True, highlight=False)
     tasks = chosen(_tasks(Effort(seeds, budget, limit)), topics or [], only or [])
     if not tasks:

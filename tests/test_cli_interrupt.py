@@ -11,9 +11,17 @@ import time
 from coop_drake.planning import load_plan
 from tests.support.scenarios import MODELS
 
+# A shell that starts tests in the background has its children ignore Ctrl-C.
+INTERRUPTIBLE = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from coop_drake.cli import main
+main()
+"""
+
 
 def test_ctrl_c_after_planning_leaves_the_plan_whole_and_nothing_half_written(tmp_path):
-    command = [sys.executable, "-c", "from coop_drake.cli import main; main()"]
+    command = [sys.executable, "-c", INTERRUPTIBLE]
     command += ["run", str(MODELS / "base.scenario.yaml"), "--out", str(tmp_path), "--json"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     while process.poll() is None and not (tmp_path / "table_1.md").exists():

@@ -1,6 +1,7 @@
 """Which tasks run, in which order, and what becomes of failures and of Ctrl-C."""
 
 import json
+import logging
 import threading
 
 import pytest
@@ -88,8 +89,10 @@ def run(monkeypatch, tasks, *arguments):
 
 def test_rows_are_written_and_shown(monkeypatch, tmp_path):
     out = tmp_path / "deep" / "bench.json"
+    level = logging.getLogger("drake").level
     result = run(monkeypatch, [Task("topic/item", lambda rows: [ROW])], "--out", str(out))
     assert result.exit_code == 0
+    assert logging.getLogger("drake").level == level
     assert json.loads(out.read_text()) == [ROW.as_dict()]
     assert "figure" in result.output
 
