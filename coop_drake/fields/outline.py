@@ -8,16 +8,17 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely import Point, Polygon
-from shapely.geometry.base import BaseGeometry
 
-from coop_drake.errors import FieldError
+from coop_drake.errors import FieldError, UnmappableError
+from coop_drake.fields.goals import goal_edges
 from coop_drake.fields.quadrature import FloatArray
 
-__all__ = ["Outline", "outline_of", "region_to_map"]
+__all__ = ["Outline", "outline_of"]
 
 ComplexArray = NDArray[np.complex128]
 IntArray = NDArray[np.int64]
 
+_SHARPEST = 1.0  # corners sharper than this cost minutes [degrees]
 _STRAIGHT = 1e-12  # a vertex is dropped if it lies this close to its neighbours' chord, times the diameter
 
 
@@ -73,61 +74,26 @@ class Outline:
         return float(np.hypot(np.ptp(v.real), np.ptp(v.imag)))
 
 
-def region_to_map(domain: Polygon, goal: Point | Polygon, inside: Point | None) -> Polygon:
-    """F: the domain for a point goal, otherwise the piece of the domain less the goal that is to be mapped.
-
-    Args:
-        domain: The cell [m].
-        goal: Point to reach, or region to reach.
-        inside: A point of the piece to keep where the goal splits the domain.
-
-    Raises:
-        FieldError: If the domain is no valid polygon, the goal is not in it, or the piece is undetermined.
-    """
-    if not isinstance(domain, Polygon) or domain.is_empty or not domain.is_valid:
-        raise FieldError(f"the domain must be one valid polygon, got {shapely.is_valid_reason(domain)}")
-    if isinstance(goal, Point):
-        if goal.is_empty or not domain.contains(goal):
-            raise FieldError(f"the goal {goal.wkt} must lie strictly inside the domain")
-        return domain
-    if goal.is_empty or not goal.is_valid or goal.area == 0.0:
-        raise FieldError("the goal region must be one valid polygon with an area")
-    if not domain.buffer(1e-9 * domain.length).covers(goal):
-        raise FieldError("the goal region must lie in the domain; intersect it with the domain first")
-    pieces = [
-        p for p in shapely.get_parts(domain.difference(goal)) if isinstance(p, Polygon) and not p.is_empty
-    ]
-    if inside is not None:
-        pieces = [p for p in pieces if p.covers(inside)]
-    if len(pieces) != 1:
-        where = "is outside the domain or inside the goal" if inside is not None else "is needed"
-        raise FieldError(
-            f"the domain less the goal has {len(pieces)} pieces to choose from: the argument `inside`, "
-            f"a point of the piece to map, {where}"
-        )
-    return pieces[0]
-
-
-def outline_of(region: Polygon, goal: Point | Polygon) -> Outline:
+def outline_of(region: Polygon, target: Point | Polygon) -> Outline:
     """Orient, clean and number the rings of F and share out the angles of the outer circle.
 
     The angle is linear in arc length; an arc that bounds the goal gets none.
 
     Args:
         region: F, from `region_to_map`.
-        goal: The goal it was made with.
+        target: What collapses, from there too: a point, a hole of F, or one arc of its outer ring.
 
     Raises:
-        FieldError: If the goal bounds the outer ring in several separate arcs, or all of it; if rings touch.
+        UnmappableError: If rings touch, or a corner is sharper than a degree.
     """
-    oriented = shapely.orient_polygons(region)
+    oriented = shapely.orient_polygons(shapely.force_2d(region))
     centre = complex(*oriented.envelope.centroid.coords[0])
     scale = float(np.hypot(*np.subtract(region.bounds[2:], region.bounds[:2])))
     _refuse_touching_rings(oriented, scale)
     vertices, touching, rings = [], [], []
     for index, ring in enumerate((oriented.exterior, *oriented.interiors)):
         points = np.asarray(ring.coords)[:-1]
-        z, on_goal = _clean(points @ np.array([1.0, 1.0j]) - centre, _goal_edges(points, goal, scale), scale)
+        z, on_goal = _clean(points @ np.array([1.0, 1.0j]) - centre, goal_edges(points, target, scale), scale)
         if len(z) < 3:
             raise FieldError(f"ring {index} of the domain has no area")
         vertices.append(z)
@@ -140,7 +106,7 @@ def outline_of(region: Polygon, goal: Point | Polygon) -> Outline:
     start[:n], end[:n] = _outer_angles(vertices[0], touching[0])
     arc = float(start[:n][touching[0]][0]) if touching[0].any() else None
     collapsed = [k for k in range(1, len(touching)) if touching[k].any()]
-    return Outline(
+    outline = Outline(
         vertices=z,
         following=following,
         preceding=_cyclic([len(v) for v in vertices], -1),
@@ -151,6 +117,8 @@ def outline_of(region: Polygon, goal: Point | Polygon) -> Outline:
         goal_ring=collapsed[0] if collapsed and arc is None else None,
         goal_angle=arc,
     )
+    _refuse_spikes(outline)
+    return outline
 
 
 def _refuse_touching_rings(region: Polygon, scale: float) -> None:
@@ -158,20 +126,30 @@ def _refuse_touching_rings(region: Polygon, scale: float) -> None:
     rings = [region.exterior, *region.interiors]
     for k, ring in enumerate(rings):
         for other in rings[:k]:
-            if ring.distance(other) <= _STRAIGHT * scale:
-                place = shapely.shortest_line(ring, other).coords[0]
-                raise FieldError(
-                    f"a ring of the domain less the goal touches another at ({place[0]:.6g}, {place[1]:.6g})"
-                    " m; leave a gap or let them overlap"
+            width = float(ring.distance(other))
+            if width <= _STRAIGHT * scale:
+                x, y = shapely.shortest_line(ring, other).coords[0]
+                raise UnmappableError(
+                    f"a ring of the domain touches another at ({x:.6g}, {y:.6g}) m; "
+                    "leave a gap or let them overlap",
+                    (x, y),
+                    width=width,
                 )
 
 
-def _goal_edges(points: FloatArray, goal: BaseGeometry, scale: float) -> NDArray[np.bool_]:
-    """Which edges of a ring bound the goal region, shape (n,)."""
-    if isinstance(goal, Point):
-        return np.zeros(len(points), dtype=bool)
-    middles = shapely.points(0.5 * (points + np.roll(points, -1, axis=0)))
-    return np.asarray(shapely.distance(goal.boundary, middles) < 1e-9 * scale, dtype=np.bool_)
+def _refuse_spikes(outline: Outline) -> None:
+    """A corner of next to no angle, or next to a full turn, would take more nodes than there is time for."""
+    angles = np.rad2deg(outline.corner_angles)
+    worst = int(np.argmin(np.minimum(angles, 360.0 - angles)))
+    angle = float(angles[worst])
+    if min(angle, 360.0 - angle) < _SHARPEST:
+        place = outline.vertices[worst] + outline.centre
+        raise UnmappableError(
+            f"the corner at ({place.real:.6g}, {place.imag:.6g}) m has an interior angle of {angle:.3g} "
+            f"degrees; between {_SHARPEST:g} and {360.0 - _SHARPEST:g} are allowed: `blunted` cuts it off",
+            (place.real, place.imag),
+            angle=angle,
+        )
 
 
 def _clean(
@@ -203,12 +181,6 @@ def _cyclic(lengths: list[int], step: int) -> IntArray:
 
 def _outer_angles(z: ComplexArray, on_goal: NDArray[np.bool_]) -> tuple[FloatArray, FloatArray]:
     """Angles at the start and the end of each outer edge [rad]."""
-    arcs = int(np.sum(on_goal & ~np.roll(on_goal, 1)))
-    if on_goal.all() or arcs > 1:
-        raise FieldError(
-            f"the goal bounds the outer ring in {arcs or 1} arcs"
-            + (" that leave nothing of it" if on_goal.all() else "; only one can collapse to a point")
-        )
     lengths = np.where(on_goal, 0.0, np.abs(np.roll(z, -1) - z))
     ends = np.cumsum(lengths) * (2.0 * np.pi / lengths.sum())
     return np.concatenate(([0.0], ends[:-1])), ends

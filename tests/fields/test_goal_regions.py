@@ -3,7 +3,6 @@ import pytest
 import shapely
 from shapely import Point, box
 
-from coop_drake.errors import FieldError
 from coop_drake.fields import HarmonicMap, VelocityField
 from tests.support import domains
 
@@ -72,9 +71,3 @@ def test_goal_and_obstacles_collapse_together():
     T, J = harmonic_map(domains.inside(harmonic_map.region, 2000, clearance=1e-3))
     assert (np.hypot(*T.T) < 1.0).all()
     assert (np.linalg.det(J) > 0.0).all()
-
-
-def test_goal_touching_the_ring_at_a_point_is_refused_with_its_place():
-    goal = shapely.Polygon([(2, 0), (2.5, 0.5), (1.5, 0.5)])
-    with pytest.raises(FieldError, match="touches"):
-        HarmonicMap(ROOM, goal)

@@ -2,16 +2,16 @@ import numpy as np
 import pytest
 from shapely import Point, Polygon, box
 
-from coop_drake.errors import FieldError
-from coop_drake.fields.outline import outline_of, region_to_map
+from coop_drake.errors import UnmappableError
+from coop_drake.fields.goals import region_to_map
+from coop_drake.fields.outline import outline_of
+from tests.support import domains
 
 ROOM = box(0, 0, 4, 2)
-FRAME = box(0.5, 0.2, 3.5, 1.8).difference(box(1, 0.6, 3, 1.4))
-POSTS = box(1.9, 0.5, 2.1, 0.7).union(box(1.9, 1.3, 2.1, 1.5))
 
 
 def outline(domain, goal, inside=None):
-    return outline_of(region_to_map(domain, goal, inside), goal)
+    return outline_of(*region_to_map(domain, goal, inside))
 
 
 def test_angles_are_linear_in_arc_length():
@@ -61,32 +61,25 @@ def test_interior_goal_is_a_hole():
     assert hole.real.min() == pytest.approx(2)
 
 
-def test_inside_selects_the_piece_of_a_split_domain():
-    goal = box(1, 0, 2, 2)
-    assert region_to_map(ROOM, goal, Point(0.5, 1)).area == pytest.approx(2)
-    assert region_to_map(ROOM, goal, Point(3, 1)).area == pytest.approx(4)
+def test_rings_that_touch_are_refused_with_their_place():
+    touching = ROOM.difference(Polygon([(2, 0), (2.5, 0.5), (1.5, 0.5)]))
+    with pytest.raises(UnmappableError, match=r"touches another at \(2, 0\) m") as caught:
+        outline(touching, Point(1, 1))
+    assert caught.value.place == (2.0, 0.0)
+    assert caught.value.width == 0.0
+    assert caught.value.angle is None
 
 
-@pytest.mark.parametrize(
-    ("domain", "goal", "inside", "message"),
-    [
-        (ROOM, Point(5, 1), None, "must lie strictly inside the domain"),
-        (ROOM, Point(4, 1), None, "must lie strictly inside the domain"),
-        (ROOM, box(3, 0, 5, 2), None, "goal region must lie in the domain"),
-        (ROOM, Polygon(), None, "one valid polygon with an area"),
-        (
-            Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]),
-            Point(0.5, 0.2),
-            None,
-            "the domain must be one valid polygon",
-        ),
-        (ROOM, box(1, 0, 2, 2), None, "has 2 pieces to choose from: the argument `inside`"),
-        (ROOM, box(1, 0, 2, 2), Point(1.5, 1), "outside the domain or inside the goal"),
-        (ROOM, ROOM, None, "has 0 pieces"),
-        (ROOM.difference(POSTS), FRAME.difference(POSTS), Point(1.5, 1), "in 2 arcs; only one can collapse"),
-        (ROOM, FRAME, Point(1.5, 1), "leave nothing of it"),
-    ],
-)
-def test_unusable_questions_are_refused(domain, goal, inside, message):
-    with pytest.raises(FieldError, match=message):
-        outline(domain, goal, inside)
+@pytest.mark.parametrize("shape", [domains.needle(0.9), domains.blade(359.1)], ids=["needle", "blade"])
+def test_corners_sharper_than_a_degree_are_refused_with_their_angle(shape):
+    domain, goal = shape
+    with pytest.raises(UnmappableError, match="has an interior angle of") as caught:
+        outline(domain, goal)
+    assert min(caught.value.angle, 360 - caught.value.angle) == pytest.approx(0.9)
+    assert Point(caught.value.place).distance(domain.boundary) < 1e-9
+    assert caught.value.width is None
+
+
+def test_a_third_coordinate_is_left_out():
+    raised = Polygon([(0, 0, 5), (4, 0, 5), (4, 2, 5), (0, 2, 5)])
+    assert outline(raised, Point(1, 1)).diameter == pytest.approx(np.hypot(4, 2))

@@ -1,0 +1,135 @@
+"""What is left of a domain when its goal collapses to a point, and which goals can collapse."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from coop_drake.errors import FieldError
+from coop_drake.fields.quadrature import FloatArray
+from coop_drake.geometry.passage import pole
+from coop_drake.geometry.simplify import sharpest_angle
+
+__all__ = ["goal_edges", "region_to_map"]
+
+_ON = 1e-9  # what is this close, times the diameter, lies on the goal's boundary
+_SLIVER = 1e-9  # pieces that are thinner, times the diameter, come from rounding
+_NEAR = 1e-3  # a goal closer to a wall that it does not touch, times its own size, hardly leaves a gap
+_SHARPEST = np.deg2rad(5.0)  # sharper corners between goal and wall are cusps to a map
+
+
+def region_to_map(
+    domain: Polygon, goal: Point | Polygon, inside: Point | None = None
+) -> tuple[Polygon, Point | Polygon]:
+    """F, the region to map, and the target: what its map sends to one point.
+
+    A goal region that has a boundary of its own, or meets the outer ring in one arc, is taken out of the
+    domain and collapses. One that meets walls otherwise (in several arcs, in a single point, at a cusp, along
+    a part of a hole) cannot collapse without a wall: then the target is its pole of inaccessibility, the
+    point of it farthest from its boundary, and F is the whole domain. To reach the target is to reach the
+    goal either way.
+
+    Args:
+        domain: The cell [m].
+        goal: Point to reach, or region to reach.
+        inside: A point of the piece to keep where the goal splits the domain, for example the start.
+
+    Returns:
+        F and the target: a point, or the goal itself.
+
+    Raises:
+        FieldError: If the domain is no valid polygon, the goal is not in it, or the piece is undetermined.
+    """
+    _check_polygon(domain, "domain")
+    if isinstance(goal, Point):
+        if goal.is_empty or not np.isfinite(goal.coords[0]).all() or not domain.contains(goal):
+            raise FieldError(f"the goal {goal.wkt} must lie strictly inside the domain{_extent(domain)}")
+        return domain, goal
+    _check_polygon(goal, "goal region")
+    if not domain.buffer(1e-9 * domain.length).covers(goal):
+        raise FieldError("the goal region must lie in the domain; intersect it with the domain first")
+    piece = _piece_to_keep(domain, goal, inside)
+    if _can_collapse(domain, piece, goal):
+        return piece, goal
+    return domain, Point(pole(goal)[0])
+
+
+def goal_edges(points: FloatArray, goal: BaseGeometry, scale: float) -> NDArray[np.bool_]:
+    """Which edges of a ring bound the goal region.
+
+    Args:
+        points: Vertices of the ring, each once, shape (n, 2) [m].
+        goal: The goal; a point bounds nothing.
+        scale: Diameter of the domain [m].
+
+    Returns:
+        One flag for the edge that starts at each vertex, shape (n,).
+    """
+    if isinstance(goal, Point):
+        return np.zeros(len(points), dtype=bool)
+    middles = shapely.points(0.5 * (points + np.roll(points, -1, axis=0)))
+    return np.asarray(shapely.distance(goal.boundary, middles) < _ON * scale, dtype=np.bool_)
+
+
+def _check_polygon(shape: object, name: str) -> None:
+    """Refuse what is not one valid polygon with an area."""
+    if not isinstance(shape, Polygon):
+        hint = "; take one of its parts" if hasattr(shape, "geoms") else ""
+        kinds = "a shapely Polygon" if name == "domain" else "a shapely Point or Polygon"
+        raise FieldError(f"the {name} must be {kinds}, got {type(shape).__name__}{hint}")
+    if shape.is_empty:
+        raise FieldError(f"the {name} must be one valid polygon with an area, got an empty one")
+    if not shape.is_valid or shape.area == 0.0:
+        raise FieldError(
+            f"the {name} must be one valid polygon with an area: {shapely.is_valid_reason(shape)}"
+        )
+
+
+def _extent(domain: Polygon) -> str:
+    """Where the domain is, in words."""
+    x0, y0, x1, y1 = domain.bounds
+    return f", which spans x {x0:.6g} to {x1:.6g} and y {y0:.6g} to {y1:.6g} m and may have holes"
+
+
+def _piece_to_keep(domain: Polygon, goal: Polygon, inside: Point | None) -> Polygon:
+    """The piece of the domain less the goal that holds a point, or the only one."""
+    least = _SLIVER * _diameter(domain)
+    parts = shapely.get_parts(domain.difference(goal))
+    pieces = [p for p in parts if isinstance(p, Polygon) and p.area > least * p.length]
+    if inside is not None:
+        pieces = [p for p in pieces if p.covers(inside)]
+    if not pieces and inside is None:
+        raise FieldError("the goal region covers the whole domain: nothing is left to map")
+    if len(pieces) != 1:
+        where = "is outside the domain or inside the goal" if inside is not None else "is needed"
+        raise FieldError(
+            f"the domain less the goal has {len(pieces)} pieces to choose from: the argument `inside`, "
+            f"a point of the piece to map, {where}"
+        )
+    return pieces[0]
+
+
+def _can_collapse(domain: Polygon, piece: Polygon, goal: Polygon) -> bool:
+    """Whether the goal is a hole of its own or one arc of the outer ring, clear of cusps and narrow gaps."""
+    scale = _diameter(domain)
+    rings = [piece.exterior, *piece.interiors]
+    on_goal = [goal_edges(shapely.get_coordinates(ring)[:-1], goal, scale) for ring in rings]
+    bounding = [k for k, flags in enumerate(on_goal) if flags.any()]
+    if len(bounding) != 1:
+        return False
+    k = bounding[0]
+    arcs = int(np.sum(on_goal[k] & ~np.roll(on_goal[k], 1)))
+    alone = bool(on_goal[k].all()) if k > 0 else arcs == 1
+    near = _NEAR * _diameter(goal)
+    walls = [ring for m, ring in enumerate(rings) if m != k]
+    clear = all(goal.distance(ring) > near for ring in walls)
+    return alone and clear and sharpest_angle(piece) >= min(_SHARPEST, 0.999 * sharpest_angle(domain))
+
+
+def _diameter(shape: BaseGeometry) -> float:
+    """Diagonal of the bounding box [m]."""
+    x0, y0, x1, y1 = shape.bounds
+    return float(np.hypot(x1 - x0, y1 - y0))

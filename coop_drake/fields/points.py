@@ -1,0 +1,29 @@
+"""Points as users give them: any array whose last axis is x, y."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from coop_drake.errors import FieldError
+from coop_drake.fields.quadrature import FloatArray
+
+__all__ = ["as_points"]
+
+
+def as_points(points: ArrayLike) -> FloatArray:
+    """Points as an array of floats, shape (..., 2) [m].
+
+    Raises:
+        FieldError: If the last axis is not x, y, or a coordinate is not a finite number.
+    """
+    try:
+        p = np.asarray(points, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise FieldError(f"points must be numbers of shape (..., 2), got {type(points).__name__}") from error
+    if p.ndim == 0 or p.shape[-1] != 2:
+        raise FieldError(f"points must have shape (..., 2), got {p.shape}")
+    if not np.isfinite(p).all():
+        first = np.argwhere(~np.isfinite(p).all(axis=-1))[0].tolist()
+        raise FieldError(f"points must be finite, but point {first or 0} is {p[tuple(first)].tolist()}")
+    return p
