@@ -1,0 +1,45 @@
+"""The law is exact whatever the size of the team, its arms, its grasps and who carries how much."""
+
+import numpy as np
+import pytest
+
+from coop_drake.simulation import simulate
+from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
+from tests.support.small_loop import joint_names, small_maps
+from tests.support.small_plan import small_plan
+
+ONE, TWO, THREE = (REVOLUTE,), (REVOLUTE, REVOLUTE), (REVOLUTE, REVOLUTE, REVOLUTE)
+SLIDE, MIXED = (PRISMATIC,), (PRISMATIC, REVOLUTE)
+TEAMS = {
+    "two": [ONE, MIXED],
+    "four": [ONE, TWO, SLIDE, THREE],
+    "eight": [ONE, TWO, (), SLIDE, ONE, MIXED, THREE, ONE],
+}
+
+
+@pytest.fixture(scope="module", params=TEAMS)
+def run(request, tmp_path_factory):
+    scenario = ring_team(tmp_path_factory.mktemp(request.param), TEAMS[request.param])
+    log = simulate(scenario, small_plan(joint_names(scenario)), small_maps())
+    return scenario, log
+
+
+def test_it_arrives_and_every_equation_holds_on_the_way(run):
+    scenario, log = run
+    assert log.violation == ""
+    assert log.reached
+    assert len(log.robot_names) == len(scenario.load_shares)
+    largest = np.abs(np.gradient(log.object_twist, log.times, axis=0)).max()
+    assert log.acceleration_error.max() <= 1e-12 * max(1.0, largest)
+    assert log.wrench_error.max() <= 1e-10
+    assert log.governor_spread.max() == 0.0
+    assert log.energy_margin.min() >= 0.0
+    assert min(log.funnel_margin.min(), log.slice_margin.min(), log.cell_clearance.min()) > 0.0
+
+
+def test_every_robot_carries_its_share(run):
+    scenario, log = run
+    total = log.object_wrench[:, None, :2]
+    shares = np.array([scenario.load_shares[name] for name in log.robot_names])
+    assert np.ptp(shares) > 0.01
+    np.testing.assert_allclose(log.measured_wrenches[:, :, :2], shares[:, None] * total, atol=1e-9)
