@@ -2,17 +2,21 @@
 
 from coop_drake.simulation.clearance import Clearance, TeamClearance
 from coop_drake.simulation.invariants import ACCELERATION_TOLERANCE, WRENCH_TOLERANCE, Invariants, Margins
+from coop_drake.simulation.ledger import Ledger, communication
 from coop_drake.simulation.log import SimulationLog
-from coop_drake.simulation.run import build_maps, simulate
+from coop_drake.simulation.maps import build_maps
+from coop_drake.simulation.run import simulate
 
 __all__ = [
     "ACCELERATION_TOLERANCE",
     "WRENCH_TOLERANCE",
     "Clearance",
     "Invariants",
+    "Ledger",
     "Margins",
     "SimulationLog",
     "TeamClearance",
     "build_maps",
+    "communication",
     "simulate",
 ]

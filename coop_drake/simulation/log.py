@@ -42,6 +42,7 @@ class SimulationLog:
         measured_wrenches: Wrench that the grasp weld transmits to the object there, shape (T, N, 3) [N, N m].
         base_wrenches: Actuation of every base at Bk, shape (T, N, 3) [N, N m].
         joint_torques: Actuation of every joint, shape (T, n) [N m or N].
+        ready_margins: Margin that every robot reports; ready where not negative, shape (T, N) [-].
         workspace_clearance: Smallest distance of any body to any wall, shape (T,) [m].
         body_clearance: Smallest distance between bodies that must not touch, shape (T,) [m].
         cell_clearance: Signed distance of p_WL to the boundary of the cell's safe set, shape (T,) [m].
@@ -74,6 +75,7 @@ class SimulationLog:
     measured_wrenches: FloatArray
     base_wrenches: FloatArray
     joint_torques: FloatArray
+    ready_margins: FloatArray
     workspace_clearance: FloatArray
     body_clearance: FloatArray
     cell_clearance: FloatArray

@@ -52,6 +52,7 @@ class Recorder:
             measured_wrenches=self._samples("measured_wrenches"),
             base_wrenches=self._samples("base_wrenches"),
             joint_torques=self._samples("joint_torques"),
+            ready_margins=self._samples("ready_margins"),
             workspace_clearance=self._margins("workspace_clearance"),
             body_clearance=self._margins("body_clearance"),
             cell_clearance=self._margins("cell_clearance"),

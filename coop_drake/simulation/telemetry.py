@@ -39,6 +39,7 @@ class Sample:
         base_wrenches: Shape (N, 3).
         joint_torques: Shape (n,).
         acceleration_error: Largest component over all robots' commands.
+        ready_margins: As every robot reports it, shape (N,).
         arrived: Whether all robots report arrival.
     """
 
@@ -59,6 +60,7 @@ class Sample:
     base_wrenches: FloatArray
     joint_torques: FloatArray
     acceleration_error: float
+    ready_margins: FloatArray
     arrived: bool
 
 
@@ -76,7 +78,7 @@ class Telemetry:
         self._grasps = [np.array([robot.X_LE.x, robot.X_LE.y]) for robot in self._team.robots]
         self._of_robots = {
             name: [_reader(controller, name, root) for controller in loop.controllers]
-            for name in ("robot_effort", *TELEMETRY)
+            for name in ("robot_effort", "ready", *TELEMETRY)
         }
         self._current_cell = _reader(loop.cell_planner, "current_cell", root)
         self._arrived = _reader(loop.cell_planner, "arrived", root)
@@ -111,6 +113,7 @@ class Telemetry:
             base_wrenches=np.array([effort[:3] for effort in efforts]),
             joint_torques=np.concatenate([effort[3:] for effort in efforts]),
             acceleration_error=self._acceleration_error(),
+            ready_margins=np.array([margin for _, margin in self._from_robots("ready")]),
             arrived=bool(self._arrived()[0]),
         )
 

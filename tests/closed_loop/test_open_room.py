@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coop_drake.control import FixedGains, ScheduledGains
-from coop_drake.simulation import simulate
+from coop_drake.simulation import communication, simulate
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_plan import ANGLE_TOLERANCE, POSITION_TOLERANCE
 
@@ -58,6 +58,16 @@ def test_all_margins_are_positive_on_every_accepted_step(run):
     for name in ("workspace_clearance", "body_clearance", "cell_clearance", "funnel_margin", "slice_margin"):
         assert getattr(log, name).min() > 0.0, name
     assert log.energy_margin.min() >= 0.0
+
+
+def test_robots_say_little_and_all_of_it_counts(run):
+    plan, log = run
+    ledger = communication(log)
+    robots = len(log.robot_names)
+    assert all(count >= len(plan.cells) for count in ledger.reports)
+    assert ledger.announcements == robots * (len(plan.cells) - 1)
+    assert ledger.message_bytes == 3 * sum(ledger.reports) + 2 * ledger.announcements
+    assert ledger.messages < 10 * robots * len(plan.cells)
 
 
 def test_the_cells_are_walked_one_by_one_and_all_agree_when(run):

@@ -28,6 +28,7 @@ GOOD = Sample(
     base_wrenches=np.zeros((2, 3)),
     joint_torques=np.zeros(2),
     acceleration_error=1e-12,
+    ready_margins=np.zeros(2),
     arrived=False,
 )
 

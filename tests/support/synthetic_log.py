@@ -65,6 +65,7 @@ def synthetic_log(problem: PlanningProblem, *, samples: int = 400) -> Simulation
         measured_wrenches=wrenches,
         base_wrenches=2.0 * wrenches,
         joint_torques=0.1 * joints,
+        ready_margins=np.tile(np.cos(times)[:, None], (1, robots)),
         workspace_clearance=margin + 0.1,
         body_clearance=margin + 0.2,
         cell_clearance=margin,
