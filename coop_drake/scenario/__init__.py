@@ -5,6 +5,7 @@ from coop_drake.scenario.load import dump_scenario, load_scenario
 from coop_drake.scenario.model import (
     Gains,
     Goal,
+    MapSettings,
     ObjectPose,
     Scenario,
     SimulatorSettings,
@@ -19,6 +20,7 @@ __all__ = [
     "Assembly",
     "Gains",
     "Goal",
+    "MapSettings",
     "ObjectPose",
     "RobotAssembly",
     "Scenario",

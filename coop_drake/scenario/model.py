@@ -113,6 +113,18 @@ class Gains:
 
 
 @dataclass(frozen=True)
+class MapSettings:
+    """How well the cells are mapped.
+
+    Attributes:
+        tolerance: Largest error of a harmonic map that is accepted, as certified; cells that cannot be mapped
+            as well as that are refused. The disk they are mapped to has radius 1 [-].
+    """
+
+    tolerance: float = 1e-8
+
+
+@dataclass(frozen=True)
 class SimulatorSettings:
     """How the closed loop is integrated.
 
@@ -159,6 +171,7 @@ class Scenario:
         load_shares: What part of the work each robot takes; they sum to one. Empty for equal parts.
         planner: How hard the planner tries.
         gains: The gain sets.
+        maps: How well the cells are mapped.
         simulator: How the closed loop is integrated.
         visualization: How recordings look.
         path: The file it was read from.
@@ -172,6 +185,7 @@ class Scenario:
     load_shares: dict[str, float] = field(default_factory=dict)
     planner: PlannerSettings = field(default_factory=PlannerSettings)
     gains: Gains = field(default_factory=Gains)
+    maps: MapSettings = field(default_factory=MapSettings)
     simulator: SimulatorSettings = field(default_factory=SimulatorSettings)
     visualization: VisualizationSettings = field(default_factory=VisualizationSettings)
     path: Path = field(default=Path("scenario.yaml"), metadata={"in_file": False})

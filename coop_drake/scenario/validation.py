@@ -11,6 +11,7 @@ from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.rings import check_workspace
 
 _ROUNDING = 1e-9
+_COARSEST_MAP = 0.01  # An error of T beyond would turn the direction of motion.
 _MAY_BE_ZERO = frozenset({"planner.margin", "planner.slice_overlap"})
 
 
@@ -28,6 +29,8 @@ def validate(scenario: Scenario) -> None:
             raise ScenarioError(file, key, value, kind)
     if scenario.planner.slice_overlap > 1.0:
         raise ScenarioError(file, "planner.slice_overlap", scenario.planner.slice_overlap, "at most 1")
+    if scenario.maps.tolerance >= _COARSEST_MAP:
+        raise ScenarioError(file, "maps.tolerance", scenario.maps.tolerance, f"less than {_COARSEST_MAP:g}")
     if scenario.simulator.accuracy >= 1.0:
         raise ScenarioError(file, "simulator.accuracy", scenario.simulator.accuracy, "less than 1")
     if scenario.gains.selected not in scenario.gains.sets:
@@ -59,6 +62,7 @@ def _positive_numbers(scenario: Scenario) -> Iterator[tuple[str, float]]:
     sections: dict[str, Any] = {
         "goal.tolerances": scenario.goal.tolerances,
         "planner": scenario.planner,
+        "maps": scenario.maps,
         "simulator": scenario.simulator,
         "visualization": scenario.visualization,
     }

@@ -1,4 +1,4 @@
-"""From a plan to a finished run: maps, closed loop, simulation, log."""
+"""From a plan and its maps to a finished run: closed loop, simulation, log."""
 
 from __future__ import annotations
 
@@ -6,10 +6,8 @@ from collections.abc import Callable, Sequence
 
 from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
-from shapely import Point
 
 from coop_drake.diagram import build_closed_loop
-from coop_drake.errors import FieldError
 from coop_drake.fields import HarmonicMap
 from coop_drake.planning.plan import Plan
 from coop_drake.plant import read_component_tree
@@ -20,33 +18,9 @@ from coop_drake.simulation.joint_limits import joint_limits_kept_by_funnels
 from coop_drake.simulation.log import SimulationLog
 from coop_drake.simulation.watch import Watch
 
-__all__ = ["build_maps", "simulate"]
+__all__ = ["simulate"]
 
 Progress = Callable[[str, float], None]
-
-
-def build_maps(
-    plan: Plan, *, tolerance: float = 1e-4, progress: Progress | None = None
-) -> tuple[HarmonicMap, ...]:
-    """Map every cell of a plan to the disk.
-
-    Args:
-        plan: The plan.
-        tolerance: Largest certified residual accepted [-].
-        progress: Told the stage and the fraction done, if given.
-
-    Raises:
-        FieldError: A map cannot be built or its certificate fails; the message names the cell.
-    """
-    maps = []
-    for index, (cell, transition) in enumerate(zip(plan.cells, plan.transitions, strict=True)):
-        try:
-            maps.append(HarmonicMap(cell.tidied, Point(transition.target), tolerance=tolerance))
-        except FieldError as error:
-            raise FieldError(f"cell {index} of {len(plan.cells)}: {error}") from error
-        if progress is not None:
-            progress("mapping", (index + 1) / len(plan.cells))
-    return tuple(maps)
 
 
 def simulate(

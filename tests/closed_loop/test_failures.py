@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from shapely import box
 
-from coop_drake.errors import FieldError
 from coop_drake.planning.plan import Plan
-from coop_drake.simulation import build_maps, simulate, stall
+from coop_drake.simulation import simulate, stall
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_plan import ROOM
 from tests.support.small_scenario import small_scenario
@@ -131,14 +130,3 @@ def test_progress_grows_to_one(problem):
     parts = [part for _, part in told]
     assert parts == sorted(parts)
     assert parts[-1] == 1.0
-
-
-def test_maps_report_progress_and_name_the_cell_that_cannot_be_mapped(problem):
-    _, plan = problem
-    told = []
-    build_maps(plan, progress=lambda stage, part: told.append((stage, part)))
-    assert told == [("mapping", (k + 1) / 3) for k in range(3)]
-    with pytest.raises(FieldError, match="cell 1 of 3: "):
-        build_maps(with_transition(plan, 1, target=np.array([0.1, 0.1])))
-    with pytest.raises(FieldError, match=r"cell 0 of 3: .*certified to"):
-        build_maps(plan, tolerance=1e-17)

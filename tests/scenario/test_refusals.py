@@ -61,6 +61,18 @@ CASES = {
         1e9,
         "between -1e+06 and 1e+06",
     ),
+    "coarse maps": (
+        ("gains:", "maps: {tolerance: 0.1}\ngains:"),
+        "maps.tolerance",
+        0.1,
+        "less than 0.01",
+    ),
+    "maps without error": (
+        ("gains:", "maps: {tolerance: 0}\ngains:"),
+        "maps.tolerance",
+        0.0,
+        "a positive number",
+    ),
     "coarse accuracy": (
         ("gains:", "simulator: {accuracy: 1}\ngains:"),
         "simulator.accuracy",

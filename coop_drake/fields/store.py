@@ -1,0 +1,178 @@
+"""Solved maps on disk, found again by what they are maps of."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import platform
+import zipfile
+import zlib
+from contextlib import suppress
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely import Point, Polygon
+
+from coop_drake.fields.certificate import MapCertificate
+from coop_drake.fields.harmonic_map import HarmonicMap, Solution
+from coop_drake.fields.layers import MapArrays
+from coop_drake.files import write_atomically
+
+__all__ = ["MapStore"]
+
+_SUFFIX = ".map.npz"
+_DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
+
+
+class MapStore:
+    """A folder of solved maps.
+
+    A file is named by a digest of the domain, the goal, the tolerance and of all that computes: the source of
+    this package and the versions of its libraries. A map is therefore never older than the code, and what is
+    read is bit by bit what was solved. Files are written whole or not at all, so any number of processes and
+    threads may share a folder. A damaged file, or one of another question, counts as missing and is replaced.
+    Where the folder cannot be written the maps are solved all the same.
+
+    Args:
+        folder: Where the files lie; it is made when the first map is kept.
+        limit: Above so many bytes, maps that were not used for longest are forgotten by `trim`.
+    """
+
+    def __init__(self, folder: Path, *, limit: int = 500_000_000) -> None:
+        self.folder = folder
+        self.limit = limit
+        self._found, self._lock = 0, Lock()
+
+    @property
+    def found(self) -> int:
+        """How many maps were read instead of solved."""
+        return self._found
+
+    def map_of(self, domain: Polygon, goal: Point | Polygon, *, tolerance: float) -> HarmonicMap:
+        """Read a map, or solve and keep it.
+
+        Args:
+            domain: The cell [m].
+            goal: Point to reach, or region to collapse [m].
+            tolerance: Largest error of T that is accepted.
+
+        Raises:
+            FieldError: As `HarmonicMap` does.
+        """
+        key = _key(domain, goal, tolerance)
+        path = self.folder / (key + _SUFFIX)
+        solution = _read(path, key)
+        if solution is not None:
+            with self._lock:
+                self._found += 1
+            return HarmonicMap.from_solution(domain, goal, solution)
+        harmonic_map = HarmonicMap(domain, goal, tolerance=tolerance)
+        _write(path, key, harmonic_map.solution)
+        return harmonic_map
+
+    def files(self) -> list[Path]:
+        """Its files, the one used last at the end."""
+        return [path for _, _, path in self._by_age()]
+
+    def size(self) -> int:
+        """Bytes that it takes."""
+        return sum(size for _, size, _ in self._by_age())
+
+    def trim(self) -> None:
+        """Forget maps that were not used for longest until the rest keeps within the limit."""
+        files = self._by_age()
+        total = sum(size for _, size, _ in files)
+        for _, size, path in files:
+            if total <= self.limit:
+                break
+            with suppress(OSError):
+                path.unlink()
+            total -= size
+
+    def clear(self) -> int:
+        """Forget all maps; returns how many there were."""
+        files = self.files()
+        for path in files:
+            path.unlink(missing_ok=True)
+        return len(files)
+
+    def _by_age(self) -> list[tuple[int, int, Path]]:
+        """(time of last use, size, path) of every file, oldest first."""
+        rows = []
+        for path in self.folder.glob("*" + _SUFFIX):
+            try:
+                status = path.stat()
+            except FileNotFoundError:  # another process was quicker to forget it
+                continue
+            rows.append((status.st_mtime_ns, status.st_size, path))
+        return sorted(rows)
+
+
+def _key(domain: Polygon, goal: Point | Polygon, tolerance: float) -> str:
+    digest = hashlib.sha256(_code())
+    for part in (shapely.to_wkb(domain), shapely.to_wkb(goal), repr(float(tolerance)).encode()):
+        digest.update(len(part).to_bytes(8, "big") + part)
+    return digest.hexdigest()
+
+
+@cache
+def _code() -> bytes:
+    """Digest of everything that the numbers in a map depend on, but for the question."""
+    digest = hashlib.sha256()
+    for path in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(path.name.encode() + b"\0" + path.read_bytes())
+    for name in ("numpy", "scipy", "numba", "shapely"):
+        digest.update(f"{name} {version(name)}".encode())
+    digest.update(f"{platform.machine()} {platform.system()}".encode())
+    return digest.digest()
+
+
+def _read(path: Path, key: str) -> Solution | None:
+    """A solution as it was written; None if there is none, or if it is damaged."""
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
+            if file["key"].item() != key:
+                return None
+            solution = Solution(
+                arrays=MapArrays(**{name: file[f"arrays.{name}"] for name in MapArrays._fields}),
+                centre=file["centre"],
+                rounding=file["rounding"].item(),
+                goal_image=file["goal_image"],
+                certificate=_certificate(file["certificate"].item()),
+            )
+        path.touch()  # used just now
+    except _DAMAGE:
+        return None
+    return solution
+
+
+def _write(path: Path, key: str, solution: Solution) -> None:
+    """Keep a solution; a folder that cannot be written keeps nothing."""
+    entries: dict[str, Any] = {f"arrays.{name}": value for name, value in solution.arrays._asdict().items()}
+    entries.update(
+        key=key,
+        centre=solution.centre,
+        rounding=solution.rounding,
+        goal_image=solution.goal_image,
+        certificate=_text(solution.certificate),
+    )
+    with suppress(OSError):
+        write_atomically(path, lambda file: np.savez(file, **entries))
+
+
+def _text(certificate: MapCertificate) -> str:
+    values = dataclasses.asdict(certificate)
+    return json.dumps({k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values.items()})
+
+
+def _certificate(text: str) -> MapCertificate:
+    values: dict[str, Any] = json.loads(text)
+    for name, value in values.items():
+        values[name] = np.array(value) if isinstance(value, list) else value
+    return MapCertificate(**values)

@@ -1,0 +1,67 @@
+"""The harmonic maps of a plan, side by side on all cores."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+from shapely import Point
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+from coop_drake.errors import FieldError
+from coop_drake.fields import HarmonicMap, MapStore
+from coop_drake.planning.plan import Plan
+
+__all__ = ["TOLERANCE", "build_maps"]
+
+TOLERANCE = 1e-8
+"""Largest certified error of a map that is accepted, if none is given; a scenario's is ``maps.tolerance``."""
+
+
+def build_maps(
+    plan: Plan,
+    *,
+    tolerance: float = TOLERANCE,
+    store: MapStore | None = None,
+    workers: int | None = None,
+    progress: Callable[[str, float], None] | None = None,
+) -> tuple[HarmonicMap, ...]:
+    """Map every cell of a plan to the disk.
+
+    Every map is solved on one thread, whatever the number of workers: the result is the same to the last bit.
+
+    Args:
+        plan: The plan.
+        tolerance: Largest certified error accepted [-].
+        store: Where maps are looked up first and kept; by default all are solved.
+        workers: How many maps are solved at the same time; by default as many as there are cores.
+        progress: Told the stage and the fraction done, if given.
+
+    Raises:
+        FieldError: A map cannot be built or its certificate fails; the message names the cell.
+    """
+
+    def solve(index: int) -> HarmonicMap:
+        cell, target = plan.cells[index].tidied, Point(plan.transitions[index].target)
+        if store is not None:
+            return store.map_of(cell, target, tolerance=tolerance)
+        return HarmonicMap(cell, target, tolerance=tolerance)
+
+    maps: list[HarmonicMap] = []
+    count = len(plan.cells)
+    pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
+    with threadpool_limits(1, user_api="blas"):
+        try:
+            for index, future in enumerate([pool.submit(solve, k) for k in range(count)]):
+                try:
+                    maps.append(future.result())
+                except FieldError as error:
+                    raise FieldError(f"cell {index} of {count}: {error}") from error
+                if progress is not None:
+                    progress("mapping", (index + 1) / count)
+        finally:
+            pool.shutdown(cancel_futures=True)
+    if store is not None and store.found < count:
+        store.trim()
+    return tuple(maps)
