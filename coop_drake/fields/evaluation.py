@@ -18,7 +18,7 @@ from coop_drake.fields.density import REFINED_NODES
 from coop_drake.fields.layers import LEVELS, MapArrays
 from coop_drake.fields.quadrature import FloatArray, gauss_nodes
 
-__all__ = ["evaluate_many", "evaluate_one", "velocity_at"]
+__all__ = ["evaluate_many", "evaluate_one", "velocities_at", "velocity_at"]
 
 _FAR = 2.2**2  # |zeta|^2 beyond which the solved nodes do
 _NEAR = 2.9  # |zeta - 1| + |zeta + 1| below which the Legendre functions are needed
@@ -298,3 +298,16 @@ def velocity_at(
         speed = max_speed * min(1.0, remaining / radius)
         velocity[0], velocity[1] = speed * dx / norm, speed * dy / norm
     return velocity
+
+
+@compiled
+def velocities_at(
+    arrays: MapArrays, points: FloatArray, rounding: float,
+    goal: FloatArray, image: FloatArray, radius: float, max_speed: float,
+) -> FloatArray:  # fmt: skip
+    """The same at many points (n, 2)."""
+    velocities = np.empty((len(points), 2))
+    for i in range(len(points)):
+        x, y = points[i, 0], points[i, 1]
+        velocities[i] = velocity_at(arrays, x, y, rounding, goal, image, radius, max_speed)
+    return velocities

@@ -5,13 +5,14 @@ from __future__ import annotations
 from math import pi, sqrt
 
 import numpy as np
-import shapely
 from numpy.typing import ArrayLike
 from shapely import Point
 
-from coop_drake.fields.evaluation import velocity_at
+from coop_drake.fields.evaluation import velocities_at, velocity_at
 from coop_drake.fields.harmonic_map import HarmonicMap
+from coop_drake.fields.points import as_points
 from coop_drake.fields.quadrature import FloatArray
+from coop_drake.geometry.boundary import edges_of
 
 __all__ = ["VelocityField"]
 
@@ -20,8 +21,14 @@ class VelocityField:
     """Where to go, and how fast at most: the pulled-back straight line to the goal's image, eq. (13).
 
     The direction is that of J^-1 (q_d - T), computed as adj(J) (q_d - T) so that crowded places do no harm.
-    The speed is max_speed * min(1, distance / slowdown_radius): near the goal proportional to the remaining
-    distance. It is zero in a goal region.
+    The speed is max_speed * min(1, distance / slowdown_radius): at most max_speed everywhere, near the goal
+    proportional to the remaining distance, zero in a goal region.
+
+    A streamline's image runs straight to q_d, so it never reaches a wall, and from almost everywhere it
+    arrives. Along it the field is Lipschitz: it is smooth in the interior but at the goal's edge, where the
+    speed has a kink. It is not near a vertex that juts into the cell, round which the direction turns within
+    any distance however small. Where a hole collapses, the streamlines that meet it form two lines at most
+    that do not arrive, and those beside them linger; in a domain without holes there are none.
     Points outside the map's region get the direction of the nearest boundary point, never NaN.
 
     Args:
@@ -34,32 +41,35 @@ class VelocityField:
     def __init__(
         self, harmonic_map: HarmonicMap, max_speed: float = 1.0, *, slowdown_radius: float | None = None
     ) -> None:
+        self.harmonic_map = harmonic_map
         self.max_speed = float(max_speed)
         goal = harmonic_map.goal
-        self._arrays, centre, self._rounding = harmonic_map.kernel_arguments
+        self._arrays, self._centre, self._rounding = harmonic_map.kernel_arguments
         if isinstance(goal, Point):
-            corners = np.array(goal.coords) - centre
             default = 0.5 * harmonic_map.region.boundary.distance(goal)
-            self._goal = np.hstack((corners, corners))
+            edges = np.tile(np.array(goal.coords)[:, :2], 2)
         else:
-            corners = np.asarray(shapely.orient_polygons(goal).exterior.coords) - centre
             default = 0.5 * sqrt(goal.area / pi)
-            self._goal = np.hstack((corners[:-1], corners[1:]))
+            edges = edges_of(goal)
+        self._goal = edges - np.tile(self._centre, 2)
         self.slowdown_radius = default if slowdown_radius is None else float(slowdown_radius)
-        self._x, self._y = float(centre[0]), float(centre[1])
         self._image = harmonic_map.goal_image
 
-    def __call__(self, point: ArrayLike) -> FloatArray:
-        """Velocity at one point.
+    def __call__(self, points: ArrayLike) -> FloatArray:
+        """Velocity at one point or at many.
 
         Args:
-            point: p in W, shape (2,) [m].
+            points: p in W, shape (..., 2) [m].
 
         Returns:
-            Velocity in W, shape (2,) [m/s].
+            Velocity in W, shape (..., 2) [m/s].
+
+        Raises:
+            FieldError: If the points have another shape or are not finite.
         """
-        x, y = np.asarray(point, dtype=float).tolist()
-        return velocity_at(
-            self._arrays, x - self._x, y - self._y, self._rounding,
-            self._goal, self._image, self.slowdown_radius, self.max_speed,
-        )  # fmt: skip
+        p = as_points(points) - self._centre
+        rest = (self._rounding, self._goal, self._image, self.slowdown_radius, self.max_speed)
+        if p.ndim == 1:
+            x, y = p.tolist()
+            return velocity_at(self._arrays, x, y, *rest)
+        return velocities_at(self._arrays, p.reshape(-1, 2), *rest).reshape(p.shape)

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
-from shapely import Polygon, box
+from shapely import Point, Polygon, box
 
-from coop_drake.fields import HarmonicMap, VelocityField
+from coop_drake.errors import FieldError
+from coop_drake.fields import HarmonicMap, VelocityField, trace_streamlines
 from tests.support import domains
 
 
@@ -75,3 +76,21 @@ def test_field_is_zero_in_a_goal_region_and_points_to_it_outside():
     assert 0.0 < np.hypot(*field([2.5 - 1e-4, 0.9])) < 1e-3
     assert field([2.4, 0.9])[0] > 0.0
     assert np.hypot(*field([1.0, 1.0])) == pytest.approx(1.0)
+
+
+def test_many_points_get_what_each_gets(harmonic_map):
+    field = VelocityField(harmonic_map, max_speed=0.6)
+    points = domains.inside(harmonic_map.region, 40)
+    np.testing.assert_array_equal(field(points), [field(p) for p in points])
+    assert field(points[:6].reshape(2, 3, 2)).shape == (2, 3, 2)
+    with pytest.raises(FieldError, match="shape"):
+        field([1.0, 2.0, 3.0])
+
+
+def test_inside_of_a_frame_is_not_in_the_goal():
+    frame = box(0.5, 0.2, 3.5, 1.8).difference(box(1, 0.6, 3, 1.4))
+    field = VelocityField(HarmonicMap(box(0, 0, 4, 2), frame, inside=Point(2, 1)))
+    assert np.hypot(*field([2.0, 1.0])) > 0.5
+    assert (field([0.8, 1.0]) == 0.0).all()
+    starts = domains.inside(box(1, 0.6, 3, 1.4), 100)
+    assert trace_streamlines(field, starts).arrived.all()
