@@ -2,7 +2,8 @@
 
 from coop_drake.fields.certificate import MapCertificate
 from coop_drake.fields.harmonic_map import HarmonicMap
+from coop_drake.fields.store import MapStore
 from coop_drake.fields.streamlines import Streamlines, trace_streamlines
 from coop_drake.fields.velocity_field import VelocityField
 
-__all__ = ["HarmonicMap", "MapCertificate", "Streamlines", "VelocityField", "trace_streamlines"]
+__all__ = ["HarmonicMap", "MapCertificate", "MapStore", "Streamlines", "VelocityField", "trace_streamlines"]
