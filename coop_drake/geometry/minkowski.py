@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from manifold3d import CrossSection, FillRule
@@ -12,7 +13,7 @@ from shapely.geometry.polygon import orient
 from coop_drake.geometry.convex import following
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.safeguards import checked_buffer, second_opinion
-from coop_drake.geometry.sum_kernels import edge_sums
+from coop_drake.geometry.sum_kernels import fitting_cycles
 
 SAFE_SIDE = 1e-6
 """How far a workspace is shrunk or grown once [m]: a hundred times the clipping library's grid."""
@@ -21,9 +22,10 @@ SAFE_SIDE = 1e-6
 class FreeSpace:
     """A workspace that footprints are subtracted from; it may be non-convex and may have holes.
 
-    A connected footprint F at p lies inside W exactly if one of its points does and it meets no edge e of W,
-    so ``W - F = (W - f) minus the union of e + (-F)`` for any f in F. Convex F makes every ``e + (-F)``
-    convex. All contours go into one clipping pass: the workspace winds once, each edge's sum unwinds.
+    The convolution of W's boundary with -F winds once around p where p + F lies inside W, and otherwise
+    1 - n times, n the number of pieces of p + F beyond the walls: positions with a positive winding number
+    are those of the difference. Only a part of W that lies inside p + F would count as free, so parts that
+    are smaller than F are left out. One clipping pass does all.
 
     Where the clipping library fails, what is called free is too small and what is not called blocked too
     large: nothing stands in for an under-space, another library's answer or a box for an over-space.
@@ -33,22 +35,26 @@ class FreeSpace:
         over: Whether positions that are left out are called blocked; else those that are kept, free.
 
     Attributes:
-        region: The workspace itself.
         edges: Its edges (x0, y0, x1, y1), shape (E, 4) [m].
     """
 
     def __init__(self, rings: Sequence[FloatArray], *, over: bool = False) -> None:
-        self.rings, self._over = tuple(rings), over
-        self.region = CrossSection(list(self.rings), FillRule.Positive)
+        self.rings, self._over = tuple(map(_without_repeats, rings)), over
         tails = [following(ring) for ring in self.rings]
         starts = np.concatenate(self.rings) if self.rings else np.empty((0, 2))
         ends = np.concatenate(tails) if tails else np.empty((0, 2))
         self.edges = np.hstack((starts, ends))
         self._lower = starts.min(axis=0, initial=np.inf)
         self._upper = starts.max(axis=0, initial=-np.inf)
-        along = ends - starts
-        doubled = float((starts[:, 0] * along[:, 1] - starts[:, 1] * along[:, 0]).sum())
-        self._most_area = 0.5 * doubled + SAFE_SIDE * float(np.hypot(*along.T).sum())
+        self._points = np.ascontiguousarray(starts, dtype=float)
+        self._first = np.cumsum([0, *map(len, self.rings)])
+        areas = [_area(ring) for ring in self.rings]
+        rooms = [
+            np.ptp(ring, axis=0) if area > 0.0 else (np.inf, np.inf)
+            for ring, area in zip(self.rings, areas, strict=True)
+        ]
+        self._rooms = np.array(rooms, dtype=float).reshape(-1, 2)
+        self._most_area = sum(areas) + SAFE_SIDE * float(np.hypot(*(ends - starts).T).sum())
 
     @classmethod
     def under(cls, workspace: Polygon | MultiPolygon) -> FreeSpace:
@@ -75,9 +81,11 @@ class FreeSpace:
         return self._stand_in(footprint) if self._over else CrossSection()
 
     def _clipped(self, footprint: FloatArray) -> CrossSection:
-        contours = [ring - footprint[0] for ring in self.rings]
-        contours.extend(edge_sums(self.edges, -footprint))
-        return CrossSection(contours, FillRule.Positive)
+        convex = np.ascontiguousarray(footprint, dtype=float)
+        drawn, first = fitting_cycles(self._points, self._first, self._rooms, convex)
+        places = first.tolist()
+        cycles = [drawn[a:b] for a, b in pairwise(places) if a < b]
+        return CrossSection(cycles, FillRule.Positive)
 
     def _plausible(self, found: CrossSection, start: FloatArray) -> bool:
         """Whether a difference lies where it must; one that blocks everything is always asked about again."""
@@ -92,6 +100,19 @@ class FreeSpace:
         """The difference as another library sees it, or a box that holds every position there can be."""
         rings = second_opinion(self.rings, self.edges.reshape(-1, 2, 2), footprint)
         return CrossSection(rings, FillRule.Positive)
+
+
+def _without_repeats(ring: FloatArray) -> FloatArray:
+    """The ring without vertices that repeat the one before."""
+    distinct: FloatArray = np.asarray(ring, dtype=float)[(ring != following(ring)).any(axis=1)]
+    return distinct
+
+
+def _area(ring: FloatArray) -> float:
+    """Area that a ring encloses, negative where it runs clockwise [m^2]."""
+    points = ring - ring[:1]
+    tail = following(points)
+    return 0.5 * float((points[:, 0] * tail[:, 1] - points[:, 1] * tail[:, 0]).sum())
 
 
 def polygon_rings(shape: Polygon | MultiPolygon) -> list[FloatArray]:

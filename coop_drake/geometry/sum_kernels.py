@@ -1,4 +1,4 @@
-"""Compiled Minkowski sums of wall edges with a convex polygon."""
+"""Compiled cycles that wind once around the positions at which a convex footprint fits between walls."""
 
 from __future__ import annotations
 
@@ -6,54 +6,81 @@ import numba
 import numpy as np
 
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.sweep_kernels import IntArray
+
+_NEEDLE = 1e-12
 
 
 @numba.njit(cache=True)
-def edge_sums(edges: FloatArray, convex: FloatArray) -> FloatArray:
-    """Sums of every edge with a convex ring, clockwise.
+def fitting_cycles(
+    points: FloatArray, first: IntArray, rooms: FloatArray, convex: FloatArray
+) -> tuple[FloatArray, IntArray]:
+    """Trace every ring with the footprint's vertex that lies furthest out: the reduced convolution with -F.
 
-    Vertices between two sides that lead the same way along e shift to the same end of e; at the two others
-    the ring opens and takes e in. Repeated vertices fill up shorter rings, and do no harm.
+    Along an edge the vertex v furthest beyond it draws the edge, shifted by -v. Where the floor is not
+    convex the vertices in between follow one by one, clockwise; where it is convex the ends are joined, for
+    whatever else the full convolution would draw there lies where the corner is inside the footprint.
 
     Args:
-        edges: Edges (x0, y0, x1, y1), shape (E, 4) [m].
-        convex: Convex ring, counter-clockwise, shape (n, 2) [m].
+        points: Vertices of all rings, outer ones counter-clockwise, holes clockwise, none twice in a row,
+            shape (E, 2) [m].
+        first: Where each ring begins, shape (R + 1,).
+        rooms: Widths in x and y of what a ring encloses, shape (R, 2): a ring with less room than F needs is
+            left out [m].
+        convex: Convex ring F, counter-clockwise, shape (n, 2) [m].
 
     Returns:
-        Rings, shape (E, m, 2), m = n + 2 unless sides are nearly parallel to edges [m].
+        Vertices of the cycles, shape (V, 2) [m], and where each begins, shape (R + 1,); none of small rings.
     """
-    count = len(convex)
-    sums = np.empty((len(edges), 2 * count, 2))
-    first = np.empty(len(edges), dtype=np.int64)
-    for e in range(len(edges)):
-        dx, dy = edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1]
-        left = 2 * count
-        before = _leads(convex, count - 1, dx, dy)
-        for i in range(count):
-            after = _leads(convex, i, dx, dy)
-            left = _placed(sums[e], left, convex[i], edges[e], before)
-            if before != after:
-                left = _placed(sums[e], left, convex[i], edges[e], after)
-            before = after
-        first[e] = left
-    least = first.min() if len(edges) > 0 else 0
-    for e in range(len(edges)):
-        for i in range(least, first[e]):
-            sums[e, i] = sums[e, first[e]]
-    return sums[:, least:]
+    furthest = _furthest(points, first, convex)
+    starts = np.zeros(len(first), np.int64)
+    drawn = np.empty((0, 2))
+    x, y = np.ptp(convex[:, 0]), np.ptp(convex[:, 1])
+    for writing in range(2):
+        size = 0
+        for r in range(len(first) - 1):
+            before = first[r + 1] - 1
+            small = rooms[r, 0] <= x and rooms[r, 1] <= y
+            for i in range(first[r], first[r] if small else first[r + 1]):
+                after = i + 1 if i + 1 < first[r + 1] else first[r]
+                k, last = furthest[before], furthest[i]
+                turn = _bends_in(points[before], points[i], points[after])
+                while True:
+                    if writing == 1:
+                        drawn[size, 0] = points[i, 0] - convex[k, 0]
+                        drawn[size, 1] = points[i, 1] - convex[k, 1]
+                    size += 1
+                    if k == last:
+                        break
+                    k = (k if k > 0 else len(convex)) - 1 if turn else last
+                before = i
+            starts[r + 1] = size
+        if writing == 0:
+            drawn = np.empty((size, 2))
+    return drawn, starts
 
 
 @numba.njit(cache=True)
-def _leads(convex: FloatArray, i: int, dx: float, dy: float) -> bool:
-    """Whether the side from vertex i to the next one lies ahead along an edge."""
-    k = i + 1 if i + 1 < len(convex) else 0
-    ahead: bool = dx * (convex[k, 1] - convex[i, 1]) - dy * (convex[k, 0] - convex[i, 0]) > 0.0
-    return ahead
+def _furthest(points: FloatArray, first: IntArray, convex: FloatArray) -> IntArray:
+    """Vertex of the footprint that lies furthest out beyond each edge, shape (E,)."""
+    furthest = np.zeros(len(points), np.int64)
+    for r in range(len(first) - 1):
+        for i in range(first[r], first[r + 1]):
+            after = i + 1 if i + 1 < first[r + 1] else first[r]
+            x, y = points[after, 1] - points[i, 1], points[i, 0] - points[after, 0]
+            most = -np.inf
+            for k in range(len(convex)):
+                out = x * convex[k, 0] + y * convex[k, 1]
+                if out > most:
+                    most, furthest[i] = out, k
+    return furthest
 
 
 @numba.njit(cache=True)
-def _placed(ring: FloatArray, left: int, vertex: FloatArray, edge: FloatArray, head: bool) -> int:
-    """Put a vertex, shifted to the edge's head or tail, before the last ones; returns the places left."""
-    end = 2 if head else 0
-    ring[left - 1, 0], ring[left - 1, 1] = vertex[0] + edge[end], vertex[1] + edge[end + 1]
-    return left - 1
+def _bends_in(before: FloatArray, here: FloatArray, after: FloatArray) -> bool:
+    """Whether a wall's corner points into the floor; a needle counts for one, which blocks no more."""
+    ax, ay = here[0] - before[0], here[1] - before[1]
+    bx, by = after[0] - here[0], after[1] - here[1]
+    cross, dot = ax * by - ay * bx, ax * bx + ay * by
+    bends: bool = cross <= 0.0 or (dot < 0.0 and cross <= -_NEEDLE * dot)
+    return bends

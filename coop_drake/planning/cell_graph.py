@@ -6,11 +6,14 @@ import heapq
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-
-import networkx as nx
+from math import inf
+from typing import TYPE_CHECKING
 
 from coop_drake.planning.cells import Region
 from coop_drake.planning.slices import Slices
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 
 class Kind(IntEnum):
@@ -34,7 +37,8 @@ class Cell:
         kind: What is known about it.
         region: Positions p_WL.
         weight: Cost of passing through.
-        joined: Cells that a path may step to, None until a search asks.
+        beside: Cells of neighbouring slices whose bounds meet this one's, None until a search asks.
+        tested: By index, whether this region meets that of a cell, as far as a search had to know.
     """
 
     index: int
@@ -42,7 +46,7 @@ class Cell:
     kind: Kind
     region: Region
     weight: float
-    joined: list[Cell] | None = None
+    beside: list[Cell] | None = None
     tested: dict[int, bool] = field(default_factory=dict)
 
 
@@ -60,39 +64,45 @@ class CellGraph:
 
     def add(self, index: int, members: Sequence[tuple[Kind, Region, float]]) -> None:
         """Put the cells (kind, region, weight) of a new leaf into the graph."""
+        self._unsettle(index)
         first = len(self.cells)
         made = [
             Cell(first + i, index, kind, region, weight) for i, (kind, region, weight) in enumerate(members)
         ]
         self.cells += made
         self.by_slice[index] = made
-        for other in self._slices.all[index].neighbours:
-            for cell in self.by_slice.get(other, ()):
-                cell.joined = None
 
     def remove(self, index: int) -> None:
         """Forget the cells of a slice that is about to be halved."""
+        self._unsettle(index)
         for cell in self.by_slice.pop(index):
             for other in cell.tested:
                 self.cells[other].tested.pop(cell.index, None)
-                self.cells[other].joined = None
-            cell.joined, cell.tested = None, {}
+            cell.beside, cell.tested = None, {}
 
-    def forbid(self, first: Cell, second: Cell) -> None:
-        """Remove the edge between two cells."""
-        first.tested[second.index] = second.tested[first.index] = False
-        first.joined = second.joined = None
+    def _unsettle(self, index: int) -> None:
+        """Let the cells around a slice look for their neighbours anew."""
+        for other in self._slices.all[index].neighbours:
+            for cell in self.by_slice.get(other, ()):
+                cell.beside = None
 
     def neighbours(self, cell: Cell) -> list[Cell]:
         """Cells of neighbouring slices whose regions meet this one's, in a fixed order."""
-        if cell.joined is None:
-            cell.joined = [
+        return [other for other in self._beside(cell) if self._meet(cell, other)]
+
+    def _beside(self, cell: Cell) -> list[Cell]:
+        if cell.beside is None:
+            west, south, east, north = cell.region.bounds
+            cell.beside = [
                 other
                 for index in sorted(self._slices.all[cell.slice].neighbours)
                 for other in self.by_slice[index]
-                if self._meet(cell, other)
+                if (bounds := other.region.bounds)[0] <= east
+                and bounds[2] >= west
+                and bounds[1] <= north
+                and bounds[3] >= south
             ]
-        return cell.joined
+        return cell.beside
 
     @staticmethod
     def _meet(cell: Cell, other: Cell) -> bool:
@@ -122,9 +132,10 @@ class CellGraph:
                 continue
             if index in goals:
                 return self._trace(back, index)
-            for other in self.neighbours(self.cells[index]):
+            cell = self.cells[index]
+            for other in self._beside(cell):
                 through = cost + other.weight
-                if through < best.get(other.index, float("inf")):
+                if through < best.get(other.index, inf) and self._meet(cell, other):
                     best[other.index], back[other.index] = through, index
                     heapq.heappush(queue, (through, other.index))
         return None
@@ -137,6 +148,8 @@ class CellGraph:
 
     def as_networkx(self) -> nx.Graph[int]:
         """The whole graph; nodes carry ``slice``, ``kind``, ``intervals`` and ``region``."""
+        import networkx as nx  # The planner does without it, and its plans need not wait for it.
+
         graph: nx.Graph[int] = nx.Graph()
         for index in sorted(self.by_slice):
             for cell in self.by_slice[index]:

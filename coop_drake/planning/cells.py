@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,6 +17,8 @@ from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 
 _NEGLIGIBLE_AREA = 1e-9
+
+_ComponentRegion = Callable[[int, Intervals], CrossSection | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,8 +106,8 @@ class CellMaker:
             for c in range(len(swept.tree.components))
         ]
         self._axes = [swept.pieces[members[0]].axes if members else () for members in self._members]
-        self._under: dict[tuple[object, ...], CrossSection] = {}
-        self._over: dict[tuple[object, ...], CrossSection] = {}
+        self._under: dict[tuple[object, ...], CrossSection | None] = {}
+        self._over: dict[tuple[object, ...], CrossSection | None] = {}
 
     def _positions(self, workspace: Polygon | MultiPolygon) -> CrossSection:
         """A box that holds every position worth asking about."""
@@ -117,12 +120,7 @@ class CellMaker:
         """Regions outside which no configuration of the nominal slice is free."""
         if self._pairs.overlapping(intervals) is not None:
             return []
-        region = self._everywhere
-        for component in range(len(self._members)):
-            region = region ^ self._over_component(component, intervals)
-            if region.is_empty():
-                return []
-        return _regions(region, 0.0)
+        return _regions(self._common(self._over_component, intervals), 0.0)
 
     def under_cells(self, expanded: Intervals) -> list[Region]:
         """Regions in which every configuration of the expanded slice is free."""
@@ -141,36 +139,47 @@ class CellMaker:
 
     def under_region(self, expanded: Intervals) -> CrossSection:
         """Positions at which the over-footprint fits, self-collision aside."""
-        region = self._everywhere
-        for component in reversed(range(len(self._members))):
-            region = region ^ self._under_component(component, expanded)
-            if region.is_empty():
-                return region
-        return region
+        return self._common(self._under_component, expanded)
 
-    def _under_component(self, component: int, expanded: Intervals) -> CrossSection:
+    def _common(
+        self, of: Callable[[int, Intervals], CrossSection | None], intervals: Intervals
+    ) -> CrossSection:
+        """What the positions for all components share; everywhere if none says anything."""
+        region: CrossSection | None = None
+        for component in reversed(range(len(self._members))):
+            region = _shared(region, of(component, intervals))
+            if region is not None and region.is_empty():
+                return region
+        return self._everywhere if region is None else region
+
+    def _under_component(self, component: int, expanded: Intervals) -> CrossSection | None:
         key = (component, *[expanded[axis] for axis in self._axes[component]])
-        found = self._under.get(key)
-        if found is None:
-            found = self._everywhere
+        if key not in self._under:
+            found: CrossSection | None = None
             for index in self._members[component]:
-                found = found ^ self._under_space.minus(self._swept.over(index, expanded))
-                if found.is_empty():
+                found = _shared(found, self._under_space.minus(self._swept.over(index, expanded)))
+                if found is not None and found.is_empty():
                     break
             self._under[key] = found
-        return found
+        return self._under[key]
 
-    def _over_component(self, component: int, intervals: Intervals) -> CrossSection:
+    def _over_component(self, component: int, intervals: Intervals) -> CrossSection | None:
         key = (component, *[intervals[axis] for axis in self._axes[component]])
-        found = self._over.get(key)
-        if found is None:
-            found = self._everywhere
+        if key not in self._over:
+            found: CrossSection | None = None
             for index in self._members[component]:
                 footprint = self._swept.under(index, intervals)
                 if footprint is not None:
-                    found = found ^ self._over_space.minus(footprint)
+                    found = _shared(found, self._over_space.minus(footprint))
             self._over[key] = found
-        return found
+        return self._over[key]
+
+
+def _shared(first: CrossSection | None, second: CrossSection | None) -> CrossSection | None:
+    """What two regions share; None stands for everywhere."""
+    if first is None or second is None:
+        return second if first is None else first
+    return first ^ second
 
 
 def _regions(section: CrossSection, smallest: float) -> list[Region]:

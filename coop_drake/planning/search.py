@@ -66,13 +66,15 @@ class _Search:
         blocked, self._goal_slices = blocked_goal(self._problem)
         if blocked:
             return self._refuted("the team collides at the goal pose whatever its free joints", blocked)
-        chain = self._sampled(_TRIES - 1)
         budget = self._problem.settings.max_slices
-        doubted = chain is None and self._attempts.object_blocked >= _OBJECT_TRIES
-        share = min(_FIRST_SHARE, budget)
-        if chain is None:
-            chain = self._squeezed(min(_SHORT_SHARE, budget), robots=0 if doubted else None)
-        if chain is None and doubted:
+        share, short = min(_FIRST_SHARE, budget), min(_SHORT_SHARE, budget)
+        doubted = self._attempts.object_blocked > 0
+        if not doubted or self._explored(short, robots=0) is not Verdict.INFEASIBLE:
+            chain = self._sampled(_TRIES - 1)
+            doubted = chain is None and self._attempts.object_blocked >= _OBJECT_TRIES
+        if chain is None and self._proofs.refutation is None:
+            chain = self._squeezed(short, robots=0 if doubted else None)
+        if chain is None and doubted and self._proofs.refutation is None:
             self._explored(budget // _OBJECT_SHARE, robots=0)
         while chain is None:
             verdict = self._explored(share)
@@ -96,7 +98,7 @@ class _Search:
             if chain is not None:
                 self._first = process_time() - self._began
                 return chain
-            if self._attempts.object_blocked >= _OBJECT_TRIES and not self._proofs.slices:
+            if self._attempts.object_blocked == _OBJECT_TRIES:
                 return None
         return None
 
