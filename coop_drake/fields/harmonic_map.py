@@ -80,8 +80,8 @@ class HarmonicMap:
         inside: Point | None = None,
     ) -> None:
         self._goal = goal
-        self._region, target = region_to_map(domain, goal, inside)
-        self._solution = _solve(outline_of(self._region, target), target, tolerance)
+        self._region, self._target = region_to_map(domain, goal, inside)
+        self._solution = _solve(outline_of(self._region, self._target), self._target, tolerance)
 
     @classmethod
     def from_solution(
@@ -90,7 +90,7 @@ class HarmonicMap:
         """The map that was solved before with these arguments, without solving it again."""
         harmonic_map = cls.__new__(cls)
         harmonic_map._goal = goal
-        harmonic_map._region, _ = region_to_map(domain, goal, inside)
+        harmonic_map._region, harmonic_map._target = region_to_map(domain, goal, inside)
         harmonic_map._solution = solution
         return harmonic_map
 
@@ -120,6 +120,11 @@ class HarmonicMap:
     def goal(self) -> Point | Polygon:
         """The goal as it was given [m]."""
         return self._goal
+
+    @property
+    def target(self) -> Point | Polygon:
+        """What goes to the goal's image: the goal, or the pole of a goal region that cannot collapse [m]."""
+        return self._target
 
     @property
     def goal_image(self) -> FloatArray:

@@ -34,10 +34,10 @@ class MapStore:
     """A folder of solved maps.
 
     A file is named by a digest of the domain, the goal, the tolerance and of all that computes: the source of
-    this package and the versions of its libraries. A map is therefore never older than the code, and what is
-    read is bit by bit what was solved. Files are written whole or not at all, so any number of processes and
-    threads may share a folder. A damaged file, or one of another question, counts as missing and is replaced.
-    Where the folder cannot be written the maps are solved all the same.
+    maps and shapes and the versions of their libraries. A map is therefore never older than the code, and
+    what is read is bit by bit what was solved. Files are written whole or not at all, so any number of
+    processes and threads may share a folder. A damaged file, or one of another question, counts as missing
+    and is replaced. Where the folder cannot be written the maps are solved all the same.
 
     Args:
         folder: Where the files lie; it is made when the first map is kept.
@@ -125,7 +125,8 @@ def _key(domain: Polygon, goal: Point | Polygon, tolerance: float) -> str:
 def _code() -> bytes:
     """Digest of everything that the numbers in a map depend on, but for the question."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    here = Path(__file__).parent
+    for path in sorted([*here.glob("*.py"), *here.with_name("geometry").glob("*.py")]):
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     for name in ("numpy", "scipy", "numba", "shapely"):
         digest.update(f"{name} {version(name)}".encode())
