@@ -1,27 +1,33 @@
 import numpy as np
+import pytest
+from shapely import Point, box, union_all
 
-from coop_drake.fields.density import _factorise_and_solve
+from coop_drake.fields import skeletons
+from coop_drake.fields.density import solve_density
+from coop_drake.fields.outline import outline_of
+from coop_drake.fields.panels import lay_panels
+from tests.support import domains
 
-
-def system(size, weakest):
-    """A matrix with known singular values from 1 down to ``weakest``, and two right-hand sides."""
-    rng = np.random.default_rng(3)
-    left, _ = np.linalg.qr(rng.normal(size=(size, size)))
-    right, _ = np.linalg.qr(rng.normal(size=(size, size)))
-    matrix = left * np.geomspace(1.0, weakest, size) @ right
-    return np.asfortranarray(matrix), rng.normal(size=(size, 2))
-
-
-def test_large_systems_are_solved_to_double_precision():
-    matrix, solution = system(1_100, 1e-3)
-    found, condition = _factorise_and_solve(matrix.copy(order="F"), matrix @ solution)
-    np.testing.assert_allclose(found, solution, atol=1e-10)
-    assert 1e3 < condition < 1e7
+SHELVES = box(0, 0, 4, 3).difference(union_all([box(0.5, 0.5, 1.5, 1), box(2, 0.6, 3.4, 2.2).buffer(-0.1)]))
 
 
-def test_what_single_precision_cannot_solve_is_factorised_in_double():
-    matrix, solution = system(1_100, 1e-9)
-    found, condition = _factorise_and_solve(matrix.copy(order="F"), matrix @ solution)
-    np.testing.assert_allclose(matrix @ found, matrix @ solution, atol=1e-12)
-    np.testing.assert_allclose(found, solution, atol=1e-4)
-    assert condition > 1e9
+def density_of(domain, goal, nodes=10):
+    outline = outline_of(domain, goal)
+    return solve_density(outline, lay_panels(outline, 1.5), np.round(outline.corner_angles, 12), nodes, 1.5)
+
+
+@pytest.mark.parametrize(
+    ("domain", "goal"),
+    [domains.maze(4), (SHELVES, Point(3.7, 2.6)), domains.rounded_room(), domains.needle(8)],
+    ids=["maze", "shelves", "rounded", "needle"],
+)
+def test_compressed_systems_have_the_same_solution(domain, goal, monkeypatch):
+    dense = density_of(domain, goal)
+    monkeypatch.setattr(skeletons, "_DENSE", 150)
+    monkeypatch.setattr(skeletons, "_LEAF", 60)
+    compressed = density_of(domain, goal)
+    scale = np.abs(dense.incoming).max()
+    np.testing.assert_allclose(compressed.hole_images, dense.hole_images, atol=1e-9)
+    # On holes the densities differ by the gauge's constant.
+    outer = outline_of(domain, goal).ring[dense.nodes.edge] == 0
+    np.testing.assert_allclose(compressed.weighted[outer], dense.weighted[outer], atol=1e-9 * scale)

@@ -1,0 +1,276 @@
+"""Entries of the double layer between nodes of the boundary: kernel, near panels, sums over all sources."""
+
+from __future__ import annotations
+
+from math import pi
+from typing import NamedTuple
+
+import numpy as np
+
+from coop_drake.fields.compiled import compiled
+from coop_drake.fields.nodes import Nodes
+from coop_drake.fields.outline import ComplexArray, IntArray
+from coop_drake.fields.quadrature import FloatArray, legendre_transform
+
+__all__ = ["DoubleLayer", "block", "double_layer", "legendre_moments", "mark_near", "subtract_double_layer"]
+
+_NEAR = 4.3  # |zeta - 1| + |zeta + 1| below which panels are integrated exactly
+
+
+class DoubleLayer(NamedTuple):
+    """2 K on the nodes of a boundary, entry by entry.
+
+    Entries of two nodes on one edge are exactly zero; so are, by convention, those of two nodes of one corner
+    block, whose interaction is part of the block's compressed operator.
+
+    Attributes:
+        x: Nodes [m], shape (n,).
+        y: Nodes [m], shape (n,).
+        dx: Line element times weight, over pi [m], shape (n,).
+        dy: The same in y.
+        edge: Edge of each node, shape (n,).
+        corner: Corner block of each node, -1 on regular panels, shape (n,).
+        first: First node of the regular panels, shape (1,).
+        pair_start: First near pair of each regular panel, and one more, shape (panels + 1,).
+        pair_target: Node of each near pair, shape (pairs,).
+        pair_weight: What replaces the kernel of its panel there, shape (pairs, nodes a panel).
+    """
+
+    x: FloatArray
+    y: FloatArray
+    dx: FloatArray
+    dy: FloatArray
+    edge: IntArray
+    corner: IntArray
+    first: IntArray
+    pair_start: IntArray
+    pair_target: IntArray
+    pair_weight: FloatArray
+
+
+def double_layer(grid: Nodes, segments: ComplexArray, panel_edge: IntArray, nodes: int) -> DoubleLayer:
+    """Prepare 2 K of a discretisation.
+
+    Args:
+        grid: The nodes.
+        segments: Centre and half vector of each regular panel, shape (panels, 2).
+        panel_edge: Edge of each regular panel, shape (panels,).
+        nodes: Gauss nodes on a panel.
+    """
+    start, target = _near_pairs(grid.position, grid.edge, segments, panel_edge)
+    weight = _near_weights(grid.position, segments, start, target, legendre_transform(nodes))
+    return DoubleLayer(
+        x=grid.position.real.copy(),
+        y=grid.position.imag.copy(),
+        dx=grid.element.real / pi,
+        dy=grid.element.imag / pi,
+        edge=grid.edge,
+        corner=grid.corner,
+        first=grid.corner_start[-1:],
+        pair_start=start,
+        pair_target=target,
+        pair_weight=weight,
+    )
+
+
+@compiled
+def block(k: DoubleLayer, rows: IntArray, columns: IntArray, row_of: IntArray) -> FloatArray:
+    """Entries of 2 K at ``rows`` x ``columns``, in columns (transposed rows) in memory.
+
+    Args:
+        k: The layer.
+        rows: Targets.
+        columns: Sources.
+        row_of: Scratch of shape (n,), -1 throughout before and after.
+    """
+    m = len(rows)
+    x, y, edge, corner = k.x[rows], k.y[rows], k.edge[rows], k.corner[rows]
+    out = np.empty((len(columns), m))
+    for b in range(len(columns)):
+        j = columns[b]
+        tx, ty, dx, dy, e = k.x[j], k.y[j], k.dx[j], k.dy[j], k.edge[j]
+        c = k.corner[j] if k.corner[j] >= 0 else -2
+        for a in range(m):
+            rx, ry = tx - x[a], ty - y[a]
+            value = (dy * rx - dx * ry) / (rx * rx + ry * ry)
+            out[b, a] = 0.0 if edge[a] == e or corner[a] == c else value
+    for a in range(m):
+        row_of[rows[a]] = a
+    first, p = k.first[0], k.pair_weight.shape[1]
+    for b in range(len(columns)):
+        j = columns[b] - first
+        if j >= 0:
+            for t in range(k.pair_start[j // p], k.pair_start[j // p + 1]):
+                a = row_of[k.pair_target[t]]
+                if a >= 0:
+                    out[b, a] = k.pair_weight[t, j % p]
+    for a in range(m):
+        row_of[rows[a]] = -1
+    return out.T
+
+
+@compiled
+def mark_near(
+    k: DoubleLayer, own: IntArray, disc: tuple[float, float, float], row_of: IntArray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes outside a set that its far field cannot represent: as sources on it, and as targets of it.
+
+    These are the nodes in a disc round the set, and those whose entry with a node of the set is corrected.
+
+    Args:
+        k: The layer.
+        own: The nodes of the set.
+        disc: Centre and radius [m].
+        row_of: Scratch as for `block`.
+
+    Returns:
+        Masks of shape (n,), False on the set itself.
+    """
+    n = len(k.x)
+    sources, targets = np.empty(n, dtype=np.bool_), np.empty(n, dtype=np.bool_)
+    for i in range(n):
+        rx, ry = k.x[i] - disc[0], k.y[i] - disc[1]
+        sources[i] = targets[i] = rx * rx + ry * ry < disc[2] * disc[2]
+    for i in own:
+        row_of[i] = 0
+    first, p = k.first[0], k.pair_weight.shape[1]
+    for panel in range(len(k.pair_start) - 1):
+        a, b = first + panel * p, first + (panel + 1) * p
+        holds, struck = False, False
+        for j in range(a, b):
+            holds = holds or row_of[j] >= 0
+        for t in range(k.pair_start[panel], k.pair_start[panel + 1]):
+            struck = struck or row_of[k.pair_target[t]] >= 0
+            if holds:
+                targets[k.pair_target[t]] = True
+        if struck:
+            sources[a:b] = True
+    for i in own:
+        row_of[i] = -1
+        sources[i] = targets[i] = False
+    return sources, targets
+
+
+@compiled
+def _near_pairs(
+    target: ComplexArray, target_edge: IntArray, segments: ComplexArray, edge: IntArray
+) -> tuple[IntArray, IntArray]:
+    """Targets near each regular panel, but those on its own edge: first of each panel, and all of them."""
+    start = np.zeros(len(segments) + 1, dtype=np.int64)
+    found = np.empty(len(target), dtype=np.int64)
+    total = 0
+    for k in range(len(segments)):
+        total = _near_of(target, target_edge, segments[k], edge[k], found, total, False)
+        start[k + 1] = total
+    found = np.empty(total, dtype=np.int64)
+    total = 0
+    for k in range(len(segments)):
+        total = _near_of(target, target_edge, segments[k], edge[k], found, total, True)
+    return start, found
+
+
+@compiled
+def _near_of(
+    target: ComplexArray, target_edge: IntArray, segment: ComplexArray, edge: int,
+    found: IntArray, total: int, keep: bool,
+) -> int:  # fmt: skip
+    """Count, and keep if wanted, the targets near one panel; the new total."""
+    centre, half = segment[0], segment[1]
+    reach = (0.5 * _NEAR) ** 2 * (half.real**2 + half.imag**2)
+    for i in range(len(target)):
+        rx, ry = target[i].real - centre.real, target[i].imag - centre.imag
+        if rx * rx + ry * ry < reach and target_edge[i] != edge:
+            zeta = (target[i] - centre) / half
+            if abs(zeta - 1.0) + abs(zeta + 1.0) < _NEAR:
+                if keep:
+                    found[total] = i
+                total += 1
+    return total
+
+
+@compiled
+def _near_weights(
+    target: ComplexArray, segments: ComplexArray, start: IntArray, found: IntArray, transform: FloatArray
+) -> FloatArray:
+    """Exact weights of near panels for polynomial densities, shape (pairs, nodes)."""
+    p = len(transform)
+    moments, weights = np.empty(p), np.zeros((len(found), p))
+    for k in range(len(segments)):
+        for t in range(start[k], start[k + 1]):
+            legendre_moments((target[found[t]] - segments[k, 0]) / segments[k, 1], moments)
+            for degree in range(p):
+                for j in range(p):
+                    weights[t, j] += moments[degree] * transform[degree, j]
+    return weights
+
+
+@compiled
+def legendre_moments(zeta: complex, out: FloatArray) -> None:
+    """1/pi times the imaginary part of the integral of P_k(x) / (x - zeta) over [-1, 1], k from 0."""
+    q0 = 0.5 * (np.log(zeta + 1.0) - np.log(zeta - 1.0))
+    q1 = zeta * q0 - 1.0
+    out[0], out[1] = -2.0 / pi * q0.imag, -2.0 / pi * q1.imag
+    for k in range(1, len(out) - 1):
+        q0, q1 = q1, ((2 * k + 1) * zeta * q1 - k * q0) / (k + 1)
+        out[k + 1] = -2.0 / pi * q1.imag
+
+
+@compiled
+def subtract_double_layer(
+    k: DoubleLayer, corner_start: IntArray, segments: ComplexArray, transform: FloatArray,
+    density: FloatArray, target: ComplexArray, target_edge: IntArray, target_corner: IntArray,
+    out: FloatArray,
+) -> None:  # fmt: skip
+    """Subtract 2 K density at other points of the boundary, by the same rules."""
+    p = len(transform)
+    moments = np.empty(p)
+    u, v = density[:, 0].copy(), density[:, 1].copy()
+    reach = (0.5 * _NEAR) ** 2
+    for i in range(len(target)):
+        px, py, e = target[i].real, target[i].imag, target_edge[i]
+        su, sv = 0.0, 0.0
+        for c in range(len(corner_start) - 1):
+            a, b = corner_start[c], corner_start[c + 1]
+            if c != target_corner[i]:
+                middle = (a + b) // 2
+                if k.edge[a] != e:
+                    fu, fv = _sum(k, u, v, a, middle, px, py)
+                    su, sv = su + fu, sv + fv
+                if k.edge[middle] != e:
+                    fu, fv = _sum(k, u, v, middle, b, px, py)
+                    su, sv = su + fu, sv + fv
+        for panel in range(len(segments)):
+            a = k.first[0] + panel * p
+            if k.edge[a] == e:
+                continue
+            centre, half = segments[panel, 0], segments[panel, 1]
+            rx, ry = px - centre.real, py - centre.imag
+            zeta = complex(9.0, 0.0)
+            if rx * rx + ry * ry < reach * (half.real**2 + half.imag**2):
+                zeta = (target[i] - centre) / half
+            if abs(zeta - 1.0) + abs(zeta + 1.0) < _NEAR:
+                legendre_moments(zeta, moments)
+                for degree in range(p):
+                    for j in range(p):
+                        weight = moments[degree] * transform[degree, j]
+                        su += weight * u[a + j]
+                        sv += weight * v[a + j]
+            else:
+                fu, fv = _sum(k, u, v, a, a + p, px, py)
+                su, sv = su + fu, sv + fv
+        out[i, 0] -= su
+        out[i, 1] -= sv
+
+
+@compiled
+def _sum(
+    k: DoubleLayer, u: FloatArray, v: FloatArray, first: int, last: int, px: float, py: float
+) -> tuple[float, float]:
+    """Sum of the kernel times both densities over consecutive nodes."""
+    su, sv = 0.0, 0.0
+    for j in range(first, last):
+        rx, ry = k.x[j] - px, k.y[j] - py
+        value = (k.dy[j] * rx - k.dx[j] * ry) / (rx * rx + ry * ry)
+        su += value * u[j]
+        sv += value * v[j]
+    return su, sv
