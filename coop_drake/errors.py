@@ -32,6 +32,10 @@ class ScenarioError(CoopDrakeError):
         self.file, self.key, self.value, self.allowed = file, key, value, allowed
         super().__init__(f"{file}: {key}: {value!r} is not allowed; expected {allowed}")
 
+    def __reduce__(self) -> tuple[type[ScenarioError], tuple[str, str, object, str]]:
+        """Pickle the data and not the message: files are read in a process of their own."""
+        return type(self), (self.file, self.key, self.value, self.allowed)
+
 
 class GeometryError(CoopDrakeError):
     """A shape cannot be used; the message names the shape and the place."""

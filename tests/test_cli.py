@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from coop_drake.cli import app, chain
+from coop_drake.cli import app, simulating
 from coop_drake.cli.reporter import Reporter
 from coop_drake.planning import load_plan
 from coop_drake.simulation import SimulationLog
@@ -148,7 +148,7 @@ def test_a_violation_ends_in_exit_code_1_and_says_which(finished, room, tmp_path
     out, _ = finished
     log = SimulationLog.load(out / "log.npz")
     broken = replace(log, reached=False, violation="robot_0::base left the workspace at t = 1.5 s by 2 mm")
-    monkeypatch.setattr(chain, "simulate", lambda *_, **__: broken)
+    monkeypatch.setattr(simulating, "simulate", lambda *_, **__: broken)
     result = invoke("simulate", room, "--plan", out / "plan.json", "--out", tmp_path, "--json")
     assert result.exit_code == 1
     facts = json.loads(result.stdout)

@@ -1,4 +1,8 @@
-"""The commands: run, plan, simulate."""
+"""The commands: run, plan, simulate.
+
+Every command brings in what it needs when it is called: some need Drake, some the planner, some pictures,
+and none should wait for, or keep in memory, what only another one needs.
+"""
 
 from __future__ import annotations
 
@@ -9,19 +13,14 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.markup import escape
 
-from coop_drake.cli.chain import Task, load_task, plan_task, read_plan, simulate_task, warm_up, write_pictures
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
-from coop_drake.cli.measures import answer_of
+from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
-from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.summary import summary_rows
 from coop_drake.cli.verify import verify_command
 from coop_drake.cli.watch import watch_command
 from coop_drake.cli.why import why_command
-from coop_drake.planning import Found, Plan
 
 __all__ = ["app", "main"]
 
@@ -87,12 +86,9 @@ def run_command(
     reporter = Reporter(machine=machine, quiet=quiet)
 
     def command() -> ExitCode:
-        task = load_task(scenario, gains)
-        folder = _folder(task, out)
-        result = plan_task(task, folder, reporter)
-        if not isinstance(result, Found):
-            return _no_plan(task, answer_of(result), result.reason, folder, reporter)
-        return _carry_out(task, result.plan, folder, reporter)
+        from coop_drake.cli.simulating import run_scenario
+
+        return run_scenario(scenario, gains, out, reporter)
 
     run_guarded(reporter, command)
 
@@ -109,14 +105,10 @@ def plan_command(
     reporter = Reporter(machine=machine, quiet=quiet)
 
     def command() -> ExitCode:
-        task = load_task(scenario, gains)
-        folder = _folder(task, out)
-        result = plan_task(task, folder, reporter)
-        if not isinstance(result, Found):
-            return _no_plan(task, answer_of(result), result.reason, folder, reporter)
-        reporter.table(task.scenario.name, summary_rows(reporter.facts))
-        reporter.say(f"The plan is in {escape(str(folder.plan))}")
-        return ExitCode.DONE
+        question = read_apart(scenario, gains)  # Drake is gone before the planner comes.
+        from coop_drake.cli.planning import plan_only
+
+        return plan_only(question, out, reporter)
 
     run_guarded(reporter, command)
 
@@ -139,10 +131,9 @@ def simulate_command(
     reporter = Reporter(machine=machine, quiet=quiet)
 
     def command() -> ExitCode:
-        task = load_task(scenario, gains)
-        folder = _folder(task, out)
-        found = read_plan(task, plan or folder.plan, reporter, gains_given=gains is not None)
-        return _carry_out(task, found, folder, reporter)
+        from coop_drake.cli.simulating import simulate_scenario
+
+        return simulate_scenario(scenario, gains, plan, out, reporter)
 
     run_guarded(reporter, command)
 
@@ -153,8 +144,9 @@ def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
     reporter = Reporter(machine=False, quiet=quiet)
 
     def command() -> ExitCode:
-        warm_up(load_task(scenario, None), reporter)
-        return ExitCode.DONE
+        from coop_drake.cli.simulating import warm_up
+
+        return warm_up(scenario, reporter)
 
     run_guarded(reporter, command)
 
@@ -162,31 +154,3 @@ def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
 app.command("watch")(watch_command)
 app.command("why")(why_command)
 app.command("verify")(verify_command)
-
-
-def _folder(task: Task, out: Path | None) -> ResultFolder:
-    return ResultFolder(out if out is not None else Path("out") / task.scenario.name)
-
-
-def _no_plan(task: Task, answer: str, reason: str, folder: ResultFolder, reporter: Reporter) -> ExitCode:
-    reporter.table(task.scenario.name, summary_rows(reporter.facts))
-    reporter.say(f"[bold]{answer}[/]: {escape(reason)}")
-    if folder.certificate.exists():
-        reporter.say(f"The proof is in {escape(str(folder.certificate))}")
-    reporter.say(f"What blocks, and what would help: coop-drake why {escape(str(task.scenario.path))}")
-    return ExitCode.INFEASIBLE if answer == "infeasible" else ExitCode.UNDECIDED
-
-
-def _carry_out(task: Task, found: Plan, folder: ResultFolder, reporter: Reporter) -> ExitCode:
-    """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run."""
-    log = simulate_task(task, found, folder, reporter)
-    write_pictures(task, found, log, folder, reporter)
-    reporter.table(task.scenario.name, summary_rows(reporter.facts))
-    reporter.say(
-        f"Results are in {escape(str(folder.path))}; open {escape(str(folder.recording))} in a browser"
-    )
-    if log.violation:
-        reporter.complain(log.violation)
-    elif not log.reached:
-        reporter.complain(f"the goal was not reached within {log.times[-1]:.1f} s of simulated time")
-    return ExitCode.DONE if log.reached and not log.violation else ExitCode.FAILED_RUN

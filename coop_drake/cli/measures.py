@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import resource
-import sys
 from collections.abc import Sequence
 from math import pi, remainder
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coop_drake.fields import HarmonicMap
-from coop_drake.planning import Found, Infeasible, PlanningResult
-from coop_drake.planning.plan import Plan
-from coop_drake.simulation import SimulationLog
+from coop_drake.planning import Found, Infeasible, Plan, PlanningResult
 
-__all__ = ["answer_of", "map_measures", "peak_memory_mb", "planning_measures", "simulation_measures"]
+if TYPE_CHECKING:
+    from coop_drake.fields import HarmonicMap
+    from coop_drake.simulation import SimulationLog
+
+__all__ = ["answer_of", "map_measures", "plan_measures", "planning_measures", "simulation_measures"]
 
 
 def answer_of(result: PlanningResult) -> str:
@@ -84,9 +83,3 @@ def simulation_measures(plan: Plan, log: SimulationLog) -> dict[str, Any]:
         "peak_joint_torque_nm": float(np.abs(log.joint_torques).max(initial=0.0)),
         "peak_speed_m_s": float(np.hypot(log.object_twist[:, 0], log.object_twist[:, 1]).max()),
     }
-
-
-def peak_memory_mb() -> float:
-    """Return the largest resident memory of this process so far [MB]."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / 1e6 if sys.platform == "darwin" else peak / 1e3  # bytes there, kilobytes here

@@ -7,6 +7,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import perf_counter, process_time
 from typing import Any
 
 from rich.console import Console
@@ -59,6 +60,17 @@ class Reporter:
 
             yield advance
             bars.update(bar, completed=1.0, doing="")
+
+    @contextmanager
+    def stopwatch(self, name: str, *, cpu: bool = False) -> Iterator[None]:
+        """Note how long a stage took, even if it fails [s]."""
+        wall, processor = perf_counter(), process_time()
+        try:
+            yield
+        finally:
+            self.facts[f"{name}_wall_seconds"] = round(perf_counter() - wall, 4)
+            if cpu:
+                self.facts[f"{name}_cpu_seconds"] = round(process_time() - processor, 4)
 
     def say(self, text: str) -> None:
         """Show a line of text, with rich's markup."""

@@ -22,6 +22,11 @@ class ResultFolder:
 
     path: Path
 
+    @classmethod
+    def of(cls, scenario: str, out: Path | None) -> ResultFolder:
+        """Return the folder that was asked for, or the usual one of a scenario."""
+        return cls(out if out is not None else Path("out") / scenario)
+
     @property
     def plan(self) -> Path:
         """The plan."""

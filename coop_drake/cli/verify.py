@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import process_time
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.chain import load_task
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.errors import RefusalError
-from coop_drake.verification import Check, verify_file
+
+if TYPE_CHECKING:
+    from coop_drake.verification import Check
 
 __all__ = ["verify_command"]
 
@@ -33,11 +35,13 @@ def verify_command(
     reporter = Reporter(machine=machine, quiet=quiet)
 
     def command() -> ExitCode:
-        task = load_task(scenario, None)
+        question = read_apart(scenario)
+        from coop_drake.verification import verify_file  # Here: no other command should wait for it.
+
         begun = process_time()
         try:
             with reporter.stage("verifying") as progress:
-                verified = verify_file(certificate, task.problem, task.scenario.gain_sets, progress)
+                verified = verify_file(certificate, question.problem, question.gain_sets, progress)
         except RefusalError as error:
             reporter.facts["valid"] = False
             reporter.complain(f"{certificate}: {error}", where=error.where, finding=error.finding)
@@ -49,7 +53,7 @@ def verify_command(
             subject=verified.subject,
             checks=[vars(check) for check in verified.checks],
         )
-        reporter.table(task.scenario.name, [_row(check) for check in verified.checks])
+        reporter.table(question.name, [_row(check) for check in verified.checks])
         reporter.say(f"[bold]valid, {verified.answer}[/]: {escape(verified.subject)}")
         return ExitCode.DONE
 

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.chain import load_task
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
-from coop_drake.planning.exploration import Verdict
-from coop_drake.planning.problem import PlanningProblem
+
+if TYPE_CHECKING:
+    from coop_drake.planning import PlanningProblem
 
 __all__ = ["watch_command"]
 
@@ -69,9 +70,9 @@ def watch_command(
     reporter = Reporter(machine=machine, quiet=quiet)
 
     def command() -> ExitCode:
-        task = load_task(scenario, None)
-        directory = output if output is not None else Path("out") / task.scenario.name / "think"
-        return _watch(task.problem, directory, frames, strategy, margin, reporter)
+        question = read_apart(scenario)
+        directory = output if output is not None else Path("out") / question.name / "think"
+        return _watch(question.problem, directory, frames, strategy, margin, reporter)
 
     run_guarded(reporter, command)
 
@@ -107,7 +108,7 @@ def _watch(
     reporter.say(
         f"{len(shots)} pictures are in {escape(str(directory))}; open {escape(str(written[-1]))} in a browser"
     )
-    return _code(film.verdict, film.margin)
+    return _code(film.verdict.value, film.margin)
 
 
 def _forget(directory: Path) -> None:
@@ -117,8 +118,8 @@ def _forget(directory: Path) -> None:
             path.unlink()
 
 
-def _code(verdict: Verdict, margin: float) -> ExitCode:
+def _code(verdict: str, margin: float) -> ExitCode:
     """What the answer is worth: that there is no way with a margin proves nothing about the question."""
-    if verdict is Verdict.FOUND:
+    if verdict == "found":
         return ExitCode.DONE
-    return ExitCode.INFEASIBLE if verdict is Verdict.INFEASIBLE and margin == 0.0 else ExitCode.UNDECIDED
+    return ExitCode.INFEASIBLE if verdict == "infeasible" and margin == 0.0 else ExitCode.UNDECIDED

@@ -9,20 +9,18 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.chain import Task, load_task
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.question import Question, read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
-from coop_drake.diagnosis import Answer, diagnose, diagnosis_figure, facts_of, rows_of, sentences_of
-from coop_drake.drawing import house_style, save_figure
 
 __all__ = ["why_command"]
 
 _EXIT_CODES = {
-    Answer.FOUND: ExitCode.DONE,
-    Answer.INFEASIBLE: ExitCode.INFEASIBLE,
-    Answer.UNDECIDED: ExitCode.UNDECIDED,
+    "found": ExitCode.DONE,
+    "infeasible": ExitCode.INFEASIBLE,
+    "undecided": ExitCode.UNDECIDED,
 }
 
 
@@ -43,29 +41,31 @@ def why_command(
     reporter = Reporter(machine=machine, quiet=quiet)
 
     def command() -> ExitCode:
-        task = load_task(scenario, None)
-        return _explain(
-            task, ResultFolder(out if out is not None else Path("out") / task.scenario.name), reporter
-        )
+        question = read_apart(scenario)
+        return _explain(question, ResultFolder.of(question.name, out), reporter)
 
     run_guarded(reporter, command)
 
 
-def _explain(task: Task, folder: ResultFolder, reporter: Reporter) -> ExitCode:
+def _explain(question: Question, folder: ResultFolder, reporter: Reporter) -> ExitCode:
     """Diagnose, show a table and sentences, and draw the picture if there is anything to see."""
+    # Here and not above: it brings in the pictures' libraries, which no other command should wait for.
+    from coop_drake.diagnosis import diagnose, diagnosis_figure, facts_of, rows_of, sentences_of
+    from coop_drake.drawing import house_style, save_figure
+
     before = process_time()
     with reporter.stage("diagnosing") as progress:
-        diagnosis = diagnose(task.problem, progress)
+        diagnosis = diagnose(question.problem, progress)
     reporter.facts.update(facts_of(diagnosis), diagnosis_cpu_seconds=round(process_time() - before, 4))
     folder.forget_diagnosis()
     with house_style():
-        figure = diagnosis_figure(task.problem, diagnosis)
+        figure = diagnosis_figure(question.problem, diagnosis)
         if figure is not None:
             for path in folder.diagnosis:
                 save_figure(figure, path)
-    reporter.table(task.scenario.name, rows_of(diagnosis))
+    reporter.table(question.name, rows_of(diagnosis))
     for sentence in sentences_of(diagnosis):
         reporter.say(escape(sentence))
     if figure is not None:
         reporter.say(f"The picture is {escape(str(folder.diagnosis[0]))}")
-    return _EXIT_CODES[diagnosis.answer]
+    return _EXIT_CODES[diagnosis.answer.value]

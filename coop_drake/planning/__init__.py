@@ -6,6 +6,7 @@ from coop_drake.planning.plan import Cell, Found, Infeasible, Plan, PlanningResu
 from coop_drake.planning.plan_file import load_plan, save_plan
 from coop_drake.planning.problem import PlannerSettings, PlanningProblem
 from coop_drake.planning.search import find_channel
+from coop_drake.planning.table import table_1
 from coop_drake.planning.transitions import make_plan, reschedule
 
 __all__ = [
@@ -28,4 +29,5 @@ __all__ = [
     "plan_time",
     "reschedule",
     "save_plan",
+    "table_1",
 ]

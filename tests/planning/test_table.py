@@ -1,6 +1,6 @@
 """Table 1 as Markdown."""
 
-from coop_drake.viz import table_1
+from coop_drake.planning import table_1
 from tests.support.cases import case
 from tests.support.synthetic_log import synthetic_plan
 

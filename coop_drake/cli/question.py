@@ -1,0 +1,66 @@
+"""What a command asks the planner, read by a process of its own that gives Drake's memory back."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from coop_drake.control import GainSet
+    from coop_drake.planning import PlanningProblem
+
+__all__ = ["Question", "read_apart"]
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is to be planned, with nothing of Drake in it.
+
+    Attributes:
+        name: The scenario's name.
+        path: The scenario file.
+        problem: What the planner is asked.
+        gain_sets: The scenario's gain sets by name.
+        gains: Name of the one in use.
+    """
+
+    name: str
+    path: Path
+    problem: PlanningProblem
+    gain_sets: Mapping[str, GainSet]
+    gains: str
+
+
+def read_apart(path: Path, gains: str | None = None) -> Question:
+    """Read a scenario and its models in a process of their own.
+
+    Only reading takes Drake. What planning does not need would stay in memory for as long as it lasts.
+
+    Args:
+        path: The scenario file.
+        gains: Name of the gain set to use, None for the one the file selects.
+
+    Raises:
+        ScenarioError: The file, a model or the name of the gain set is wrong.
+    """
+    with subprocess.Popen(
+        [sys.executable, "-m", "coop_drake.cli.reading"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,  # Ctrl-C is answered here.
+    ) as process:
+        try:
+            answer, _ = process.communicate(pickle.dumps((path, gains)))
+        finally:
+            process.kill()
+    if process.returncode != 0:
+        raise RuntimeError(f"{path}: the process that reads it ended with code {process.returncode}")
+    came: Question | Exception = pickle.loads(answer)
+    if isinstance(came, Exception):
+        raise came
+    return came

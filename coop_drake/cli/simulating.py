@@ -1,0 +1,96 @@
+"""The chain's second half: from a plan through maps and the closed loop to pictures; each notes its facts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from rich.markup import escape
+
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.measures import map_measures, simulation_measures
+from coop_drake.cli.memory import peak_memory_mb
+from coop_drake.cli.planning import plan_question, read_plan, without_plan
+from coop_drake.cli.reading import Task, read_task
+from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.summary import summary_rows
+from coop_drake.planning import Found, Plan
+from coop_drake.planning.planner import plan
+from coop_drake.simulation import SimulationLog, build_maps, simulate
+from coop_drake.viz import write_figures, write_recording
+
+__all__ = ["run_scenario", "simulate_scenario", "warm_up"]
+
+_WARM_UP_SECONDS = 0.05  # Simulated time that calls every kernel [s].
+
+
+def run_scenario(scenario: Path, gains: str | None, out: Path | None, reporter: Reporter) -> ExitCode:
+    """Plan and carry the plan out."""
+    task = read_task(scenario, gains)
+    folder = ResultFolder.of(task.scenario.name, out)
+    result = plan_question(task.question, folder, reporter)
+    if not isinstance(result, Found):
+        return without_plan(task.question, result, folder, reporter)
+    return _carry_out(task, result.plan, folder, reporter)
+
+
+def simulate_scenario(
+    scenario: Path, gains: str | None, plan_file: Path | None, out: Path | None, reporter: Reporter
+) -> ExitCode:
+    """Carry out a plan made before: the file that is named, or the one among the scenario's results."""
+    task = read_task(scenario, gains)
+    folder = ResultFolder.of(task.scenario.name, out)
+    found = read_plan(task.question, plan_file or folder.plan, reporter, gains_given=gains is not None)
+    return _carry_out(task, found, folder, reporter)
+
+
+def _carry_out(task: Task, found: Plan, folder: ResultFolder, reporter: Reporter) -> ExitCode:
+    """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run."""
+    log = _simulate(task, found, folder, reporter)
+    _draw(task, found, log, folder, reporter)
+    reporter.table(task.scenario.name, summary_rows(reporter.facts))
+    reporter.say(
+        f"Results are in {escape(str(folder.path))}; open {escape(str(folder.recording))} in a browser"
+    )
+    if log.violation:
+        reporter.complain(log.violation)
+    elif not log.reached:
+        reporter.complain(f"the goal was not reached within {log.times[-1]:.1f} s of simulated time")
+    return ExitCode.DONE if log.reached and not log.violation else ExitCode.FAILED_RUN
+
+
+def _simulate(task: Task, found: Plan, folder: ResultFolder, reporter: Reporter) -> SimulationLog:
+    """Map every cell, run the closed loop, note how it went and write the log."""
+    with reporter.stage("mapping") as progress, reporter.stopwatch("mapping"):
+        maps = build_maps(found, progress=progress)
+    reporter.facts.update(map_measures(maps))
+    with reporter.stage("simulating") as progress, reporter.stopwatch("simulation"):
+        log = simulate(task.scenario, found, maps, progress=progress)
+    reporter.facts.update(simulation_measures(found, log), peak_memory_mb=peak_memory_mb())
+    folder.make()
+    folder.forget_simulation()
+    log.save(folder.log)
+    return log
+
+
+def _draw(task: Task, found: Plan, log: SimulationLog, folder: ResultFolder, reporter: Reporter) -> None:
+    """Draw the figures and write the recording."""
+    problem = task.question.problem
+    with reporter.stage("drawing"):
+        write_figures(problem.workspace, problem.tree, found, log, folder.path)
+    with reporter.stage("recording") as progress, reporter.stopwatch("recording"):
+        write_recording(task.scenario, found, log, folder.recording, progress=progress)
+
+
+def warm_up(scenario: Path, reporter: Reporter) -> ExitCode:
+    """Go through the chain once without results: compiles every kernel, for later processes too."""
+    task = read_task(scenario, None)
+    question = task.question
+    with reporter.stage("compiling") as progress:
+        result = plan(question.problem, question.gain_sets[question.gains], gain_set_name=question.gains)
+        if isinstance(result, Found):
+            maps = build_maps(result.plan, progress=progress)
+            short = replace(task.scenario.simulator, max_time=_WARM_UP_SECONDS)
+            simulate(replace(task.scenario, simulator=short), result.plan, maps)
+    return ExitCode.DONE
