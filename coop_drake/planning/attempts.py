@@ -7,40 +7,31 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from shapely import MultiPolygon
 from shapely.errors import ShapelyError
 
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.band import drawn_tight, hurried_time
+from coop_drake.planning.band import drawn_tight
 from coop_drake.planning.boxes import Box, Regions, make_channel
 from coop_drake.planning.cells import Region
 from coop_drake.planning.certify import Certifier, PathBox
-from coop_drake.planning.channel import Channel
-from coop_drake.planning.margins import exact_footprint, marginal_workspace, margins
+from coop_drake.planning.channel import Channel, Way
+from coop_drake.planning.clear_ways import best_of, margins_along, with_room
+from coop_drake.planning.margins import exact_footprint, marginal_workspace
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.refine import configuration_scale
 from coop_drake.planning.sampler import Ladder, Sampler
 from coop_drake.planning.tightening import fitted, widened
 
 _CLEARANCES = (0.015, 0.002)
-_CLEARANCE_SHARE = 1.3
 _SAMPLES = 4_000
 _GAP = 0.01
 _GROWTHS, _GROWTH_SEEDS = (0.06, 0.1, 0.03), 2
 _FIRST_BANDS = (0.05, 600), (0.05, 3_000)
-_BRIEF_BAND = 0.1, 1_500
-_BANDS = (0.1, 3_000), (0.05, 1_000)
 _LIGHT_TRIES = 4
 _HEAVY_SAMPLES = 32_000
-_MORE_SAMPLES = 8_000
-_OTHERS, _FRESH = 3, 1
-_DETOUR = 1.5
-_MARGIN_SEED = 1
-_STEPS_UP = (1.2, 1.1)
-_STEPS_DOWN = (0.9, 0.8)
 
 Progress = Callable[[float], None]
 
@@ -132,7 +123,7 @@ class SampledAttempts:
     def with_margin(
         self, chain: Chain, tried: list[tuple[float, str]], progress: Callable[[float, float], None]
     ) -> Chain:
-        """Look for the largest margin at which a path can be covered, best near the one that is known.
+        """Draw the best path there is away from the walls, and cover it at the largest margin that it keeps.
 
         Args:
             chain: Boxes at no margin.
@@ -140,70 +131,22 @@ class SampledAttempts:
             progress: Called with a margin and the share of a path that is covered.
 
         Returns:
-            A chain at the margin, or at none if that is all there is.
+            A chain at a margin, or at none if that is all there is.
         """
         progress(0.0, 0.0)
-        near = self._quickest(chain.path)
-        for margin in margins(self._problem.settings.margin):
+        near = best_of(self._problem, self._ladder, chain.path, _GAP)
+        path = with_room(self._problem, near, _GAP)
+        for margin in margins_along(self._problem, path):
             progress(margin, 0.0)
             try:
-                found = self._at(margin, near, progress)
+                found = self._chain(path, margin, progress)
             except (GeometryError, ShapelyError):
                 found = None
-            tried.append(
-                (margin if found is None else found.margin, "not found" if found is None else "found")
-            )
+            tried.append((margin, "not found" if found is None else "found"))
             if found is not None:
                 return found
-        path = near
-        for spacing, moves in _BANDS:
-            path = drawn_tight(self._problem, path, _CLEARANCES[-1], 0.0, _GAP, spacing, moves)
         tried.append((0.0, "found"))
         return self._chain(path, 0.0) or self._chain(chain.path, 0.0) or chain
-
-    def _at(self, margin: float, near: FloatArray, progress: Callable[[float, float], None]) -> Chain | None:
-        """A chain at a margin or not far from it, along the quickest of some sampled paths."""
-        clearance = _CLEARANCE_SHARE * margin
-        path = self._sampled(marginal_workspace(self._problem, clearance), near)
-        if path is None:
-            return None
-        for spacing, moves in _BANDS:
-            path = drawn_tight(self._problem, path, clearance, margin, _GAP, spacing, moves)
-        chain = self._chain(path, margin, progress)
-        if chain is None:
-            smaller = (self._chain(path, share * margin, progress) for share in _STEPS_DOWN)
-            return next((less for less in smaller if less is not None), None)
-        if margin < self._problem.settings.margin:
-            larger = (self._chain(path, share * margin, progress) for share in _STEPS_UP)
-            return next((more for more in larger if more is not None), chain)
-        return chain
-
-    def _quickest(self, known: FloatArray) -> FloatArray:
-        """The quickest of a known path and of some more: they may turn another way."""
-        workspace = marginal_workspace(self._problem, _CLEARANCES[0])
-        sampler = Sampler(self._ladder, workspace, _GAP, _MARGIN_SEED)
-        sampled = [known, *(sampler.path(_MORE_SAMPLES) for _ in range(_OTHERS))]
-        tight = [
-            drawn_tight(self._problem, path, _CLEARANCES[-1], 0.0, _GAP, *_BRIEF_BAND)
-            for path in sampled
-            if len(path)
-        ]
-        return min(tight, key=hurried_time)
-
-    def _sampled(self, workspace: MultiPolygon, near: FloatArray) -> FloatArray | None:
-        """The quickest of a path sampled near another one and of some sampled anywhere.
-
-        None if there is none that is nearly as quick as that other one. Those sampled anywhere end with the
-        first failure if there is no path yet: more would fail, too.
-        """
-        sampler = Sampler(self._ladder, workspace, _GAP, _MARGIN_SEED)
-        paths = [sampler.along(near, _SAMPLES)]
-        for _ in range(_FRESH):
-            paths.append(sampler.path(_MORE_SAMPLES))
-            if not any(map(len, paths)):
-                break
-        best = min((path for path in paths if len(path)), key=hurried_time, default=None)
-        return None if best is None or hurried_time(best) > _DETOUR * hurried_time(near) else best
 
     def _chain(
         self,
@@ -221,7 +164,18 @@ class SampledAttempts:
         self.slices += certifier.trials
         return None if boxes is None else Chain(tuple(boxes), path, margin)
 
-    def channel(self, chain: Chain) -> Channel | None:
+    def way(self, chain: Chain, spare: Chain) -> Way:
+        """A chain's path, with the channel of its boxes, or of a spare chain's where geometry fails."""
+
+        def channel() -> Channel:
+            found = self._channel(chain) or self._channel(spare)
+            if found is None:
+                raise GeometryError("the positions that are free for the boxes of a path cannot be made")
+            return found
+
+        return Way(chain.path, chain.margin, len(chain.boxes), channel)
+
+    def _channel(self, chain: Chain) -> Channel | None:
         """Boxes of a chain with all positions that are free for them; None if geometry fails."""
         regions = Regions(self._problem, self._swept, self._pairs, chain.margin)
         boxes = [regions.around(box) for box in chain.boxes]

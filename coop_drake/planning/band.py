@@ -6,7 +6,7 @@ import numpy as np
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import ComponentTree
-from coop_drake.planning.band_kernels import improve
+from coop_drake.planning.band_kernels import clearances, improve
 from coop_drake.planning.margins import marginal_workspace
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.refine import configuration_scale
@@ -14,12 +14,26 @@ from coop_drake.planning.sampler import densified
 from coop_drake.planning.team_arrays import team_arrays
 from coop_drake.planning.walls import FAR, walls_for
 
-_LEAST_ROOM = 0.005
-_SPEED, _TURN_RATE, _JOINT_RATE = 1.2, 0.5, 0.6
+__all__ = ["PRICE", "drawn_tight", "likely_time", "room_along"]
+
+PRICE = 0.12
+"""Price per length of the path, times the clearance there [m]."""
+
+LEAST_ROOM = 0.005
+"""Clearance that is added to what a path has before it is priced [m]."""
+
+SPEED, TURN_RATE, JOINT_RATE = 1.2, 0.5, 0.6
 """Speeds of position, theta and joints with which transports go at their best [m/s, rad/s]."""
 
-_PRICE = 0.12
-"""Price per length of the path, times the clearance there [m]."""
+SPACING = 0.1
+"""Distance between samples of a path in any scaled axis, where nothing else is said [m]."""
+
+SLOWNESS, SOME_ROOM = 0.25, 0.02
+"""What narrowness costs candidates: time per length, times clearance and some room [s], [m]."""
+
+NEAR_END = 2.0
+"""Over so many clearances from the start or the goal there may be less room: where they stand close to a
+wall themselves [-]."""
 
 
 def drawn_tight(
@@ -28,8 +42,9 @@ def drawn_tight(
     clearance: float,
     margin: float,
     gap: float,
-    spacing: float = 0.05,
+    spacing: float = SPACING,
     moves: int = 4_000,
+    price: float = PRICE,
 ) -> FloatArray:
     """Improve a path; start and goal stay, joints that are free at the goal may end elsewhere.
 
@@ -41,6 +56,7 @@ def drawn_tight(
         gap: Distance that pairs of bodies keep [m].
         spacing: Distance between samples of the path in any scaled axis [m].
         moves: Changes that are tried.
+        price: What a length of the path costs, times the clearance there: the more, the wider it runs [m].
     """
     tree = problem.tree
     scale = configuration_scale(tree)
@@ -50,7 +66,7 @@ def drawn_tight(
     better: FloatArray = improve(
         team,
         walls,
-        np.array([_PRICE * spacing, max(clearance - margin, 0.0) + _LEAST_ROOM, FAR]),
+        np.array([price * spacing, max(clearance - margin, 0.0) + LEAST_ROOM, FAR]),
         densified(path, scale, spacing),
         np.concatenate((-unbounded, tree.joint_lower)),
         np.concatenate((unbounded, tree.joint_upper)),
@@ -63,19 +79,47 @@ def drawn_tight(
     return better
 
 
-def hurried_time(path: FloatArray) -> float:
-    """Least time that a path may take, walls aside: the slowest of position, theta and joints in turn [s].
+def likely_time(problem: PlanningProblem, path: FloatArray) -> float:
+    """About how long a transport along a path takes, to tell candidates apart: the less room, the slower [s].
 
     Args:
+        problem: The question.
         path: Configurations, theta unwrapped, shape (m, 3 + n).
     """
-    moved = np.abs(np.diff(path, axis=0))
-    times = np.column_stack(
-        (np.hypot(moved[:, 0], moved[:, 1]) / _SPEED, moved[:, 2] / _TURN_RATE, moved[:, 3:] / _JOINT_RATE)
-    )
-    return float(times.max(axis=1).sum())
+    scale, team = configuration_scale(problem.tree), team_arrays(problem.tree)
+    samples = densified(path, scale, SPACING)
+    rooms = np.maximum(clearances(team, walls_for(problem.workspace, team), samples, FAR), 0.0)
+    moved = np.abs(np.diff(samples, axis=0))
+    shifted = np.hypot(moved[:, 0], moved[:, 1])
+    hurried = np.maximum(shifted / SPEED, (moved[:, 2:] / _speeds(problem.tree)[2:]).max(axis=1))
+    swept = shifted + 0.5 * (moved[:, 2:] * scale[2:]).max(axis=1)
+    return float((hurried + SLOWNESS * swept / (np.minimum(rooms[1:], rooms[:-1]) + SOME_ROOM)).sum())
+
+
+def room_along(problem: PlanningProblem, path: FloatArray, most: float) -> float:
+    """Clearance of a path's samples, but for those near an end where the end itself has less.
+
+    Args:
+        problem: The question.
+        path: Configurations, theta unwrapped, shape (m, 3 + n).
+        most: Clearances above this one do not matter [m].
+
+    Returns:
+        The clearance; a measure of samples, and no proof [m].
+    """
+    scale, team = configuration_scale(problem.tree), team_arrays(problem.tree)
+    samples = densified(path, scale, 0.5 * SPACING)
+    rooms = clearances(team, walls_for(problem.workspace, team), samples, FAR)
+    moved = [(np.abs(samples - samples[end]) * scale).sum(axis=1) for end in (0, -1)]
+    excused = np.minimum(*moved) / NEAR_END
+    room = most
+    while True:
+        short = rooms[(rooms < room) & (excused > room)]
+        if not len(short):
+            return max(room, 0.0)
+        room = float(short.min())
 
 
 def _speeds(tree: ComponentTree) -> FloatArray:
     """Speeds of all axes of z at their best, shape (3 + n,)."""
-    return np.array([_SPEED, _SPEED, _TURN_RATE, *[_JOINT_RATE] * len(tree.joints)])
+    return np.array([SPEED, SPEED, TURN_RATE, *[JOINT_RATE] * len(tree.joints)])

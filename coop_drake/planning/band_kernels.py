@@ -106,3 +106,22 @@ def improve(
                 path[k] = fresh[k]
                 cost[k] = fresh_cost[k]
     return path
+
+
+@numba.njit(cache=True)
+def clearances(team: TeamArrays, walls: Walls, path: FloatArray, most: float) -> FloatArray:
+    """Distance of the team from the walls at every sample, at most ``most``; -1 where it meets one.
+
+    Args:
+        team: The team.
+        walls: The floor.
+        path: Configurations, shape (m, 3 + n).
+        most: Distances above this one do not matter [m].
+
+    Returns:
+        Distances, shape (m,) [m].
+    """
+    result = np.empty(len(path))
+    for k in range(len(path)):
+        result[k] = wall_clearance(team, walls, place(team, path[k]), most)
+    return result

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from shapely import Polygon
@@ -44,6 +45,23 @@ class Channel:
     margin: float
     goal_angle: float
     path: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Way:
+    """A path that is covered with boxes proved free; their polygons are made where they are asked for.
+
+    Attributes:
+        path: From start to goal, theta unwrapped, shape (m, 3 + n).
+        margin: The margin rho that the path keeps in every box [m].
+        boxes: How many boxes cover it.
+        channel: Makes the channel of these boxes; raises a GeometryError where geometry fails.
+    """
+
+    path: FloatArray
+    margin: float
+    boxes: int
+    channel: Callable[[], Channel]
 
 
 @dataclass(frozen=True)

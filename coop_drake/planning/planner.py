@@ -1,4 +1,4 @@
-"""The planner: search a channel, make it a plan; three answers."""
+"""The planner: search a way, make it a plan; three answers."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from shapely.errors import ShapelyError
 
 from coop_drake.control import GainSet
 from coop_drake.errors import GeometryError, PlanError, StallError
-from coop_drake.planning.channel import Channel, SearchReport
+from coop_drake.planning.channel import NoChannel, SearchReport
 from coop_drake.planning.plan import Found, Infeasible, PlanningResult, Undecided
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.quickest import quickest_plan
-from coop_drake.planning.search import find_channel
+from coop_drake.planning.search import find_way
 from coop_drake.planning.transitions import Progress
 
 __all__ = ["plan"]
 
 FINER_ATTEMPTS = 2
-"""How often a channel that cannot be executed is searched again, each time with half the margin."""
+"""How often a way that cannot be executed is searched again, each time with half the margin."""
 
 
 def plan(
@@ -26,7 +26,7 @@ def plan(
 ) -> PlanningResult:
     """Find a plan, or prove that none exists.
 
-    A channel that is found but cannot be executed (a passage of less than a millimetre, or of minutes)
+    A way that is found but cannot be executed (a passage of less than a millimetre, or of minutes)
     proves nothing: the search begins again at a smaller margin, which gives other cells; if that does not
     help the answer is Undecided.
 
@@ -41,9 +41,9 @@ def plan(
     """
     question, report, stall = problem, SearchReport(0, 0, 0, ()), ""
     for _ in range(1 + FINER_ATTEMPTS):
-        answer, latest = find_channel(question, progress)
+        answer, latest = find_way(question, progress)
         report = _added(report, latest)
-        if not isinstance(answer, Channel):
+        if isinstance(answer, NoChannel):
             if answer.proved:
                 return Infeasible(answer.reason, report, answer.separation)
             return Undecided(stall or answer.reason, report)

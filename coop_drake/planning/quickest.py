@@ -12,7 +12,7 @@ from coop_drake.control import GainSet
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.geometry.passage import PassageFinder
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.channel import Channel
+from coop_drake.planning.channel import Channel, Way
 from coop_drake.planning.channel_ends import check_ends, goal_intervals, turned_to_start
 from coop_drake.planning.plan import Plan
 from coop_drake.planning.problem import PlanningProblem
@@ -26,7 +26,7 @@ __all__ = ["quickest_plan"]
 
 def quickest_plan(
     problem: PlanningProblem,
-    channel: Channel,
+    found: Channel | Way,
     gain_set: GainSet,
     *,
     gain_set_name: str,
@@ -36,21 +36,23 @@ def quickest_plan(
 
     Args:
         problem: What was asked.
-        channel: The boxes that a search found.
+        found: The boxes that a search found, or a path that boxes cover.
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
         progress: Called with a stage and the share of it that is done.
 
     Raises:
+        GeometryError: If the boxes that cover the path cannot be made, where they are needed.
         PlanError: If the channel does not join the start to the goal.
         StallError: If a passage is too narrow or too slow to be executed; names it.
     """
-    channel = turned_to_start(channel, problem.start[2])
-    check_ends(problem, channel)
-    way = channel.path if channel.path is not None else way_through(problem, channel)
+    if isinstance(found, Channel):
+        found = turned_to_start(found, problem.start[2])
+        check_ends(problem, found)
+    way = found.path if found.path is not None else way_through(problem, found)
     if progress is not None:
         progress("choosing boxes", 0.0)
-    better = resliced(problem, channel, way, gain_set)
+    better = resliced(problem, way, found.margin, gain_set)
     if better is not None:
         try:
             return make_plan(
@@ -60,6 +62,7 @@ def quickest_plan(
         except (GeometryError, PlanError, StallError, ShapelyError):
             # The boxes that the search found are as good a proof, and their necks are other ones.
             pass
+    channel = found if isinstance(found, Channel) else found.channel()
     return make_plan(problem, channel, gain_set, gain_set_name=gain_set_name, progress=progress)
 
 

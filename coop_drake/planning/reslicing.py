@@ -24,6 +24,7 @@ from coop_drake.planning.channel import Channel, FreeBox
 from coop_drake.planning.channel_ends import final_intervals
 from coop_drake.planning.margins import shrunk
 from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.slices import nearest_turn
 from coop_drake.planning.walls import Walls, walls_under
 
 __all__ = ["Resliced", "resliced"]
@@ -39,7 +40,7 @@ PADS = (0.005, 0.015, 0.03, 0.06)
 """Boxes are padded by one of these in every angle and joint [rad or m]."""
 
 MARGIN_SHARES = (0.3, 0.1)
-"""Shares of the channel's margin that waypoints keep, tried in this order [-]."""
+"""Shares of the margin that was found that waypoints keep, tried in this order [-]."""
 
 LEAST = 2e-3
 """Waypoints keep at least this clearance [m]."""
@@ -64,9 +65,7 @@ class Resliced:
     targets: tuple[FloatArray, ...]
 
 
-def resliced(
-    problem: PlanningProblem, channel: Channel, way: FloatArray, gain_set: GainSet
-) -> Resliced | None:
+def resliced(problem: PlanningProblem, way: FloatArray, margin: float, gain_set: GainSet) -> Resliced | None:
     """Lay boxes along a way anew: merged where that saves hand-overs, narrow where clearance saves time.
 
     Which boxes is decided by a compiled simulation of the closed loop; whether they are free is proved as in
@@ -74,8 +73,8 @@ def resliced(
 
     Args:
         problem: What was asked.
-        channel: The boxes that were found.
         way: Free configurations from start to goal, theta unwrapped, shape (m, 3 + n).
+        margin: The margin that was found [m].
         gain_set: Gains, fixed or to be scheduled.
 
     Returns:
@@ -85,11 +84,12 @@ def resliced(
     pairs = BodyPairs(swept)
     floor = shrunk(problem.workspace, 0.0)
     boxes, walls = box_arrays(swept, pairs), walls_under(floor, problem.tree.reach)
+    angle = float(way[-1, 2] + nearest_turn(float(problem.goal_pose[2] - way[-1, 2])))
+    goals = np.array(final_intervals(problem, angle))
     for share in MARGIN_SHARES:
-        least = max(share * channel.margin, LEAST)
+        least = max(share * margin, LEAST)
         points = _waypoints(boxes, walls, way, least)
         places = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
-        goals = np.array(final_intervals(problem, channel.goal_angle))
         course = Course(
             boxes, walls, points, places, np.array(PADS), goals, schedule_of(gain_set), least,
             problem.position_tolerance,
@@ -98,7 +98,7 @@ def resliced(
         if found is not None:
             free, ends = found
             targets = (*(points[j, :2] for j in ends[:-1]), problem.goal_pose[:2])
-            return Resliced(Channel(tuple(free), CORE_SHARE * least, channel.goal_angle), targets)
+            return Resliced(Channel(tuple(free), CORE_SHARE * least, angle), targets)
     return None
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from time import process_time
 
+from coop_drake.errors import GeometryError
 from coop_drake.planning.attempts import Chain, SampledAttempts
-from coop_drake.planning.channel import Channel, NoChannel, SearchReport
+from coop_drake.planning.channel import Channel, NoChannel, SearchReport, Way
 from coop_drake.planning.clearance_bound import clearance_bound
 from coop_drake.planning.events import Watch
 from coop_drake.planning.exploration import Verdict
@@ -27,7 +28,29 @@ _FIRST_SHARE = 250
 def find_channel(
     problem: PlanningProblem, progress: Progress | None = None, watch: Watch | None = None
 ) -> tuple[Channel | NoChannel, SearchReport]:
-    """Find a channel at any margin or prove that there is none, then look for a larger margin.
+    """Find a channel at any margin or prove that there is none; ``find_way`` with its channel made.
+
+    Args:
+        problem: The question.
+        progress: Called with a phase and the share of it that is done.
+        watch: Called with the events of explorations.
+
+    Returns:
+        The channel, or why there is none, and a report.
+    """
+    answer, report = find_way(problem, progress, watch)
+    if not isinstance(answer, Way):
+        return answer, report
+    try:
+        return answer.channel(), report
+    except GeometryError as error:
+        return NoChannel(False, str(error)), report
+
+
+def find_way(
+    problem: PlanningProblem, progress: Progress | None = None, watch: Watch | None = None
+) -> tuple[Way | Channel | NoChannel, SearchReport]:
+    """Find a way at any margin or prove that there is none, then look for a larger margin.
 
     Sampled paths that are covered with proved boxes come first, explorations by cells in turns with more of
     them later; only these may answer "infeasible", and only at margin zero. Budgets are counted in samples
@@ -39,7 +62,7 @@ def find_channel(
         watch: Called with the events of explorations.
 
     Returns:
-        The channel, or why there is none, and a report.
+        A sampled way, the channel of an exploration, or why there is neither, and a report.
     """
     if problem.settings.strategy != "portfolio":
         return explored_channel(problem, progress, watch)
@@ -58,8 +81,8 @@ class _Search:
         self._tried: list[tuple[float, str]] = []
         self._goal_slices = self._bound_slices = 0
 
-    def run(self) -> tuple[Channel | NoChannel, SearchReport]:
-        """Sample, then prove and sample in turns; see ``find_channel``."""
+    def run(self) -> tuple[Way | Channel | NoChannel, SearchReport]:
+        """Sample, then prove and sample in turns; see ``find_way``."""
         chain = self._sampled(1)
         if chain is not None:
             return self._with_margin(chain)
@@ -116,17 +139,14 @@ class _Search:
         told = self._teller("exploring slices")
         return self._proofs.run(share, robots, lambda count: told(count / self._problem.settings.max_slices))
 
-    def _with_margin(self, chain: Chain) -> tuple[Channel | NoChannel, SearchReport]:
-        """The channel at the largest margin that is found; at none if geometry fails there."""
+    def _with_margin(self, chain: Chain) -> tuple[Way, SearchReport]:
+        """The way at the largest margin that is found."""
 
         def told(margin: float, share: float) -> None:
             self._teller(f"searching at margin {margin:.3f} m")(share)
 
         best = self._attempts.with_margin(chain, self._tried, told)
-        channel = self._attempts.channel(best) or self._attempts.channel(chain)
-        if channel is None:
-            return self._undecided(Verdict.RESOLUTION)
-        return channel, self._report(len(channel.boxes), 0)
+        return self._attempts.way(best, chain), self._report(len(best.boxes), 0)
 
     def _explored_channel(self) -> tuple[Channel, SearchReport]:
         self._first = process_time() - self._began

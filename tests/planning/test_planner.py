@@ -21,11 +21,11 @@ def asked(monkeypatch):
     def play(*answers):
         left = list(answers)
 
-        def find_channel(problem, progress=None):
+        def find_way(problem, progress=None):
             questions.append(problem)
             return left.pop(0), REPORT
 
-        monkeypatch.setattr(planner, "find_channel", find_channel)
+        monkeypatch.setattr(planner, "find_way", find_way)
         return questions
 
     return play

@@ -66,7 +66,7 @@ def test_the_same_channel_gives_the_same_boxes(base, quick):
 
 def test_targets_lie_in_the_cores_of_both_boxes_and_cores_inside(base):
     problem, channel = base
-    found = resliced(problem, channel, channel.path, ScheduledGains())
+    found = resliced(problem, channel.path, channel.margin, ScheduledGains())
     assert found is not None
     assert 0.0 < found.channel.margin < channel.margin
     for index, (here, after) in enumerate(zip(found.channel.boxes, found.channel.boxes[1:], strict=False)):
@@ -91,7 +91,7 @@ def test_a_way_can_be_had_from_the_boxes_alone(base):
 def test_what_cannot_be_proved_is_not_used(base, monkeypatch):
     own = make_plan(*base, ScheduledGains(), gain_set_name="scheduled")
     monkeypatch.setattr(CellMaker, "under_cells", lambda self, expanded: [])
-    assert resliced(*base, base[1].path, ScheduledGains()) is None
+    assert resliced(base[0], base[1].path, base[1].margin, ScheduledGains()) is None
     plan = quickest_plan(*base, ScheduledGains(), gain_set_name="scheduled")
     assert [cell.safe.wkb for cell in plan.cells] == [cell.safe.wkb for cell in own.cells]
 

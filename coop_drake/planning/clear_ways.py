@@ -1,0 +1,85 @@
+"""Ways with room to both sides: the best of some candidates, drawn away from the walls, then straightened."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.planning.band import drawn_tight, likely_time, room_along
+from coop_drake.planning.margins import SMALLEST_MARGIN, marginal_workspace
+from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.sampler import Ladder, Sampler
+
+__all__ = ["best_of", "margins_along", "with_room"]
+
+LEAST_CLEARANCE = 0.002
+"""Clearance that candidates keep [m]."""
+
+SAMPLED_CLEARANCE = 0.015
+"""Clearance that other candidates are sampled with [m]."""
+
+CANDIDATES, SAMPLES, SEED = 3, 4_000, 1
+"""So many other candidates are sampled, with so many samples for each stage."""
+
+BRIEF = 1_200
+"""Moves after which candidates are compared."""
+
+WIDE_PRICE, WIDE_MOVES = 0.6, 2_000
+"""Price at which a way is drawn away from the walls [m], and moves for it."""
+
+KEPT = 0.75
+"""Share of its clearance that a way keeps while it is straightened [-]."""
+
+STRAIGHT = (0.1, 2_000), (0.05, 800)
+"""Spacings [m] and moves with which it is straightened."""
+
+MARGIN_SHARES = (0.8, 0.65, 0.5, 0.35)
+"""Shares of a way's clearance that its boxes may keep as a margin, tried in this order [-]."""
+
+
+def best_of(problem: PlanningProblem, ladder: Ladder, known: FloatArray, gap: float) -> FloatArray:
+    """The best of a known path and of some more, by length and clearance: they may turn another way.
+
+    Args:
+        problem: The question.
+        ladder: Its stages.
+        known: A free path, theta unwrapped, shape (m, 3 + n).
+        gap: Distance that pairs of bodies keep [m].
+    """
+    sampler = Sampler(ladder, marginal_workspace(problem, SAMPLED_CLEARANCE), gap, SEED)
+    paths = [known, *(sampler.path(SAMPLES) for _ in range(CANDIDATES))]
+    tight = [
+        drawn_tight(problem, path, LEAST_CLEARANCE, 0.0, gap, moves=BRIEF) for path in paths if len(path)
+    ]
+    return min(tight, key=lambda path: likely_time(problem, path))
+
+
+def with_room(problem: PlanningProblem, path: FloatArray, gap: float) -> FloatArray:
+    """Draw a path away from the walls, and straighten it as far as it keeps most of that clearance.
+
+    Args:
+        problem: The question.
+        path: A free path, theta unwrapped, shape (m, 3 + n).
+        gap: Distance that pairs of bodies keep [m].
+    """
+    most = problem.settings.margin / min(MARGIN_SHARES)
+    path = drawn_tight(problem, path, LEAST_CLEARANCE, 0.0, gap, moves=WIDE_MOVES, price=WIDE_PRICE)
+    clearance = max(KEPT * room_along(problem, path, most), LEAST_CLEARANCE)
+    for spacing, moves in STRAIGHT:
+        path = drawn_tight(problem, path, clearance, clearance, gap, spacing, moves)
+    return path
+
+
+def margins_along(problem: PlanningProblem, path: FloatArray) -> Iterator[float]:
+    """Margins to try for boxes along a path, those that are not worth an attempt left out [m].
+
+    Args:
+        problem: The question, whose settings hold the largest margin.
+        path: A free path, theta unwrapped, shape (m, 3 + n).
+    """
+    largest = problem.settings.margin
+    room = room_along(problem, path, largest / MARGIN_SHARES[0])
+    for share in MARGIN_SHARES:
+        margin = min(share * room, largest)
+        if margin >= SMALLEST_MARGIN:
+            yield margin
