@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from coop_drake.fields.points import as_points
 from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.velocity_field import VelocityField
-from coop_drake.geometry.boundary import BoundaryDistance
 
 __all__ = ["Streamlines", "trace_streamlines"]
 
-_STEP = 0.3  # of the distance to the walls, or to the goal if that is less
-_SHORTEST_STEP = 1e-5  # of the region's size, for starts on a wall
+_TURN = 0.2  # largest turn of the direction within a step [rad]
+_LONGEST = 0.05  # longest step, of the region's size
+_FIRST = 1e-3  # first step, of the region's size
+_GROWTH = 1.6  # of the next step where the direction hardly turns
 _ARRIVED = 0.01  # of the radius of slowing down
 
 
@@ -40,43 +41,56 @@ class Streamlines:
 
 
 def trace_streamlines(field: VelocityField, starts: ArrayLike, *, max_steps: int = 2_000) -> Streamlines:
-    """Follow a field from many starts by Heun's rule, with steps that shorten near walls.
+    """Follow a field from many starts by Heun's rule, with steps within which it hardly turns.
+
+    A step that would leave the region or turn too much is tried again at half its length.
 
     Args:
         field: The field.
         starts: Points in the map's region, shape (n, 2) [m].
-        max_steps: Steps after which a streamline counts as lost.
+        max_steps: Tries after which a streamline counts as lost.
 
     Raises:
         FieldError: If the starts have another shape or are not finite.
     """
     here = as_points(starts).reshape(-1, 2).copy()
-    region, goal = field.harmonic_map.region, field.harmonic_map.goal
-    clearance = BoundaryDistance(region)
-    shortest = _SHORTEST_STEP * float(np.hypot(*np.subtract(region.bounds[2:], region.bounds[:2])))
-    close = _ARRIVED * field.slowdown_radius
-    times, going = np.zeros(len(here)), np.ones(len(here), dtype=bool)
-    history, followed = [here.copy()], [going.copy()]
-    shapely.prepare(goal)
+    goal, region = field.harmonic_map.goal, field.harmonic_map.region
+    x0, y0, x1, y1 = region.bounds
+    size, close = float(np.hypot(x1 - x0, y1 - y0)), _ARRIVED * field.slowdown_radius
+    times, reach = np.zeros(len(here)), np.full(len(here), _FIRST * size)
+    going = np.flatnonzero(shapely.distance(goal, shapely.points(here)) > close)
+    history = [(np.arange(len(here)), here.copy())]
+    shapely.prepare(region)
     for _ in range(max_steps):
-        remaining = np.asarray(shapely.distance(goal, shapely.points(here)))
-        going = going & (remaining > close)
-        if not going.any():
+        if not len(going):
             break
-        p, left = here[going], remaining[going]
-        room = np.maximum(clearance.batch(p), 0.0)
-        step = np.minimum(
-            _STEP * room + shortest, np.where(left > 2.0 * close, 0.5 * left, left - 0.99 * close)
-        )
+        p = here[going]
+        left = np.asarray(shapely.distance(goal, shapely.points(p)))
+        step = np.minimum(reach[going], np.where(left > 2.0 * close, 0.5 * left, left - 0.99 * close))
         first = field(p)
         second = field(p + step[:, None] * _unit(first))
-        here[going] = p + 0.5 * step[:, None] * (_unit(first) + _unit(second))
-        times[going] += step * _slowness(first, second)
-        history.append(here.copy())
-        followed.append(going)
+        after = p + 0.5 * step[:, None] * (_unit(first) + _unit(second))
+        turn = np.linalg.norm(_unit(second) - _unit(first), axis=1)
+        chords = shapely.linestrings(np.stack((p, after), axis=1))
+        good = (turn < _TURN) & shapely.covers(region, chords)
+        moved = going[good]
+        here[moved] = after[good]
+        times[moved] += (step * _slowness(first, second))[good]
+        history.append((moved, after[good]))
+        growth = np.where(good, np.where(turn < 0.5 * _TURN, _GROWTH, 1.0), 0.5)
+        reach[going] = np.minimum(step * growth, _LONGEST * size)
+        going = going[~good | (shapely.distance(goal, shapely.points(here[going])) > close)]
     times[going] = np.inf
-    visited, on_way = np.array(history), np.array(followed)
-    return Streamlines(tuple(visited[on_way[:, k], k] for k in range(len(here))), times)
+    return Streamlines(_paths(history, len(here)), times)
+
+
+def _paths(history: list[tuple[NDArray[np.intp], FloatArray]], count: int) -> tuple[FloatArray, ...]:
+    """Points of each streamline in order, from the steps of all of them."""
+    owner = np.concatenate([moved for moved, _ in history])
+    points = np.concatenate([places for _, places in history])
+    order = np.argsort(owner, kind="stable")
+    ends = np.cumsum(np.bincount(owner, minlength=count))[:-1]
+    return tuple(np.split(points[order], ends))
 
 
 def _unit(vectors: FloatArray) -> FloatArray:

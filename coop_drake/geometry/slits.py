@@ -2,52 +2,54 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
+from math import inf
 
 import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
+from shapely.ops import substring
 
-__all__ = ["component_at", "cut_holes"]
+from coop_drake.geometry.medial import IndexArray
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.triangles import Triangles, triangulate
+
+__all__ = ["WIDTH", "component_at", "cut_holes", "slits_of"]
 
 WIDTH = 0.04
-"""Width of a slit [m]: thin walls would make the map's boundary nearly coincide with itself."""
+"""Greatest width of a slit [m]: thin walls would make the map's boundary nearly coincide with itself."""
 
-SPACING = 0.1
-"""Distance of the points of a ring from which a slit may start [m]."""
+WIDTH_PER_LENGTH = 0.2
+"""Nor is a slit wider than this share of its length [-]."""
+
+NEAR = 1.0
+"""How far the end of a slit may be moved to square it, over its length [-]."""
+
+SQUARED_ENDS = (0, 1, 0, 1)
+"""Ends that stay where they are while the other one is moved, in turn."""
+
+BREAKS = 12
+"""How often the reach of a slit into a wall is halved so that it does not come out on the other side."""
 
 
-@dataclass(frozen=True)
-class _Slit:
-    """A straight way from one ring to another: rings are counted from the outer one, 0."""
+def cut_holes(polygon: Polygon, path: BaseGeometry, room: float) -> Polygon:
+    """Join every hole to the outer ring, directly or by way of other holes, where nobody needs to pass.
 
-    rings: tuple[int, int]
-    line: LineString
-    away: float
-    """Distance from the path that must stay open [m]."""
-
-
-def cut_holes(polygon: Polygon, path: LineString, room: float) -> Polygon:
-    """Join every hole to the outer ring, directly or by way of other holes, on the side away from a path.
-
-    A slit is a straight strip a few centimetres wide. Of all straight ways between two rings those that keep
-    ``room`` from the path come first, then the short ones far away from it.
+    See `slits_of`. A slit is a straight strip a few centimetres wide.
 
     Args:
         polygon: The region [m].
-        path: The passage that must stay open, inside the polygon [m].
+        path: What must stay open, inside the polygon: a passage that ends at the goal, or the goal [m].
         room: Distance from the path within which a slit does harm [m].
 
     Returns:
         What is left around the path's start; the polygon itself if it has no hole. A hole that no straight
         slit can reach without crossing the path stays.
     """
-    cut: BaseGeometry = polygon
-    for slit in _spanning_slits(polygon, path, room):
-        width = min(WIDTH, 0.5 * slit.away)
-        cut = cut.difference(_prolonged(slit.line, width).buffer(0.5 * width, cap_style="flat"))
-    return component_at(cut, shapely.Point(path.coords[0]))
+    strips = [_strip(slit, polygon, float(path.distance(slit))) for slit in slits_of(polygon, path, room)]
+    cut = polygon.difference(shapely.union_all(strips))
+    return component_at(cut, Point(shapely.get_coordinates(path)[0]))
 
 
 def component_at(shape: BaseGeometry, point: Point) -> Polygon:
@@ -56,42 +58,104 @@ def component_at(shape: BaseGeometry, point: Point) -> Polygon:
     return parts[0] if parts else Polygon()
 
 
-def _spanning_slits(polygon: Polygon, path: LineString, room: float) -> list[_Slit]:
-    """The fewest and best slits that join all rings: a spanning tree of rings, built greedily."""
+def slits_of(polygon: Polygon, path: BaseGeometry, room: float) -> list[LineString]:
+    """Straight ways between rings that make a region simply connected, where the ways to the path part.
 
-    def rank(slit: _Slit) -> tuple[bool, float]:
-        return slit.away < room, slit.line.length - min(slit.away, 3.0 * room)
+    On a triangulation whose vertices all lie on rings, the quickest ways from everywhere to the path cross
+    some of the diagonals; the others join the rings in a tree, for a spanning tree of the triangles and one
+    of the rings share no diagonal. So no start has a longer way than before. Diagonals within ``room`` of the
+    path are replaced by others where there are any; those that cross it are never taken.
 
-    group = list(range(1 + len(polygon.interiors)))
+    Args:
+        polygon: The region [m].
+        path: What must stay open, as for `cut_holes` [m].
+        room: Distance from the path within which a slit does harm; half the width below which a passage slows
+            down [m].
+    """
+    if not polygon.interiors:
+        return []
+    mesh = triangulate(polygon)
+    arrival, entrance = _quickest_ways(mesh, path, room)
+    lines = np.asarray(shapely.linestrings(mesh.vertices[mesh.diagonals]))
+    away = np.asarray(shapely.distance(lines, path))
+    crossed = np.zeros(len(away), dtype=np.bool_)
+    crossed[entrance[entrance >= 0]] = True
+    latest = arrival[mesh.neighbours].max(axis=1)
+    length = np.asarray(shapely.length(lines))
+    # The way that is lost least comes first: among crossed diagonals the one farthest upstream.
+    order = np.lexsort((length, np.where(crossed, -latest, 0.0), crossed, away < room))
+    group = np.arange(1 + len(polygon.interiors))
     chosen = []
-    for slit in sorted(_candidates(polygon, path), key=rank):
-        first, second = (group[ring] for ring in slit.rings)
-        if first != second:
-            group = [first if label == second else label for label in group]
-            chosen.append(slit)
-    return chosen
+    for k in order:
+        first, second = group[mesh.ring[mesh.diagonals[k]]]
+        if first != second and away[k] > 0.0:
+            group[group == first] = second
+            chosen.append(k)
+    return _squared(polygon, path, list(lines[chosen]), mesh.ring[mesh.diagonals[chosen]])
 
 
-def _candidates(polygon: Polygon, path: LineString) -> list[_Slit]:
-    """Shortest ways from points of each hole to each other ring that cross neither walls nor the path."""
-    rings = [polygon.exterior, *polygon.interiors]
-    inside = polygon.buffer(1e-7)
-    slits = []
-    for k, hole in enumerate(rings[1:], start=1):
-        corners = shapely.get_coordinates(shapely.segmentize(hole, SPACING))
-        points = shapely.points(0.5 * (corners[:-1] + corners[1:]))
-        for m, other in enumerate(rings):
-            if m == k:
-                continue
-            for line in shapely.shortest_line(points, other):
-                away = float(path.distance(line))
-                if away > 0.0 and line.length > 0.0 and inside.covers(line):
-                    slits.append(_Slit((k, m), line, away))
-    return slits
+def _squared(
+    polygon: Polygon, path: BaseGeometry, lines: list[LineString], rings: IndexArray
+) -> list[LineString]:
+    """Move one end of each slit to where it meets its ring squarely, if that is near and in nobody's way."""
+    walls = [polygon.exterior, *polygon.interiors]
+    shapely.prepare(polygon)
+    for k, line in enumerate(lines):
+        others = shapely.union_all(lines[:k] + lines[k + 1 :])
+        for end in SQUARED_ENDS:
+            short = shapely.shortest_line(Point(lines[k].coords[end]), walls[rings[k][1 - end]])
+            short = short if end == 0 else short.reverse()
+            if (
+                0.0 < short.length < lines[k].length
+                and line.hausdorff_distance(short) <= NEAR * line.length
+                and path.distance(short) >= 0.5 * path.distance(line)
+                and not others.intersects(short)
+                and shapely.contains_properly(polygon, substring(short, 0.01, 0.99, normalized=True))
+            ):
+                lines[k] = short
+    return lines
 
 
-def _prolonged(line: LineString, reach: float) -> LineString:
-    """The line, longer at both ends, so that a strip along it breaks through both rings."""
-    start, end = shapely.get_coordinates(line)
-    step = reach * (end - start) / np.linalg.norm(end - start)
-    return LineString([start - step, end + step])
+def _quickest_ways(mesh: Triangles, path: BaseGeometry, room: float) -> tuple[FloatArray, IndexArray]:
+    """When each triangle reaches the path's end, and through which diagonal it is left (-1 on the path)."""
+    centres = mesh.vertices[mesh.corners].mean(axis=1)
+    ends = mesh.vertices[mesh.diagonals]
+    middles, widths = ends.mean(axis=1), np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    walked = np.linalg.norm(centres[mesh.neighbours] - middles[:, None], axis=2).sum(axis=1)
+    cost = walked * (1.0 + 2.0 * room / widths)
+    around: list[list[tuple[int, int]]] = [[] for _ in centres]
+    for k, (a, b) in enumerate(mesh.neighbours.tolist()):
+        around[a].append((b, k))
+        around[b].append((a, k))
+    met = np.flatnonzero(shapely.intersects(shapely.polygons(mesh.vertices[mesh.corners]), path))
+    arrival, entrance = np.full(len(centres), inf), np.full(len(centres), -1)
+    arrival[met] = [_left_on(path, Point(centres[t])) for t in met]
+    queue = [(float(arrival[t]), int(t)) for t in met]
+    heapify(queue)
+    while queue:
+        time, here = heappop(queue)
+        if time > arrival[here]:
+            continue
+        for there, k in around[here]:
+            if time + cost[k] < arrival[there] and not (arrival[there] < inf and entrance[there] < 0):
+                arrival[there], entrance[there] = time + cost[k], k
+                heappush(queue, (float(arrival[there]), there))
+    return arrival, entrance
+
+
+def _left_on(path: BaseGeometry, point: Point) -> float:
+    """Length of a path from its point nearest to another one to its end; zero for what is no path [m]."""
+    return path.length - path.project(point) if isinstance(path, LineString) and path.length > 0.0 else 0.0
+
+
+def _strip(slit: LineString, polygon: Polygon, away: float) -> Polygon:
+    """A strip along a slit that breaks through the rings at both ends, but not out of a thin wall again."""
+    width = min(WIDTH, WIDTH_PER_LENGTH * slit.length, 0.5 * away)
+    start, end = shapely.get_coordinates(slit)
+    step = width * (end - start) / slit.length
+    for _ in range(BREAKS):
+        strip = LineString([start - step, end + step]).buffer(0.5 * width, cap_style="flat")
+        if shapely.get_num_geometries(strip.intersection(polygon)) == 1:
+            break
+        step = 0.5 * step
+    return strip
