@@ -13,7 +13,7 @@ from coop_drake.fields.quadrature import FloatArray
 from coop_drake.geometry.passage import pole
 from coop_drake.geometry.simplify import sharpest_angle
 
-__all__ = ["goal_edges", "region_to_map"]
+__all__ = ["check_question", "goal_edges", "region_to_map"]
 
 _ON = 1e-9  # what is this close, times the diameter, lies on the goal's boundary
 _SLIVER = 1e-9  # pieces that are thinner, times the diameter, come from rounding
@@ -43,18 +43,29 @@ def region_to_map(
     Raises:
         FieldError: If the domain is no valid polygon, the goal is not in it, or the piece is undetermined.
     """
-    _check_polygon(domain, "domain")
+    check_question(domain, goal)
     if isinstance(goal, Point):
-        if goal.is_empty or not np.isfinite(goal.coords[0]).all() or not domain.contains(goal):
-            raise FieldError(f"the goal {goal.wkt} must lie strictly inside the domain{_extent(domain)}")
         return domain, goal
-    _check_polygon(goal, "goal region")
-    if not domain.buffer(1e-9 * domain.length).covers(goal):
-        raise FieldError("the goal region must lie in the domain; intersect it with the domain first")
     piece = _piece_to_keep(domain, goal, inside)
     if _can_collapse(domain, piece, goal):
         return piece, goal
     return domain, Point(pole(goal)[0])
+
+
+def check_question(domain: Polygon, goal: Point | Polygon) -> None:
+    """Refuse a domain that is no valid polygon, or a goal that is not in it.
+
+    Raises:
+        FieldError: With what is wrong and what is allowed.
+    """
+    _check_polygon(domain, "domain")
+    if isinstance(goal, Point):
+        if goal.is_empty or not np.isfinite(goal.coords[0]).all() or not domain.contains(goal):
+            raise FieldError(f"the goal {goal.wkt} must lie strictly inside the domain{_extent(domain)}")
+        return
+    _check_polygon(goal, "goal region")
+    if not domain.buffer(1e-9 * domain.length).covers(goal):
+        raise FieldError("the goal region must lie in the domain; intersect it with the domain first")
 
 
 def goal_edges(points: FloatArray, goal: BaseGeometry, scale: float) -> NDArray[np.bool_]:

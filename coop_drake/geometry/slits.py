@@ -40,16 +40,16 @@ def cut_holes(polygon: Polygon, path: BaseGeometry, room: float) -> Polygon:
 
     Args:
         polygon: The region [m].
-        path: What must stay open, inside the polygon: a passage that ends at the goal, or the goal [m].
+        path: What must stay open, inside the polygon: a passage that ends at the goal, the goal, or both [m].
         room: Distance from the path within which a slit does harm [m].
 
     Returns:
-        What is left around the path's start; the polygon itself if it has no hole. A hole that no straight
+        What is left around the path; the polygon itself if it has no hole. A hole that no straight
         slit can reach without crossing the path stays.
     """
     strips = [_strip(slit, polygon, float(path.distance(slit))) for slit in slits_of(polygon, path, room)]
     cut = polygon.difference(shapely.union_all(strips))
-    return component_at(cut, Point(shapely.get_coordinates(path)[0]))
+    return component_at(cut, path.representative_point())
 
 
 def component_at(shape: BaseGeometry, point: Point) -> Polygon:
@@ -145,7 +145,8 @@ def _quickest_ways(mesh: Triangles, path: BaseGeometry, room: float) -> tuple[Fl
 
 def _left_on(path: BaseGeometry, point: Point) -> float:
     """Length of a path from its point nearest to another one to its end; zero for what is no path [m]."""
-    return path.length - path.project(point) if isinstance(path, LineString) and path.length > 0.0 else 0.0
+    lines = [p for p in shapely.get_parts(path) if isinstance(p, LineString) and p.length > 0.0]
+    return float(lines[0].length - lines[0].project(point)) if lines else 0.0
 
 
 def _strip(slit: LineString, polygon: Polygon, away: float) -> Polygon:

@@ -1,0 +1,84 @@
+"""Cells cut open: without holes no streamline lingers, and no aisle between collapsed holes is crowded."""
+
+from __future__ import annotations
+
+import shapely
+from shapely import GeometryCollection, LineString, Point, Polygon
+
+from coop_drake.errors import FieldError
+from coop_drake.fields.goals import check_question
+from coop_drake.geometry.passage import PassageFinder, pole
+from coop_drake.geometry.slits import cut_holes
+
+__all__ = ["cut_open"]
+
+_ROUNDING = 1e-9  # of the domain's boundary, by which what is left may stick out of it
+
+
+def cut_open(domain: Polygon, goal: Point | Polygon, start: Point | None = None) -> Polygon:
+    """The domain with slits that join its holes to the outer ring, where the quickest ways to the goal part.
+
+    A hole that collapses to a point makes two kinds of trouble: streamlines beside the two that end on it
+    linger there, and in an aisle between two holes the map's Jacobian is as small as exp(-pi length / width),
+    so that its direction drowns in rounding. In a simply connected cell neither happens. Slits lie where ways
+    to the goal on either side take equally long, so hardly any way gets longer.
+
+    Example:
+        ```
+        cell = cut_open(domain, goal)
+        field = VelocityField(HarmonicMap(cell, goal))
+        ```
+
+    Args:
+        domain: The cell, with or without holes [m].
+        goal: Point or region to reach; no slit meets it.
+        start: Where a transport begins. No slit is nearer to the widest passage from there to the goal than
+            half the passage's clearance, and none within its clearance where there is a choice.
+
+    Returns:
+        What is left, inside the domain. Holes that the goal encloses stay.
+
+    Raises:
+        FieldError: If the domain, goal or start is not usable, or a hole cannot be joined by straight slits.
+    """
+    check_question(domain, goal)
+    if start is not None and not domain.contains(start):
+        raise FieldError(f"the start {start.wkt} must lie strictly inside the domain")
+    if not domain.interiors:
+        return domain
+    kept, room = _what_stays_open(domain, goal, start)
+    cell = cut_holes(domain, kept, room)
+    _certify(domain, cell, goal, kept)
+    return cell
+
+
+def _what_stays_open(
+    domain: Polygon, goal: Point | Polygon, start: Point | None
+) -> tuple[GeometryCollection, float]:
+    """The goal, with the widest passage to it; and the distance from it that slits are to keep [m]."""
+    if start is None:
+        return GeometryCollection([goal]), domain.area / domain.length
+    target = goal if isinstance(goal, Point) else Point(pole(goal)[0])
+    passage = PassageFinder(domain).find(start.coords[0], target.coords[0])
+    return GeometryCollection([passage.path, goal]), passage.neck
+
+
+def _certify(domain: Polygon, cell: Polygon, goal: Point | Polygon, kept: GeometryCollection) -> None:
+    """Check that the cell lies in the domain, holds what must stay open, and is simply connected.
+
+    Raises:
+        FieldError: If it does not.
+    """
+    if cell.is_empty or not cell.is_valid or not domain.buffer(_ROUNDING * domain.length).covers(cell):
+        raise FieldError("the slits leave no valid cell around the goal")
+    lines = [part for part in shapely.get_parts(kept) if isinstance(part, LineString)]
+    if not all(cell.contains(line) for line in lines):
+        raise FieldError("the slits cross the widest passage to the goal")
+    filled = Polygon(goal.exterior) if isinstance(goal, Polygon) else goal
+    for hole in cell.interiors:
+        if not filled.covers(hole):
+            x, y = hole.centroid.coords[0]
+            raise FieldError(
+                f"the hole around ({x:.6g}, {y:.6g}) m cannot be joined to the outer ring by straight slits "
+                "that leave the passage to the goal open"
+            )
