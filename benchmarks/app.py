@@ -11,10 +11,12 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from benchmarks.commands import bench_commands, bench_help
 from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.ledger import Ledger, LedgerError
 from benchmarks.mapping import bench_mapping
 from benchmarks.planner.ablation import ablation_tasks
+from benchmarks.planner.contradiction import contradiction_tasks
 from benchmarks.planner.growth import growth_tasks
 from benchmarks.planner.head_to_head import Effort, head_to_head_tasks
 from benchmarks.planner.ompl_peer import has_ompl
@@ -30,6 +32,7 @@ _FAILED, _BAD_USE, _INTERRUPTED = 1, 2, 130
 _LIMIT = 20.0
 _ABLATION_LIMIT = 5.0
 _COMPILING_LIMIT = 600.0
+_COMMANDED = ("base", "tight", "closed", "three", "elbow")
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
@@ -38,11 +41,13 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 def main(
     topics: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[TOPIC]...", help="planner, mapping, simulating; all by default."),
+        typer.Argument(metavar="[TOPIC]...", help="planner, command, mapping, simulating; all by default."),
     ] = None,
     only: Annotated[
         list[str] | None,
-        typer.Option(help="A case, peer or group: base, ompl, growth, robots, ablation; may be repeated."),
+        typer.Option(
+            help="A case, peer or group: base, ompl, growth, robots, ablation, no_way; may be repeated."
+        ),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Runs of every peer.")] = 10,
     budget: Annotated[float, typer.Option(min=0.1, help="CPU seconds of every run of OMPL.")] = 8.0,
@@ -78,9 +83,16 @@ def _tasks(effort: Effort) -> list[Task]:
         *head_to_head_tasks(effort),
         *ablation_tasks(min(effort.limit, _ABLATION_LIMIT)),
         *growth_tasks(effort.limit),
+        *contradiction_tasks(),
+        Task("command/help", lambda rows: bench_help(), alone=True),
+        *(_command_task(scenario) for scenario in _COMMANDED),
         Task("mapping/base", lambda rows: bench_mapping(), alone=True),
         Task("simulating/base", lambda rows: bench_simulation(), alone=True),
     ]
+
+
+def _command_task(scenario: str) -> Task:
+    return Task(f"command/plan_{scenario}", lambda rows: bench_commands(scenario), alone=True)
 
 
 def _measure(tasks: list[Task], ledger: Ledger, jobs: int, console: Console) -> int:

@@ -8,16 +8,14 @@ import resource
 import signal
 import sys
 from math import ceil
-from pathlib import Path
 from time import process_time
 from types import FrameType
 from typing import IO
 
 from benchmarks.isolated import GRACE, Isolated
+from coop_drake.memory import peak_memory_mb
 
-__all__ = ["main", "peak_memory_mb"]
-
-_STATUS = Path("/proc/self/status")
+__all__ = ["main"]
 
 
 def main() -> None:
@@ -34,20 +32,6 @@ def main() -> None:
 
 def _cost(value: object, start: float) -> Isolated[object]:
     return Isolated(value, process_time() - start, peak_memory_mb())
-
-
-def peak_memory_mb() -> float:
-    """Largest resident memory of this process [MB].
-
-    Where the kernel keeps it for the program alone that is read: the figure of ``getrusage`` begins with
-    what the parent held when it started this process.
-    """
-    if _STATUS.exists():
-        fields = dict(line.split(":", 1) for line in _STATUS.read_text().splitlines())
-        if "VmHWM" in fields:
-            return int(fields["VmHWM"].split()[0]) * 1.024e-3
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return peak / 1e6 if sys.platform == "darwin" else peak * 1.024e-3
 
 
 def _limit_time(seconds: int, start: float, answer: IO[bytes]) -> None:

@@ -8,13 +8,15 @@ from pathlib import Path
 from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.measures import map_measures, simulation_measures
-from coop_drake.cli.memory import peak_memory_mb
+from coop_drake.cli.mapping import map_cells, save_certificates
+from coop_drake.cli.measures import simulation_measures
 from coop_drake.cli.planning import plan_question, read_plan, without_plan
 from coop_drake.cli.reading import Task, read_task
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import summary_rows
+from coop_drake.fields import HarmonicMap
+from coop_drake.memory import peak_memory_mb
 from coop_drake.planning import Found, Plan
 from coop_drake.planning.planner import plan
 from coop_drake.simulation import SimulationLog, build_maps, simulate
@@ -25,29 +27,40 @@ __all__ = ["run_scenario", "simulate_scenario", "warm_up"]
 _WARM_UP_SECONDS = 0.05  # Simulated time that calls every kernel [s].
 
 
-def run_scenario(scenario: Path, gains: str | None, out: Path | None, reporter: Reporter) -> ExitCode:
-    """Plan and carry the plan out."""
+def run_scenario(
+    scenario: Path, gains: str | None, out: Path | None, reporter: Reporter, *, fresh_maps: bool = False
+) -> ExitCode:
+    """Plan and carry the plan out, with maps solved before unless fresh ones are asked for."""
     task = read_task(scenario, gains)
     folder = ResultFolder.of(task.scenario.name, out)
     result = plan_question(task.question, folder, reporter)
     if not isinstance(result, Found):
         return without_plan(task.question, result, folder, reporter)
-    return _carry_out(task, result.plan, folder, reporter)
+    return _carry_out(task, result.plan, folder, reporter, fresh_maps)
 
 
 def simulate_scenario(
-    scenario: Path, gains: str | None, plan_file: Path | None, out: Path | None, reporter: Reporter
+    scenario: Path,
+    gains: str | None,
+    plan_file: Path | None,
+    out: Path | None,
+    reporter: Reporter,
+    *,
+    fresh_maps: bool = False,
 ) -> ExitCode:
     """Carry out a plan made before: the file that is named, or the one among the scenario's results."""
     task = read_task(scenario, gains)
     folder = ResultFolder.of(task.scenario.name, out)
     found = read_plan(task.question, plan_file or folder.plan, reporter, gains_given=gains is not None)
-    return _carry_out(task, found, folder, reporter)
+    return _carry_out(task, found, folder, reporter, fresh_maps)
 
 
-def _carry_out(task: Task, found: Plan, folder: ResultFolder, reporter: Reporter) -> ExitCode:
+def _carry_out(
+    task: Task, found: Plan, folder: ResultFolder, reporter: Reporter, fresh_maps: bool
+) -> ExitCode:
     """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run."""
-    log = _simulate(task, found, folder, reporter)
+    maps = map_cells(task, found, reporter, fresh=fresh_maps)
+    log = _simulate(task, found, maps, folder, reporter)
     _draw(task, found, log, folder, reporter)
     reporter.table(task.scenario.name, summary_rows(reporter.facts))
     reporter.say(
@@ -60,16 +73,16 @@ def _carry_out(task: Task, found: Plan, folder: ResultFolder, reporter: Reporter
     return ExitCode.DONE if log.reached and not log.violation else ExitCode.FAILED_RUN
 
 
-def _simulate(task: Task, found: Plan, folder: ResultFolder, reporter: Reporter) -> SimulationLog:
-    """Map every cell, run the closed loop, note how it went and write the log."""
-    with reporter.stage("mapping") as progress, reporter.stopwatch("mapping"):
-        maps = build_maps(found, progress=progress)
-    reporter.facts.update(map_measures(maps))
+def _simulate(
+    task: Task, found: Plan, maps: tuple[HarmonicMap, ...], folder: ResultFolder, reporter: Reporter
+) -> SimulationLog:
+    """Run the closed loop, note how it went, and write the log and the maps' certificates."""
     with reporter.stage("simulating") as progress, reporter.stopwatch("simulation"):
         log = simulate(task.scenario, found, maps, progress=progress)
     reporter.facts.update(simulation_measures(found, log), peak_memory_mb=peak_memory_mb())
     folder.make()
     folder.forget_simulation()
+    save_certificates(task, maps, folder)
     log.save(folder.log)
     return log
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from shapely import Polygon, affinity, box
+from shapely import MultiPolygon, Polygon, affinity, box
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.geometry.pose import FloatArray
@@ -118,11 +118,9 @@ def fitting_positions(walls: Walls, ring: FloatArray, among: BaseGeometry) -> Ba
     return _areas(fits.difference(shapely.union_all(sums[shapely.intersects(fits, sums)])))
 
 
-def _areas(shape: BaseGeometry) -> BaseGeometry:
+def _areas(shape: BaseGeometry) -> MultiPolygon:
     """The polygons of a shape: sweeps lie a hair inside, so that lines hold no free position."""
-    parts = [part for part in shapely.get_parts(shape) if isinstance(part, Polygon)]
-    areas: BaseGeometry = shapely.multipolygons(parts)
-    return areas
+    return MultiPolygon([part for part in shapely.get_parts(shape) if isinstance(part, Polygon)])
 
 
 def _with_area(ring: FloatArray | None) -> FloatArray | None:

@@ -1,4 +1,4 @@
-"""How much memory a command took."""
+"""How much memory this process and those that it waited for took."""
 
 from __future__ import annotations
 
