@@ -10,13 +10,13 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.measures import answer_of, plan_measures, planning_measures
-from coop_drake.memory import peak_memory_mb
 from coop_drake.cli.question import Question
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import summary_rows
 from coop_drake.errors import PlanError
 from coop_drake.files import write_atomically
+from coop_drake.memory import peak_memory_mb
 from coop_drake.planning import (
     Found,
     Infeasible,

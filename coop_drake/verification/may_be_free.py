@@ -101,7 +101,7 @@ class FreePositions:
         return self._rings[key]
 
 
-def fitting_positions(walls: Walls, ring: FloatArray, among: BaseGeometry) -> BaseGeometry:
+def fitting_positions(walls: Walls, ring: FloatArray, among: BaseGeometry) -> MultiPolygon:
     """Positions p at which a convex footprint stays inside the floor: (W - f) minus all e + (-F).
 
     Args:
