@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from benchmarks.commands import bench_commands, bench_help
 from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.ledger import Ledger, LedgerError
-from benchmarks.mapping import bench_mapping
+from benchmarks.mapping import mapping_tasks
 from benchmarks.planner.ablation import ablation_tasks
 from benchmarks.planner.contradiction import contradiction_tasks
 from benchmarks.planner.growth import growth_tasks
@@ -86,7 +86,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *contradiction_tasks(),
         Task("command/help", lambda rows: bench_help(), alone=True),
         *(_command_task(scenario) for scenario in _COMMANDED),
-        Task("mapping/base", lambda rows: bench_mapping(), alone=True),
+        *mapping_tasks(),
         Task("simulating/base", lambda rows: bench_simulation(), alone=True),
     ]
 

@@ -39,7 +39,7 @@ RUN_KEYS = PLAN_KEYS | {
     "simulated_seconds",
     "simulation_wall_seconds",
 }
-RESULTS = ["log.npz", "plan.json", "summary.png", "table_1.md", "transport.html"]
+RESULTS = ["log.npz", "maps.json", "plan.json", "summary.png", "table_1.md", "transport.html"]
 
 
 def invoke(*arguments):
@@ -98,6 +98,8 @@ def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_
     facts = json.loads(result.stdout)
     assert facts.keys() >= RUN_KEYS
     assert facts["gains"] == "table_2"
+    assert facts["maps_read"] == facts["maps"] > 0  # the run before left them in the cache
+    assert (tmp_path / "maps.json").read_bytes() == (out / "maps.json").read_bytes()
     assert not (tmp_path / "plan.json").exists()
     assert (tmp_path / "transport.html").exists()
 

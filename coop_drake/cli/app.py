@@ -16,6 +16,7 @@ import typer
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.map_cache import maps_command
 from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.verify import verify_command
@@ -44,6 +45,9 @@ OutPath = Annotated[
 ]
 GainsName = Annotated[
     str | None, typer.Option("--gains", metavar="NAME", help="Gain set; the scenario's choice by default.")
+]
+FreshMaps = Annotated[
+    bool, typer.Option("--fresh-maps", help="Solve all maps anew; others come from the cache, see `maps`.")
 ]
 Machine = Annotated[
     bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
@@ -79,6 +83,7 @@ def run_command(
     scenario: ScenarioPath,
     out: OutPath = None,
     gains: GainsName = None,
+    fresh_maps: FreshMaps = False,
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
@@ -88,7 +93,7 @@ def run_command(
     def command() -> ExitCode:
         from coop_drake.cli.simulating import run_scenario
 
-        return run_scenario(scenario, gains, out, reporter)
+        return run_scenario(scenario, gains, out, reporter, fresh_maps=fresh_maps)
 
     run_guarded(reporter, command)
 
@@ -124,6 +129,7 @@ def simulate_command(
     gains: Annotated[
         str | None, typer.Option("--gains", metavar="NAME", help="Gain set; the plan's own by default.")
     ] = None,
+    fresh_maps: FreshMaps = False,
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
@@ -133,7 +139,7 @@ def simulate_command(
     def command() -> ExitCode:
         from coop_drake.cli.simulating import simulate_scenario
 
-        return simulate_scenario(scenario, gains, plan, out, reporter)
+        return simulate_scenario(scenario, gains, plan, out, reporter, fresh_maps=fresh_maps)
 
     run_guarded(reporter, command)
 
@@ -154,3 +160,4 @@ def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
 app.command("watch")(watch_command)
 app.command("why")(why_command)
 app.command("verify")(verify_command)
+app.command("maps")(maps_command)

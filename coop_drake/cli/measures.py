@@ -50,10 +50,13 @@ def plan_measures(plan: Plan) -> dict[str, Any]:
 
 def map_measures(maps: Sequence[HarmonicMap]) -> dict[str, Any]:
     """Return how well the maps are certified."""
+    certificates = [harmonic_map.certificate for harmonic_map in maps]
     return {
         "maps": len(maps),
-        "max_map_residual": max(harmonic_map.certificate.residual for harmonic_map in maps),
-        "max_map_unknowns": max(harmonic_map.certificate.unknowns for harmonic_map in maps),
+        "max_map_residual": max(certificate.residual for certificate in certificates),
+        "max_map_error_bound": max(certificate.error_bound for certificate in certificates),
+        "max_map_unknowns": max(certificate.unknowns for certificate in certificates),
+        "max_map_condition": max(certificate.condition for certificate in certificates),
     }
 
 

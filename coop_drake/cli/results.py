@@ -9,7 +9,7 @@ __all__ = ["ResultFolder"]
 
 _AFTER_PLANNING = ("plan.json", "certificate.json", "table_1.md")
 _AFTER_DIAGNOSING = ("why.png", "why.svg")
-_AFTER_SIMULATING = ("log.npz", "transport.html", "fig[01][0-9]_*.png", "summary.png")
+_AFTER_SIMULATING = ("maps.json", "log.npz", "transport.html", "fig[01][0-9]_*.png", "summary.png")
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,11 @@ class ResultFolder:
         return self.path / "table_1.md"
 
     @property
+    def maps(self) -> Path:
+        """The certificates of the cells' maps."""
+        return self.path / "maps.json"
+
+    @property
     def log(self) -> Path:
         """The simulation log."""
         return self.path / "log.npz"
@@ -67,7 +72,7 @@ class ResultFolder:
         self.forget_simulation()
 
     def forget_simulation(self) -> None:
-        """Remove an older simulation's log, recording and figures."""
+        """Remove an older simulation's log, certificates of maps, recording and figures."""
         self._remove(_AFTER_SIMULATING)
 
     def forget_diagnosis(self) -> None:

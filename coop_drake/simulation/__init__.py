@@ -4,7 +4,7 @@ from coop_drake.simulation.clearance import Clearance, TeamClearance
 from coop_drake.simulation.invariants import ACCELERATION_TOLERANCE, WRENCH_TOLERANCE, Invariants, Margins
 from coop_drake.simulation.ledger import Ledger, communication
 from coop_drake.simulation.log import SimulationLog
-from coop_drake.simulation.maps import build_maps
+from coop_drake.simulation.maps import build_maps, certificate_rows
 from coop_drake.simulation.run import simulate
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "SimulationLog",
     "TeamClearance",
     "build_maps",
+    "certificate_rows",
     "communication",
     "simulate",
 ]

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
+import numpy as np
 from shapely import Point
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
@@ -13,7 +16,7 @@ from coop_drake.errors import FieldError
 from coop_drake.fields import HarmonicMap, MapStore
 from coop_drake.planning.plan import Plan
 
-__all__ = ["TOLERANCE", "build_maps"]
+__all__ = ["TOLERANCE", "build_maps", "certificate_rows"]
 
 TOLERANCE = 1e-8
 """Largest certified error of a map that is accepted, if none is given; a scenario's is ``maps.tolerance``."""
@@ -65,3 +68,13 @@ def build_maps(
     if store is not None and store.found < count:
         store.trim()
     return tuple(maps)
+
+
+def certificate_rows(maps: Sequence[HarmonicMap]) -> list[dict[str, Any]]:
+    """What every map is worth, as plain values by the names of `MapCertificate`, cells counted from 0."""
+    rows = []
+    for cell, harmonic_map in enumerate(maps):
+        values = dataclasses.asdict(harmonic_map.certificate)
+        plain = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values.items()}
+        rows.append({"cell": cell, "vertices": len(harmonic_map.solution.arrays.edges), **plain})
+    return rows

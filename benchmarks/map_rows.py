@@ -1,0 +1,113 @@
+"""What one map costs and how good it is, beside the least that any method of its size takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import process_time
+
+import numpy as np
+import scipy.linalg
+import shapely
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+from benchmarks.domains import Domain
+from benchmarks.rows import Row
+from benchmarks.timing import best_seconds, seconds
+from coop_drake.errors import FieldError
+from coop_drake.fields import HarmonicMap
+
+__all__ = ["cost_rows", "map_rows"]
+
+RESIDUAL = 1e-8
+"""Largest residual on the boundary that a map may have; the certified error is 2 M + 1 times that."""
+
+_POINTS = 1_000
+_QUICK = 0.3  # what takes no longer is timed several times [s]
+_MOST_UNKNOWNS = 4_000  # larger dense systems take too long to be a peer
+
+
+def _mapped(domain: Domain) -> HarmonicMap:
+    """Map a domain to the residual that all rows are measured at.
+
+    Raises:
+        FieldError: It cannot be mapped as well as that.
+    """
+    holes = len(domain.cell.interiors) + 1  # a goal region may be one more
+    return HarmonicMap(domain.cell, domain.goal, tolerance=(2 * holes + 1) * RESIDUAL)
+
+
+def map_rows(name: str, domain: Domain, published_residual: float | None = None) -> list[Row]:
+    """Solve and judge a map, then evaluate it.
+
+    Args:
+        name: What the rows' names begin with.
+        domain: What to map.
+        published_residual: That of the authors' own implementation of such maps (hntf2d, single precision,
+            3200 elements) on such a shape, if known.
+    """
+    rows = cost_rows(name, domain, published_residual)
+    return rows if rows[0].unit == "refused" else [*rows, *_evaluation_rows(name, _mapped(domain))]
+
+
+def cost_rows(name: str, domain: Domain, published_residual: float | None = None) -> list[Row]:
+    """Solve and judge one map, beside one dense system of as many unknowns; arguments as in `map_rows`."""
+    start = process_time()
+    try:
+        certificate = _mapped(domain).certificate
+    except FieldError:
+        return [Row(f"{name}/answer", 0.0, "refused"), Row(f"{name}/vertices", domain.vertices, "-")]
+    first = process_time() - start
+    again = (
+        _best(lambda: _mapped(domain)) if first < _QUICK else seconds(lambda: _mapped(domain), process_time)
+    )
+    n = certificate.unknowns
+    peer = f"dense solve, {n} unknowns" if n <= _MOST_UNKNOWNS else ""
+    hntf2d = "" if published_residual is None else "hntf2d, published"
+    return [
+        Row(f"{name}/answer", 1.0, "mapped"),
+        Row(f"{name}/vertices", domain.vertices, "-"),
+        Row(f"{name}/unknowns", n, "-"),
+        Row(f"{name}/first_cpu_seconds", first, "s"),
+        Row(f"{name}/cpu_seconds", again, "s", peer, _dense_seconds(n) if peer else None),
+        Row(f"{name}/residual", certificate.residual, "-", hntf2d, published_residual),
+    ]
+
+
+def _evaluation_rows(name: str, harmonic_map: HarmonicMap) -> list[Row]:
+    """T and J at one point and at a thousand, beside bare sums over as many sources in numpy."""
+    low, high = np.reshape(harmonic_map.region.bounds, (2, 2))
+    points = np.random.default_rng(0).uniform(low, high, (20 * _POINTS, 2))
+    points = points[shapely.contains_xy(harmonic_map.region, *points.T)][:_POINTS]
+    n = harmonic_map.certificate.unknowns
+    sources = np.exp(2j * np.pi * np.arange(n) / n)
+    weights = np.column_stack((sources, 1j * sources))
+
+    def sums(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        kernel = 1.0 / (sources - z[:, None])
+        return kernel @ weights, (kernel * kernel) @ weights
+
+    places = 0.5 * (points @ np.array([1.0, 1.0j])) / float(np.abs(high).max())
+    one = _best(lambda: [harmonic_map(point) for point in points]) / len(points)
+    many = _best(lambda: harmonic_map(points)) / len(points)
+    with threadpool_limits(1, user_api="blas"):
+        one_sum = _best(lambda: [sums(z) for z in places.reshape(-1, 1)]) / len(points)
+        many_sums = _best(lambda: sums(places)) / len(points)
+    peer = f"sums over {n} sources"
+    return [
+        Row(f"{name}/one_point", 1e6 * one, "us", peer, 1e6 * one_sum),
+        Row(f"{name}/per_point_of_1000", 1e6 * many, "us", peer, 1e6 * many_sums),
+    ]
+
+
+def _best(work: Callable[[], object]) -> float:
+    """CPU time of a call that may be repeated [s]."""
+    return best_seconds(work, 3, clock=process_time)
+
+
+def _dense_seconds(unknowns: int) -> float:
+    """CPU time of one dense system with two right-hand sides, on one thread [s]."""
+    random = np.random.default_rng(0)
+    matrix = random.normal(size=(unknowns, unknowns)) + unknowns * np.eye(unknowns)
+    right = random.normal(size=(unknowns, 2))
+    with threadpool_limits(1, user_api="blas"):
+        return _best(lambda: scipy.linalg.solve(matrix, right, check_finite=False))
