@@ -15,7 +15,7 @@ DOMAINS = {
     "warehouse": (WAREHOUSE, GOAL, 40),
     "maze": (*domains.maze(5), 80),
     "Minkowski, mitre": (WAREHOUSE.buffer(-0.15, join_style="mitre"), GOAL, 40),
-    "Minkowski, round": (WAREHOUSE.buffer(-0.15, quad_segs=3), GOAL, 10),
+    "Minkowski, round": (WAREHOUSE.buffer(-0.15, quad_segs=3), GOAL, 20),
     "goal on the outer ring": (WAREHOUSE, box(6.5, 4.8, 8, 6), 40),
 }
 ACCURACY = 4e-4  # of the oracle, whose elements are constant
