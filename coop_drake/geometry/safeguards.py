@@ -6,11 +6,55 @@ from collections.abc import Sequence
 
 import numpy as np
 import shapely
+from manifold3d import CrossSection
 from shapely import MultiPolygon, Polygon
 from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.geometry.pose import FloatArray
+
+_FAILURES = (RuntimeError, ValueError, ArithmeticError)
+_ROUNDING = 1e-6
+"""Areas that should be equal may differ by this share."""
+
+
+def shared(first: CrossSection, second: CrossSection, *, over: bool) -> CrossSection:
+    """What two regions share; where clipping fails, the smaller one if they are over-regions, or nothing.
+
+    Args:
+        first: A region.
+        second: Another one.
+        over: Whether positions that are left out are called blocked; else those that are kept, free.
+    """
+    smaller = min(first, second, key=CrossSection.area)
+    try:
+        found = first ^ second
+        if found.area() <= (1.0 + _ROUNDING) * smaller.area():
+            return found
+    except _FAILURES:
+        pass
+    return smaller if over else CrossSection()
+
+
+def components(section: CrossSection, *, over: bool) -> list[CrossSection]:
+    """Connected parts of a region; where that fails, an over-region is one part, and another has none."""
+    if section.is_empty():
+        return []
+    try:
+        parts = [part for part in section.decompose() if not part.is_empty()]
+        if abs(sum(part.area() for part in parts) - section.area()) <= _ROUNDING * section.area():
+            return parts
+    except _FAILURES:
+        pass
+    return [section] if over else []
+
+
+def meet(first: CrossSection, second: CrossSection, *, otherwise: bool) -> bool:
+    """Whether two regions share more than their boundary; ``otherwise`` where clipping fails."""
+    try:
+        return not (first ^ second).is_empty()
+    except _FAILURES:
+        return otherwise
 
 
 def checked_buffer(workspace: Polygon | MultiPolygon, distance: float) -> Polygon | MultiPolygon:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from coop_drake.geometry.safeguards import shared
 from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.cell_graph import Cell
 from coop_drake.planning.cells import Region
@@ -61,7 +62,7 @@ class StrongBranching:
         ]
         first = [self._enters(part, channel, place - 1) for part in parts]
         last = [self._enters(part, channel, place + 1) for part in parts]
-        area = sum((part.region.section ^ cell.region.section).area() for part in parts)
+        area = sum(shared(part.region.section, cell.region.section, over=True).area() for part in parts)
         return Trial(axis, not _joined(parts, first, last), round(area, 9))
 
     def _enters(self, part: _Part, channel: Sequence[Cell], place: int) -> bool:

@@ -108,7 +108,10 @@ class CellGraph:
     def _meet(cell: Cell, other: Cell) -> bool:
         meets = cell.tested.get(other.index)
         if meets is None:
-            meets = cell.region.meets(other.region)
+            # What fails is no blockage; but a free channel is proved from every cell to the next.
+            meets = cell.region.meets(
+                other.region, otherwise=(cell.kind, other.kind) != (Kind.FREE, Kind.FREE)
+            )
             cell.tested[other.index] = other.tested[cell.index] = meets
         return meets
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,11 +13,10 @@ from coop_drake.geometry.body_pairs import BodyPair, BodyPairs
 from coop_drake.geometry.convex import following
 from coop_drake.geometry.minkowski import FreeSpace
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.safeguards import components, meet, shared
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 
 _NEGLIGIBLE_AREA = 1e-9
-
-_ComponentRegion = Callable[[int, Intervals], CrossSection | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,12 +78,12 @@ class Region:
             inside ^= (spans & (ax < ay * slope)).sum(axis=1) % 2 == 1
         return np.where(inside, nearest, -nearest)
 
-    def meets(self, other: Region) -> bool:
-        """Whether both sets share more than their boundary."""
+    def meets(self, other: Region, *, otherwise: bool = True) -> bool:
+        """Whether both sets share more than their boundary; ``otherwise`` where geometry fails."""
         a, b = self.bounds, other.bounds
         if a[0] > b[2] or b[0] > a[2] or a[1] > b[3] or b[1] > a[3]:
             return False
-        return not (self.section ^ other.section).is_empty()
+        return meet(self.section, other.section, otherwise=otherwise)
 
 
 class CellMaker:
@@ -120,13 +118,14 @@ class CellMaker:
         """Regions outside which no configuration of the nominal slice is free."""
         if self._pairs.overlapping(intervals) is not None:
             return []
-        return _regions(self._common(self._over_component, intervals), 0.0)
+        return regions_of(self._common(intervals, over=True), over=True)
 
     def under_cells(self, expanded: Intervals) -> list[Region]:
         """Regions in which every configuration of the expanded slice is free."""
         if self._pairs.touching(expanded) is not None:
             return []
-        return _regions(self.under_region(expanded), _NEGLIGIBLE_AREA)
+        regions = regions_of(self.under_region(expanded), over=False)
+        return [region for region in regions if region.area > _NEGLIGIBLE_AREA]
 
     def guide_cells(self, intervals: Intervals) -> list[Region]:
         """Free regions of the slice's middle configuration: a hint for the search, never a proof."""
@@ -139,15 +138,14 @@ class CellMaker:
 
     def under_region(self, expanded: Intervals) -> CrossSection:
         """Positions at which the over-footprint fits, self-collision aside."""
-        return self._common(self._under_component, expanded)
+        return self._common(expanded, over=False)
 
-    def _common(
-        self, of: Callable[[int, Intervals], CrossSection | None], intervals: Intervals
-    ) -> CrossSection:
+    def _common(self, intervals: Intervals, *, over: bool) -> CrossSection:
         """What the positions for all components share; everywhere if none says anything."""
         region: CrossSection | None = None
         for component in reversed(range(len(self._members))):
-            region = _shared(region, of(component, intervals))
+            one = (self._over_component if over else self._under_component)(component, intervals)
+            region = _shared(region, one, over)
             if region is not None and region.is_empty():
                 return region
         return self._everywhere if region is None else region
@@ -157,7 +155,7 @@ class CellMaker:
         if key not in self._under:
             found: CrossSection | None = None
             for index in self._members[component]:
-                found = _shared(found, self._under_space.minus(self._swept.over(index, expanded)))
+                found = _shared(found, self._under_space.minus(self._swept.over(index, expanded)), False)
                 if found is not None and found.is_empty():
                     break
             self._under[key] = found
@@ -170,18 +168,23 @@ class CellMaker:
             for index in self._members[component]:
                 footprint = self._swept.under(index, intervals)
                 if footprint is not None:
-                    found = _shared(found, self._over_space.minus(footprint))
+                    found = _shared(found, self._over_space.minus(footprint), True)
             self._over[key] = found
         return self._over[key]
 
 
-def _shared(first: CrossSection | None, second: CrossSection | None) -> CrossSection | None:
+def _shared(first: CrossSection | None, second: CrossSection | None, over: bool) -> CrossSection | None:
     """What two regions share; None stands for everywhere."""
     if first is None or second is None:
         return second if first is None else first
-    return first ^ second
+    return shared(first, second, over=over)
 
 
-def _regions(section: CrossSection, smallest: float) -> list[Region]:
-    regions = [Region.of(part) for part in section.decompose()]
-    return sorted((r for r in regions if r.area > smallest), key=lambda r: r.bounds)
+def regions_of(section: CrossSection, *, over: bool) -> list[Region]:
+    """Connected parts of a section, in a fixed order.
+
+    Args:
+        section: A region.
+        over: Whether nothing outside it is free; else all of it is.
+    """
+    return sorted(map(Region.of, components(section, over=over)), key=lambda region: region.bounds)

@@ -16,7 +16,7 @@ from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.sweep_kernels import over_piece
 from coop_drake.geometry.swept_tree import Piece, sweep_arrays
 from coop_drake.geometry.tree import ComponentTree, ConvexShape
-from coop_drake.planning.cells import Region
+from coop_drake.planning.cells import regions_of
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.separation import DiscSeparation
 from coop_drake.planning.separation_making import disc_separation
@@ -37,7 +37,7 @@ def disc_refuted(problem: PlanningProblem) -> DiscSeparation | None:
     space = FreeSpace.over(problem.workspace)
     for component, disc in _discs(problem.tree):
         centre, radius = disc.vertices[0], disc.radius
-        regions = [Region.of(part) for part in space.minus(radius * _INSIDE * _DIRECTIONS).decompose()]
+        regions = regions_of(space.minus(radius * _INSIDE * _DIRECTIONS), over=True)
         start = problem.tree.poses(problem.start)[component].apply(disc.vertices)[0]
         goals = _places(problem, component, centre)
         reached = [to_polygon(region.section) for region in regions if region.holds(start)]

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
+import numpy as np
 from shapely import Polygon
 
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ComponentTree
+from coop_drake.geometry.tree import Component, ComponentTree
+
+LIMIT_ROOM = 0.01
+"""Room that a joint has about its start and goal, also beyond a limit: a funnel has two sides [rad].
+
+Prismatic joints have so much in units of the object's radius.
+"""
 
 
 @dataclass(frozen=True)
@@ -39,9 +46,11 @@ class PlannerSettings:
 class PlanningProblem:
     """One question to the planner.
 
+    Joints that start or are to end at a limit, or that cannot move, get ``LIMIT_ROOM`` beyond their limits.
+
     Attributes:
         workspace: The floor W, outer ring and holes [m].
-        tree: The team as seen from the object outwards.
+        tree: The team as seen from the object outwards, with that room.
         start: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
         goal_pose: (x, y, theta) of the object, shape (3,); theta is taken modulo 2 pi.
         goal_joints: Goal value of each joint, None where the joint is free, length n.
@@ -60,3 +69,32 @@ class PlanningProblem:
     angle_tolerance: float = 0.02
     joint_tolerance: float = 0.02
     settings: PlannerSettings = field(default_factory=PlannerSettings)
+
+    def __post_init__(self) -> None:
+        """Give room to joints at their limits."""
+        joints = [component.joint for component in self.tree.components if component.joint is not None]
+        known = min(len(self.start) - 3, len(self.goal_joints))
+        if all(joint.index < known for joint in joints):
+            roomy = tuple(map(self._with_room, self.tree.components))
+            if any(new is not old for new, old in zip(roomy, self.tree.components, strict=True)):
+                object.__setattr__(self, "tree", replace(self.tree, components=roomy))
+
+    def _with_room(self, component: Component) -> Component:
+        """The component, its joint with room about its start and its goal; the same where it has that."""
+        joint = component.joint
+        if joint is None:
+            return component
+        room = LIMIT_ROOM if joint.kind == "revolute" else LIMIT_ROOM * object_radius(self.tree)
+        ends = (float(self.start[3 + joint.index]), self.goal_joints[joint.index])
+        values = [value for value in ends if value is not None and joint.lower <= value <= joint.upper]
+        lower = min([joint.lower, *[value - room for value in values]])
+        upper = max([joint.upper, *[value + room for value in values]])
+        if (lower, upper) == (joint.lower, joint.upper):
+            return component
+        return replace(component, joint=replace(joint, lower=lower, upper=upper))
+
+
+def object_radius(tree: ComponentTree) -> float:
+    """Distance of the furthest point of the object, with what is welded to it, from its origin [m]."""
+    shapes = [shape for body in tree.components[0].bodies for shape in body.shapes]
+    return max(float(np.hypot(*shape.vertices.T).max()) + shape.radius for shape in shapes)

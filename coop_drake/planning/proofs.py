@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 from coop_drake.geometry.body_pairs import BodyPairs
@@ -32,12 +32,12 @@ class Refutation:
     Attributes:
         reason: Why, in a sentence.
         robots: Robots that the proof is about, with the object.
-        separation: The proof in a form that can be checked again, where it can be stated.
+        separation: The proof in a form that can be checked again.
     """
 
     reason: str
     robots: tuple[int, ...]
-    separation: Separation | None
+    separation: Separation
 
 
 class Proofs:
@@ -92,9 +92,9 @@ class Proofs:
         for chosen in self._questions(robots):
             if self.refutation is None and self._goes_on(chosen, asked=robots is not None):
                 outcome = self._exploration(chosen).run(self._most(chosen, share), progress)
+                if outcome.verdict is Verdict.INFEASIBLE and not self._refute(chosen):
+                    outcome = replace(outcome, verdict=Verdict.RESOLUTION)
                 self._outcomes[chosen] = outcome
-                if outcome.verdict is Verdict.INFEASIBLE:
-                    self._refute(chosen)
         if self.refutation is not None:
             return Verdict.INFEASIBLE
         latest = self._outcomes.get(self._all)
@@ -150,12 +150,16 @@ class Proofs:
             return "the whole team"
         return "the object alone" if not chosen else f"the object with robots {list(chosen)} alone"
 
-    def _refute(self, chosen: tuple[int, ...]) -> None:
+    def _refute(self, chosen: tuple[int, ...]) -> bool:
+        """State the proof; one that cannot be stated is none: cells all but touch, or geometry fails."""
         question, _ = relaxed(self._problem, chosen)
         exploration = self._exploration(chosen)
         separation = slice_separation(question, chosen, exploration.slices, exploration.over_leaves())
+        if separation is None:
+            return False
         reason = f"the over-approximations of {self._words(chosen)} separate start from goal"
         self.refutation = Refutation(reason, chosen, separation)
+        return True
 
 
 def explorer(

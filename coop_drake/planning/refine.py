@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.safeguards import shared
 from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.geometry.tree import ComponentTree
 from coop_drake.planning.cells import CellMaker, Region
@@ -43,7 +44,7 @@ class Blame:
         expanded = self._slices.expanded(intervals)
         pair = self._maker.blocked_pair(expanded)
         if pair is not None:
-            free = (self._maker.under_region(expanded) ^ region.section).area()
+            free = shared(self._maker.under_region(expanded), region.section, over=False).area()
             involved = [axis for axis in pair.axes if axis in axes]
             if involved and free > _MOSTLY_FREE * region.area:
                 return self._widest(intervals, involved)
@@ -59,7 +60,8 @@ class Blame:
     def _freed(self, intervals: Intervals, axis: int, region: Region) -> float:
         total = 0.0
         for half in halves(intervals, axis):
-            total += (self._maker.under_region(self._slices.expanded(half)) ^ region.section).area()
+            under = self._maker.under_region(self._slices.expanded(half))
+            total += shared(under, region.section, over=False).area()
         return round(total, 9)
 
 

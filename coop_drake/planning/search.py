@@ -14,6 +14,8 @@ from coop_drake.planning.exploration import Verdict
 from coop_drake.planning.goals import blocked_goal
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.proofs import Proofs
+from coop_drake.planning.question_checks import check_question, goal_beyond_limits
+from coop_drake.planning.rescaling import Rescaling, usual_unit
 from coop_drake.planning.separation import Separation
 from coop_drake.planning.strategies import explored_channel
 
@@ -63,17 +65,39 @@ def find_way(
 
     Returns:
         A sampled way, the channel of an exploration, or why there is neither, and a report.
+
+    Raises:
+        PlanError: If the question cannot be meant; names the entry and what is allowed.
     """
+    check_question(problem)
+    beyond = goal_beyond_limits(problem)
+    if beyond is not None:
+        proof, slices = blocked_goal(problem)
+        report = SearchReport(slices, 0, 0, ((0.0, Verdict.INFEASIBLE.value),))
+        return NoChannel(True, beyond, proof), report
+    unit = usual_unit(problem.tree)
+    if unit == 1.0:
+        return _answered(problem, progress, watch)
+    scale = Rescaling(problem, unit)
+    answer, report = _answered(scale.question(), progress, scale.watched(watch), unit)
+    return scale.answer(answer), scale.report(report)
+
+
+def _answered(
+    problem: PlanningProblem, progress: Progress | None, watch: Watch | None, unit: float = 1.0
+) -> tuple[Way | Channel | NoChannel, SearchReport]:
     if problem.settings.strategy != "portfolio":
         return explored_channel(problem, progress, watch)
-    return _Search(problem, progress, watch).run()
+    return _Search(problem, progress, watch, unit).run()
 
 
 class _Search:
-    """One search: its two halves and what they took."""
+    """One search: its two halves and what they took; its unit of length in metres, for words."""
 
-    def __init__(self, problem: PlanningProblem, progress: Progress | None, watch: Watch | None) -> None:
-        self._began = process_time()
+    def __init__(
+        self, problem: PlanningProblem, progress: Progress | None, watch: Watch | None, unit: float
+    ) -> None:
+        self._began, self._unit = process_time(), unit
         self._first: float | None = None
         self._problem, self._progress = problem, progress
         self._attempts = SampledAttempts(problem)
@@ -143,7 +167,7 @@ class _Search:
         """The way at the largest margin that is found."""
 
         def told(margin: float, share: float) -> None:
-            self._teller(f"searching at margin {margin:.3f} m")(share)
+            self._teller(f"searching at margin {self._unit * margin:.3f} m")(share)
 
         best = self._attempts.with_margin(chain, self._tried, told)
         return self._attempts.way(best, chain), self._report(len(best.boxes), 0)
@@ -165,7 +189,7 @@ class _Search:
         bound, self._bound_slices = clearance_bound(self._problem)
         reason = f"no answer after {self._slices()} slices: {verdict.value}"
         if bound is not None:
-            reason += f"; it is proved that no way keeps {bound:g} m from the walls"
+            reason += f"; it is proved that no way keeps {self._unit * bound:g} m from the walls"
         return NoChannel(False, reason, mixed=mixed), self._report(*self._proofs.counts(), resolution)
 
     def _slices(self) -> int:

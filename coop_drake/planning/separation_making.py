@@ -8,6 +8,7 @@ from typing import TypeVar
 import numpy as np
 import shapely
 from shapely import Point, Polygon
+from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.geometry.minkowski import to_polygon
@@ -47,7 +48,7 @@ def slice_separation(
         regions: Over-cells of every leaf by its id.
 
     Returns:
-        The proof, or None where the cells touch so closely that none can be stated.
+        The proof, or None where none can be stated: the cells all but touch, or geometry fails.
     """
     leaves = slices.leaves()
     joined = {
@@ -120,7 +121,10 @@ def blocked_goal_proof(robots: Sequence[int], boxes: Sequence[Intervals]) -> Blo
 
 def _first(separated: Callable[[float], Found | None]) -> Found | None:
     for growth in GROWTHS:
-        found = separated(growth)
+        try:
+            found = separated(growth)
+        except (ShapelyError, ValueError):
+            continue
         if found is not None:
             return found
     return None

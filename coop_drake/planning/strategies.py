@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.safeguards import shared
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.boxes import Box, make_channel
 from coop_drake.planning.cells import CellMaker, Region
@@ -93,7 +94,10 @@ def _boxes(problem: PlanningProblem, found: list[tuple[Intervals, Region]], marg
     return [
         Box(
             intervals,
-            max(maker.under_cells(intervals), key=lambda full: (full.section ^ core.section).area()),
+            max(
+                maker.under_cells(intervals),
+                key=lambda full: shared(full.section, core.section, over=False).area(),
+            ),
             core,
         )
         for intervals, core in found
@@ -108,6 +112,8 @@ def _none(
         robots = sorted({joint.robot for joint in problem.tree.joints})
         leaves = exploration.over_leaves()
         separation = slice_separation(problem, robots, exploration.slices, leaves)
+        if separation is None:
+            return NoChannel(False, "the proof that was found cannot be stated"), search.report(exploration)
         reason = f"the over-approximations of {outcome.slices} slices separate start from goal"
         return NoChannel(True, reason, separation), search.report(exploration)
     mixed = exploration.undecided(outcome.path)
