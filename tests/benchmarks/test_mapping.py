@@ -1,0 +1,47 @@
+"""Shapes to map are what they say, and rows name what they stand beside."""
+
+import pytest
+from shapely import Point, box
+
+from benchmarks.domains import Domain, hall_with_pillars, standard_domains, wavy_room
+from benchmarks.map_rows import RESIDUAL, cost_rows, map_rows
+from benchmarks.mapping import PILLARS, VERTICES, mapping_tasks
+
+
+@pytest.mark.parametrize("domain", standard_domains().values(), ids=standard_domains())
+def test_shapes_are_valid_and_hold_their_goals(domain):
+    assert domain.cell.is_valid
+    assert domain.cell.covers(domain.goal)
+
+
+def test_rooms_have_as_many_corners_and_halls_as_many_pillars_as_asked():
+    assert [wavy_room(count).vertices for count in VERTICES] == list(VERTICES)
+    for count in PILLARS:
+        hall = hall_with_pillars(count)
+        assert len(hall.cell.interiors) == count
+        assert hall.vertices == 4 + 4 * count
+        assert hall.cell.contains(hall.goal)
+
+
+def test_a_map_is_measured_beside_its_peers():
+    rows = {
+        row.figure: row
+        for row in map_rows("mapping/domains/square", Domain(box(0, 0, 1, 1), Point(0.5, 0.4)), 2e-3)
+    }
+    assert rows["answer"].unit == "mapped"
+    assert 0.0 < rows["residual"].value <= RESIDUAL
+    assert rows["residual"].peer_value == 2e-3
+    assert rows["cpu_seconds"].peer == f"dense solve, {rows['unknowns'].value} unknowns"
+    assert all(rows[figure].ratio > 0.0 for figure in ("cpu_seconds", "one_point", "per_point_of_1000"))
+
+
+def test_a_shape_that_is_refused_is_a_row_too():
+    needle = Domain(box(0, 0, 1, 1).union(box(1, 0.5, 2, 0.5 + 1e-9)), Point(0.5, 0.4))
+    rows = cost_rows("mapping/growth/needle", needle)
+    assert [(row.figure, row.unit) for row in rows] == [("answer", "refused"), ("vertices", "-")]
+
+
+def test_every_task_has_a_name_of_its_own_and_the_machine_to_itself():
+    tasks = mapping_tasks()
+    assert len({task.name for task in tasks}) == len(tasks) == 1 + len(standard_domains()) + 10
+    assert all(task.alone for task in tasks)
