@@ -39,15 +39,15 @@ class Patience:
     Attributes:
         answer: CPU time of our answer [s].
         ompl: CPU time of each of OMPL's runs [s].
-        runs: How many runs of OMPL, and of the compiled trees.
+        runs: How many runs of OMPL, and of the compiled trees, each with a seed of its own.
         checks: Configurations that each run of the trees may check.
         trees: CPU time after which they are stopped, for each run [s].
     """
 
     answer: float = 20.0
     ompl: float = 15.0
-    runs: int = 2
-    checks: int = 400_000
+    runs: int = 1
+    checks: int = 500_000
     trees: float = 40.0
 
 
