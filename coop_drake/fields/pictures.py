@@ -126,7 +126,8 @@ def _two_panels(harmonic_map: HarmonicMap, caption: str) -> tuple[Figure, tuple[
     draw_polygon(cell, harmonic_map.region, facecolor="white", edgecolor="none", zorder=0)
     if not isinstance(harmonic_map.goal, Point):
         draw_polygon(cell, harmonic_map.goal, facecolor=GREEN, edgecolor="none", alpha=0.5, zorder=0.5)
-    disk.set(xlim=(-1.15, 1.15), ylim=(-1.15, 1.15), xlabel="u [-]", ylabel="v [-]")
+    disk.set(xlim=(-1.3, 1.3), ylim=(-1.2, 1.2), xlabel="u [-]", ylabel="v [-]")
+    disk.set(xticks=(-1, 0, 1), yticks=(-1, 0, 1))
     for ax in (cell, disk):
         ax.set_aspect("equal")
         ax.grid(visible=False)
