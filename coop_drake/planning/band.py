@@ -10,7 +10,7 @@ from coop_drake.planning.band_kernels import clearances, improve
 from coop_drake.planning.margins import marginal_workspace
 from coop_drake.planning.problem import PlanningProblem
 from coop_drake.planning.refine import configuration_scale
-from coop_drake.planning.sampler import densified
+from coop_drake.planning.sampler import JOINT_RATE, SPEED, TURN_RATE, densified
 from coop_drake.planning.team_arrays import team_arrays
 from coop_drake.planning.walls import FAR, walls_for
 
@@ -21,9 +21,6 @@ PRICE = 0.12
 
 LEAST_ROOM = 0.005
 """Clearance that is added to what a path has before it is priced [m]."""
-
-SPEED, TURN_RATE, JOINT_RATE = 1.2, 0.5, 0.6
-"""Speeds of position, theta and joints with which transports go at their best [m/s, rad/s]."""
 
 SPACING = 0.1
 """Distance between samples of a path in any scaled axis, where nothing else is said [m]."""

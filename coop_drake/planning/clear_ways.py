@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import takewhile
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.band import drawn_tight, likely_time, room_along
@@ -18,8 +19,9 @@ LEAST_CLEARANCE = 0.002
 SAMPLED_CLEARANCE = 0.015
 """Clearance that other candidates are sampled with [m]."""
 
-CANDIDATES, SAMPLES, SEED = 3, 4_000, 1
-"""So many other candidates are sampled, with so many samples for each stage."""
+CANDIDATES, CHOICES, SAMPLES, SEED = 3, 3, 2_500, 1
+"""So many other candidates are sampled, each along the quickest of so many paths of the object, with so many
+samples for each stage."""
 
 BRIEF = 1_200
 """Moves after which candidates are compared."""
@@ -40,6 +42,8 @@ MARGIN_SHARES = (0.8, 0.65, 0.5, 0.35)
 def best_of(problem: PlanningProblem, ladder: Ladder, known: FloatArray, gap: float) -> FloatArray:
     """The best of a known path and of some more, by length and clearance: they may turn another way.
 
+    The first that is not found ends it: more would fail, too.
+
     Args:
         problem: The question.
         ladder: Its stages.
@@ -47,10 +51,9 @@ def best_of(problem: PlanningProblem, ladder: Ladder, known: FloatArray, gap: fl
         gap: Distance that pairs of bodies keep [m].
     """
     sampler = Sampler(ladder, marginal_workspace(problem, SAMPLED_CLEARANCE), gap, SEED)
-    paths = [known, *(sampler.path(SAMPLES) for _ in range(CANDIDATES))]
-    tight = [
-        drawn_tight(problem, path, LEAST_CLEARANCE, 0.0, gap, moves=BRIEF) for path in paths if len(path)
-    ]
+    sampled = (sampler.path(SAMPLES, CHOICES) for _ in range(CANDIDATES))
+    paths = [known, *takewhile(len, sampled)]
+    tight = [drawn_tight(problem, path, LEAST_CLEARANCE, 0.0, gap, moves=BRIEF) for path in paths]
     return min(tight, key=lambda path: likely_time(problem, path))
 
 

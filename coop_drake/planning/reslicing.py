@@ -33,14 +33,17 @@ LENGTH_STEP, ANGLE_STEP = 0.3, 0.15
 """Waypoints lie no farther apart than this [m, rad or m]."""
 
 
-HALVINGS = 4
+HALVINGS = 6
 """So often the stretch between two waypoints is halved until a box holds both."""
 
 PADS = (0.005, 0.015, 0.03, 0.06)
 """Boxes are padded by one of these in every angle and joint [rad or m]."""
 
-MARGIN_SHARES = (0.3, 0.1)
-"""Shares of the margin that was found that waypoints keep, tried in this order [-]."""
+NARROW_PADS = (0.002, 0.006, 0.015, 0.03)
+"""And by one of these where a box padded by the least of the others does not hold two waypoints."""
+
+LEVELS = ((0.3, PADS), (0.1, PADS), (0.1, NARROW_PADS))
+"""Shares of the margin that was found that waypoints keep [-], and paddings; tried in this order."""
 
 LEAST = 2e-3
 """Waypoints keep at least this clearance [m]."""
@@ -86,12 +89,14 @@ def resliced(problem: PlanningProblem, way: FloatArray, margin: float, gain_set:
     boxes, walls = box_arrays(swept, pairs), walls_under(floor, problem.tree.reach)
     angle = float(way[-1, 2] + nearest_turn(float(problem.goal_pose[2] - way[-1, 2])))
     goals = np.array(final_intervals(problem, angle))
-    for share in MARGIN_SHARES:
+    for share, pads in LEVELS:
         least = max(share * margin, LEAST)
-        points = _waypoints(boxes, walls, way, least)
+        points = _waypoints(boxes, walls, way, least, pads[0])
+        if points is None:
+            continue
         places = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
         course = Course(
-            boxes, walls, points, places, np.array(PADS), goals, schedule_of(gain_set), least,
+            boxes, walls, points, places, np.array(pads), goals, schedule_of(gain_set), least,
             problem.position_tolerance,
         )  # fmt: skip
         found = _chain(course, Regions(problem, swept, pairs, CORE_SHARE * least))
@@ -102,8 +107,13 @@ def resliced(problem: PlanningProblem, way: FloatArray, margin: float, gain_set:
     return None
 
 
-def _waypoints(boxes: BoxArrays, walls: Walls, way: FloatArray, least: float) -> FloatArray:
-    """Waypoints evenly along a way, closer where that is needed for boxes to hold neighbours, (n, 3 + m)."""
+def _waypoints(
+    boxes: BoxArrays, walls: Walls, way: FloatArray, least: float, pad: float
+) -> FloatArray | None:
+    """Waypoints evenly along a way, closer where that is needed for boxes to hold neighbours, (n, 3 + m).
+
+    None if some two neighbours are not held by a box however close they are.
+    """
     moves = np.abs(np.diff(way, axis=0))
     paces = np.hypot(moves[:, 0], moves[:, 1]) / LENGTH_STEP, moves[:, 2:].max(axis=1) / ANGLE_STEP
     at = np.concatenate([[0.0], np.cumsum(np.maximum(*paces))])
@@ -111,19 +121,26 @@ def _waypoints(boxes: BoxArrays, walls: Walls, way: FloatArray, least: float) ->
     def configuration(s: float) -> FloatArray:
         return np.array([np.interp(s, at, column) for column in way.T])
 
-    def between(first: float, last: float, halvings: int) -> list[FloatArray]:
+    def between(first: float, last: float, halvings: int) -> list[FloatArray] | None:
         """Waypoints after the first place up to the last."""
         pair = np.stack([configuration(first), configuration(last)])
-        lower, upper = padded(boxes, pair, PADS[0])
-        if halvings == 0 or fits(boxes, walls, lower, upper, pair[:, :2].copy(), least):
+        lower, upper = padded(boxes, pair, pad)
+        if fits(boxes, walls, lower, upper, pair[:, :2].copy(), least):
             return [pair[1]]
+        if halvings == 0:
+            return None
         middle = 0.5 * (first + last)
-        return between(first, middle, halvings - 1) + between(middle, last, halvings - 1)
+        one = between(first, middle, halvings - 1)
+        other = None if one is None else between(middle, last, halvings - 1)
+        return None if one is None or other is None else one + other
 
     stops = np.linspace(0.0, at[-1], max(1, ceil(at[-1])) + 1)
     points = [way[0]]
     for first, last in pairwise(stops.tolist()):
-        points += between(first, last, HALVINGS)
+        held = between(first, last, HALVINGS)
+        if held is None:
+            return None
+        points += held
     return np.array(points)
 
 

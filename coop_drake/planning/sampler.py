@@ -28,6 +28,9 @@ _SPACING = 0.1
 _SAMPLED_LENGTH = 20.0
 """Length of a guide that one budget of samples is meant for [m]."""
 
+SPEED, TURN_RATE, JOINT_RATE = 1.2, 0.5, 0.6
+"""Speeds of position, theta and joints with which transports go at their best [m/s, rad/s]."""
+
 _NO_PATH = np.empty((0, 3))
 
 
@@ -106,7 +109,7 @@ class Sampler:
         self._tell = progress
         self.object_blocked = False
 
-    def path(self, samples: int) -> FloatArray:
+    def path(self, samples: int, choices: int = 1) -> FloatArray:
         """Path from start to goal, theta unwrapped, shape (m, 3 + n); no rows if none was found.
 
         A disc inside the object goes first, then the object around the disc's path, then each robot around
@@ -115,13 +118,15 @@ class Sampler:
 
         Args:
             samples: Samples drawn at most for each stage.
+            choices: Paths of the object among which the quickest is taken, for it decides how all turn.
         """
         robots, stage = self._ladder.robots, self._ladder.stage
         steps = 2 + 2 * len(robots)
         disc, _ = self._guide(self._ladder.disc, None, _DISC_SHARE * samples)
         disc = None if disc is None else replace(disc, turned=False)
         self._told(1 / steps)
-        best, _ = self._guide(stage(()), disc, samples)
+        found = (self._guide(stage(()), disc, samples)[0] for _ in range(choices))
+        best = min((guide for guide in found if guide is not None), key=_hurried, default=None)
         self.object_blocked = best is None
         alone: list[tuple[int, int, Guide]] = []
         for robot in robots if best is not None else ():
@@ -142,17 +147,6 @@ class Sampler:
             if best is None:
                 return _NO_PATH
         return _NO_PATH if best is None else best.path
-
-    def along(self, path: FloatArray, samples: int) -> FloatArray:
-        """Path of the whole team near another one; no rows if none was found.
-
-        Args:
-            path: Configurations to sample around, shape (m, 3 + n).
-            samples: Samples drawn at most.
-        """
-        stage = self._ladder.stage(self._ladder.robots)
-        found, _ = self._guide(stage, Guide(path, stage.joints), samples)
-        return _NO_PATH if found is None else found.path
 
     def _guide(self, stage: Stage, around: Guide | None, samples: int) -> tuple[Guide | None, int]:
         """Path of a stage, sampled around another one's, and the samples drawn for it."""
@@ -217,6 +211,12 @@ class Sampler:
     def _told(self, share: float) -> None:
         if self._tell is not None:
             self._tell(share)
+
+
+def _hurried(guide: Guide) -> float:
+    """Least time that a path of the object may take, walls aside [s]."""
+    moved = np.abs(np.diff(guide.path[:, :3], axis=0))
+    return float(np.maximum(np.hypot(moved[:, 0], moved[:, 1]) / SPEED, moved[:, 2] / TURN_RATE).sum())
 
 
 def _corridor(stage: Stage, around: Guide | None) -> tuple[FloatArray, FloatArray]:
