@@ -24,8 +24,8 @@ __all__ = ["base_rows", "mapping_tasks"]
 VERTICES = (10, 30, 100, 300, 1_000)
 PILLARS = (0, 1, 6, 20, 50)
 
-#: Largest residuals of hntf2d, the authors' own implementation of such maps, with 3200 elements.
-_PUBLISHED = {
+#: Largest residuals on such shapes of hntf2d, the authors' own implementation, with 3200 elements.
+_HNTF2D = {
     "square": 2e-3,
     "u_corridor": 1e-2,
     "warehouse": 8e-3,
@@ -41,8 +41,7 @@ def mapping_tasks() -> list[Task]:
     """One task for the base plan, one for every shape."""
     tasks = [Task("mapping/base", lambda rows: base_rows(), alone=True)]
     tasks += [
-        _task(f"mapping/domains/{name}", domain, _PUBLISHED[name])
-        for name, domain in standard_domains().items()
+        _task(f"mapping/domains/{name}", domain, _HNTF2D[name]) for name, domain in standard_domains().items()
     ]
     grown = {f"vertices/{count}": wavy_room(count) for count in VERTICES}
     grown.update({f"holes/{count}": hall_with_pillars(count) for count in PILLARS})
@@ -51,8 +50,8 @@ def mapping_tasks() -> list[Task]:
     return tasks
 
 
-def _task(name: str, domain: Domain, published: float) -> Task:
-    return Task(name, lambda rows: map_rows(name, domain, published), alone=True)
+def _task(name: str, domain: Domain, hntf2d_residual: float) -> Task:
+    return Task(name, lambda rows: map_rows(name, domain, hntf2d_residual), alone=True)
 
 
 def _growth_task(name: str, domain: Domain) -> Task:
