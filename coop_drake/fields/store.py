@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import shapely
+from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]
 from shapely import Point, Polygon
 
 from coop_drake.fields.certificate import MapCertificate
@@ -34,10 +35,10 @@ class MapStore:
     """A folder of solved maps.
 
     A file is named by a digest of the domain, the goal, the tolerance and of all that computes: the source of
-    maps and shapes and the versions of their libraries. A map is therefore never older than the code, and
-    what is read is bit by bit what was solved. Files are written whole or not at all, so any number of
-    processes and threads may share a folder. A damaged file, or one of another question, counts as missing
-    and is replaced. Where the folder cannot be written the maps are solved all the same.
+    maps and shapes, the versions of their libraries, the processor. A map is therefore never older than the
+    code, and what is read is bit by bit what would be solved. Files are written whole or not at all, so any
+    number of processes and threads may share a folder. A damaged file, or one of another question, counts as
+    missing and is replaced. Where the folder cannot be written the maps are solved all the same.
 
     Args:
         folder: Where the files lie; it is made when the first map is kept.
@@ -130,7 +131,8 @@ def _code() -> bytes:
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
     for name in ("numpy", "scipy", "numba", "shapely"):
         digest.update(f"{name} {version(name)}".encode())
-    digest.update(f"{platform.machine()} {platform.system()}".encode())
+    # Compiled sums and BLAS use what the processor has, which changes the last bits.
+    digest.update(f"{platform.system()} {platform.machine()} {get_host_cpu_name()}".encode())
     return digest.digest()
 
 
