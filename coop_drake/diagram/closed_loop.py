@@ -9,13 +9,14 @@ from pydrake.geometry import Meshcat, MeshcatVisualizer
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from coop_drake.control import slowdown_radius
+from coop_drake.diagram.deployment import DeployedController, deploy
 from coop_drake.diagram.robot_controller import RobotKnowledge, build_robot_controller
 from coop_drake.diagram.station import TransportStation, build_station
 from coop_drake.errors import PlanError
 from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.planning.plan import Plan
-from coop_drake.plant import TeamPlant, build_robot_plant, set_configuration
+from coop_drake.plant import RobotPlant, TeamPlant, build_robot_plant, set_configuration
 from coop_drake.scenario import Scenario
 from coop_drake.systems import CellPlanner, GovernedCell
 
@@ -33,7 +34,8 @@ class ClosedLoop:
         diagram: The whole.
         station: The simulated team.
         cell_planner: The supervisor.
-        controllers: One sub-Diagram for each robot.
+        controllers: One sub-Diagram for each robot, as the others see it.
+        deployed: What stands round the controllers, empty where the team is ideal.
         plan: The plan that they follow.
     """
 
@@ -41,7 +43,13 @@ class ClosedLoop:
     station: TransportStation
     cell_planner: CellPlanner
     controllers: tuple[Diagram, ...]
+    deployed: tuple[DeployedController, ...]
     plan: Plan
+
+    @property
+    def laws(self) -> tuple[Diagram, ...]:
+        """The controllers themselves, without what a deployment puts round them."""
+        return tuple(deployed.controller for deployed in self.deployed) or self.controllers
 
     @property
     def team(self) -> TeamPlant:
@@ -53,6 +61,8 @@ class ClosedLoop:
         context = self.diagram.CreateDefaultContext()
         team = self.team
         set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.plan.start)
+        for deployed in self.deployed:
+            deployed.prepare(context)
         return context
 
 
@@ -76,15 +86,21 @@ def build_closed_loop(
     team = station.team
     _check(plan, maps, team)
     builder.AddNamedSystem("transport_station", station.diagram)
-    planner = builder.AddNamedSystem("cell_planner", CellPlanner(len(team.robots), len(plan.cells)))
-    controllers = []
+    planner = builder.AddNamedSystem(
+        "cell_planner", CellPlanner(len(team.robots), len(plan.cells), period=scenario.deployment.period)
+    )
+    controllers, deployed = [], []
     for k, knowledge in enumerate(_knowledge(scenario, plan, maps, team)):
-        controller = builder.AddNamedSystem(f"robot_{k}_controller", build_robot_controller(knowledge))
+        controller = build_robot_controller(knowledge)
+        if not scenario.deployment.ideal:
+            deployed.append(deploy(controller, scenario.deployment, k))
+            controller = deployed[-1].diagram
+        builder.AddNamedSystem(f"robot_{k}_controller", controller)
         _connect(builder, station.diagram, planner, controller, k)
         controllers.append(controller)
     if meshcat is not None:
         MeshcatVisualizer.AddToBuilder(builder, station.diagram.GetOutputPort("query_object"), meshcat)
-    return ClosedLoop(builder.Build(), station, planner, tuple(controllers), plan)
+    return ClosedLoop(builder.Build(), station, planner, tuple(controllers), tuple(deployed), plan)
 
 
 def _connect(
@@ -106,19 +122,28 @@ def _knowledge(
         )
         for cell, transition, field_map in zip(plan.cells, plan.transitions, maps, strict=True)
     ]
+    factor = 1.0 + scenario.deployment.mass_error
     return [
         RobotKnowledge(
-            robot=build_robot_plant(scenario, robot.index),
+            robot=_robot(scenario, robot.index, factor),
             X_LE=robot.X_LE,
             joints=robot.q_slice,
-            object_inertia=team.object_inertia,
+            object_inertia=team.object_inertia.scaled(factor),
             load_share=scenario.load_share(robot.name, len(team.robots)),
             plan=plan,
             cells=cells,
             position_tolerance=scenario.goal.tolerances.position,
+            period=scenario.deployment.period,
         )
         for robot in team.robots
     ]
+
+
+def _robot(scenario: Scenario, index: int, factor: float) -> RobotPlant:
+    robot = build_robot_plant(scenario, index)
+    if factor != 1.0:
+        robot.scale_masses(factor)
+    return robot
 
 
 def _field(harmonic_map: HarmonicMap, governor_gain: float) -> VelocityField:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem
-from pydrake.systems.primitives import Integrator
+from pydrake.systems.primitives import DiscreteTimeIntegrator, Integrator
 
 from coop_drake.geometry.pose import PlanarPose
 from coop_drake.planning.plan import Plan
@@ -51,6 +51,7 @@ class RobotKnowledge:
         plan: The plan.
         cells: What the governor needs of every cell.
         position_tolerance: How close to the goal counts as arrived [m].
+        period: Time between two computations [s]; None for continuous time.
     """
 
     robot: RobotPlant
@@ -61,6 +62,7 @@ class RobotKnowledge:
     plan: Plan
     cells: Sequence[GovernedCell]
     position_tolerance: float
+    period: float | None = None
 
 
 def build_robot_controller(knowledge: RobotKnowledge) -> Diagram:
@@ -100,7 +102,7 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
     return {
         "object_estimator": ObjectEstimator(knowledge.robot, p_LE),
         "reference_governor": ReferenceGovernor(cells),
-        "governor_state": Integrator(plan.start[:2]),
+        "governor_state": _governor_state(knowledge),
         "orientation_ppc": OrientationPpc(axis_laws(plan, [0])),
         "joint_ppc": JointPpc(axis_laws(plan, joint_axes)),
         "wrench_law": WrenchLaw(
@@ -119,6 +121,13 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
             knowledge.position_tolerance,
         ),
     }
+
+
+def _governor_state(knowledge: RobotKnowledge) -> Integrator | DiscreteTimeIntegrator:
+    """Keeps p_G; the discrete one is set to the start when a context is made."""
+    if knowledge.period is None:
+        return Integrator(knowledge.plan.start[:2])
+    return DiscreteTimeIntegrator(2, knowledge.period)
 
 
 def _connect_by_name(builder: DiagramBuilder, blocks: Mapping[str, LeafSystem]) -> None:

@@ -9,12 +9,21 @@ from typing import Any
 import numpy as np
 from pydrake.multibody.parsing import GetScopedFrameByName
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import Frame, JacobianWrtVariable, Joint, MultibodyForces, PlanarJoint, RigidBody
+from pydrake.multibody.tree import (
+    Frame,
+    JacobianWrtVariable,
+    Joint,
+    ModelInstanceIndex,
+    MultibodyForces,
+    PlanarJoint,
+    RigidBody,
+    SpatialInertia,
+)
 from pydrake.systems.framework import Context
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant.chain import find_base
-from coop_drake.plant.parsing import add_models, finalize, set_actuators
+from coop_drake.plant.parsing import add_models, bodies_of, finalize, set_actuators
 from coop_drake.scenario import Scenario, assemble
 
 _PLANAR = [3, 4, 2]
@@ -54,6 +63,20 @@ class RobotPlant:
         state[self.position_index] = z
         state[len(z) + self.velocity_index] = z_rate
         self.plant.SetPositionsAndVelocities(self.context, state)
+
+    def scale_masses(self, factor: float) -> None:
+        """Multiply mass and inertia of every body by a factor, as a model that is wrong about them has it."""
+        for body in bodies_of(self.plant, self._models):
+            inertia = body.CalcSpatialInertiaInBodyFrame(self.context)
+            scaled = SpatialInertia(
+                factor * inertia.get_mass(), inertia.get_com(), inertia.get_unit_inertia()
+            )
+            body.SetSpatialInertiaInBodyFrame(self.context, scaled)
+
+    @property
+    def _models(self) -> list[str]:
+        models = range(2, self.plant.num_model_instances())  # after the world and Drake's default
+        return [self.plant.GetModelInstanceName(ModelInstanceIndex(i)) for i in models]
 
     @cached_property
     def _order(self) -> Any:

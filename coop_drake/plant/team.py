@@ -41,6 +41,10 @@ class ObjectInertia:
     inertia_about_com: float
     p_LLcm: FloatArray  # noqa: N815
 
+    def scaled(self, factor: float) -> ObjectInertia:
+        """The same with mass and inertia multiplied by a factor."""
+        return ObjectInertia(factor * self.mass, factor * self.inertia_about_com, self.p_LLcm)
+
 
 @dataclass(frozen=True)
 class RobotModel:

@@ -1,6 +1,7 @@
 """The typed scenario file: dataclasses, loading and validation."""
 
 from coop_drake.scenario.assembly import Assembly, RobotAssembly, assemble
+from coop_drake.scenario.deployment import ActuatorLimits, Deployment, Measurements, Messages
 from coop_drake.scenario.load import dump_scenario, load_scenario
 from coop_drake.scenario.model import (
     Gains,
@@ -17,10 +18,14 @@ from coop_drake.scenario.model import (
 from coop_drake.scenario.packages import package_map
 
 __all__ = [
+    "ActuatorLimits",
     "Assembly",
+    "Deployment",
     "Gains",
     "Goal",
     "MapSettings",
+    "Measurements",
+    "Messages",
     "ObjectPose",
     "RobotAssembly",
     "Scenario",

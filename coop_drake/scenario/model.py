@@ -10,6 +10,7 @@ from shapely import Polygon
 from coop_drake.control.gains import FixedGains, GainSet, ScheduledGains
 from coop_drake.geometry.pose import PlanarPose
 from coop_drake.planning.problem import PlannerSettings
+from coop_drake.scenario.deployment import Deployment
 
 # No `from __future__ import annotations` here: Drake's YAML loader reads the types of the fields.
 
@@ -173,6 +174,7 @@ class Scenario:
         gains: The gain sets.
         maps: How well the cells are mapped.
         simulator: How the closed loop is integrated.
+        deployment: What keeps the team from being ideal.
         visualization: How recordings look.
         path: The file it was read from.
     """
@@ -187,6 +189,7 @@ class Scenario:
     gains: Gains = field(default_factory=Gains)
     maps: MapSettings = field(default_factory=MapSettings)
     simulator: SimulatorSettings = field(default_factory=SimulatorSettings)
+    deployment: Deployment = field(default_factory=Deployment)
     visualization: VisualizationSettings = field(default_factory=VisualizationSettings)
     path: Path = field(default=Path("scenario.yaml"), metadata={"in_file": False})
 

@@ -6,6 +6,7 @@ from typing import Any
 
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.assembly import assemble
+from coop_drake.scenario.deployment_checks import check_deployment
 from coop_drake.scenario.directives import check_directive
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.rings import check_workspace
@@ -38,6 +39,7 @@ def validate(scenario: Scenario) -> None:
         raise ScenarioError(file, "gains.selected", scenario.gains.selected, f"a gain set, one of {known}")
     for index, directive in enumerate(scenario.directives):
         check_directive(file, f"directives[{index}]", directive)
+    check_deployment(scenario)
     _check_load_shares(scenario, [robot.name for robot in assemble(scenario).robots])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,10 +54,11 @@ class Invariants:
     Args:
         clearance: Distances of the team's bodies.
         plan: The plan that is followed.
+        exact: Whether the law's equations must hold to rounding, as they do for an ideal team.
     """
 
-    def __init__(self, clearance: TeamClearance, plan: Plan) -> None:
-        self._clearance, self._plan = clearance, plan
+    def __init__(self, clearance: TeamClearance, plan: Plan, *, exact: bool = True) -> None:
+        self._clearance, self._plan, self._exact = clearance, plan, exact
         self._cells = [BoundaryDistance(cell.safe) for cell in plan.cells]
         self._axes = ("object angle", *plan.joint_names)
 
@@ -76,12 +78,8 @@ class Invariants:
             (f"distance of {self._worst(in_slice)} to its slice", float(in_slice.min()), "rad or m"),
         )
         broken = [f"{name} is {value:.3g} {unit}" for name, value, unit in strict if not value > 0.0]
-        if not sample.energy_margin >= 0.0:
-            broken.append(f"Delta E is {sample.energy_margin:.3g} m^2/s^2")
-        if not sample.acceleration_error <= ACCELERATION_TOLERANCE:
-            broken.append(f"realised less commanded acceleration is {sample.acceleration_error:.3g} m/s^2")
-        if not wrench_error <= WRENCH_TOLERANCE:
-            broken.append(f"measured less commanded grasp wrench is {wrench_error:.3g} N")
+        if self._exact:
+            broken.extend(_inexact(sample, wrench_error))
         where = f"at t = {sample.time:.6g} s in cell {sample.cell}: "
         return Margins(
             workspace_clearance=walls.distance,
@@ -97,3 +95,12 @@ class Invariants:
 
     def _worst(self, margins: FloatArray) -> str:
         return self._axes[int(np.argmin(margins))]
+
+
+def _inexact(sample: Sample, wrench_error: float) -> Iterator[str]:
+    if not sample.energy_margin >= 0.0:
+        yield f"Delta E is {sample.energy_margin:.3g} m^2/s^2"
+    if not sample.acceleration_error <= ACCELERATION_TOLERANCE:
+        yield f"realised less commanded acceleration is {sample.acceleration_error:.3g} m/s^2"
+    if not wrench_error <= WRENCH_TOLERANCE:
+        yield f"measured less commanded grasp wrench is {wrench_error:.3g} N"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
@@ -50,7 +51,13 @@ def simulate(
     loop = build_closed_loop(scenario, plan, maps, meshcat)
     clearance = TeamClearance(scenario.workspace.polygon, read_component_tree(loop.team))
     root = loop.create_context()
-    watch = Watch(loop, Invariants(clearance, plan), scenario.goal.tolerances.position, root, progress)
+    watch = Watch(
+        loop,
+        Invariants(clearance, plan, exact=scenario.deployment.ideal),
+        scenario.goal.tolerances.position,
+        root,
+        progress,
+    )
     simulator = Simulator(loop.diagram, root)
     _configure(simulator, scenario.simulator)
     simulator.set_monitor(watch)
@@ -79,7 +86,9 @@ def _configure(simulator: Simulator, settings: SimulatorSettings) -> None:
 
 def _advance(simulator: Simulator, watch: Watch, max_time: float) -> None:
     try:
-        simulator.AdvanceTo(max_time)
+        # Trial steps of a run that is lost overflow; that it is lost is for the watch to tell.
+        with np.errstate(over="ignore", invalid="ignore"):
+            simulator.AdvanceTo(max_time)
     except RuntimeError as error:
         # Drake's own failures, such as a step that shrinks to nothing; errors of Python keep their type.
         watch.give_up(f"the integrator failed ({error})")

@@ -77,9 +77,9 @@ class Telemetry:
         self._plant_context = self._team.plant.GetMyContextFromRoot(root)
         self._grasps = [np.array([robot.X_LE.x, robot.X_LE.y]) for robot in self._team.robots]
         self._of_robots = {
-            name: [_reader(controller, name, root) for controller in loop.controllers]
-            for name in ("robot_effort", "ready", *TELEMETRY)
+            name: [_reader(law, name, root) for law in loop.laws] for name in ("ready", *TELEMETRY)
         }
+        self._of_robots["robot_effort"] = [_reader(c, "robot_effort", root) for c in loop.controllers]
         self._current_cell = _reader(loop.cell_planner, "current_cell", root)
         self._arrived = _reader(loop.cell_planner, "arrived", root)
         self._accelerations = _reader(loop.station.diagram, "generalized_acceleration", root)

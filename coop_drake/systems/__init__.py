@@ -4,6 +4,7 @@ from coop_drake.systems.axis_laws import AxisLaw, axis_laws
 from coop_drake.systems.cell_planner import CellPlanner
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
 from coop_drake.systems.joint_ppc import JointPpc
+from coop_drake.systems.message_channel import MessageChannel, whole_periods
 from coop_drake.systems.object_estimator import ObjectEstimator
 from coop_drake.systems.orientation_ppc import OrientationPpc
 from coop_drake.systems.ready_monitor import ReadyMonitor
@@ -20,6 +21,7 @@ __all__ = [
     "CellPlanner",
     "GovernedCell",
     "JointPpc",
+    "MessageChannel",
     "ObjectEstimator",
     "ObjectPoseSensor",
     "OrientationPpc",
@@ -30,4 +32,5 @@ __all__ = [
     "TeamActuation",
     "WrenchLaw",
     "axis_laws",
+    "whole_periods",
 ]

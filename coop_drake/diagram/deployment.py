@@ -1,0 +1,163 @@
+"""What stands between a robot's controller and the world when the team is not ideal."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.common import RandomDistribution, RandomGenerator
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.primitives import Adder, DiscreteTimeDelay, Gain, RandomSource, Saturation, ZeroOrderHold
+
+from coop_drake.diagram.robot_controller import TELEMETRY
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.scenario import Deployment
+from coop_drake.systems import MessageChannel, whole_periods
+
+__all__ = ["DeployedController", "deploy"]
+
+
+#: Nothing gives more than this, whatever the law asks for once it has lost its funnel [N, N m]: a plant driven
+#: to infinity would end the process instead of the run.
+_STRONGEST = 1e5
+
+
+@dataclass(frozen=True)
+class DeployedController:
+    """A controller behind its sensors, actuators and radio.
+
+    Attributes:
+        diagram: The same ports as the controller inside.
+        controller: The controller inside.
+        noises: Sources of noise.
+        delays: For each measured port the block that delays it.
+        seed: Of the sources of noise.
+    """
+
+    diagram: Diagram
+    controller: Diagram
+    noises: tuple[RandomSource, ...]
+    delays: dict[str, DiscreteTimeDelay]
+    seed: int
+
+    def prepare(self, root: Context) -> None:
+        """Seed the noise; let p_G and what was measured before the start be what they are at the start."""
+        pose = self.diagram.GetInputPort("object_pose").Eval(self.diagram.GetMyContextFromRoot(root))
+        governor = self.controller.GetSubsystemByName("governor_state")
+        governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), pose[:2])
+        generator = RandomGenerator(self.seed)
+        for noise in self.noises:
+            noise.SetRandomContext(noise.GetMyMutableContextFromRoot(root), generator)
+        for name, delay in self.delays.items():
+            now = self.diagram.GetInputPort(name).Eval(self.diagram.GetMyContextFromRoot(root))
+            buffer = delay.GetMyMutableContextFromRoot(root).get_mutable_discrete_state_vector()
+            buffer.SetFromVector(np.tile(now, buffer.size() // len(now)))
+
+
+def deploy(controller: Diagram, deployment: Deployment, robot: int) -> DeployedController:
+    """Put noise, delays, holds, limits and a radio round a robot's controller, those that are switched on.
+
+    In the order of the signals: ``robot_state`` and ``object_pose`` get noise, then a delay; ``robot_effort``
+    is held for a period, then limited; ``ready`` goes through a :class:`MessageChannel`.
+
+    Args:
+        controller: From :func:`build_robot_controller`, with the same period.
+        deployment: What is switched on.
+        robot: Index k of the robot; every robot has noise and losses of its own.
+    """
+    builder = DiagramBuilder()
+    builder.AddNamedSystem("controller", controller)
+    wrapping = _Wrapping(builder, deployment)
+    joints = (controller.GetInputPort("robot_state").size() - 6) // 2
+    wrapping.measure(controller, "object_pose", _noise(deployment, 0)[:3])
+    wrapping.measure(controller, "robot_state", _noise(deployment, joints))
+    builder.ExportInput(controller.GetInputPort("current_cell"), "current_cell")
+    effort = wrapping.actuate(controller.GetOutputPort("robot_effort"), joints)
+    builder.ExportOutput(effort, "robot_effort")
+    seed = int(np.random.SeedSequence([deployment.seed, robot]).generate_state(1)[0])
+    builder.ExportOutput(wrapping.send(controller.GetOutputPort("ready"), seed), "ready")
+    for name in TELEMETRY:
+        builder.ExportOutput(controller.GetOutputPort(name), name)
+    return DeployedController(builder.Build(), controller, tuple(wrapping.noises), wrapping.delays, seed)
+
+
+class _Wrapping:
+    """Adds blocks to a builder as far as a deployment asks for them.
+
+    Args:
+        builder: Receives them.
+        deployment: What is switched on.
+    """
+
+    def __init__(self, builder: DiagramBuilder, deployment: Deployment) -> None:
+        self._builder, self._deployment = builder, deployment
+        self.noises: list[RandomSource] = []
+        self.delays: dict[str, DiscreteTimeDelay] = {}
+
+    def measure(self, controller: Diagram, name: str, deviations: FloatArray) -> None:
+        """Export an input of the controller with its noise and its delay."""
+        entry, period = controller.GetInputPort(name), self._deployment.period
+        size = entry.size()
+        if period is not None and self._deployment.measurements.delay > 0.0:
+            steps = whole_periods(self._deployment.measurements.delay, period)
+            delay = self._builder.AddNamedSystem(f"{name}_delay", DiscreteTimeDelay(period, steps, size))
+            self._builder.Connect(delay.get_output_port(), entry)
+            self.delays[name], entry = delay, delay.get_input_port()
+        if period is not None and deviations.any():
+            adder = self._builder.AddNamedSystem(f"{name}_measured", Adder(2, size))
+            noise = self._builder.AddNamedSystem(
+                f"{name}_noise", RandomSource(RandomDistribution.kGaussian, size, period)
+            )
+            scale = self._builder.AddNamedSystem(f"{name}_deviations", Gain(deviations))
+            self._builder.Connect(noise.get_output_port(), scale.get_input_port())
+            self._builder.Connect(scale.get_output_port(), adder.get_input_port(1))
+            self._builder.Connect(adder.get_output_port(), entry)
+            self.noises.append(noise)
+            entry = adder.get_input_port(0)
+        self._builder.ExportInput(entry, name)
+
+    def actuate(self, effort: OutputPort, joints: int) -> OutputPort:
+        """The effort as the actuators give it."""
+        if self._deployment.period is not None:
+            hold = self._builder.AddNamedSystem(
+                "effort_hold", ZeroOrderHold(self._deployment.period, 3 + joints)
+            )
+            self._builder.Connect(effort, hold.get_input_port())
+            effort = hold.get_output_port()
+        limits = _limits(self._deployment, joints)
+        saturation = self._builder.AddNamedSystem("actuator_limits", Saturation(-limits, limits))
+        self._builder.Connect(effort, saturation.get_input_port())
+        return saturation.get_output_port()
+
+    def send(self, ready: OutputPort, seed: int) -> OutputPort:
+        """The reports as the cell planner hears them."""
+        if self._deployment.period is None:
+            return ready
+        messages = self._deployment.messages
+        channel = MessageChannel(
+            self._deployment.period,
+            delay=messages.delay,
+            loss=messages.loss,
+            repeat=messages.repeat,
+            seed=seed,
+        )
+        self._builder.AddNamedSystem("radio", channel)
+        self._builder.Connect(ready, channel.get_input_port())
+        return channel.get_output_port()
+
+
+def _noise(deployment: Deployment, joints: int) -> FloatArray:
+    """Standard deviations of (x, y, angle, joints..., their rates), shape (2 (3 + n),)."""
+    m = deployment.measurements
+    positions = [m.position_noise, m.position_noise, *[m.angle_noise] * (1 + joints)]
+    return np.array([*positions, *[m.rate_noise] * (3 + joints)])
+
+
+def _limits(deployment: Deployment, joints: int) -> FloatArray:
+    """Largest base wrench and joint torques, shape (3 + n,)."""
+    limits = deployment.actuators
+    force, torque, effort = (
+        _STRONGEST if limit is None else limit
+        for limit in (limits.base_force, limits.base_torque, limits.joint_effort)
+    )
+    return np.array([force, force, torque, *[effort] * joints])

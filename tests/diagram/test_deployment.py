@@ -1,0 +1,126 @@
+"""What a deployment puts round the controllers, and that it is nothing where nothing is switched on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+
+from coop_drake.diagram import build_closed_loop
+from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
+from tests.support.small_loop import small_maps, small_problem
+from tests.support.system_checks import port_sizes
+
+NOISE = Measurements(position_noise=0.01, angle_noise=0.02, rate_noise=0.03)
+
+
+def loop_of(**deployment):
+    scenario, plan = small_problem("base")
+    return build_closed_loop(replace(scenario, deployment=Deployment(**deployment)), plan, small_maps())
+
+
+def parts(diagram):
+    return {system.get_name() for system in diagram.GetSystems()}
+
+
+def test_an_ideal_team_has_nothing_round_its_controllers():
+    loop = loop_of(seed=3)
+    assert loop.deployed == ()
+    assert loop.laws == loop.controllers
+
+
+@pytest.mark.parametrize(
+    ("deployment", "more"),
+    [
+        ({"mass_error": 0.1}, set()),
+        ({"actuators": ActuatorLimits(base_force=50.0)}, set()),
+        ({"control_rate": 200.0}, {"effort_hold", "radio"}),
+        (
+            {"control_rate": 200.0, "measurements": NOISE},
+            {"effort_hold", "radio"}
+            | {
+                f"{name}_{part}"
+                for name in ("object_pose", "robot_state")
+                for part in ("noise", "deviations", "measured")
+            },
+        ),
+        (
+            {"control_rate": 200.0, "measurements": Measurements(delay=0.01)},
+            {"effort_hold", "radio", "object_pose_delay", "robot_state_delay"},
+        ),
+    ],
+)
+def test_only_what_is_switched_on_is_there(deployment, more):
+    loop = loop_of(**deployment)
+    for deployed, controller in zip(loop.deployed, loop.controllers, strict=True):
+        assert deployed.diagram is controller
+        assert parts(controller) == {"controller", "actuator_limits"} | more
+        assert port_sizes(controller) == port_sizes(deployed.controller)
+
+
+def test_a_sampled_team_keeps_its_governors_between_samples():
+    loop = loop_of(control_rate=200.0)
+    root = loop.create_context()
+    assert root.num_continuous_states() == 2 * (3 + len(loop.team.joints))
+    for law in loop.laws:
+        governor = law.GetOutputPort("governor_position").Eval(law.GetMyContextFromRoot(root))
+        np.testing.assert_array_equal(governor, loop.plan.start[:2])
+
+
+def test_before_the_start_everything_stood_still():
+    loop = loop_of(control_rate=200.0, measurements=Measurements(delay=0.02))
+    root = loop.create_context()
+    for law in loop.laws:
+        state = law.GetOutputPort("object_state").Eval(law.GetMyContextFromRoot(root))
+        np.testing.assert_allclose(state, [*loop.plan.start[:3], 0.0, 0.0, 0.0], atol=1e-12)
+
+
+def test_every_robot_has_noise_of_its_own_and_a_seed_decides_it():
+    def measured(seed):
+        loop = loop_of(control_rate=200.0, measurements=NOISE, seed=seed)
+        simulator = Simulator(loop.diagram, loop.create_context())
+        simulator.AdvanceTo(0.05)
+        root = simulator.get_context()
+        return [
+            law.GetInputPort("object_pose").Eval(law.GetMyContextFromRoot(root)).tolist() for law in loop.laws
+        ]
+
+    first = measured(1)
+    assert measured(1) == first
+    assert measured(2) != first
+    assert first[0] != first[1]
+
+
+def test_actuators_give_no_more_than_their_limits():
+    loop = loop_of(actuators=ActuatorLimits(base_force=0.5, base_torque=0.25, joint_effort=0.125))
+    simulator = Simulator(loop.diagram, loop.create_context())
+    simulator.AdvanceTo(0.2)
+    for controller, law in zip(loop.controllers, loop.laws, strict=True):
+        given, wanted = (
+            part.GetOutputPort("robot_effort").Eval(part.GetMyContextFromRoot(simulator.get_context()))
+            for part in (controller, law)
+        )
+        limits = np.array([0.5, 0.5, 0.25, 0.125])
+        np.testing.assert_array_equal(given, np.clip(wanted, -limits, limits))
+        assert np.any(given != wanted)
+
+
+def test_robots_that_overestimate_masses_push_harder():
+    efforts = []
+    for error in (0.0, 0.5):
+        loop = loop_of(mass_error=error)
+        root = loop.create_context()
+        efforts.append(
+            [law.GetOutputPort("robot_effort").Eval(law.GetMyContextFromRoot(root)) for law in loop.laws]
+        )
+    np.testing.assert_allclose(efforts[1], 1.5 * np.array(efforts[0]), rtol=1e-9, atol=1e-9)
+    assert np.abs(efforts[0]).max() > 0.1
+
+
+def test_between_robots_only_reports_cross_in_a_deployment_too():
+    loop = loop_of(control_rate=100.0, measurements=NOISE, messages=Messages(0.1, 0.1, 0.02))
+    for (sink, entry), (source, output) in loop.diagram.connection_map().items():
+        ends = (source.get_name(), sink.get_name())
+        if "transport_station" not in ends:
+            port = source.get_output_port(output).get_name(), sink.get_input_port(entry).get_name()
+            assert port[0] in ("ready", "current_cell"), (ends, port)
