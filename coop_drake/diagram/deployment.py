@@ -17,8 +17,8 @@ from coop_drake.systems import MessageChannel, whole_periods
 __all__ = ["DeployedController", "deploy"]
 
 
-#: Nothing gives more than this, whatever the law asks for once it has lost its funnel [N, N m]: a plant driven
-#: to infinity would end the process instead of the run.
+#: Nothing gives more than this, whatever the law asks for once it has lost its funnel [N, N m]: a plant
+#: driven to infinity would end the process instead of the run.
 _STRONGEST = 1e5
 
 

@@ -11,7 +11,7 @@ class Measurements:
 
     Attributes:
         position_noise: Standard deviation of every measured position [m].
-        angle_noise: Standard deviation of every measured angle, and of the position of every joint [rad or m].
+        angle_noise: Standard deviation of every measured angle and of every joint's position [rad or m].
         rate_noise: Standard deviation of every measured rate [m/s or rad/s].
         delay: Age of what is measured, rounded up to whole control periods [s].
     """

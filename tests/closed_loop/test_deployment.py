@@ -1,4 +1,4 @@
-"""Every departure from the ideal team alone: a mild one, with which it still arrives, and one that breaks it."""
+"""Every departure from the ideal team: a mild one, with which it still arrives, and one that breaks it."""
 
 from dataclasses import replace
 from functools import cache
