@@ -1,5 +1,6 @@
 """Harmonic maps of planar cells to the unit disk, and the velocity fields they induce."""
 
+from coop_drake.fields.blunting import blunted
 from coop_drake.fields.certificate import MapCertificate
 from coop_drake.fields.cuts import cut_open
 from coop_drake.fields.harmonic_map import HarmonicMap
@@ -13,6 +14,7 @@ __all__ = [
     "MapStore",
     "Streamlines",
     "VelocityField",
+    "blunted",
     "cut_open",
     "trace_streamlines",
 ]

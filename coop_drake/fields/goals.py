@@ -11,13 +11,14 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.errors import FieldError
 from coop_drake.fields.quadrature import FloatArray
 from coop_drake.geometry.passage import pole
-from coop_drake.geometry.simplify import sharpest_angle
+from coop_drake.geometry.simplify import sharpest_angle, simplify_inward
 
-__all__ = ["check_question", "goal_edges", "region_to_map"]
+__all__ = ["check_domain", "check_question", "goal_edges", "region_to_map"]
 
 _ON = 1e-9  # what is this close, times the diameter, lies on the goal's boundary
 _SLIVER = 1e-9  # pieces that are thinner, times the diameter, come from rounding
 _NEAR = 1e-3  # a goal closer to a wall that it does not touch, times its own size, hardly leaves a gap
+_TINY = 1e-7  # shorter edges, times the diameter, are kinks to a map: their vertices are rounded
 _SHARPEST = np.deg2rad(5.0)  # sharper corners between goal and wall are cusps to a map
 
 
@@ -38,12 +39,14 @@ def region_to_map(
         inside: A point of the piece to keep where the goal splits the domain, for example the start.
 
     Returns:
-        F and the target: a point, or the goal itself.
+        F and the target: a point, or the goal itself. Edges shorter than 1e-7 times the domain's size, whose
+        ends are hardly more than rounding, are left out, inward.
 
     Raises:
         FieldError: If the domain is no valid polygon, the goal is not in it, or the piece is undetermined.
     """
     check_question(domain, goal)
+    domain = _without_tiny_edges(domain)
     if isinstance(goal, Point):
         return domain, goal
     piece = _piece_to_keep(domain, goal, inside)
@@ -52,13 +55,22 @@ def region_to_map(
     return domain, Point(pole(goal)[0])
 
 
+def check_domain(domain: Polygon) -> None:
+    """Refuse a domain that is no valid polygon.
+
+    Raises:
+        FieldError: With what is wrong and what is allowed.
+    """
+    _check_polygon(domain, "domain")
+
+
 def check_question(domain: Polygon, goal: Point | Polygon) -> None:
     """Refuse a domain that is no valid polygon, or a goal that is not in it.
 
     Raises:
         FieldError: With what is wrong and what is allowed.
     """
-    _check_polygon(domain, "domain")
+    check_domain(domain)
     if isinstance(goal, Point):
         if goal.is_empty or not np.isfinite(goal.coords[0]).all() or not domain.contains(goal):
             raise FieldError(f"the goal {goal.wkt} must lie strictly inside the domain{_extent(domain)}")
@@ -97,6 +109,14 @@ def _check_polygon(shape: object, name: str) -> None:
         raise FieldError(
             f"the {name} must be one valid polygon with an area: {shapely.is_valid_reason(shape)}"
         )
+
+
+def _without_tiny_edges(domain: Polygon) -> Polygon:
+    """The domain, simplified inward by no more than tiny edges are long if it has any."""
+    scale = _diameter(domain)
+    rings = [shapely.get_coordinates(ring) for ring in (domain.exterior, *domain.interiors)]
+    shortest = min(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).min()) for ring in rings)
+    return simplify_inward(domain, _TINY * scale) if shortest < _TINY * scale else domain
 
 
 def _extent(domain: Polygon) -> str:

@@ -113,3 +113,17 @@ def test_inside_selects_the_piece_of_a_split_domain():
 def test_points_of_wrong_shape_are_refused(points, message):
     with pytest.raises(FieldError, match=message):
         HarmonicMap(*domains.square())(points)
+
+
+def test_edges_as_short_as_rounding_are_left_out_inward():
+    kinked = Polygon([(0, 0), (1, 0), (1 + 7e-9, 7e-9), (2, 1), (1 + 3e-9, 2), (1, 2), (0, 1 + 1e-8), (0, 1)])
+    region, _ = region_to_map(kinked, Point(0.5, 0.5))
+    assert len(region.exterior.coords) == 6
+    assert kinked.buffer(1e-15).covers(region)
+    assert kinked.difference(region).area < 1e-7
+    assert HarmonicMap(kinked, Point(0.5, 0.5), tolerance=1e-8).certificate.error_bound <= 1e-8
+
+
+def test_edges_of_a_micrometre_are_kept():
+    domain, goal = domains.bevelled(1e-6)
+    assert region_to_map(domain, goal)[0] is domain
