@@ -57,7 +57,7 @@ def test_a_process_that_reads_and_dies_is_no_answer(tmp_path, monkeypatch):
 
 def test_a_bug_in_reading_comes_with_its_traceback(tmp_path, monkeypatch):
     (tmp_path / "sitecustomize.py").write_text(BROKEN)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ZeroDivisionError, match="here") as caught:
         read_apart(tmp_path / "room.scenario.yaml")
     assert "in broken" in caught.value.__notes__[0]

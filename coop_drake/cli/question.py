@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import subprocess
 import sys
@@ -49,9 +50,10 @@ def read_apart(path: Path, gains: str | None = None) -> Question:
         ScenarioError: The file, a model or the name of the gain set is wrong.
     """
     with subprocess.Popen(
-        [sys.executable, "-m", "coop_drake.cli.reading"],
+        [sys.executable, "-P", "-m", "coop_drake.cli.reading"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},  # It finds what this one finds.
         start_new_session=True,  # Ctrl-C is answered here.
     ) as process:
         try:
