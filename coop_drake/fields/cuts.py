@@ -6,8 +6,7 @@ import shapely
 from shapely import GeometryCollection, LineString, Point, Polygon
 
 from coop_drake.errors import FieldError
-from coop_drake.fields.goals import check_question
-from coop_drake.geometry.passage import PassageFinder, pole
+from coop_drake.fields.goals import check_question, pole_of
 from coop_drake.geometry.slits import cut_holes
 
 __all__ = ["cut_open"]
@@ -32,8 +31,8 @@ def cut_open(domain: Polygon, goal: Point | Polygon, start: Point | None = None)
     Args:
         domain: The cell, with or without holes [m].
         goal: Point or region to reach; no slit meets it.
-        start: Where a transport begins. No slit is nearer to the widest passage from there to the goal than
-            half the passage's clearance, and none within its clearance where there is a choice.
+        start: Where a transport begins: no slit crosses the widest passage from there to the goal, nor comes
+            nearer to it than the passage's walls where there is a choice.
 
     Returns:
         What is left, inside the domain. Holes that the goal encloses stay.
@@ -58,7 +57,9 @@ def _what_stays_open(
     """The goal, with the widest passage to it; and the distance from it that slits are to keep [m]."""
     if start is None:
         return GeometryCollection([goal]), domain.area / domain.length
-    target = goal if isinstance(goal, Point) else Point(pole(goal)[0])
+    from coop_drake.geometry.passage import PassageFinder  # loads scipy's Voronoi diagrams
+
+    target = goal if isinstance(goal, Point) else pole_of(goal)
     passage = PassageFinder(domain).find(start.coords[0], target.coords[0])
     return GeometryCollection([passage.path, goal]), passage.neck
 

@@ -10,10 +10,9 @@ from shapely.geometry.base import BaseGeometry
 
 from coop_drake.errors import FieldError
 from coop_drake.fields.quadrature import FloatArray
-from coop_drake.geometry.passage import pole
 from coop_drake.geometry.simplify import sharpest_angle, simplify_inward
 
-__all__ = ["check_domain", "check_question", "goal_edges", "region_to_map"]
+__all__ = ["check_domain", "check_question", "goal_edges", "pole_of", "region_to_map"]
 
 _ON = 1e-9  # what is this close, times the diameter, lies on the goal's boundary
 _SLIVER = 1e-9  # pieces that are thinner, times the diameter, come from rounding
@@ -52,7 +51,7 @@ def region_to_map(
     piece = _piece_to_keep(domain, goal, inside)
     if _can_collapse(domain, piece, goal):
         return piece, goal
-    return domain, Point(pole(goal)[0])
+    return domain, pole_of(goal)
 
 
 def check_domain(domain: Polygon) -> None:
@@ -78,6 +77,13 @@ def check_question(domain: Polygon, goal: Point | Polygon) -> None:
     _check_polygon(goal, "goal region")
     if not domain.buffer(1e-9 * domain.length).covers(goal):
         raise FieldError("the goal region must lie in the domain; intersect it with the domain first")
+
+
+def pole_of(goal: Polygon) -> Point:
+    """The point of a goal region that is farthest from its boundary."""
+    from coop_drake.geometry.passage import pole  # loads scipy's Voronoi diagrams, which few goals need
+
+    return Point(pole(goal)[0])
 
 
 def goal_edges(points: FloatArray, goal: BaseGeometry, scale: float) -> NDArray[np.bool_]:

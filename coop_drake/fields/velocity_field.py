@@ -28,7 +28,7 @@ class VelocityField:
     arrives. Along it the field is Lipschitz: it is smooth in the interior but at the goal's edge, where the
     speed has a kink. It is not near a vertex that juts into the cell, round which the direction turns within
     any distance however small. Where a hole collapses, the streamlines that meet it form two lines at most
-    that do not arrive, and those beside them linger; in a domain without holes there are none.
+    that do not arrive, and those beside them linger; `cut_open` rids a domain of holes.
     Points outside the map's region get the direction of the nearest boundary point, never NaN.
 
     Args:

@@ -11,9 +11,8 @@ from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
-from coop_drake.geometry.medial import IndexArray
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.triangles import Triangles, triangulate
+from coop_drake.geometry.triangles import IndexArray, Triangles, triangulate
 
 __all__ = ["WIDTH", "component_at", "cut_holes", "slits_of"]
 

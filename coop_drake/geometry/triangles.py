@@ -6,12 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import Polygon
 
-from coop_drake.geometry.medial import IndexArray
 from coop_drake.geometry.pose import FloatArray
 
-__all__ = ["Triangles", "triangulate"]
+__all__ = ["IndexArray", "Triangles", "triangulate"]
+
+IndexArray = NDArray[np.intp]
 
 PER_GAP = 1.0
 """Longest piece of a ring, over its distance to the opposite wall [-]."""

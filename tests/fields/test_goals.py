@@ -5,7 +5,7 @@ import pytest
 from shapely import MultiPolygon, Point, Polygon, affinity, box
 
 from coop_drake.errors import FieldError
-from coop_drake.fields import HarmonicMap
+from coop_drake.fields import HarmonicMap, VelocityField, trace_streamlines
 from coop_drake.fields.goals import region_to_map
 from tests.support import domains
 
@@ -51,6 +51,17 @@ def test_a_goal_clear_of_walls_or_on_one_arc_collapses(name):
     shared = region.exterior.intersection(goal.exterior).length > 0.0
     assert np.hypot(*harmonic_map.goal_image) <= 1.0 + 1e-12
     assert bool(np.hypot(*harmonic_map.goal_image) > 1.0 - 1e-9) is shared
+
+
+@pytest.mark.parametrize("name", [*COLLAPSING, *THROUGH_THE_POLE])
+def test_every_goal_is_reached(name):
+    domain, goal, inside = {**COLLAPSING, **THROUGH_THE_POLE}[name]
+    harmonic_map = HarmonicMap(domain, goal, inside=inside, tolerance=1e-6)
+    starts = domains.inside(harmonic_map.region, 60)
+    streamlines = trace_streamlines(VelocityField(harmonic_map), starts)
+    assert len(starts) > 10
+    assert streamlines.arrived.all()
+    assert max(goal.distance(Point(path[-1])) for path in streamlines.paths) < 0.01 * np.sqrt(goal.area)
 
 
 @pytest.mark.parametrize("name", THROUGH_THE_POLE)
