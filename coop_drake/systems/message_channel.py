@@ -2,36 +2,17 @@
 
 from __future__ import annotations
 
-import copy
-from dataclasses import dataclass
+from random import Random
 
 import numpy as np
-from pydrake.common.value import Value
-from pydrake.systems.framework import BasicVector, Context, EventStatus, LeafSystem, State
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from coop_drake.systems.current_cell import READY_SIZE
 
-__all__ = ["MessageChannel"]
+__all__ = ["MessageChannel", "whole_periods"]
 
-Report = tuple[float, float]
-
-_NOTHING: Report = (-1.0, -1.0)
-"""Heard before the first report arrives: it is about no cell, so it never counts."""
-
-
-@dataclass
-class _Air:
-    """What the channel keeps.
-
-    Attributes:
-        heard: The report that arrived last.
-        under_way: Reports on their way: the periods of their arrival and of their sending, and the report.
-        dice: Decide what is lost or repeated.
-    """
-
-    heard: Report
-    under_way: list[tuple[int, int, Report]]
-    dice: np.random.Generator
+#: Stands for no report, as before the first arrives: it is about no cell, so it never counts.
+_NOTHING = (-1.0, -1.0)
 
 
 class MessageChannel(LeafSystem):
@@ -42,9 +23,10 @@ class MessageChannel(LeafSystem):
     output  ``heard``    2    the report that arrived last; (-1, -1) before the first
     ======= ============ ==== ================================================================
 
-    State: one abstract value, the reports under way and the dice. It is updated every ``period``. A lost
-    report leaves the last one standing; a repeated one arrives again one delay (at least one period) later,
-    when it may be stale.
+    State: one discrete group, updated every ``period``: the report heard, then what arrives in each of the
+    next periods, (-1, -1) where nothing does. A lost report leaves the last one standing; a repeated one
+    arrives again one delay (at least one period) later, unless a newer one arrives then. What is lost is
+    drawn from the seed and the number of the period.
 
     Args:
         period: Time between two reports [s].
@@ -67,31 +49,28 @@ class MessageChannel(LeafSystem):
             )
         if not (0.0 <= loss <= 1.0 and 0.0 <= repeat <= 1.0):
             raise ValueError(f"MessageChannel's probabilities must lie in [0, 1], not {loss} and {repeat}")
-        self._period, self._loss, self._repeat = period, loss, repeat
+        self._period, self._loss, self._repeat, self._seed = period, loss, repeat, seed
         self._delay = whole_periods(delay, period)
+        self._again = self._delay + max(self._delay, 1)
         self._sent = self.DeclareVectorInputPort("sent", READY_SIZE)
-        self._air = self.DeclareAbstractState(Value(_Air(_NOTHING, [], np.random.default_rng(seed))))
-        self.DeclareVectorOutputPort("heard", READY_SIZE, self._write_heard, {self.xa_ticket()})
-        self.DeclarePeriodicUnrestrictedUpdateEvent(period_sec=period, offset_sec=0.0, update=self._transmit)
+        self.DeclareDiscreteState(np.tile(_NOTHING, 1 + self._again))
+        self.DeclareVectorOutputPort("heard", READY_SIZE, self._write_heard, {self.xd_ticket()})
+        self.DeclarePeriodicDiscreteUpdateEvent(period_sec=period, offset_sec=0.0, update=self._transmit)
 
-    def _transmit(self, context: Context, state: State) -> EventStatus:
-        before = context.get_abstract_state(int(self._air)).get_value()
-        air = _Air(before.heard, list(before.under_way), copy.deepcopy(before.dice))
-        now, (index, margin) = round(context.get_time() / self._period), self._sent.Eval(context)
-        lost, repeated = air.dice.random(2) < (self._loss, self._repeat)
-        if not lost:
-            air.under_way.append((now + self._delay, now, (index, margin)))
-            if repeated:
-                air.under_way.append((now + self._delay + max(self._delay, 1), now, (index, margin)))
-        arrived = [entry for entry in air.under_way if entry[0] <= now]
-        air.under_way = [entry for entry in air.under_way if entry[0] > now]
-        if arrived:
-            air.heard = max(arrived)[2]  # of those that arrive together, the one that was sent last
-        state.get_mutable_abstract_state(int(self._air)).set_value(air)
-        return EventStatus.Succeeded()
+    def _transmit(self, context: Context, discrete_state: DiscreteValues) -> None:
+        kept = context.get_discrete_state_vector().value().reshape(-1, READY_SIZE)
+        heard, arrivals = kept[0], np.vstack([kept[1:], _NOTHING])
+        dice = Random(self._seed << 32 | round(context.get_time() / self._period))
+        if dice.random() >= self._loss:
+            arrivals[self._delay] = self._sent.Eval(context)
+            if dice.random() < self._repeat:
+                arrivals[self._again] = arrivals[self._delay]
+        if arrivals[0, 0] >= 0.0:
+            heard = arrivals[0]
+        discrete_state.get_mutable_vector().SetFromVector(np.concatenate([heard, arrivals[1:].ravel()]))
 
     def _write_heard(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(context.get_abstract_state(int(self._air)).get_value().heard)
+        output.SetFromVector(context.get_discrete_state_vector().value()[:READY_SIZE])
 
 
 def whole_periods(time: float, period: float) -> int:
