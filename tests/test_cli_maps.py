@@ -81,6 +81,7 @@ def test_the_cache_lies_where_the_system_keeps_caches_unless_named(monkeypatch):
     assert "coop_drake" in map_cache().folder.parts
 
 
-def test_a_tolerance_that_cannot_be_met_fails_with_cell_and_place(tmp_path):
-    with pytest.raises(FieldError, match=r"cell 0 of 3: .*certified to.*1e-15 was asked for; at fault is"):
+def test_a_tolerance_that_cannot_be_met_fails_with_cell_place_and_key(tmp_path):
+    message = r"cell 0 of 3: .*at fault is the .*room\.scenario\.yaml: maps\.tolerance is 1e-15"
+    with pytest.raises(FieldError, match=message):
         map_cells(task_with(tmp_path, 1e-15), PLAN, Reporter(machine=True, quiet=True), fresh=True)

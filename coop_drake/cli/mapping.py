@@ -9,6 +9,7 @@ from coop_drake.cli.measures import map_measures
 from coop_drake.cli.reading import Task
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
+from coop_drake.errors import FieldError
 from coop_drake.fields import HarmonicMap
 from coop_drake.files import write_atomically
 from coop_drake.planning import Plan
@@ -25,10 +26,16 @@ def map_cells(task: Task, found: Plan, reporter: Reporter, *, fresh: bool) -> tu
         found: The plan.
         reporter: Takes note.
         fresh: Whether maps solved before are left aside.
+
+    Raises:
+        FieldError: A cell cannot be mapped; the message names it, and the setting that it is measured by.
     """
-    store = None if fresh else map_cache()
+    store, tolerance = None if fresh else map_cache(), task.scenario.maps.tolerance
     with reporter.stage("mapping") as progress, reporter.stopwatch("mapping"):
-        maps = build_maps(found, tolerance=task.scenario.maps.tolerance, store=store, progress=progress)
+        try:
+            maps = build_maps(found, tolerance=tolerance, store=store, progress=progress)
+        except FieldError as error:
+            raise FieldError(f"{error} ({task.scenario.path}: maps.tolerance is {tolerance:g})") from error
     reporter.facts.update(map_measures(maps), maps_read=0 if store is None else store.found)
     return maps
 
