@@ -47,19 +47,26 @@ def map_rows(name: str, domain: Domain, hntf2d_residual: float | None = None) ->
         hntf2d_residual: That of the authors' own implementation of such maps (hntf2d, single precision,
             3200 elements) on such a shape, if known.
     """
-    rows = cost_rows(name, domain, hntf2d_residual)
-    return rows if rows[0].unit == "refused" else [*rows, *_evaluation_rows(name, _mapped(domain))]
+    rows, harmonic_map = _measured(name, domain, hntf2d_residual)
+    return rows if harmonic_map is None else [*rows, *_evaluation_rows(name, harmonic_map)]
 
 
-def cost_rows(name: str, domain: Domain, hntf2d_residual: float | None = None) -> list[Row]:
-    """Solve and judge one map, beside one dense system of as many unknowns; arguments as in `map_rows`."""
+def cost_rows(name: str, domain: Domain) -> list[Row]:
+    """Solve and judge a map; arguments as in `map_rows`."""
+    return _measured(name, domain, None)[0]
+
+
+def _measured(
+    name: str, domain: Domain, hntf2d_residual: float | None
+) -> tuple[list[Row], HarmonicMap | None]:
+    """Solve and judge one map, beside one dense system of as many unknowns; the map if there is one."""
     start = process_time()
     try:
-        certificate = _mapped(domain).certificate
+        harmonic_map = _mapped(domain)
     except FieldError:
-        return [Row(f"{name}/answer", 0.0, "refused"), Row(f"{name}/vertices", domain.vertices, "-")]
+        return [Row(f"{name}/answer", 0.0, "refused"), Row(f"{name}/vertices", domain.vertices, "-")], None
     first = process_time() - start
-    again = _best(lambda: _mapped(domain))
+    certificate, again = harmonic_map.certificate, _best(lambda: _mapped(domain))
     n = certificate.unknowns
     peer = f"dense solve, {n} unknowns" if n <= _MOST_UNKNOWNS else ""
     peer_map = "" if hntf2d_residual is None else "hntf2d (3200 elements), measured apart"
@@ -70,7 +77,7 @@ def cost_rows(name: str, domain: Domain, hntf2d_residual: float | None = None) -
         Row(f"{name}/first_cpu_seconds", first, "s"),
         Row(f"{name}/cpu_seconds", again, "s", peer, _dense_seconds(n) if peer else None),
         Row(f"{name}/residual", certificate.residual, "-", peer_map, hntf2d_residual),
-    ]
+    ], harmonic_map
 
 
 def _evaluation_rows(name: str, harmonic_map: HarmonicMap) -> list[Row]:
