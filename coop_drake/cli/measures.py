@@ -63,6 +63,9 @@ def map_measures(maps: Sequence[HarmonicMap]) -> dict[str, Any]:
 def simulation_measures(plan: Plan, log: SimulationLog) -> dict[str, Any]:
     """Return how the run went: errors at its end, smallest margins and peaks over all accepted steps."""
     x, y, theta = log.object_pose[-1] - plan.goal_pose
+    from coop_drake.simulation import communication  # here, for it brings Drake, which planning does without
+
+    ledger = communication(log)
     base_forces = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1])
     return {
         "reached": log.reached,
@@ -81,6 +84,9 @@ def simulation_measures(plan: Plan, log: SimulationLog) -> dict[str, Any]:
         "min_delta_e": float(log.energy_margin.min()),
         "max_acceleration_error": float(log.acceleration_error.max()),
         "max_wrench_error_n": float(log.wrench_error.max()),
+        "max_governor_spread_m": float(log.governor_spread.max()),
+        "messages": ledger.messages,
+        "message_bytes": ledger.message_bytes,
         "peak_base_wrench_n": float(base_forces.max()),
         "peak_base_torque_nm": float(np.abs(log.base_wrenches[..., 2]).max()),
         "peak_joint_torque_nm": float(np.abs(log.joint_torques).max(initial=0.0)),
