@@ -29,8 +29,8 @@ def region_to_map(
     A goal region that has a boundary of its own, or meets the outer ring in one arc, is taken out of the
     domain and collapses. One that meets walls otherwise (in several arcs, in a single point, at a cusp, along
     a part of a hole) cannot collapse without a wall: then the target is its pole of inaccessibility, the
-    point of it farthest from its boundary, and F is the whole domain. To reach the target is to reach the
-    goal either way.
+    point of it farthest from its boundary, and F is the whole domain. So it is where nothing but the goal is
+    left or the start lies in it. To reach the target is to reach the goal either way.
 
     Args:
         domain: The cell [m].
@@ -49,7 +49,7 @@ def region_to_map(
     if isinstance(goal, Point):
         return domain, goal
     piece = _piece_to_keep(domain, goal, inside)
-    if _can_collapse(domain, piece, goal):
+    if piece is not None and _can_collapse(domain, piece, goal):
         return piece, goal
     return domain, pole_of(goal)
 
@@ -131,22 +131,25 @@ def _extent(domain: Polygon) -> str:
     return f", which spans x {x0:.6g} to {x1:.6g} and y {y0:.6g} to {y1:.6g} m and may have holes"
 
 
-def _piece_to_keep(domain: Polygon, goal: Polygon, inside: Point | None) -> Polygon:
-    """The piece of the domain less the goal that holds a point, or the only one."""
+def _piece_to_keep(domain: Polygon, goal: Polygon, inside: Point | None) -> Polygon | None:
+    """The piece of the domain less the goal that holds a point, or the only one; None within the goal.
+
+    Raises:
+        FieldError: If the point is needed but missing, or outside the domain.
+    """
     least = _SLIVER * _diameter(domain)
     parts = shapely.get_parts(domain.difference(goal))
     pieces = [p for p in parts if isinstance(p, Polygon) and p.area > least * p.length]
-    if inside is not None:
-        pieces = [p for p in pieces if p.covers(inside)]
-    if not pieces and inside is None:
-        raise FieldError("the goal region covers the whole domain: nothing is left to map")
-    if len(pieces) != 1:
-        where = "is outside the domain or inside the goal" if inside is not None else "is needed"
+    if inside is None and len(pieces) > 1:
         raise FieldError(
-            f"the domain less the goal has {len(pieces)} pieces to choose from: the argument `inside`, "
-            f"a point of the piece to map, {where}"
+            f"the goal region splits the domain into {len(pieces)} pieces: the argument `inside`, a point of "
+            "the piece to map, is needed"
         )
-    return pieces[0]
+    if inside is not None:
+        if not domain.covers(inside):
+            raise FieldError(f"`inside`, {inside.wkt}, is outside the domain{_extent(domain)}")
+        pieces = [p for p in pieces if p.covers(inside)]
+    return pieces[0] if pieces else None
 
 
 def _can_collapse(domain: Polygon, piece: Polygon, goal: Polygon) -> bool:

@@ -37,6 +37,8 @@ THROUGH_THE_POLE = {
     "part of a hole": (WITH_CRATE, box(2.5, 0.8, 3, 1.2), None),
     "a hole and the wall": (WITH_CRATE, box(1.8, 1.3, 2.2, 2), None),
     "a hole's corner": (WITH_CRATE, Polygon([(2.5, 0.7), (3, 0.3), (3, 0.7)]), None),
+    "the whole domain": (ROOM, ROOM, None),
+    "a start within it": (ROOM, box(1, 0, 2, 2), Point(1.5, 1)),
     "a cusp against the wall": (ROOM, Polygon([(1, 0.04), (4, 0), (4, 1), (2, 1)]), None),
 }
 
@@ -89,9 +91,8 @@ def test_any_other_goal_is_reached_through_its_pole(name):
         ([(0, 0), (1, 0), (0, 1)], Point(0.2, 0.2), None, "the domain must be a shapely Polygon, got list"),
         (Polygon(), Point(0, 0), None, "the domain must be one valid polygon with an area, got an empty"),
         (Polygon([(0, 0), (1, 1), (1, 0), (0, 1)]), Point(0.5, 0.2), None, "Self-intersection"),
-        (ROOM, box(1, 0, 2, 2), None, "has 2 pieces to choose from: the argument `inside`"),
-        (ROOM, box(1, 0, 2, 2), Point(1.5, 1), "outside the domain or inside the goal"),
-        (ROOM, ROOM, None, "covers the whole domain: nothing is left to map"),
+        (ROOM, box(1, 0, 2, 2), None, "splits the domain into 2 pieces: the argument `inside`"),
+        (ROOM, box(1, 0, 2, 2), Point(5, 1), r"`inside`, POINT \(5 1\), is outside the domain"),
     ],
 )
 def test_unusable_questions_are_refused(domain, goal, inside, message):
