@@ -45,7 +45,7 @@ def blunted(domain: Polygon, *, sharpest: float = 10.0, depth: float | None = No
     check_domain(domain)
     if not 0.0 < sharpest <= 45.0 or (depth is not None and not depth > 0.0):
         raise FieldError(f"sharpest must be in (0, 45] degrees, depth positive, got {sharpest} and {depth}")
-    oriented = shapely.orient_polygons(shapely.force_2d(domain))
+    oriented = shapely.orient_polygons(shapely.remove_repeated_points(shapely.force_2d(domain)))
     x0, y0, x1, y1 = domain.bounds
     size = float(np.hypot(x1 - x0, y1 - y0))
     limit = np.deg2rad(sharpest)

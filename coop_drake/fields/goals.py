@@ -47,7 +47,7 @@ def region_to_map(
     check_question(domain, goal)
     domain = _without_tiny_edges(domain)
     if isinstance(goal, Point):
-        return domain, goal
+        return domain, Point(goal.x, goal.y) if goal.has_z else goal
     piece = _piece_to_keep(domain, goal, inside)
     if piece is not None and _can_collapse(domain, piece, goal):
         return piece, goal

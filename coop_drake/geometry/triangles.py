@@ -9,6 +9,7 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from coop_drake.geometry.boundary import edges_of
 from coop_drake.geometry.pose import FloatArray
 
 __all__ = ["IndexArray", "Triangles", "triangulate"]
@@ -47,56 +48,58 @@ def triangulate(polygon: Polygon) -> Triangles:
     Args:
         polygon: The region, with holes or without [m].
     """
-    rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
-    walls = np.vstack([np.hstack((r[:-1], r[1:])) for r in rings])
-    cut = [_cut_up(r, walls, polygon) for r in rings]
+    polygon = shapely.remove_repeated_points(polygon)
+    walls = edges_of(polygon)
+    sizes = [len(ring.coords) - 1 for ring in (polygon.exterior, *polygon.interiors)]
+    finest = float(np.hypot(*np.subtract(polygon.bounds[2:], polygon.bounds[:2]))) / FINEST
+    pieces = _cut_up(walls, finest)
+    ring_of = np.repeat(np.arange(len(sizes)), sizes)[pieces[:, 2].astype(np.intp)]
+    cut = [pieces[ring_of == k, :2] for k in range(len(sizes))]
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(Polygon(cut[0], cut[1:])))
-    points = np.vstack(cut)
-    vertices, first = np.unique(points, axis=0, return_index=True)
-    ring = np.repeat(np.arange(len(cut)), [len(r) for r in cut])[first]
+    vertices, first = np.unique(pieces[:, :2], axis=0, return_index=True)
     places = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
     known, corners = np.unique(np.vstack((vertices, places.reshape(-1, 2))), axis=0, return_inverse=True)
-    assert len(known) == len(vertices)
+    assert len(known) == len(vertices)  # no triangle has a corner of its own
     corners = corners.ravel()[len(vertices) :].reshape(-1, 3)
     sides = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(len(corners)), 3)
     order = np.lexsort((sides[:, 1], sides[:, 0]))
     sides, owner = sides[order], owner[order]
     twice = np.flatnonzero((sides[1:] == sides[:-1]).all(axis=1))
-    return Triangles(vertices, ring, corners, sides[twice], np.column_stack((owner[twice], owner[twice + 1])))
+    return Triangles(
+        vertices, ring_of[first], corners, sides[twice], np.column_stack((owner[twice], owner[twice + 1]))
+    )
 
 
-def _cut_up(ring: FloatArray, walls: FloatArray, polygon: Polygon) -> FloatArray:
-    """Vertices of a ring with points between them, each once, shape (n, 2)."""
-    finest = float(np.hypot(*np.subtract(polygon.bounds[2:], polygon.bounds[:2]))) / FINEST
-    start, end = ring[:-1], ring[1:]
-    edge = np.arange(len(start))
-    own = np.hstack((start, end))
-    while True:
-        middle, length = 0.5 * (start + end), np.linalg.norm(end - start, axis=1)
-        gap = _opposite(middle, own[edge], walls)
-        long = length > np.maximum(PER_GAP * gap, finest)
-        if not long.any():
-            return start
-        count = np.where(long, 2, 1)
-        half = np.repeat(np.arange(len(start)), count)
-        second = np.concatenate(([False], half[1:] == half[:-1]))
-        first = np.concatenate((half[1:] == half[:-1], [False]))
-        start, end = (
-            np.where(second[:, None], middle[half], start[half]),
-            np.where(first[:, None], middle[half], end[half]),
-        )
-        edge = edge[half]
+def _cut_up(walls: FloatArray, finest: float) -> FloatArray:
+    """Starts of the pieces of all walls in order, and the wall of each: rows (x, y, wall)."""
+    z = walls @ np.array([[1.0, 0.0], [1.0j, 0.0], [0.0, 1.0], [0.0, 1.0j]])
+    starts, ends = z[:, None, :], z[None, :, :]
+    touching = (starts[..., :, None] == ends[..., None, :]).any(axis=(2, 3))
+    wall, part = np.arange(len(z)), np.array([[0.0, 1.0]] * len(z))
+    done = []
+    while len(wall):
+        middle = z[wall, 0] + part.mean(axis=1) * (z[wall, 1] - z[wall, 0])
+        length = (part[:, 1] - part[:, 0]) * np.abs(z[wall, 1] - z[wall, 0])
+        long = length > np.maximum(PER_GAP * _opposite(middle, z, touching[wall]), finest)
+        done.append(np.column_stack((wall[~long], part[~long, 0])))
+        low, high = part[long].T
+        half = 0.5 * (low + high)
+        wall = np.tile(wall[long], 2)
+        part = np.vstack((np.column_stack((low, half)), np.column_stack((half, high))))
+    rows = np.concatenate(done)
+    rows = rows[np.lexsort((rows[:, 1], rows[:, 0]))]
+    of = rows[:, 0].astype(np.intp)
+    places = walls[of, :2] + rows[:, 1:] * (walls[of, 2:] - walls[of, :2])
+    return np.column_stack((places, of))
 
 
-def _opposite(points: FloatArray, own: FloatArray, walls: FloatArray) -> FloatArray:
-    """Distance of points on walls ``own`` to the nearest wall that does not touch their own, shape (n,)."""
-    a, d = walls[:, :2], walls[:, 2:] - walls[:, :2]
-    offset = points[:, None] - a
-    along = np.clip((offset * d).sum(axis=2) / np.maximum((d * d).sum(axis=1), 1e-300), 0.0, 1.0)
-    distance = np.linalg.norm(offset - along[..., None] * d, axis=2)
-    ends = np.stack((walls[:, :2], walls[:, 2:]), axis=1)
-    mine = np.stack((own[:, :2], own[:, 2:]), axis=1)
-    touches = (mine[:, None, :, None] == ends[None, :, None, :]).all(axis=4).any(axis=(2, 3))
-    distance[touches] = np.inf
+def _opposite(
+    points: NDArray[np.complex128], walls: NDArray[np.complex128], own: NDArray[np.bool_]
+) -> FloatArray:
+    """Distance of points to the nearest wall but ``own`` (points, walls), shape (points,)."""
+    along = walls[:, 1] - walls[:, 0]
+    offset = points[:, None] - walls[:, 0]
+    part = np.clip((np.conj(along) * offset).real / np.maximum(np.abs(along) ** 2, 1e-300), 0.0, 1.0)
+    distance = np.where(own, np.inf, np.abs(offset - part * along))
     return np.asarray(distance.min(axis=1))

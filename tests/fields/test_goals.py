@@ -136,6 +136,13 @@ def test_edges_as_short_as_rounding_are_left_out_inward():
     assert HarmonicMap(kinked, Point(0.5, 0.5), tolerance=1e-8).certificate.error_bound <= 1e-8
 
 
+def test_a_third_coordinate_does_no_harm():
+    raised = Polygon([(0, 0, 3), (4, 0, 3), (4, 2, 3), (0, 2, 3)])
+    here, there = HarmonicMap(raised, Point(3, 1, 3)), HarmonicMap(ROOM, Point(3, 1))
+    assert np.hypot(*here.goal_image) == pytest.approx(np.hypot(*there.goal_image))
+    assert np.isfinite(VelocityField(here)([0.5, 0.5])).all()
+
+
 def test_edges_of_a_micrometre_are_kept():
     domain, goal = domains.bevelled(1e-6)
     assert region_to_map(domain, goal)[0] is domain
