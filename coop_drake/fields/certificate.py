@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from coop_drake.fields.outline import ComplexArray, IntArray, Outline
 from coop_drake.fields.panels import Panels
 from coop_drake.fields.quadrature import FloatArray
 
-__all__ = ["MapCertificate", "certify", "describe_place"]
+__all__ = ["Fault", "MapCertificate", "certify", "find_fault"]
 
 # Chebyshev points of two degrees: denser than the nodes, and other points than they are.
 _ON_PANEL = np.sort(np.cos(np.pi * (np.arange(17) + 0.5) / 17))
@@ -35,6 +36,8 @@ class MapCertificate:
         condition: Estimate of its condition in the 1-norm.
         worst_place: Where the residual is largest, in W [m], shape (2,).
         worst_place_description: The corner or gap there, in words.
+        worst_angle: Interior angle of the corner there [degrees], None at a gap.
+        worst_gap: Width of the gap there [m], None at a corner.
     """
 
     residual: float
@@ -44,6 +47,22 @@ class MapCertificate:
     condition: float
     worst_place: FloatArray
     worst_place_description: str
+    worst_angle: float | None = None
+    worst_gap: float | None = None
+
+
+class Fault(NamedTuple):
+    """A corner or a gap, by its name.
+
+    Attributes:
+        description: Its name.
+        angle: Interior angle of the corner [degrees], None for a gap.
+        gap: Width of the gap [m], None for a corner.
+    """
+
+    description: str
+    angle: float | None
+    gap: float | None
 
 
 def certify(
@@ -73,6 +92,7 @@ def certify(
     residuals = np.where(np.isfinite(residuals), residuals, np.inf)
     worst = int(np.argmax(residuals))
     place = position[worst] + outline.centre
+    fault = find_fault(outline, panels, position[worst], int(edge[worst]))
     return MapCertificate(
         residual=float(residuals[worst]),
         error_bound=float((2 * outline.holes + 1) * residuals[worst]),
@@ -80,7 +100,9 @@ def certify(
         unknowns=arrays.sources.shape[1] + outline.holes,
         condition=condition,
         worst_place=np.array([place.real, place.imag]),
-        worst_place_description=describe_place(outline, panels, position[worst], int(edge[worst])),
+        worst_place_description=fault.description,
+        worst_angle=fault.angle,
+        worst_gap=fault.gap,
     )
 
 
@@ -105,16 +127,16 @@ def _samples(
     return outline.vertices[edge] + (outline.ends - outline.vertices)[edge] * part, expected, edge
 
 
-def describe_place(outline: Outline, panels: Panels, place: complex, edge: int) -> str:
-    """Name the corner or the gap at a place of the boundary, in words."""
+def find_fault(outline: Outline, panels: Panels, place: complex, edge: int) -> Fault:
+    """Name the corner or the gap at a place of the boundary."""
     for vertex in (edge, int(outline.following[edge])):
         if abs(place - outline.vertices[vertex]) <= 1.5 * panels.legs[vertex]:
             where = outline.vertices[vertex] + outline.centre
-            angle = np.rad2deg(outline.corner_angles[vertex])
+            angle = float(np.rad2deg(outline.corner_angles[vertex]))
             corner = f"the corner at ({where.real:.6g}, {where.imag:.6g}) m"
-            return f"{corner} with interior angle {angle:.4g} degrees"
+            return Fault(f"{corner} with interior angle {angle:.4g} degrees", angle, None)
     along = abs(place - outline.vertices[edge])
     own = np.flatnonzero(panels.edge == edge)
     nearest = own[np.argmin(np.abs(0.5 * (panels.start + panels.end)[own] - along))]
-    where = place + outline.centre
-    return f"the gap of {panels.gap[nearest]:.3g} m at ({where.real:.6g}, {where.imag:.6g}) m"
+    where, gap = place + outline.centre, float(panels.gap[nearest])
+    return Fault(f"the gap of {gap:.3g} m at ({where.real:.6g}, {where.imag:.6g}) m", None, gap)

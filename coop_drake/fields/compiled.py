@@ -17,4 +17,4 @@ _FAST = {"contract", "reassoc"}
 
 def compiled(function: F) -> F:
     """Compile at the first call; single-threaded, division by zero gives infinity as in numpy."""
-    return cast(F, numba.njit(cache=True, error_model="numpy", fastmath=_FAST)(function))
+    return cast(F, numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)(function))

@@ -1,4 +1,4 @@
-"""The boundary integral equation of one map: assembled, solved, its density refined.
+"""The boundary integral equation of one map: assembled and solved.
 
 With the complex density mu and the domain on the left of every ring,
 
@@ -21,16 +21,14 @@ import numpy as np
 from threadpoolctl import ThreadpoolController  # type: ignore[import-untyped]
 
 from coop_drake.fields.corners import corner_operator
-from coop_drake.fields.double_layer import double_layer, subtract_double_layer
+from coop_drake.fields.double_layer import double_layer
 from coop_drake.fields.nodes import Nodes, place_nodes
 from coop_drake.fields.outline import ComplexArray, IntArray, Outline
 from coop_drake.fields.panels import Panels
-from coop_drake.fields.quadrature import FloatArray, legendre_transform
+from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.skeletons import Cluster, solve_clusters
 
-__all__ = ["REFINED_NODES", "Density", "solve_density"]
-
-REFINED_NODES = 16  # nodes on a panel after the Nystrom interpolation
+__all__ = ["Density", "solve_density"]
 
 
 @dataclass(frozen=True)
@@ -40,17 +38,12 @@ class Density:
     Attributes:
         nodes: Where the equation was solved.
         weighted: Density at the nodes, weight-corrected in corner blocks, shape (n, 2).
-        refined: The discretisation with `REFINED_NODES` nodes a panel.
-        incoming: On refined nodes: the density on regular panels, on corner blocks the field that comes
-            in from the rest of the boundary, shape (m, 2).
         hole_images: c_k, shape (holes, 2).
         condition: Largest condition of a system that was factorised, estimated in the 1-norm.
     """
 
     nodes: Nodes
     weighted: FloatArray
-    refined: Nodes
-    incoming: FloatArray
     hole_images: FloatArray
     condition: float
 
@@ -73,17 +66,7 @@ def solve_density(
         balance = means @ sigma
         constants = np.asarray(-np.linalg.solve(balance[:, 2:], balance[:, :2]), dtype=float)
         weighted = np.ascontiguousarray(sigma[:, :2] + sigma[:, 2:] @ constants)
-
-    refined = place_nodes(outline, panels, angles, REFINED_NODES, closeness)
-    images: FloatArray = 0.5 * constants
-    incoming = 2.0 * (
-        _as_real(refined.boundary_value) + np.vstack((np.zeros((1, 2)), images))[outline.ring[refined.edge]]
-    )
-    subtract_double_layer(
-        layer, grid.corner_start, segments, legendre_transform(nodes), weighted,
-        refined.position, refined.edge, refined.corner, incoming,
-    )  # fmt: skip
-    return Density(grid, weighted, refined, incoming, images, condition)
+    return Density(grid, weighted, 0.5 * constants, condition)
 
 
 def _atoms(corner_start: IntArray, blocks: list[FloatArray], nodes: int, right: FloatArray) -> list[Cluster]:

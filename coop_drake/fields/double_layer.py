@@ -12,9 +12,9 @@ from coop_drake.fields.nodes import Nodes
 from coop_drake.fields.outline import ComplexArray, IntArray
 from coop_drake.fields.quadrature import FloatArray, legendre_transform
 
-__all__ = ["DoubleLayer", "block", "double_layer", "legendre_moments", "mark_near", "subtract_double_layer"]
+__all__ = ["NEAR", "DoubleLayer", "block", "double_layer", "legendre_moments", "mark_near"]
 
-_NEAR = 4.3  # |zeta - 1| + |zeta + 1| below which panels are integrated exactly
+NEAR = 4.3  # |zeta - 1| + |zeta + 1| below which panels are integrated exactly
 
 
 class DoubleLayer(NamedTuple):
@@ -176,12 +176,12 @@ def _near_of(
 ) -> int:  # fmt: skip
     """Count, and keep if wanted, the targets near one panel; the new total."""
     centre, half = segment[0], segment[1]
-    reach = (0.5 * _NEAR) ** 2 * (half.real**2 + half.imag**2)
+    reach = (0.5 * NEAR) ** 2 * (half.real**2 + half.imag**2)
     for i in range(len(target)):
         rx, ry = target[i].real - centre.real, target[i].imag - centre.imag
         if rx * rx + ry * ry < reach and target_edge[i] != edge:
             zeta = (target[i] - centre) / half
-            if abs(zeta - 1.0) + abs(zeta + 1.0) < _NEAR:
+            if abs(zeta - 1.0) + abs(zeta + 1.0) < NEAR:
                 if keep:
                     found[total] = i
                 total += 1
@@ -213,64 +213,3 @@ def legendre_moments(zeta: complex, out: FloatArray) -> None:
     for k in range(1, len(out) - 1):
         q0, q1 = q1, ((2 * k + 1) * zeta * q1 - k * q0) / (k + 1)
         out[k + 1] = -2.0 / pi * q1.imag
-
-
-@compiled
-def subtract_double_layer(
-    k: DoubleLayer, corner_start: IntArray, segments: ComplexArray, transform: FloatArray,
-    density: FloatArray, target: ComplexArray, target_edge: IntArray, target_corner: IntArray,
-    out: FloatArray,
-) -> None:  # fmt: skip
-    """Subtract 2 K density at other points of the boundary, by the same rules."""
-    p = len(transform)
-    moments = np.empty(p)
-    u, v = density[:, 0].copy(), density[:, 1].copy()
-    reach = (0.5 * _NEAR) ** 2
-    for i in range(len(target)):
-        px, py, e = target[i].real, target[i].imag, target_edge[i]
-        su, sv = 0.0, 0.0
-        for c in range(len(corner_start) - 1):
-            a, b = corner_start[c], corner_start[c + 1]
-            if c != target_corner[i]:
-                middle = (a + b) // 2
-                if k.edge[a] != e:
-                    fu, fv = _sum(k, u, v, a, middle, px, py)
-                    su, sv = su + fu, sv + fv
-                if k.edge[middle] != e:
-                    fu, fv = _sum(k, u, v, middle, b, px, py)
-                    su, sv = su + fu, sv + fv
-        for panel in range(len(segments)):
-            a = k.first[0] + panel * p
-            if k.edge[a] == e:
-                continue
-            centre, half = segments[panel, 0], segments[panel, 1]
-            rx, ry = px - centre.real, py - centre.imag
-            zeta = complex(9.0, 0.0)
-            if rx * rx + ry * ry < reach * (half.real**2 + half.imag**2):
-                zeta = (target[i] - centre) / half
-            if abs(zeta - 1.0) + abs(zeta + 1.0) < _NEAR:
-                legendre_moments(zeta, moments)
-                for degree in range(p):
-                    for j in range(p):
-                        weight = moments[degree] * transform[degree, j]
-                        su += weight * u[a + j]
-                        sv += weight * v[a + j]
-            else:
-                fu, fv = _sum(k, u, v, a, a + p, px, py)
-                su, sv = su + fu, sv + fv
-        out[i, 0] -= su
-        out[i, 1] -= sv
-
-
-@compiled
-def _sum(
-    k: DoubleLayer, u: FloatArray, v: FloatArray, first: int, last: int, px: float, py: float
-) -> tuple[float, float]:
-    """Sum of the kernel times both densities over consecutive nodes."""
-    su, sv = 0.0, 0.0
-    for j in range(first, last):
-        rx, ry = k.x[j] - px, k.y[j] - py
-        value = (k.dy[j] * rx - k.dx[j] * ry) / (rx * rx + ry * ry)
-        su += value * u[j]
-        sv += value * v[j]
-    return su, sv

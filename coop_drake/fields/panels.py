@@ -10,7 +10,7 @@ from coop_drake.fields.compiled import compiled
 from coop_drake.fields.outline import Outline
 from coop_drake.fields.quadrature import FloatArray
 
-__all__ = ["Panels", "lay_panels", "segment_distance"]
+__all__ = ["Panels", "lay_panels", "point_distance", "segment_distance"]
 
 _MAX_ANGLE = np.pi / 3  # span of the boundary angle that one panel resolves
 _SLIVER = 1e-3  # parts of a leg that are not worth a panel
@@ -56,11 +56,13 @@ def lay_panels(outline: Outline, closeness: float) -> Panels:
 
 
 @compiled
-def _point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+def point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Distance of a point from a segment from a to b [m]."""
     dx, dy = bx - ax, by - ay
     t = ((px - ax) * dx + (py - ay) * dy) / (dx * dx + dy * dy)
     t = min(1.0, max(0.0, t))
-    return float(np.hypot(px - ax - t * dx, py - ay - t * dy))
+    rx, ry = px - ax - t * dx, py - ay - t * dy
+    return float(np.sqrt(rx * rx + ry * ry))
 
 
 @compiled
@@ -68,12 +70,12 @@ def segment_distance(p: FloatArray, q: FloatArray) -> float:
     """Distance of two segments (x0, y0, x1, y1) that do not cross [m]."""
     return min(
         min(
-            _point_distance(p[0], p[1], q[0], q[1], q[2], q[3]),
-            _point_distance(p[2], p[3], q[0], q[1], q[2], q[3]),
+            point_distance(p[0], p[1], q[0], q[1], q[2], q[3]),
+            point_distance(p[2], p[3], q[0], q[1], q[2], q[3]),
         ),
         min(
-            _point_distance(q[0], q[1], p[0], p[1], p[2], p[3]),
-            _point_distance(q[2], q[3], p[0], p[1], p[2], p[3]),
+            point_distance(q[0], q[1], p[0], p[1], p[2], p[3]),
+            point_distance(q[2], q[3], p[0], p[1], p[2], p[3]),
         ),
     )
 
@@ -153,7 +155,7 @@ def _edge_panels(
                 if other != e:
                     gap = min(gap, segment_distance(piece, edges[other]))
                 x, y = edges[other, 0], edges[other, 1]
-                vertex = min(vertex, _point_distance(x, y, piece[0], piece[1], piece[2], piece[3]))
+                vertex = min(vertex, point_distance(x, y, piece[0], piece[1], piece[2], piece[3]))
             if b - a <= min(closeness * max(gap, vertex), longest[e]) or depth > 250 or b - a < 1e-9 * length:
                 rows.append((float(e), a, b, gap))
             else:

@@ -65,6 +65,6 @@ def test_refusal_of_a_domain_too_fine_names_the_gap():
     comb = box(0, 0, 4, 1)
     for k in range(60):
         comb = comb.difference(box(0.05 + 0.066 * k, 0.2, 0.07 + 0.066 * k, 2))
-    ragged = [(x, 0.0 if i % 2 else -1e-4) for i, x in enumerate(np.linspace(0, 4, 400))]
+    ragged = [(x, 0.0 if i % 2 else -1e-4) for i, x in enumerate(np.linspace(0, 4, 1200))]
     with pytest.raises(FieldError, match=r"unknowns, at most \d+ are allowed; narrowest is the"):
         HarmonicMap(comb.union(Polygon([*ragged, (4, 0.1), (0, 0.1)])), Point(2, 0.1))

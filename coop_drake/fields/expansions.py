@@ -1,0 +1,245 @@
+"""Local expansions: all that is far from a box, as one short power series in it.
+
+A quadtree covers the domain. Every box knows what is near it: panels, rings of corners, corners from some
+level down. What was near its parent and is far from it goes into its power series, the rest is inherited by
+its four quarters. A leaf keeps one series for everything far and a short list of what is near, so that a
+point costs a polynomial and a few panels, however long the boundary is.
+
+Far from a box is what the quadrature resolves anywhere in it and whose series converges fast enough.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from coop_drake.fields.compiled import compiled
+from coop_drake.fields.layers import INSIDE, LEVELS, ON_BOUNDARY, OUTSIDE, MapArrays
+from coop_drake.fields.outline import IntArray
+from coop_drake.fields.quadrature import FloatArray
+from coop_drake.fields.sources import FAR, gather, seen_from, size
+from coop_drake.fields.walls import is_inside
+
+__all__ = ["grown"]
+
+_REACH = 2.8  # distance per radius of a box from which something is far
+_REFINED = 1.45  # |zeta| from which its refined nodes do
+_TAIL = 2.0  # distance from the vertex per length of the legs from which a corner is its compressed density
+_MANY = 4  # near panels shorter than the box that are worth a division
+_DEPTH = 50  # divisions at most
+_BOXES = 40_000  # boxes of one size at most
+
+
+class _Boxes(NamedTuple):
+    """Boxes of one size.
+
+    Attributes:
+        square: Centre and half diagonal, shape (n, 3).
+        state: `ON_BOUNDARY`, `INSIDE` or `OUTSIDE`, shape (n,).
+        series: Power series of what is far, shape (n, ORDER, 4).
+        near_start: First entry of each in ``near``, and the end, shape (n + 1,).
+        near: Rows as in `MapArrays`.
+    """
+
+    square: FloatArray
+    state: IntArray
+    series: FloatArray
+    near_start: IntArray
+    near: IntArray
+
+    def chosen(self, which: IntArray) -> _Boxes:
+        """Some of them."""
+        count = np.diff(self.near_start)[which]
+        start = np.concatenate(([0], np.cumsum(count)))
+        rows = np.arange(start[-1]) + np.repeat(self.near_start[which] - start[:-1], count)
+        return _Boxes(self.square[which], self.state[which], self.series[which], start, self.near[rows])
+
+    def quarters(self) -> _Boxes:
+        """The four quarters of each, with what was near the whole."""
+        series = np.repeat(self.series, 4, axis=0)
+        signs = np.array([(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)])
+        _shift(series, signs / np.sqrt(8.0))
+        square = np.repeat(self.square, 4, axis=0)
+        square[:, :2] += np.tile(signs, (len(self.square), 1)) * square[:, 2:] / np.sqrt(8.0)
+        square[:, 2] *= 0.5
+        return self.chosen(np.repeat(np.arange(len(self.square)), 4))._replace(square=square, series=series)
+
+
+def grown(m: MapArrays, opened: bool) -> MapArrays:
+    """The map with its leaves divided until little is near any of them.
+
+    Args:
+        m: A map with leaves that are valid, if large.
+        opened: Whether corners may be opened into their rings, and panels have their refined densities.
+    """
+    child, leaf_of = m.box_child.copy(), m.box_leaf.copy()
+    box = np.flatnonzero(child < 0)
+    box = box[np.argsort(leaf_of[box])]
+    boxes = _Boxes(m.leaf_square, m.leaf_state, m.local, m.near_start, m.near)
+    finished: list[_Boxes] = []
+    leaves = 0
+    for depth in range(_DEPTH):
+        series, state = boxes.series.copy(), boxes.state.copy()
+        start, near, worth = _sort_out(m, opened, boxes.square, state, series, boxes.near_start, boxes.near)
+        boxes = _Boxes(boxes.square, state, series, start, near)
+        # Unopened, the boxes serve points of the boundary alone.
+        served = boxes.state != OUTSIDE if opened else boxes.state == ON_BOUNDARY
+        split = (worth > _MANY) & served & (depth + 1 < _DEPTH)
+        split &= 4 * np.count_nonzero(split) <= _BOXES
+        leaf = np.flatnonzero(~split)
+        finished.append(boxes.chosen(leaf))
+        leaf_of[box[leaf]] = leaves + np.arange(len(leaf))
+        leaves += len(leaf)
+        if not split.any():
+            break
+        boxes = boxes.chosen(np.flatnonzero(split)).quarters()
+        new = len(child) + np.arange(len(boxes.state))
+        child[box[split]], leaf_of[box[split]] = new[::4], -1
+        child = np.concatenate((child, np.full(len(new), -1)))
+        leaf_of = np.concatenate((leaf_of, np.full(len(new), -1)))
+        box = new
+    counts = np.concatenate([np.diff(part.near_start) for part in finished])
+    return m._replace(
+        box_child=child,
+        box_leaf=leaf_of,
+        leaf_square=np.concatenate([part.square for part in finished]),
+        leaf_state=np.concatenate([part.state for part in finished]),
+        local=np.concatenate([part.series for part in finished]),
+        near_start=np.concatenate(([0], np.cumsum(counts))),
+        near=np.concatenate([part.near for part in finished]),
+    )
+
+
+@compiled
+def _sort_out(
+    m: MapArrays, opened: bool, square: FloatArray, state: IntArray, series: FloatArray,
+    start: IntArray, near: IntArray,
+) -> tuple[IntArray, IntArray, IntArray]:  # fmt: skip
+    """Add to each box's series what is far from it, and find its state.
+
+    Returns:
+        Where the rows start that stay near each box, these rows, and how many are worth a division.
+    """
+    nodes, todo = np.empty((6, 1024)), np.empty((4096, 3), dtype=np.int64)
+    kept, first = np.empty((2 * len(near) + 64, 3), dtype=np.int64), np.zeros(len(square) + 1, dtype=np.int64)
+    worth = np.zeros(len(square), dtype=np.int64)
+    end = 0
+    for box in range(len(square)):
+        x, y, radius = square[box, 0], square[box, 1], square[box, 2]
+        nearest = np.inf
+        for candidate in range(start[box], start[box + 1]):
+            todo[0] = near[candidate]
+            waiting = 1
+            while waiting > 0:
+                waiting -= 1
+                k, place, level = todo[waiting, 0], todo[waiting, 1], todo[waiting, 2]
+                seen = seen_from(m, k, place, level, x, y)
+                if _is_far(place, opened, seen, radius):
+                    count = gather(m, k, place, level, opened, seen, x, y, radius, nodes)
+                    _expand(nodes, count, radius, series[box])
+                elif opened and place < 0 and seen[2] >= radius and level + 1 < LEVELS:
+                    waiting = _open(m, k, level, todo, waiting)
+                else:
+                    if end == len(kept):
+                        kept = np.concatenate((kept, np.empty_like(kept)))
+                    kept[end, 0], kept[end, 1], kept[end, 2] = k, place, level
+                    end += 1
+                    nearest = min(nearest, seen[0])
+        worth[box] = _worth(m, kept[first[box] : end], x, y, radius)
+        if state[box] == ON_BOUNDARY and nearest > radius:
+            state[box] = INSIDE if is_inside(m.edges, x, y) else OUTSIDE
+        if state[box] == OUTSIDE:  # no point is ever looked for there
+            end, worth[box] = first[box], 0
+        first[box + 1] = end
+    return first, kept[:end], worth
+
+
+@compiled
+def _open(m: MapArrays, k: int, level: int, todo: IntArray, waiting: int) -> int:
+    """Put the panels of a corner's ring, and the corner within, on the list of candidates."""
+    for place in range(2 * m.corner_index[k, 1]):
+        todo[waiting, 0], todo[waiting, 1], todo[waiting, 2] = k, place, level
+        waiting += 1
+    todo[waiting, 0], todo[waiting, 1], todo[waiting, 2] = k, -1, level + 1
+    return waiting + 1
+
+
+@compiled
+def _worth(m: MapArrays, near: IntArray, x: float, y: float, radius: float) -> int:
+    """How much of what is near a box is worth a division: panels and corners that are shorter than it.
+
+    What belongs to a vertex in it does not count: divisions would find the same again.
+    """
+    own, nearest, worth = -1, 1.5 * radius, 0
+    for item in range(len(near)):
+        k = near[item, 0]
+        if k >= 0:
+            distance = np.sqrt((m.corners[k, 0] - x) ** 2 + (m.corners[k, 1] - y) ** 2)
+            if distance < nearest:
+                own, nearest = k, distance
+    for item in range(len(near)):
+        k, place = near[item, 0], near[item, 1]
+        if k != own or k < 0:
+            worth += 1 if size(m, k, place, near[item, 2]) < radius else 0
+    return worth
+
+
+@compiled
+def _is_far(place: int, opened: bool, seen: tuple[float, float, float], radius: float) -> bool:
+    """Whether all of a box is far from what is ``seen`` from its centre."""
+    distance, middle, size = seen
+    if place < 0:
+        factor = _TAIL
+    elif opened:
+        factor = _REFINED
+    else:
+        factor = FAR
+    return distance >= _REACH * radius and middle - radius >= factor * size
+
+
+@compiled
+def _expand(nodes: FloatArray, count: int, radius: float, series: FloatArray) -> None:
+    """Add the power series of sources in units of the radius, rows (u, v) as real and imaginary parts."""
+    for j in range(count):
+        inverse = 1.0 / (nodes[0, j] * nodes[0, j] + nodes[1, j] * nodes[1, j])
+        re, im = nodes[0, j] * inverse, -nodes[1, j] * inverse
+        dx, dy = nodes[2, j], nodes[3, j]
+        nodes[2, j], nodes[3, j] = dx * re - dy * im, dx * im + dy * re
+        nodes[0, j], nodes[1, j] = radius * re, radius * im
+    for degree in range(len(series)):
+        a, b, c, d = 0.0, 0.0, 0.0, 0.0
+        for j in range(count):
+            re, im, u, v = nodes[2, j], nodes[3, j], nodes[4, j], nodes[5, j]
+            a += u * re
+            b += u * im
+            c += v * re
+            d += v * im
+            nodes[2, j], nodes[3, j] = (
+                re * nodes[0, j] - im * nodes[1, j],
+                re * nodes[1, j] + im * nodes[0, j],
+            )
+        series[degree, 0] += a
+        series[degree, 1] += b
+        series[degree, 2] += c
+        series[degree, 3] += d
+
+
+@compiled
+def _shift(series: FloatArray, shifts: FloatArray) -> None:
+    """Turn series, four a box, into those of its quarters, whose centres are ``shifts`` (4, 2) radii away."""
+    n = series.shape[1]
+    for box in range(len(series)):
+        c, sx, sy = series[box], shifts[box % 4, 0], shifts[box % 4, 1]
+        for k in range(n - 1):
+            for j in range(n - 2, k - 1, -1):
+                u, ui, v, vi = c[j + 1, 0], c[j + 1, 1], c[j + 1, 2], c[j + 1, 3]
+                c[j, 0] += sx * u - sy * ui
+                c[j, 1] += sx * ui + sy * u
+                c[j, 2] += sx * v - sy * vi
+                c[j, 3] += sx * vi + sy * v
+        scale = 1.0
+        for k in range(n):
+            for i in range(4):
+                c[k, i] *= scale
+            scale *= 0.5

@@ -1,0 +1,170 @@
+"""Solving one outline: with as many nodes as the tolerance needs, certified, or refused by name."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, NoReturn
+
+import numpy as np
+from shapely import Point, Polygon
+
+from coop_drake.errors import UnmappableError
+from coop_drake.fields.certificate import MapCertificate, certify, find_fault
+from coop_drake.fields.corners import leg_panels
+from coop_drake.fields.density import solve_density
+from coop_drake.fields.evaluation import evaluate_many
+from coop_drake.fields.layers import MapArrays
+from coop_drake.fields.outline import Outline
+from coop_drake.fields.packing import pack_layers
+from coop_drake.fields.panels import Panels, lay_panels
+from coop_drake.fields.quadrature import FloatArray
+
+__all__ = ["Solution", "solve"]
+
+_GAIN = 4.0  # by which the error falls with every node a panel, about
+_PROGRESS = 0.7  # share of the error that an attempt must undercut, or more would not help either
+_LARGE = 3_000  # unknowns from which the first attempt is left out
+_MAX_UNKNOWNS = 30_000  # some ten seconds
+
+
+class Attempt(NamedTuple):
+    """How finely to solve: Gauss nodes on a panel; longest panel per unit of distance, see `leg_panels`."""
+
+    nodes: int
+    closeness: float
+
+
+# Ten nodes suffice for most cells, twelve for most large ones.
+_FEWEST = Attempt(10, 1.5)
+_ATTEMPTS = (
+    _FEWEST,
+    Attempt(12, 1.5),
+    Attempt(14, 1.5),
+    Attempt(16, 1.5),
+    Attempt(16, 1.0),
+    Attempt(20, 0.7),
+)
+
+
+class Solution(NamedTuple):
+    """What solving leaves behind: all that evaluating a map takes, as plain arrays and numbers.
+
+    Attributes:
+        arrays: The layers, for the kernels that evaluate them.
+        centre: Origin of their coordinates in W [m], shape (2,).
+        rounding: How far outside still counts as on the wall [m].
+        goal_image: q_d, the goal's image in the disk, shape (2,).
+        certificate: How far the map can be from the true one.
+    """
+
+    arrays: MapArrays
+    centre: FloatArray
+    rounding: float
+    goal_image: FloatArray
+    certificate: MapCertificate
+
+
+def solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solution:
+    """Solve with more and more nodes until the certificate is good enough.
+
+    Args:
+        outline: The rings.
+        goal: What goes to the goal's image where the outline does not say it.
+        tolerance: Largest certified error.
+
+    Raises:
+        UnmappableError: If more nodes do not help any more, or would be too many.
+    """
+    best: MapCertificate | None = None
+    last = _FEWEST
+    for attempt in _ATTEMPTS:
+        if best is not None and not _is_promising(attempt, last, best.error_bound / tolerance):
+            continue
+        panels = lay_panels(outline, attempt.closeness)
+        unknowns = _unknowns(outline, panels, attempt)
+        if attempt == _FEWEST and _LARGE <= unknowns <= _MAX_UNKNOWNS:
+            continue
+        if unknowns > _MAX_UNKNOWNS:
+            _refuse(best, tolerance, outline, panels, unknowns)
+        solution = _solve(outline, goal, panels, attempt)
+        bound = solution.certificate.error_bound
+        if bound <= tolerance:
+            return solution
+        if best is not None and bound > _PROGRESS * best.error_bound:
+            break
+        best, last = solution.certificate, attempt
+    _refuse(best, tolerance, outline, panels, unknowns)
+
+
+def _is_promising(attempt: Attempt, last: Attempt, excess: float) -> bool:
+    """Whether an attempt may bring the error down that far; the last of one closeness is always made."""
+    final = max(other.nodes for other in _ATTEMPTS if other.closeness == attempt.closeness)
+    gain = _GAIN ** (attempt.nodes - last.nodes)
+    return attempt.closeness != last.closeness or attempt.nodes == final or gain >= excess
+
+
+def _angles(outline: Outline) -> FloatArray:
+    """Angles of the corners, rounded: they hit the cache of operators and change nothing beyond rounding."""
+    angles: FloatArray = np.round(outline.corner_angles, 12)
+    return angles
+
+
+def _unknowns(outline: Outline, panels: Panels, attempt: Attempt) -> int:
+    """Size of the linear system but for the holes' images."""
+    legs = sum(2 * len(leg_panels(float(angle), attempt.closeness)[0]) - 2 for angle in _angles(outline))
+    return attempt.nodes * (len(panels.edge) + legs)
+
+
+def _solve(outline: Outline, goal: Point | Polygon, panels: Panels, attempt: Attempt) -> Solution:
+    """Make one attempt."""
+    angles = _angles(outline)
+    centre = np.array([outline.centre.real, outline.centre.imag])
+    # Coordinates come rounded: what lies outside by less than this counts as on the wall.
+    rounding = 8.0 * float(np.finfo(float).eps) * (abs(outline.centre) + outline.diameter)
+    density = solve_density(outline, panels, angles, *attempt)
+    arrays = pack_layers(outline, panels, angles, density, attempt.closeness)
+    certificate = certify(outline, panels, arrays, density.hole_images, density.condition, rounding)
+    image = _goal_image(outline, goal, density.hole_images, arrays, rounding)
+    return Solution(arrays, centre, rounding, image, certificate)
+
+
+def _goal_image(
+    outline: Outline, goal: Point | Polygon, hole_images: FloatArray, arrays: MapArrays, rounding: float
+) -> FloatArray:
+    """Where the goal goes: a point of the circle, a hole's image, or the image of a point."""
+    image: FloatArray
+    if outline.goal_angle is not None:
+        return np.array([np.cos(outline.goal_angle), np.sin(outline.goal_angle)])
+    if outline.goal_ring is not None:
+        image = hole_images[outline.goal_ring - 1].copy()
+        return image
+    point = np.array(goal.coords) - [outline.centre.real, outline.centre.imag]
+    images, _ = evaluate_many(arrays, point, rounding)
+    image = images[0]
+    return image
+
+
+def _refuse(
+    best: MapCertificate | None, tolerance: float, outline: Outline, panels: Panels, unknowns: int
+) -> NoReturn:
+    """Name the place where the best attempt is worst; without one, the narrowest gap."""
+    if best is not None:
+        raise UnmappableError(
+            f"the harmonic map is certified to {best.error_bound:.2g} only, {tolerance:.2g} was asked for; "
+            f"at fault is {best.worst_place_description}",
+            (float(best.worst_place[0]), float(best.worst_place[1])),
+            angle=best.worst_angle,
+            width=best.worst_gap,
+        )
+    k = int(np.argmin(panels.gap))
+    edge = int(panels.edge[k])
+    tangent = (outline.ends - outline.vertices)[edge]
+    place = outline.vertices[edge] + 0.5 * (panels.start + panels.end)[k] * tangent / abs(tangent)
+    fault = find_fault(outline, panels, place, edge)
+    where = place + outline.centre
+    raise UnmappableError(
+        f"the harmonic map would take {unknowns} unknowns, at most {_MAX_UNKNOWNS} are allowed; narrowest is "
+        + fault.description,
+        (where.real, where.imag),
+        angle=fault.angle,
+        width=fault.gap,
+    )
