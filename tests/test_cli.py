@@ -256,3 +256,15 @@ def test_machines_get_no_infinities_and_no_numpy(capsys):
     reporter.facts.update(a=float("inf"), b=np.float64(1.5), c=np.int64(2), d=np.bool_(True))
     reporter.close()
     assert json.loads(capsys.readouterr().out) == {"a": None, "b": 1.5, "c": 2, "d": True}
+
+
+def test_a_diagram_is_drawn_as_svg_and_a_stranger_s_controller_refused(room, tmp_path):
+    result = invoke("diagram", room, "--robot", "1", "--out", tmp_path)
+    assert result.exit_code == 0, result.stderr
+    drawing = (tmp_path / "diagram.svg").read_text()
+    assert drawing.startswith("<?xml")
+    assert "Controller of robot 1" in drawing
+    refused = invoke("diagram", room, "--robot", "7", "--out", tmp_path / "none")
+    assert refused.exit_code == 2
+    assert "a number from 0 to 1" in refused.stderr
+    assert not (tmp_path / "none").exists()

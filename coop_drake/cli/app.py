@@ -14,6 +14,7 @@ from typing import Annotated
 
 import typer
 
+from coop_drake.cli.diagram import diagram_command
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
 from coop_drake.cli.map_cache import maps_command
@@ -161,3 +162,4 @@ app.command("watch")(watch_command)
 app.command("why")(why_command)
 app.command("verify")(verify_command)
 app.command("maps")(maps_command)
+app.command("diagram")(diagram_command)

@@ -58,6 +58,11 @@ class ResultFolder:
         return self.path / "transport.html"
 
     @property
+    def diagram(self) -> Path:
+        """How the closed loop is wired."""
+        return self.path / "diagram.svg"
+
+    @property
     def diagnosis(self) -> tuple[Path, Path]:
         """The picture that says why there is no plan, for screens and for print."""
         return self.path / "why.png", self.path / "why.svg"

@@ -1,0 +1,61 @@
+"""The command diagram: draws how the closed loop is wired."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.results import ResultFolder
+
+__all__ = ["diagram_command"]
+
+
+def diagram_command(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")],
+    robot: Annotated[
+        int, typer.Option("--robot", metavar="K", min=0, help="Whose controller is opened.")
+    ] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="DIR", file_okay=False, help="Where the picture goes; out/<scenario> by default."
+        ),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+) -> None:
+    """Draw the blocks of the closed loop and of one robot's controller, as they are wired in Drake."""
+    reporter = Reporter(machine=False, quiet=quiet)
+    run_guarded(reporter, lambda: _draw(scenario, robot, out, reporter))
+
+
+def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> ExitCode:
+    # Here and not above: no other command should wait for Drake or for the pictures' library.
+    from coop_drake.cli.mapping import map_cells
+    from coop_drake.cli.planning import plan_question, without_plan
+    from coop_drake.cli.reading import read_task
+    from coop_drake.diagram import build_closed_loop
+    from coop_drake.drawing import save_figure
+    from coop_drake.errors import ScenarioError
+    from coop_drake.planning import Found
+    from coop_drake.scenario import assemble
+    from coop_drake.viz.block_diagram import block_diagram_figure
+
+    task = read_task(scenario, None)
+    robots = assemble(task.scenario).robots
+    if robot >= len(robots):
+        raise ScenarioError(str(scenario), "--robot", robot, f"a number from 0 to {len(robots) - 1}")
+    folder = ResultFolder.of(task.scenario.name, out)
+    result = plan_question(task.question, folder, reporter)
+    if not isinstance(result, Found):
+        return without_plan(task.question, result, folder, reporter)
+    loop = build_closed_loop(task.scenario, result.plan, map_cells(task, result.plan, reporter, fresh=False))
+    with reporter.stage("drawing"):
+        save_figure(block_diagram_figure(loop, robot), folder.diagram)
+    reporter.say(f"The picture is {escape(str(folder.diagram))}")
+    return ExitCode.DONE
