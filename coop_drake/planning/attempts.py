@@ -28,7 +28,7 @@ from coop_drake.planning.tightening import fitted, widened
 _CLEARANCES = (0.015, 0.002)
 _SAMPLES = 4_000
 _GAP = 0.01
-_GROWTHS, _GROWTH_SEEDS = (0.06, 0.1, 0.03), 2
+_GROWTHS, _GROWTH_SEEDS = (0.1, 0.06, 0.03), 2
 _FIRST_BANDS = (0.05, 600), (0.05, 3_000)
 _LIGHT_TRIES = 4
 _HEAVY_SAMPLES = 32_000

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -131,6 +132,16 @@ class CellMaker:
         """Free regions of the slice's middle configuration: a hint for the search, never a proof."""
         middle = tuple((0.5 * (lower + upper), 0.5 * (lower + upper)) for lower, upper in intervals)
         return self.under_cells(middle)
+
+    @property
+    def moving_axes(self) -> list[tuple[int, ...]]:
+        """Axes (theta, q...) that move each component; none of one without bodies."""
+        return self._axes
+
+    def places_for(self, component: int, angles: Sequence[float]) -> list[Region]:
+        """Positions at which one component, with bodies, is free at some angles (theta, q...)."""
+        section = self._under_component(component, tuple((angle, angle) for angle in angles))
+        return [] if section is None else regions_of(section, over=False)
 
     def blocked_pair(self, expanded: Intervals) -> BodyPair | None:
         """A pair of bodies that may touch somewhere in the expanded slice, None if there is none."""

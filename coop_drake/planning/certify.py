@@ -16,9 +16,9 @@ from coop_drake.planning.box_kernels import BoxArrays, longest_box, padded
 from coop_drake.planning.sampler import densified
 from coop_drake.planning.walls import Walls, walls_under
 
-_LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.0003))
+_LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.0003), (0.0003, 0.0001))
 _RESOLUTION = 0.02
-_FINEST = 0.002
+_FINEST = 0.0005
 _FINER = 4
 
 

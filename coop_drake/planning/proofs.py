@@ -69,15 +69,21 @@ class Proofs:
         return sum(outcome.slices for outcome in self._outcomes.values())
 
     def run(
-        self, share: int, robots: int | None = None, progress: Callable[[int], None] | None = None
+        self,
+        share: int,
+        robots: int | None = None,
+        progress: Callable[[int], None] | None = None,
+        *,
+        doubted: bool = True,
     ) -> Verdict:
         """Explore on until every exploration has an answer or has made its share of slices.
 
         Args:
             share: Slices of each exploration, those of earlier calls included.
-            robots: How many robots a relaxation keeps at most, for a caller who doubts such relaxations
-                already; None for the whole question and every relaxation that is in doubt.
+            robots: How many robots a question keeps at most; None for the whole question and every
+                relaxation that is in doubt.
             progress: Called with the number of slices that an exploration has.
+            doubted: Whether the caller doubts the relaxations to so many robots already.
 
         Returns:
             INFEASIBLE with ``refutation``; FOUND if the whole question has a free channel; RESOLUTION if it
@@ -90,7 +96,7 @@ class Proofs:
                 reason = "a disc inside the team cannot get from start to goal"
                 self.refutation = Refutation(reason, (), disc)
         for chosen in self._questions(robots):
-            if self.refutation is None and self._goes_on(chosen, asked=robots is not None):
+            if self.refutation is None and self._goes_on(chosen, asked=robots is not None and doubted):
                 outcome = self._exploration(chosen).run(self._most(chosen, share), progress)
                 if outcome.verdict is Verdict.INFEASIBLE and not self._refute(chosen):
                     outcome = replace(outcome, verdict=Verdict.RESOLUTION)

@@ -25,6 +25,7 @@ _OBJECT_TRIES = 2
 _OBJECT_SHARE = 2
 _SHORT_SHARE = 120
 _FIRST_SHARE = 250
+_FEW_ROBOTS = 1
 
 
 def find_channel(
@@ -117,10 +118,10 @@ class _Search:
         share, short = min(_FIRST_SHARE, budget), min(_SHORT_SHARE, budget)
         doubted = self._attempts.object_blocked > 0
         if not doubted or self._explored(short, robots=0) is not Verdict.INFEASIBLE:
-            chain = self._sampled(_TRIES - 1)
+            chain = self._sampled(_TRIES - 2)
             doubted = chain is None and self._attempts.object_blocked >= _OBJECT_TRIES
         if chain is None and self._proofs.refutation is None:
-            chain = self._squeezed(short, robots=0 if doubted else None)
+            chain = self._squeezed(short if doubted else share, doubted)
         if chain is None and doubted and self._proofs.refutation is None:
             self._explored(budget // _OBJECT_SHARE, robots=0)
         while chain is None:
@@ -131,7 +132,7 @@ class _Search:
             if verdict is Verdict.FOUND:
                 return self._explored_channel()
             chain = self._sampled(_TRIES)
-            if chain is None and (verdict is Verdict.RESOLUTION or share == budget):
+            if chain is None and (verdict is Verdict.RESOLUTION or self._proofs.slices >= budget):
                 return self._undecided(verdict)
             share = min(2 * share, budget)
         return self._with_margin(chain)
@@ -149,9 +150,9 @@ class _Search:
                 return None
         return None
 
-    def _squeezed(self, share: int, robots: int | None) -> Chain | None:
-        """A chain near one for a larger floor, unless a short exploration answers the question."""
-        verdict = self._explored(share, robots)
+    def _squeezed(self, share: int, doubted: bool) -> Chain | None:
+        """A chain near one for a larger floor, unless a short exploration of few robots has the answer."""
+        verdict = self._explored(share, 0 if doubted else _FEW_ROBOTS, doubted=doubted)
         if verdict in (Verdict.INFEASIBLE, Verdict.FOUND):
             return None
         chain = self._attempts.squeezed(self._teller("squeezing paths through"))
@@ -159,9 +160,10 @@ class _Search:
             self._first = process_time() - self._began
         return chain
 
-    def _explored(self, share: int, robots: int | None = None) -> Verdict:
+    def _explored(self, share: int, robots: int | None = None, *, doubted: bool = True) -> Verdict:
         told = self._teller("exploring slices")
-        return self._proofs.run(share, robots, lambda count: told(count / self._problem.settings.max_slices))
+        most = self._problem.settings.max_slices
+        return self._proofs.run(share, robots, lambda count: told(count / most), doubted=doubted)
 
     def _with_margin(self, chain: Chain) -> tuple[Way, SearchReport]:
         """The way at the largest margin that is found."""

@@ -49,7 +49,7 @@ class Refinement:
         self._slices, self._maker, self._rule = slices, maker, rule
         self._levers = axis_levers(problem.tree)
         self._blame = Blame(maker, slices, self._levers)
-        self._branching = StrongBranching(problem, slices, halves)
+        self._branching = StrongBranching(problem, slices, maker, halves)
         self.finest = finest_widths(problem)
 
     def splittable(self, intervals: Intervals) -> list[int]:
@@ -91,6 +91,8 @@ class Refinement:
     def _best(self, channel: Sequence[Cell], place: int) -> Trial:
         """The halving that cuts; else one that may part bodies in each other's way; else what leaves least.
 
+        Where one component alone is in the way at the middle, only its own axes are tried.
+
         Where no halving takes anything of the cell it is the widest.
         """
         cell = channel[place]
@@ -99,6 +101,9 @@ class Refinement:
             axis: (intervals[axis][1] - intervals[axis][0]) * self._levers[axis]
             for axis in self.splittable(intervals)
         }
+        if cell.kind is Kind.MIXED:
+            blamed = [axis for axis in self._branching.blamed(channel, place) if axis in sweeps]
+            sweeps = {axis: sweeps[axis] for axis in blamed} or sweeps
         widest = max(sweeps.values())
         trials = [
             self._branching.trial(channel, place, axis)

@@ -74,7 +74,7 @@ def test_a_rod_passes_a_corridor_wider_than_itself_only(corridor: float, found: 
 
 
 def test_a_spent_budget_is_no_proof() -> None:
-    problem = rod_problem(0.203, PlannerSettings(max_slices=8))
+    problem = rod_problem(0.2002, PlannerSettings(max_slices=8))
     channel, report = find_channel(problem)
     assert isinstance(channel, NoChannel)
     assert not channel.proved
