@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
+import pydrake  # noqa: F401  Some tests take it away.
 import pytest
 
 from coop_drake.cli import question
@@ -50,6 +51,7 @@ def test_a_process_that_reads_and_dies_is_no_answer(tmp_path, monkeypatch):
     dies = tmp_path / "dies"
     dies.write_text("#!/bin/sh\ncat > /dev/null\nexit 7\n")
     dies.chmod(0o755)
+    monkeypatch.delitem(sys.modules, "pydrake")
     monkeypatch.setattr(question.sys, "executable", str(dies))
     with pytest.raises(RuntimeError, match=r"ended with code 7"):
         read_apart(tmp_path / "room.scenario.yaml")
@@ -57,6 +59,7 @@ def test_a_process_that_reads_and_dies_is_no_answer(tmp_path, monkeypatch):
 
 def test_a_bug_in_reading_comes_with_its_traceback(tmp_path, monkeypatch):
     (tmp_path / "sitecustomize.py").write_text(BROKEN)
+    monkeypatch.delitem(sys.modules, "pydrake")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ZeroDivisionError, match="here") as caught:
         read_apart(tmp_path / "room.scenario.yaml")

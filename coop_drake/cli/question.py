@@ -40,7 +40,8 @@ class Question:
 def read_apart(path: Path, gains: str | None = None) -> Question:
     """Read a scenario and its models in a process of their own.
 
-    Only reading takes Drake. What planning does not need would stay in memory for as long as it lasts.
+    Only reading takes Drake. What planning does not need would stay in memory for as long as it lasts; where
+    Drake is in memory already, nothing is to be had from another process.
 
     Args:
         path: The scenario file.
@@ -49,6 +50,10 @@ def read_apart(path: Path, gains: str | None = None) -> Question:
     Raises:
         ScenarioError: The file, a model or the name of the gain set is wrong.
     """
+    if "pydrake" in sys.modules:
+        from coop_drake.cli.reading import read_task
+
+        return read_task(path, gains).question
     with subprocess.Popen(
         [sys.executable, "-P", "-m", "coop_drake.cli.reading"],
         stdin=subprocess.PIPE,
