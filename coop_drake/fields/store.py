@@ -21,8 +21,9 @@ from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]
 from shapely import Point, Polygon
 
 from coop_drake.fields.certificate import MapCertificate
-from coop_drake.fields.harmonic_map import HarmonicMap, Solution
+from coop_drake.fields.harmonic_map import HarmonicMap
 from coop_drake.fields.layers import MapArrays
+from coop_drake.fields.solving import Solution
 from coop_drake.files import write_atomically
 
 __all__ = ["MapStore"]
@@ -45,7 +46,7 @@ class MapStore:
         limit: Above so many bytes, maps that were not used for longest are forgotten by `trim`.
     """
 
-    def __init__(self, folder: Path, *, limit: int = 500_000_000) -> None:
+    def __init__(self, folder: Path, *, limit: int = 1_000_000_000) -> None:
         self.folder = folder
         self.limit = limit
         self._found, self._lock = 0, Lock()
