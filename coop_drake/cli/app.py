@@ -20,6 +20,7 @@ from coop_drake.cli.guard import run_guarded
 from coop_drake.cli.map_cache import maps_command
 from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.reproduce import reproduce_command
 from coop_drake.cli.verify import verify_command
 from coop_drake.cli.watch import watch_command
 from coop_drake.cli.why import why_command
@@ -163,3 +164,4 @@ app.command("why")(why_command)
 app.command("verify")(verify_command)
 app.command("maps")(maps_command)
 app.command("diagram")(diagram_command)
+app.command("reproduce")(reproduce_command)

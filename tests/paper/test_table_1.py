@@ -4,8 +4,15 @@ import numpy as np
 import pytest
 
 from coop_drake.control import FixedGains, ScheduledGains, transition_gains
+from coop_drake.reproduction.table_1 import (
+    ANGLE_TOLERANCE,
+    CORRECTED,
+    GOAL_ANGLE,
+    PRINTED,
+    START,
+    table_transitions,
+)
 from tests.support.axes_run import play
-from tests.support.table_1 import ANGLE_TOLERANCE, CORRECTED, GOAL_ANGLE, PRINTED, START, table_transitions
 
 JOINT_RANGE = 3.74
 OVERLAPS = np.array([0.1, 0.15, 0.2])

@@ -1,6 +1,10 @@
 """Table 1 of the paper as data: the intervals of theta, q_11 and q_21 in its thirty cells."""
 
+from __future__ import annotations
+
 import numpy as np
+
+from coop_drake.geometry.pose import FloatArray
 
 # Columns as printed: theta_l, theta_u, then lower and upper end of q_11, lower and upper end of q_21.
 PRINTED = np.array(
@@ -48,8 +52,12 @@ GOAL_ANGLE = 4.663
 ANGLE_TOLERANCE = 0.02
 
 
-def table_transitions(table):
-    """Return, for every row, the slice's ends, the goal interval's ends and where the axes rest on entry."""
+def table_transitions(table: FloatArray) -> list[dict[str, FloatArray]]:
+    """Return, for every row, the slice's ends, the goal interval's ends and where the axes rest on entry.
+
+    Args:
+        table: Rows as printed, shape (m, 6) [rad].
+    """
     lower, upper = table[:, 0::2].copy(), table[:, 1::2].copy()
     goal_lower, goal_upper = lower.copy(), upper.copy()
     goal_lower[:-1], goal_upper[:-1] = np.maximum(lower[:-1], lower[1:]), np.minimum(upper[:-1], upper[1:])

@@ -1,0 +1,78 @@
+"""Table 1 through the closed loop with two gain sets: peaks, margins and times beside each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder
+
+from coop_drake.plant import build_team_plant, planning_problem
+from coop_drake.reproduction.corridor import corridor_plan, corridor_scenario
+from coop_drake.scenario import Scenario
+from coop_drake.simulation import SimulationLog, build_maps, simulate
+
+__all__ = ["GainFigures", "compare_gains"]
+
+
+@dataclass(frozen=True)
+class GainFigures:
+    """What one gain set made of Table 1.
+
+    Attributes:
+        name: The gain set.
+        seconds: Duration of the transport [s].
+        peak_force: Largest base force [N].
+        peak_angular_acceleration: Of the object, between accepted steps [rad/s^2].
+        peak_joint_rate: Largest rate of a joint [rad/s].
+        funnel_margin: Smallest distance of an axis to its funnel [rad].
+        acceleration_error: Realised less commanded acceleration [m/s^2 or rad/s^2].
+        violation: What was violated; empty if nothing was.
+    """
+
+    name: str
+    seconds: float
+    peak_force: float
+    peak_angular_acceleration: float
+    peak_joint_rate: float
+    funnel_margin: float
+    acceleration_error: float
+    violation: str
+
+
+def compare_gains(
+    scenario: Scenario,
+    names: Sequence[str] = ("table_2", "scheduled"),
+    progress: Callable[[str, float], None] | None = None,
+) -> list[GainFigures]:
+    """Play the thirty cells once with every gain set.
+
+    Args:
+        scenario: Of a team of two robots with a joint each, which knows the gain sets.
+        names: The gain sets.
+        progress: Told the stage and the fraction done, if given.
+    """
+    hall = corridor_scenario(scenario)
+    problem = planning_problem(hall, build_team_plant(hall, DiagramBuilder()))
+    figures = []
+    for name in names:
+        found = corridor_plan(problem, hall.gain_sets[name], name)
+        log = simulate(hall, found, build_maps(found), progress=progress)
+        figures.append(_figures(name, log))
+    return figures
+
+
+def _figures(name: str, log: SimulationLog) -> GainFigures:
+    forces = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1])
+    turning = np.diff(log.object_twist[:, 2]) / np.diff(log.times)
+    return GainFigures(
+        name=name,
+        seconds=float(log.times[-1]),
+        peak_force=float(forces.max()),
+        peak_angular_acceleration=float(np.abs(turning).max()),
+        peak_joint_rate=float(np.abs(log.joint_rates).max()),
+        funnel_margin=float(log.funnel_margin.min()),
+        acceleration_error=float(log.acceleration_error.max()),
+        violation=log.violation if not log.reached else "",
+    )
