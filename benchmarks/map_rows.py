@@ -24,6 +24,7 @@ RESIDUAL = 1e-8
 
 _POINTS = 1_000
 _QUICK = 0.3  # what takes no longer is timed several times [s]
+_SLOW = 3.0  # what takes longer is done once [s]
 _MOST_UNKNOWNS = 4_000  # larger dense systems take too long to be a peer
 
 
@@ -66,7 +67,8 @@ def _measured(
     except FieldError:
         return [Row(f"{name}/answer", 0.0, "refused"), Row(f"{name}/vertices", domain.vertices, "-")], None
     first = process_time() - start
-    certificate, again = harmonic_map.certificate, _best(lambda: _mapped(domain))
+    certificate = harmonic_map.certificate
+    again = _best(lambda: _mapped(domain)) if first < _SLOW else first
     n = certificate.unknowns
     peer = f"dense solve, {n} unknowns" if n <= _MOST_UNKNOWNS else ""
     peer_map = "" if hntf2d_residual is None else "hntf2d (3200 elements), measured apart"
