@@ -13,7 +13,7 @@ from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Interval, Intervals, SweptTree
-from coop_drake.planning.cells import CellMaker, Region
+from coop_drake.planning.cells import CellMaker, Region, regions_of
 from coop_drake.planning.certify import PathBox
 from coop_drake.planning.channel import Channel, FreeBox
 from coop_drake.planning.margins import disc_polygon, is_patched, marginal_workspace
@@ -73,7 +73,7 @@ class Regions:
             core = _joined(self._cells(self._core, self._narrow, box), box)
         else:
             section = FreeSpace(full.rings).minus(disc_polygon(self._margin))
-            core = _joined([Region.of(part) for part in section.decompose()], box)
+            core = _joined(regions_of(section, over=False), box)
         return None if core is None else Box(box.intervals, full, core)
 
     def _cells(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from coop_drake.errors import GeometryError
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.exploration import Exploration, Verdict
@@ -34,7 +35,10 @@ def clearance_bound(problem: PlanningProblem) -> tuple[float | None, int]:
         for chosen in parts:
             question, _ = relaxed(problem, chosen)
             swept = SweptTree(question.tree)
-            workspace = marginal_workspace(problem, _OCTAGON * clearance)
+            try:
+                workspace = marginal_workspace(problem, _OCTAGON * clearance)
+            except GeometryError:
+                return bound, slices
             outcome = Exploration(question, workspace, swept, BodyPairs(swept)).run(_BUDGET)
             slices += outcome.slices
             refuted = outcome.verdict is Verdict.INFEASIBLE

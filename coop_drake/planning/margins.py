@@ -10,6 +10,8 @@ import shapely
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.errors import GeometryError
+from coop_drake.geometry import safeguards
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.minkowski import FreeSpace, polygon_rings, to_polygon
 from coop_drake.geometry.pose import FloatArray
@@ -34,11 +36,18 @@ def margins(first: float) -> Iterator[float]:
 
 
 def shrunk(workspace: Polygon, margin: float) -> MultiPolygon:
-    """Workspace without its points nearer than the margin to a wall, corners by an octagon about the disc."""
+    """Workspace without its points nearer than the margin to a wall, corners by an octagon about the disc.
+
+    Raises:
+        GeometryError: If geometry fails.
+    """
     if margin <= 0.0:
         return MultiPolygon([workspace])
     section = FreeSpace(polygon_rings(workspace)).minus(disc_polygon(margin))
-    return MultiPolygon([to_polygon(part) for part in section.decompose() if not part.is_empty()])
+    parts = safeguards.components(section, over=False)
+    if not (parts or section.is_empty()):
+        raise GeometryError(f"the floor at a margin of {margin} m cannot be parted")
+    return MultiPolygon([to_polygon(part) for part in parts])
 
 
 def disc_polygon(radius: float) -> FloatArray:
@@ -54,44 +63,48 @@ def marginal_workspace(problem: PlanningProblem, margin: float) -> MultiPolygon:
     start near a wall does not forbid a margin everywhere else.
     """
     result = shrunk(problem.workspace, margin)
-    for footprint, clearance in _ends(problem):
-        if clearance < _CLOSE * margin and problem.workspace.contains(footprint):
-            own = shrunk(problem.workspace, _SHARE * clearance)
-            patch = own.intersection(footprint.buffer(2.0 * margin, quad_segs=2))
-            result = _areas(shapely.union(result, patch))
+    for footprint, clearance in _close_ends(problem, margin):
+        own = shrunk(problem.workspace, _SHARE * clearance)
+        patch = own.intersection(footprint.buffer(2.0 * margin, quad_segs=2))
+        result = _areas(shapely.union(result, patch))
     return result
 
 
 def is_patched(problem: PlanningProblem, margin: float) -> bool:
     """Whether start or goal stand closer to a wall than a margin allows, so that they get a patch."""
-    return any(
-        clearance < _CLOSE * margin and problem.workspace.contains(footprint)
-        for footprint, clearance in _ends(problem)
-    )
+    return bool(_close_ends(problem, margin))
 
 
-def _ends(problem: PlanningProblem) -> list[tuple[BaseGeometry, float]]:
-    """Footprints at start and goal with their clearance [m]."""
-    footprints = _start_footprint(problem), _goal_footprint(problem)
-    return [(footprint, float(problem.workspace.boundary.distance(footprint))) for footprint in footprints]
+def _close_ends(problem: PlanningProblem, margin: float) -> list[tuple[BaseGeometry, float]]:
+    """Footprints at start and goal that stand closer to a wall than a margin allows, and how close [m]."""
+    boundary = problem.workspace.boundary
+    close = []
+    for configuration, components in _ends(problem):
+        pieces, radii = _pieces(problem.tree, configuration, components)
+        # No end is farther from the walls than its pieces: most questions end here.
+        if (shapely.distance(boundary, pieces) - radii).min() >= _CLOSE * margin:
+            continue
+        footprint = exact_footprint(problem.tree, configuration, components)
+        clearance = float(boundary.distance(footprint))
+        if clearance < _CLOSE * margin and problem.workspace.contains(footprint):
+            close.append((footprint, clearance))
+    return close
+
+
+def _ends(problem: PlanningProblem) -> list[tuple[FloatArray, int | None]]:
+    """Configurations at start and goal, and how many components are known there.
+
+    At the goal that is all of them if every joint has a goal, else the object's alone.
+    """
+    joints = [0.0 if value is None else value for value in problem.goal_joints]
+    free = any(value is None for value in problem.goal_joints)
+    goal = np.array([*problem.goal_pose, *joints])
+    return [(problem.start, None), (goal, 1 if free else None)]
 
 
 def _areas(shape: BaseGeometry) -> MultiPolygon:
     parts = [part for part in shapely.get_parts(shape) if isinstance(part, Polygon)]
     return MultiPolygon(parts)
-
-
-def _start_footprint(problem: PlanningProblem) -> BaseGeometry:
-    return exact_footprint(problem.tree, problem.start)
-
-
-def _goal_footprint(problem: PlanningProblem) -> BaseGeometry:
-    """Footprint at the goal of what is known there: of all if every joint has a goal, else the object's."""
-    joints = [0.0 if value is None else value for value in problem.goal_joints]
-    configuration = np.array([*problem.goal_pose, *joints])
-    if any(value is None for value in problem.goal_joints):
-        return exact_footprint(problem.tree, configuration, components=1)
-    return exact_footprint(problem.tree, configuration)
 
 
 def exact_footprint(
@@ -104,12 +117,19 @@ def exact_footprint(
         configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
         components: How many components to take; None for all.
     """
-    poses = tree.poses(configuration)
+    pieces, radii = _pieces(tree, configuration, components)
+    return shapely.union_all(shapely.buffer(pieces, radii, quad_segs=32))
+
+
+def _pieces(
+    tree: ComponentTree, configuration: FloatArray, components: int | None
+) -> tuple[list[BaseGeometry], FloatArray]:
+    """Hulls of the pieces of the first components at a configuration, and by how much they are grown [m]."""
     chosen: list[Component] = list(tree.components[:components])
-    shapes = [
-        shapely.MultiPoint(X_WC.apply(shape.vertices)).convex_hull.buffer(shape.radius, quad_segs=32)
-        for component, X_WC in zip(chosen, poses, strict=False)
+    placed = [
+        (shapely.MultiPoint(X_WC.apply(shape.vertices)).convex_hull, shape.radius)
+        for component, X_WC in zip(chosen, tree.poses(configuration), strict=False)
         for body in component.bodies
         for shape in body.shapes
     ]
-    return shapely.union_all(shapes)
+    return [hull for hull, _ in placed], np.array([radius for _, radius in placed])

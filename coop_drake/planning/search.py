@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from time import process_time
 
+from shapely.errors import ShapelyError
+
 from coop_drake.errors import GeometryError
 from coop_drake.planning.attempts import Chain, SampledAttempts
 from coop_drake.planning.channel import Channel, NoChannel, SearchReport, Way
@@ -171,7 +173,11 @@ class _Search:
         def told(margin: float, share: float) -> None:
             self._teller(f"searching at margin {self._unit * margin:.3f} m")(share)
 
-        best = self._attempts.with_margin(chain, self._tried, told)
+        try:
+            best = self._attempts.with_margin(chain, self._tried, told)
+        except (GeometryError, ShapelyError):
+            best = chain
+            self._tried.append((0.0, "found"))
         return self._attempts.way(best, chain), self._report(len(best.boxes), 0)
 
     def _explored_channel(self) -> tuple[Channel, SearchReport]:

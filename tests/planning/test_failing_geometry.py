@@ -97,3 +97,43 @@ def test_a_search_without_clipping_answers_nothing(monkeypatch, corridor: float)
     channel, _ = find_channel(rod_problem(corridor, PlannerSettings(max_slices=32)))
     assert isinstance(channel, NoChannel)
     assert not channel.proved
+
+
+def moved_and_doubled(section: CrossSection, *others: CrossSection) -> CrossSection:
+    """A result that is too large to be right: what was put in, moved and doubled."""
+    return section + section.translate((50.0, 0.0))
+
+
+BROKEN = [
+    ("__xor__", raising),
+    ("__xor__", moved_and_doubled),
+    ("decompose", raising),
+    ("decompose", lambda section: []),
+]
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.sampled_from(BROKEN), st.integers(1, 9), st.sampled_from((0.19, 0.3)))
+def test_no_exploration_errs_however_often_regions_cannot_be_cut_or_parted(
+    broken, every: int, corridor: float
+) -> None:
+    name, failure = broken
+    works, calls = getattr(CrossSection, name), iter(range(1_000_000_000))
+    problem = rod_problem(corridor)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(
+            CrossSection, name, lambda *sections: (failure if next(calls) % every == 0 else works)(*sections)
+        )
+        outcome = exploration_of(problem).run(200)
+    assert outcome.verdict is not (Verdict.FOUND if corridor < 0.2 else Verdict.INFEASIBLE)
+
+
+@pytest.mark.parametrize(("name", "failure"), BROKEN)
+def test_a_search_that_cannot_cut_or_part_regions_never_errs(monkeypatch, name: str, failure) -> None:
+    monkeypatch.setattr(CrossSection, name, failure)
+    for corridor in (0.19, 0.3):
+        answer, _ = find_channel(rod_problem(corridor, PlannerSettings(max_slices=32)))
+        if corridor < 0.2:
+            assert isinstance(answer, NoChannel)
+        else:
+            assert not (isinstance(answer, NoChannel) and answer.proved)
