@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from math import pi, sqrt
 
+import numba
 import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon
 
-from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.boundary import BoundaryDistance, signed_distance_compiled
+from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.slits import component_at
 
 __all__ = ["corridor_around"]
@@ -19,8 +21,12 @@ STRIDE = 0.5
 SHORTEST_STRIDE = 5e-3
 """And at least this, where there is hardly any clearance [m]."""
 
-QUARTER_VERTICES = 4
-"""Vertices of a quarter of a disc."""
+VERTICES = 16
+"""Vertices of a disc."""
+
+_ANGLES = np.arange(VERTICES) * (2.0 * pi / VERTICES)
+CIRCLE = np.stack((np.cos(_ANGLES), np.sin(_ANGLES)), axis=1)
+"""They themselves, about the origin, shape (VERTICES, 2)."""
 
 
 def corridor_around(polygon: Polygon, path: LineString, widening: float) -> Polygon:
@@ -37,14 +43,29 @@ def corridor_around(polygon: Polygon, path: LineString, widening: float) -> Poly
     Returns:
         The part of the corridor that holds the path's start.
     """
-    distance = BoundaryDistance(polygon)
-    discs, s = [], 0.0
-    while s < path.length:
-        point = path.interpolate(s)
-        room = distance(np.array(point.coords[0]))
-        discs.append(point.buffer(widening * room, quad_segs=QUARTER_VERTICES))
-        s += max(STRIDE * room, SHORTEST_STRIDE)
-    end = Point(path.coords[-1])
-    discs.append(end.buffer(widening * distance(np.array(end.coords[0])), quad_segs=QUARTER_VERTICES))
-    links = [shapely.union(first, second).convex_hull for first, second in pairwise(discs)] or discs
+    edges = BoundaryDistance(polygon).edges
+    centres = _stops(edges, shapely.get_coordinates(path))
+    rings = centres[:, None, :2] + widening * centres[:, None, 2:] * CIRCLE
+    pairs = np.concatenate((rings[:-1], rings[1:]), axis=1) if len(rings) > 1 else rings
+    links = shapely.convex_hull(shapely.multipoints(pairs))
     return component_at(shapely.union_all(links).intersection(polygon), Point(path.coords[0]))
+
+
+@numba.njit(cache=True)
+def _stops(edges: FloatArray, path: FloatArray) -> FloatArray:
+    """Places along a path, both ends among them, with their clearances (x, y, d), shape (k, 3)."""
+    stops = []
+    left = 0.0
+    for k in range(len(path) - 1):
+        x, y = path[k, 0], path[k, 1]
+        dx, dy = path[k + 1, 0] - x, path[k + 1, 1] - y
+        length = sqrt(dx * dx + dy * dy)
+        while left < length:
+            px, py = x + left / length * dx, y + left / length * dy
+            room = signed_distance_compiled(edges, px, py)
+            stops.append((px, py, room))
+            left += max(STRIDE * room, SHORTEST_STRIDE)
+        left -= length
+    x, y = path[-1, 0], path[-1, 1]
+    stops.append((x, y, signed_distance_compiled(edges, x, y)))
+    return np.array(stops)

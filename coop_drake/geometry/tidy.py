@@ -80,19 +80,20 @@ def tidy_cell(safe: Polygon, points: Sequence[FloatArray]) -> Polygon:
         opened = cut_holes(opened, route.path, route.neck) or region
     for strength in STRENGTHS:
         cell = _tidied(opened, route, strength)
-        if _serves(cell, safe, points, NECK_KEPT * route.neck):
-            return _without_bays(cell, safe, points, route)
+        for candidate in (_without_bays(cell, route), cell):
+            if candidate is not None and _serves(candidate, safe, points, NECK_KEPT * route.neck):
+                return candidate
     return opened
 
 
-def _without_bays(cell: Polygon, safe: Polygon, points: Sequence[FloatArray], route: _Route) -> Polygon:
-    """The corridor around the passage, if it is a good cell with fewer vertices."""
+def _without_bays(cell: Polygon, route: _Route) -> Polygon | None:
+    """The corridor around the passage in a cell, None if it has no fewer vertices."""
     if not cell.covers(route.path):
-        return cell
+        return None
     corridor = corridor_around(cell, route.path, CORRIDOR)
     corridor = _simplified(Polygon(corridor.exterior), route, 1.0)
     fewer = shapely.get_num_coordinates(corridor) < shapely.get_num_coordinates(cell)
-    return corridor if fewer and _serves(corridor, safe, points, NECK_KEPT * route.neck) else cell
+    return corridor if fewer else None
 
 
 def _route(region: Polygon, points: Sequence[FloatArray]) -> _Route:

@@ -17,6 +17,9 @@ from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.sweep_kernels import IntArray, SweepArrays, over_piece, separated
 from coop_drake.planning.walls import Walls, point_segment, square_at
 
+COARSENESS = 0.15
+"""A box may fall short of the longest one by this share of its samples [-]."""
+
 _STEP_SHARE = 0.5
 _BOX_TIME = 0.6
 _SPEED = 3.0
@@ -227,7 +230,7 @@ def longest_box(
     room: float,
     margin: float,
 ) -> tuple[int, int, int]:
-    """Find how far along a path one free box reaches: doubling, then bisection.
+    """Find about how far along a path one free box reaches: doubling, then bisection.
 
     Args:
         boxes: The team.
@@ -247,7 +250,7 @@ def longest_box(
     best, failed, reach = first, last + 1, 1
     quickest, fastest, trials = first, 0.0, 0
     length, measured = 0.0, first
-    while failed - best > 1:
+    while failed - best > max(1, int(COARSENESS * (best - first))):
         j = min(best + reach, last) if failed > last else (best + failed) // 2
         part = samples[first : j + 1]
         lower, upper = padded(boxes, part, pad)

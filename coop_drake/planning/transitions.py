@@ -22,13 +22,18 @@ from coop_drake.planning.digest import problem_digest
 from coop_drake.planning.estimate import timed, travel_time
 from coop_drake.planning.plan import Cell, Plan, Transition
 from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.rescaling import usual_unit
 from coop_drake.planning.shortcuts import without_detours
 from coop_drake.planning.targets import choose_targets
 
 __all__ = ["make_plan", "reschedule"]
 
 NARROWEST = 1e-3
-"""Necks and goal regions below this clearance are refused: the governor would crawl [m]."""
+"""Necks and goal regions below this clearance are refused, of a team of the usual size: the governor would
+crawl [m]."""
+
+ENOUGH = 0.9
+"""The region of the goal need not be wider than this share of the position tolerance [-]."""
 
 DISC_VERTICES = 32
 """Vertices of the last goal region, inscribed in the disc of the position tolerance."""
@@ -135,7 +140,9 @@ def _way(
         region = component_at(_disc(target, problem.position_tolerance).intersection(here), Point(target))
     inradius = 0.0 if region.is_empty else BoundaryDistance(region)(target)
     way = _Way(target, region, inradius, PassageFinder(here).find(entry, target))
-    if min(inradius, way.passage.neck) < NARROWEST:
+    narrowest = NARROWEST * usual_unit(problem.tree)
+    wanted = narrowest if len(cells) > 1 else min(narrowest, ENOUGH * problem.position_tolerance)
+    if inradius < wanted or way.passage.neck < narrowest:
         seconds = travel_time(way.passage.length, way.passage.neck)
         raise StallError(_stall(problem, index, way, seconds))
     return way
@@ -171,11 +178,12 @@ def _transition(
 def _stall(problem: PlanningProblem, index: int, way: _Way, seconds: float) -> str:
     passage = way.passage
     x, y = passage.narrowest
+    narrowest = NARROWEST * usual_unit(problem.tree)
     return (
         f"cell {index}: the object's passage through ({x:.3f}, {y:.3f}) is {2e3 * passage.neck:.1f} mm "
         f"wide and {passage.length:.2f} m long, about {seconds:.0f} s, and its target "
         f"({way.target[0]:.3f}, {way.target[1]:.3f}) has {1e3 * way.inradius:.1f} mm around it; expected "
-        f"at least {2e3 * NARROWEST:.0f} mm and {1e3 * NARROWEST:.0f} mm, and at most "
+        f"at least {2e3 * narrowest:g} mm and {1e3 * narrowest:g} mm, and at most "
         f"{problem.settings.max_transition_time:.0f} s"
     )
 

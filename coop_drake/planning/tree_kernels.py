@@ -15,6 +15,8 @@ from coop_drake.planning.team_arrays import TeamArrays
 from coop_drake.planning.walls import Walls
 
 _SQUARES = 2_500
+_GUIDED = 0.85
+_LEAST_SPREAD = 0.1
 
 
 class _Tree(NamedTuple):
@@ -131,13 +133,17 @@ def _grow(
 def _draw(
     u: FloatArray, guide: FloatArray, spread: FloatArray, lower: FloatArray, upper: FloatArray
 ) -> FloatArray:
-    """One sample: around the guide for most of the draws, uniform otherwise and on axes without spread."""
+    """One sample: around the guide for most of the draws, uniform otherwise and on axes without spread.
+
+    Some keep closer to the guide than others: what is narrow for the guide is narrower for what it guides.
+    """
     z = lower + u[2:] * (upper - lower)
-    if len(guide) > 0 and u[0] < 0.85:
+    if len(guide) > 0 and u[0] < _GUIDED:
         at = guide[min(len(guide) - 1, int(u[1] * len(guide)))]
+        share = _LEAST_SPREAD + (1.0 - _LEAST_SPREAD) * u[0] / _GUIDED
         for k in range(len(z)):
             if spread[k] > 0.0:
-                z[k] = at[k] + (2.0 * u[2 + k] - 1.0) * spread[k]
+                z[k] = at[k] + (2.0 * u[2 + k] - 1.0) * share * spread[k]
                 if k > 2:
                     z[k] = min(upper[k], max(lower[k], z[k]))
     return z

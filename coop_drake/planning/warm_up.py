@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from shapely import box
+from shapely import Polygon, box
 
 from coop_drake.control import ScheduledGains
 from coop_drake.geometry.convex import normals
+from coop_drake.geometry.passage import PassageFinder
 from coop_drake.geometry.pose import PlanarPose
 from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.planning.planner import plan
@@ -17,7 +18,7 @@ _SLICES = 8
 
 
 def main() -> None:
-    """Plan a square with one arm across an empty floor, which calls every kernel."""
+    """Plan a square with one arm across an empty floor, and pass a corner: this calls every kernel."""
     square = Body("object", None, (ConvexShape(0.2 * normals(np.array([0.0, 0.5, 1.0, 1.5]) * np.pi)),))
     base = Body("base", 0, (ConvexShape(np.zeros((1, 2)), 0.1),))
     joint = TreeJoint("arm", "revolute", 0, 0, PlanarPose(0.5), 1.0, (1.0, 0.0), -1.0, 1.0)
@@ -34,6 +35,8 @@ def main() -> None:
     )
     plan(question, ScheduledGains(), gain_set_name="scheduled")
     Proofs(question).run(_SLICES)
+    bent = Polygon([(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)])
+    PassageFinder(bent).find((2.5, 0.5), (0.5, 2.5))
 
 
 if __name__ == "__main__":
