@@ -157,24 +157,19 @@ def _near_pairs(
 ) -> tuple[IntArray, IntArray]:
     """Targets near each regular panel, but those on its own edge: first of each panel, and all of them."""
     start = np.zeros(len(segments) + 1, dtype=np.int64)
-    found = np.empty(len(target), dtype=np.int64)
-    total = 0
+    found = np.empty(64, dtype=np.int64)
     for k in range(len(segments)):
-        total = _near_of(target, target_edge, segments[k], edge[k], found, total, False)
-        start[k + 1] = total
-    found = np.empty(total, dtype=np.int64)
-    total = 0
-    for k in range(len(segments)):
-        total = _near_of(target, target_edge, segments[k], edge[k], found, total, True)
-    return start, found
+        while start[k] + len(target) > len(found):
+            found = np.concatenate((found, np.empty_like(found)))
+        start[k + 1] = _near_of(target, target_edge, segments[k], edge[k], found, start[k])
+    return start, found[: start[-1]].copy()
 
 
 @compiled
 def _near_of(
-    target: ComplexArray, target_edge: IntArray, segment: ComplexArray, edge: int,
-    found: IntArray, total: int, keep: bool,
-) -> int:  # fmt: skip
-    """Count, and keep if wanted, the targets near one panel; the new total."""
+    target: ComplexArray, target_edge: IntArray, segment: ComplexArray, edge: int, found: IntArray, end: int
+) -> int:
+    """Write the targets near one panel; the new end."""
     centre, half = segment[0], segment[1]
     reach = (0.5 * NEAR) ** 2 * (half.real**2 + half.imag**2)
     for i in range(len(target)):
@@ -182,10 +177,9 @@ def _near_of(
         if rx * rx + ry * ry < reach and target_edge[i] != edge:
             zeta = (target[i] - centre) / half
             if abs(zeta - 1.0) + abs(zeta + 1.0) < NEAR:
-                if keep:
-                    found[total] = i
-                total += 1
-    return total
+                found[end] = i
+                end += 1
+    return end
 
 
 @compiled

@@ -129,7 +129,8 @@ def _sort_out(
         x, y, radius = square[box, 0], square[box, 1], square[box, 2]
         nearest = np.inf
         for candidate in range(start[box], start[box + 1]):
-            todo[0] = near[candidate]
+            for i in range(3):
+                todo[0, i] = near[candidate, i]
             waiting = 1
             while waiting > 0:
                 waiting -= 1

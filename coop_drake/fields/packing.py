@@ -169,7 +169,9 @@ def _fields(inward: FloatArray, field: FloatArray) -> FloatArray:
     """The field that comes in at every level, shape (LEVELS + 1, 2, n, 2)."""
     n = inward.shape[1]
     fields = np.zeros((LEVELS + 1, 2, n, 2))
-    fields[0] = field
+    for parity in range(2):
+        for i in range(n):
+            fields[0, parity, i, 0], fields[0, parity, i, 1] = field[parity, i, 0], field[parity, i, 1]
     for level in range(LEVELS):
         for parity in range(2):
             for i in range(n):

@@ -22,7 +22,7 @@ __all__ = ["Solution", "solve"]
 
 _GAIN = 4.0  # by which the error falls with every node a panel, about
 _PROGRESS = 0.7  # share of the error that an attempt must undercut, or more would not help either
-_LARGE = 3_000  # unknowns from which the first attempt is left out
+_LARGE = 2_000  # unknowns from which the first attempt is left out
 _MAX_UNKNOWNS = 30_000  # some ten seconds
 
 
@@ -33,16 +33,9 @@ class Attempt(NamedTuple):
     closeness: float
 
 
-# Ten nodes suffice for most cells, twelve for most large ones.
+# Ten nodes suffice for most cells, thirteen for most large ones.
 _FEWEST = Attempt(10, 1.5)
-_ATTEMPTS = (
-    _FEWEST,
-    Attempt(12, 1.5),
-    Attempt(14, 1.5),
-    Attempt(16, 1.5),
-    Attempt(16, 1.0),
-    Attempt(20, 0.7),
-)
+_ATTEMPTS = (_FEWEST, Attempt(13, 1.5), Attempt(16, 1.5), Attempt(16, 1.0), Attempt(20, 0.7))
 
 
 class Solution(NamedTuple):

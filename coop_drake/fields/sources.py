@@ -66,7 +66,8 @@ def gather(
             first, last = first + place * per_panel, first + (place + 1) * per_panel
         for j in range(first, last):
             nodes[0, j - first], nodes[1, j - first] = m.sources[0, j] - x, m.sources[1, j] - y
-            nodes[2:, j - first] = m.sources[2:, j]
+            for row in range(2, 6):
+                nodes[row, j - first] = m.sources[row, j]
         return int(last - first)
     if place < 0:
         return _gather_tail(m, k, level, x, y, nodes)

@@ -109,6 +109,71 @@ def test_jacobian_is_the_derivative(mapped):
     np.testing.assert_allclose(J, np.stack(differences, axis=-1), atol=1e-6 * np.abs(J).max())
 
 
+@pytest.mark.parametrize(
+    ("name", "finest"), [("warehouse", 1e-10), ("two_rooms", 1e-9), ("rounded_room", 1e-10), ("maze", 1e-9)]
+)
+def test_jacobian_a_centimetre_from_walls_is_that_of_a_finer_map(name, finest):
+    domain, goal = NAMED[name]
+    points, _ = domains.off_wall(domain, 0.01)
+    points = points[shapely.contains_xy(domain.buffer(-0.0099), *points.T)][::7]
+    plain, finer = HarmonicMap(domain, goal), HarmonicMap(domain, goal, tolerance=finest)
+    assert finer.certificate.unknowns > plain.certificate.unknowns
+    h = 5e-4
+    differences = []
+    for axis in np.eye(2):
+        f = [finer(points + k * h * axis)[0] for k in (-3, -2, -1, 1, 2, 3)]
+        differences.append((-f[0] + 9 * f[1] - 45 * f[2] + 45 * f[3] - 9 * f[4] + f[5]) / (60 * h))
+    _, J = plain(points)
+    np.testing.assert_allclose(J, np.stack(differences, axis=-1), atol=1e-6 * np.abs(J).max())
+
+
+def test_polygon_of_many_sides_is_mapped_like_the_disk():
+    """On the inscribed polygon of n sides T differs from p / r by O(n^-2)."""
+    errors = []
+    for sides in (40, 80):
+        angle = 2 * np.pi * np.arange(sides) / sides
+        ring = 2.0 * np.column_stack((np.cos(angle), np.sin(angle)))
+        points = domains.inside(Polygon(ring), 200, clearance=0.2)
+        T, J = HarmonicMap(Polygon(ring), Point(0.3, 0.2))(points)
+        turn = (T[0] @ points[0] + 1j * (points[0, 0] * T[0, 1] - points[0, 1] * T[0, 0])) / (
+            points[0] @ points[0]
+        )
+        turn /= abs(turn)
+        z = (T[:, 0] + 1j * T[:, 1]) / turn
+        errors.append(np.abs(z - 0.5 * (points[:, 0] + 1j * points[:, 1])).max())
+        np.testing.assert_allclose(np.linalg.det(J), 0.25, atol=10 / sides**2)
+    assert errors[1] < 0.3 * errors[0] < 2e-3
+
+
+def test_polygons_of_many_sides_are_mapped_like_the_annulus():
+    """The hole of radius a in the disk of radius b goes to 0: T = r (rho - a^2 / rho) / (b^2 - a^2) b."""
+    errors = []
+    for sides in (24, 48):
+        angle = 2 * np.pi * np.arange(sides) / sides
+        circle = np.column_stack((np.cos(angle), np.sin(angle)))
+        domain = Polygon(2.0 * circle, [0.5 * circle])
+        points = domains.inside(domain, 300, clearance=0.1)
+        T, _ = HarmonicMap(domain, Point(1.2, 0.3))(points)
+        radius = np.hypot(*points.T)
+        expected = 2.0 * (radius - 0.25 / radius) / (4.0 - 0.25)
+        errors.append(np.abs(np.hypot(*T.T) - expected).max())
+    assert errors[1] < 0.3 * errors[0] < 1e-2
+
+
+def test_vertices_go_exactly_where_they_belong():
+    domain, goal = NAMED["warehouse"]
+    harmonic_map = HarmonicMap(domain, goal)
+    outer = np.asarray(shapely.orient_polygons(domain).exterior.coords)
+    s = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(outer, axis=0).T))))
+    T, _ = harmonic_map(outer)
+    turned = np.unwrap(np.arctan2(T[:, 1], T[:, 0]))
+    np.testing.assert_allclose(turned - turned[0], 2 * np.pi * s / s[-1], atol=1e-14)
+    for hole in domain.interiors:
+        T, J = harmonic_map(np.asarray(hole.coords))
+        assert np.ptp(T, axis=0).max() == 0.0
+        assert np.isfinite(J).all()
+
+
 def test_map_has_the_mean_value_property(mapped):
     centres = domains.inside(mapped.region, 1000, clearance=0.05)
     centres = centres[:20]
