@@ -18,6 +18,7 @@ from coop_drake.fields.quadrature import FloatArray, gauss_nodes, interpolation
 
 __all__ = ["CornerOperator", "corner_operator", "leg_panels"]
 
+_BROAD = 4.0 * pi / 9.0  # gap between the legs from which one panel resolves the other leg at every scale
 _DOUBLINGS = 8  # 2^8 dyadic levels: below rounding for every angle that a polygon can have
 
 
@@ -49,7 +50,7 @@ def leg_panels(angle: float, closeness: float) -> tuple[FloatArray, FloatArray]:
         closeness: Longest panel per unit of distance.
     """
     gap = min(angle, 2.0 * pi - angle)
-    if gap >= pi / 3 - 1e-9:
+    if gap >= _BROAD - 1e-9:
         return np.array([0.0, 1.0]), np.array([0.5, 1.0])
     count = ceil(log(2.0) / log1p(closeness * sin(gap)))
     ring = 0.5 * 2.0 ** (np.arange(count + 1) / count)

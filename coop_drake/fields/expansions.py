@@ -26,7 +26,8 @@ __all__ = ["grown"]
 _REACH = 2.8  # distance per radius of a box from which something is far
 _REFINED = 1.45  # |zeta| from which its refined nodes do
 _TAIL = 2.0  # distance from the vertex per length of the legs from which a corner is its compressed density
-_MANY = 4  # near panels shorter than the box that are worth a division
+_MANY = 5  # near panels shorter than the box that are worth a division
+_CORNER = 2  # panels that a corner near by costs as much as
 _DEPTH = 50  # divisions at most
 _BOXES = 40_000  # boxes of one size at most
 
@@ -182,7 +183,8 @@ def _worth(m: MapArrays, near: IntArray, x: float, y: float, radius: float) -> i
     for item in range(len(near)):
         k, place = near[item, 0], near[item, 1]
         if k != own or k < 0:
-            worth += 1 if size(m, k, place, near[item, 2]) < radius else 0
+            cost = 1 if place >= 0 else _CORNER
+            worth += cost if size(m, k, place, near[item, 2]) < radius else 0
     return worth
 
 

@@ -23,7 +23,7 @@ __all__ = ["Solution", "solve"]
 _GAIN = 4.0  # by which the error falls with every node a panel, about
 _PROGRESS = 0.7  # share of the error that an attempt must undercut, or more would not help either
 _LARGE = 2_000  # unknowns from which the first attempt is left out
-_MAX_UNKNOWNS = 30_000  # some ten seconds
+_MAX_UNKNOWNS = 40_000  # some ten seconds
 
 
 class Attempt(NamedTuple):
