@@ -21,6 +21,8 @@ __all__ = ["TOLERANCE", "build_maps", "certificate_rows"]
 TOLERANCE = 1e-8
 """Largest certified error of a map that is accepted, if none is given; a scenario's is ``maps.tolerance``."""
 
+_MOST_WORKERS = 8  # More of them wait for one another: between kernels they share one interpreter.
+
 
 def build_maps(
     plan: Plan,
@@ -38,7 +40,7 @@ def build_maps(
         plan: The plan.
         tolerance: Largest certified error accepted [-].
         store: Where maps are looked up first and kept; by default all are solved.
-        workers: How many maps are solved at the same time; by default as many as there are cores.
+        workers: How many maps are solved at the same time; by default one a core, eight at most.
         progress: Told the stage and the fraction done, if given.
 
     Raises:
@@ -53,7 +55,7 @@ def build_maps(
 
     maps: list[HarmonicMap] = []
     count = len(plan.cells)
-    pool = ThreadPoolExecutor(workers or os.cpu_count() or 1)
+    pool = ThreadPoolExecutor(workers or min(_MOST_WORKERS, os.cpu_count() or 1))
     with threadpool_limits(1, user_api="blas"):
         try:
             for index, future in enumerate([pool.submit(solve, k) for k in range(count)]):
