@@ -24,6 +24,7 @@ from coop_drake.planning.channel import Channel, FreeBox
 from coop_drake.planning.channel_ends import final_intervals
 from coop_drake.planning.margins import shrunk
 from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.rescaling import usual_unit
 from coop_drake.planning.slices import nearest_turn
 from coop_drake.planning.walls import Walls, walls_under
 
@@ -39,14 +40,14 @@ HALVINGS = 6
 PADS = (0.005, 0.015, 0.03, 0.06)
 """Boxes are padded by one of these in every angle and joint [rad or m]."""
 
-NARROW_PADS = (0.002, 0.006, 0.015, 0.03)
+NARROW_PADS = (0.001, 0.003, 0.01, 0.03)
 """And by one of these where a box padded by the least of the others does not hold two waypoints."""
 
 LEVELS = ((0.3, PADS), (0.1, PADS), (0.1, NARROW_PADS))
 """Shares of the margin that was found that waypoints keep [-], and paddings; tried in this order."""
 
 LEAST = 2e-3
-"""Waypoints keep at least this clearance [m]."""
+"""Waypoints keep at least this clearance, of a team of the usual size [m]."""
 
 CORE_SHARE = 0.9
 """Share of the waypoints' clearance that cores keep, so that waypoints lie well inside [-]."""
@@ -89,8 +90,9 @@ def resliced(problem: PlanningProblem, way: FloatArray, margin: float, gain_set:
     boxes, walls = box_arrays(swept, pairs), walls_under(floor, problem.tree.reach)
     angle = float(way[-1, 2] + nearest_turn(float(problem.goal_pose[2] - way[-1, 2])))
     goals = np.array(final_intervals(problem, angle))
-    for share, pads in LEVELS:
-        least = max(share * margin, LEAST)
+    smallest = LEAST * usual_unit(problem.tree)
+    # At a small margin levels are the same: each is tried once.
+    for least, pads in dict.fromkeys((max(share * margin, smallest), pads) for share, pads in LEVELS):
         points = _waypoints(boxes, walls, way, least, pads[0])
         if points is None:
             continue

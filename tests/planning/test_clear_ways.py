@@ -1,0 +1,102 @@
+"""Ways with room: drawn away from the walls, measured as shapely measures them, and covered on demand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shapely import Polygon
+
+from coop_drake.errors import GeometryError
+from coop_drake.planning import attempts
+from coop_drake.planning.attempts import SampledAttempts
+from coop_drake.planning.band import likely_time, room_along
+from coop_drake.planning.channel import Channel, Way
+from coop_drake.planning.clear_ways import margins_along, with_room
+from coop_drake.planning.margins import exact_footprint
+from coop_drake.planning.search import find_channel, find_way
+from tests.planning.test_search import rod_problem
+from tests.support.free_positions import FreePositions
+
+CORRIDOR = 0.6
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return rod_problem(CORRIDOR)
+
+
+@pytest.fixture(scope="module")
+def bent():
+    """A way for the rod that turns late and scrapes along a wall of the corridor."""
+    y = 0.5 * CORRIDOR - 0.1 - 0.02
+    return np.array(
+        [[-2.5, 0, 1.5], [-1.7, y, 0.0], [1.7, y, 0.0], [2.5, 0, 1.5]],
+        dtype=float,
+    )
+
+
+def clearance(problem, way):
+    """Least distance of the exact footprint from the walls at many places of a way [m]."""
+    places = np.linspace(0.0, len(way) - 1.0, 400)
+    samples = np.array([np.interp(places, np.arange(len(way)), column) for column in way.T]).T
+    walls = problem.workspace.boundary
+    return min(walls.distance(exact_footprint(problem.tree, z)) for z in samples)
+
+
+def test_room_is_what_shapely_measures(problem, bent):
+    assert room_along(problem, bent, 1.0) == pytest.approx(clearance(problem, bent), abs=2e-3)
+    assert room_along(problem, bent, 0.01) == 0.01
+
+
+def test_a_start_near_a_wall_leaves_room_elsewhere(problem):
+    way = np.array([[-2.5, 0.48, 1.5], [-2.0, 0.0, 0.0], [-1.8, 0.0, 0.0]])
+    near = replace(problem, start=way[0])
+    assert clearance(near, way) < 0.03
+    assert room_along(near, way, 0.15) > 0.05
+    assert room_along(near, np.vstack((way, way[0])), 0.15) > 0.05
+
+
+def test_a_way_is_drawn_from_the_walls_and_stays_free(problem, bent):
+    wide = with_room(problem, bent, 0.01)
+    np.testing.assert_array_equal(wide[[0, -1]], bent[[0, -1]])
+    assert clearance(problem, wide) > 3.0 * clearance(problem, bent)
+    assert likely_time(problem, wide) < likely_time(problem, bent)
+    for z in wide:
+        assert FreePositions(problem.tree, problem.workspace, z[2:]).free(z[None, :2]).all()
+
+
+def test_margins_fall_and_keep_to_what_is_asked(problem, bent):
+    wide = with_room(problem, bent, 0.01)
+    margins = list(margins_along(problem, wide))
+    assert margins == sorted(margins, reverse=True)
+    assert 0.0 < margins[-1] <= margins[0] <= problem.settings.margin
+    unasked = replace(problem, settings=replace(problem.settings, margin=0.0))
+    assert list(margins_along(unasked, wide)) == []
+
+
+def test_polygons_are_made_where_they_are_asked_for(problem, monkeypatch):
+    made = []
+    inner = attempts.make_channel
+    monkeypatch.setattr(attempts, "make_channel", lambda *given: made.append(given) or inner(*given))
+    way, report = find_way(problem)
+    assert isinstance(way, Way)
+    assert made == []
+    assert way.margin == report.margins[-1][0]
+    channel = way.channel()
+    assert isinstance(channel, Channel)
+    assert len(made) == 1
+    assert channel.margin == way.margin
+    assert len(channel.boxes) <= way.boxes
+    for box in channel.boxes:
+        assert isinstance(box.polygon, Polygon)
+        assert box.polygon.covers(box.core)
+
+
+def test_polygons_that_cannot_be_made_are_no_channel_and_no_proof(problem, monkeypatch):
+    monkeypatch.setattr(SampledAttempts, "_channel", lambda self, chain: None)
+    way, _ = find_way(problem)
+    with pytest.raises(GeometryError, match="cannot be made"):
+        way.channel()
+    answer, _ = find_channel(problem)
+    assert not isinstance(answer, Channel)
+    assert not answer.proved
