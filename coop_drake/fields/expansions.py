@@ -122,7 +122,7 @@ def _sort_out(
     Returns:
         Where the rows start that stay near each box, these rows, and how many are worth a division.
     """
-    nodes, todo = np.empty((6, 1024)), np.empty((4096, 3), dtype=np.int64)
+    nodes, todo = _room(m)
     kept, first = np.empty((2 * len(near) + 64, 3), dtype=np.int64), np.zeros(len(square) + 1, dtype=np.int64)
     worth = np.zeros(len(square), dtype=np.int64)
     end = 0
@@ -155,6 +155,17 @@ def _sort_out(
             end, worth[box] = first[box], 0
         first[box + 1] = end
     return first, kept[:end], worth
+
+
+@compiled
+def _room(m: MapArrays) -> tuple[FloatArray, IntArray]:
+    """Room for the nodes of the largest source, and for the candidates of a corner opened all the way down."""
+    largest, rings = 64, 1
+    for k in range(len(m.corner_index) - 1):
+        solved = m.corner_index[k + 1, 0] - m.corner_index[k, 0]
+        largest = max(largest, solved, 2 * m.corner_index[k, 2])
+        rings = max(rings, 2 * m.corner_index[k, 1])
+    return np.empty((6, largest)), np.empty((LEVELS * rings + 2, 3), dtype=np.int64)
 
 
 @compiled
