@@ -16,7 +16,7 @@ from coop_drake.fields.quadrature import FloatArray
 __all__ = ["Fault", "MapCertificate", "certify", "find_fault"]
 
 # Chebyshev points of two degrees: denser than the nodes, and other points than they are.
-_ON_PANEL = np.sort(np.cos(np.pi * (np.arange(17) + 0.5) / 17))
+_ON_PANEL = np.sort(np.cos(np.pi * (np.arange(23) + 0.5) / 23))
 _ON_RING = np.cos(np.pi * (np.arange(5) + 0.5) / 5)
 _RINGS = np.array([0, 1, 2, 3, 5, 8, 13, 21, 33])
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.fields.compiled import compiled
-from coop_drake.fields.layers import INSIDE, LEVELS, ON_BOUNDARY, OUTSIDE, MapArrays
+from coop_drake.fields.layers import INSIDE, LEVELS, ON_BOUNDARY, OUTSIDE, REFINED_NODES, MapArrays
 from coop_drake.fields.outline import IntArray
 from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.sources import FAR, gather, seen_from, size
@@ -24,7 +24,7 @@ from coop_drake.fields.walls import is_inside
 __all__ = ["grown"]
 
 _REACH = 2.8  # distance per radius of a box from which something is far
-_REFINED = 1.45  # |zeta| from which its refined nodes do
+_REFINED = 1.45  # |zeta| from which the refined nodes of a panel do
 _TAIL = 2.0  # distance from the vertex per length of the legs from which a corner is its compressed density
 _MANY = 5  # near panels shorter than the box that are worth a division
 _CORNER = 2  # panels that a corner near by costs as much as
@@ -122,7 +122,8 @@ def _sort_out(
     Returns:
         Where the rows start that stay near each box, these rows, and how many are worth a division.
     """
-    nodes, todo = _room(m)
+    most, rings = _most(m)
+    nodes, todo = np.empty((6, most)), np.empty((LEVELS * (2 * rings + 1) + 1, 3), dtype=np.int64)
     kept, first = np.empty((2 * len(near) + 64, 3), dtype=np.int64), np.zeros(len(square) + 1, dtype=np.int64)
     worth = np.zeros(len(square), dtype=np.int64)
     end = 0
@@ -158,14 +159,13 @@ def _sort_out(
 
 
 @compiled
-def _room(m: MapArrays) -> tuple[FloatArray, IntArray]:
-    """Room for the nodes of the largest source, and for the candidates of a corner opened all the way down."""
-    largest, rings = 64, 1
-    for k in range(len(m.corner_index) - 1):
-        solved = m.corner_index[k + 1, 0] - m.corner_index[k, 0]
-        largest = max(largest, solved, 2 * m.corner_index[k, 2])
-        rings = max(rings, 2 * m.corner_index[k, 1])
-    return np.empty((6, largest)), np.empty((LEVELS * rings + 2, 3), dtype=np.int64)
+def _most(m: MapArrays) -> tuple[int, int]:
+    """Most nodes that a source has, most panels that a ring has on one leg."""
+    nodes, rings = max(REFINED_NODES, m.sources.shape[1] - m.corner_index[-1, 0]), 1
+    for k in range(len(m.corners)):
+        nodes = max(nodes, 2 * m.corner_index[k, 2], m.corner_index[k + 1, 0] - m.corner_index[k, 0])
+        rings = max(rings, m.corner_index[k, 1])
+    return nodes, rings
 
 
 @compiled

@@ -63,3 +63,12 @@ def test_leaves_share_out_the_square(mapped):
     area = 2.0 * arrays.leaf_square[:, 2] ** 2
     assert area.sum() == pytest.approx((2.0 * arrays.root[2]) ** 2)
     assert sorted(arrays.box_leaf[arrays.box_child < 0]) == list(range(len(area)))
+
+
+def test_sharp_corners_of_many_nodes_fit():
+    domain, goal = domains.needle(1.2)
+    harmonic_map = HarmonicMap(domain, goal)
+    assert harmonic_map.kernel_arguments[0].corner_index[:-1, 2].max() > 300
+    T, J = harmonic_map(domains.inside(domain, 100))
+    assert (np.hypot(*T.T) < 1.0).all()
+    assert (np.linalg.det(J) > 0.0).all()
