@@ -74,3 +74,29 @@ def test_a_hole_stays_a_hole() -> None:
     polygon = to_polygon(part)
     assert len(polygon.interiors) == 1
     assert Polygon(polygon.interiors[0]).area == pytest.approx(0.8**2, abs=10 * SAFE_SIDE)
+
+
+def test_what_is_smaller_than_the_footprint_holds_none() -> None:
+    """An island within the footprint, as a hole in the walls around it would, must not pass for room."""
+    square = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
+    islands = MultiPolygon([box(0, 0, 0.4, 0.4), box(2, 0, 4, 2), box(5, 0, 6.5, 0.4)])
+    found = as_shapely(FreeSpace.under(islands).minus(square))
+    assert found.symmetric_difference(box(2.5, 0.5, 3.5, 1.5)).area < 1e-4
+
+
+@settings(max_examples=40)
+@given(POINTS, st.integers(0, 2**32 - 1))
+def test_difference_equals_the_reference_on_floors_of_many_parts(
+    points: list[tuple[float, float]], seed: int
+) -> None:
+    footprint = convex_ring(points)
+    corners = np.random.default_rng(seed).integers(0, 12, (9, 2)) * 0.25
+    floor = union_all([box(x, y, x + 0.25 * (1 + k % 5), y + 0.5) for k, (x, y) in enumerate(corners)])
+    floor = floor.difference(union_all([box(x + 0.1, y + 0.1, x + 0.2, y + 0.6) for x, y in corners[:4]]))
+    parts = MultiPolygon([part for part in getattr(floor, "geoms", [floor]) if isinstance(part, Polygon)])
+    if footprint is None:
+        return
+    found = as_shapely(FreeSpace.under(parts).minus(0.5 * footprint))
+    exact = union_all([exact_difference(part, 0.5 * footprint) for part in parts.geoms])
+    assert found.difference(exact).area < 1e-9
+    assert exact.difference(found).area < 1e-4

@@ -51,6 +51,14 @@ def test_strong_branching_needs_a_fraction_of_the_slices() -> None:
     assert 2 * strong.slices < blame.slices
 
 
+def test_the_whole_of_a_team_is_refuted_along_the_few_axes_that_matter() -> None:
+    """Six dimensions, no relaxation: theta and the joint of the robot that is in the way come first."""
+    exploration = explorer(transport(0.95, robots=3))
+    outcome = exploration.run(1000)
+    assert outcome.verdict is Verdict.INFEASIBLE
+    assert outcome.slices < 600
+
+
 def test_bodies_in_each_others_way_are_parted_along_their_own_axis() -> None:
     block = Body("block", None, (rectangle(-0.1, 0.1, -0.3, 0.3),))
     arm = Body("arm", 0, (rectangle(-0.3, 0.3, -0.05, 0.05),))

@@ -141,3 +141,11 @@ def test_progress_is_told_and_may_interrupt() -> None:
     with pytest.raises(KeyboardInterrupt):
         find_channel(case("base"), stop)
     assert told == ["sampling paths"]
+
+
+def test_a_millimetre_of_room_is_found() -> None:
+    """The corridor is three millimetres wider than one in which the object alone is proved to be stuck."""
+    problem = transport(0.78)
+    channel, _ = find_channel(problem)
+    assert isinstance(channel, Channel)
+    assert_channel_is_sound(problem, channel)
