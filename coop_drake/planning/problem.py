@@ -23,11 +23,12 @@ class PlannerSettings:
     """How hard the planner tries.
 
     Attributes:
-        margin: First margin rho tried [m]; halved until a plan is found, 0 last.
+        margin: First margin rho tried [m]; smaller ones follow until a plan is found, 0 last. For teams of
+            another scale than usual one that they could not mean is replaced by the usual one, scaled.
         slice_overlap: Overlap of neighbouring slices as a fraction of their width, for under-cells only.
         angle_resolution: Slices of angles are not split below this width [rad].
         length_resolution: Slices of prismatic joints are not split below this width [m].
-        max_slices: Work budget of one attempt, in slices made.
+        max_slices: Work budget of explorations, in slices made by all of them.
         max_transition_time: Longest estimated time of one transition that is accepted [s].
         strategy: ``portfolio`` samples, certifies and proves; ``cells`` explores by cells alone; ``paper``
             explores as the paper's Algorithms 1 and 2 are printed, at margin zero.
