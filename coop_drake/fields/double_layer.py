@@ -1,4 +1,4 @@
-"""Entries of the double layer between nodes of the boundary: kernel, near panels, sums over all sources."""
+"""Entries of the double layer between nodes of the boundary: the kernel, and exact weights of near panels."""
 
 from __future__ import annotations
 
