@@ -109,13 +109,19 @@ class SampledAttempts:
             progress: Called with the share of the sampling that is done.
         """
         try:
+            fits: list[FloatArray] = []
             for seed, growth in product(range(_GROWTH_SEEDS), _GROWTHS if self._inside else ()):
                 larger = widened(self._problem.workspace, growth)
                 path = Sampler(self._ladder, larger, _GAP, seed, progress).path(_SAMPLES)
                 close = fitted(self._problem, path, growth) if len(path) else None
-                chain = None if close is None else self._chain(close, 0.0, quick=True)
-                if chain is not None:
-                    return chain
+                if close is not None:
+                    fits.append(close)
+                    chain = self._chain(close, 0.0, quick=True)
+                    if chain is not None:
+                        return chain
+            # Boxes for a millimetre of room last: others can be executed sooner.
+            covered = (self._chain(close, 0.0, quick=True, last=True) for close in fits)
+            return next((chain for chain in covered if chain is not None), None)
         except (GeometryError, ShapelyError):
             pass
         return None
@@ -155,12 +161,13 @@ class SampledAttempts:
         progress: Callable[[float, float], None] | None = None,
         *,
         quick: bool = False,
+        last: bool = False,
     ) -> Chain | None:
         """Cover a path with boxes that keep a margin."""
         workspace = marginal_workspace(self._problem, margin)
         certifier = Certifier(self._swept, self._pairs, workspace, self._scale, margin)
         told = None if progress is None else (lambda share: progress(margin, share))
-        boxes = certifier.boxes(path, told, quick=quick)
+        boxes = certifier.boxes(path, told, quick=quick, last=last)
         self.slices += certifier.trials
         return None if boxes is None else Chain(tuple(boxes), path, margin)
 

@@ -16,9 +16,10 @@ from coop_drake.planning.box_kernels import BoxArrays, longest_box, padded
 from coop_drake.planning.sampler import densified
 from coop_drake.planning.walls import Walls, walls_under
 
-_LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.0003), (0.0003, 0.0001))
+_LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.0003))
+_LAST_LEVELS = (*_LEVELS, (0.0003, 0.0001))
 _RESOLUTION = 0.02
-_FINEST = 0.0005
+_FINEST, _LAST_FINEST = 0.002, 0.0005
 _FINER = 4
 
 
@@ -68,7 +69,12 @@ class Certifier:
         self.trials = 0
 
     def boxes(
-        self, path: FloatArray, progress: Callable[[float], None] | None = None, *, quick: bool = False
+        self,
+        path: FloatArray,
+        progress: Callable[[float], None] | None = None,
+        *,
+        quick: bool = False,
+        last: bool = False,
     ) -> list[PathBox] | None:
         """Chain of boxes from the path's first to its last configuration, or None if one is missing.
 
@@ -76,14 +82,18 @@ class Certifier:
             path: Configurations with theta unwrapped, the first one free, shape (m, 3 + n).
             progress: Called with the share of the path that is covered.
             quick: Whether to take the longest boxes instead of those that are passed quickest.
+            last: Whether boxes may be as small as a millimetre of room asks for, too narrow to be executed
+                in good time.
         """
         samples = densified(path, self._scale, _RESOLUTION)
         chain: list[PathBox] = []
         i = 0
         while i < len(samples) - 1:
-            found = self._longest(samples, i, quick)
+            found = self._longest(samples, i, quick, _LAST_LEVELS if last else _LEVELS)
             if found is None:
-                if np.abs((samples[i + 1] - samples[i]) * self._scale).max() < _FINEST:
+                if np.abs((samples[i + 1] - samples[i]) * self._scale).max() < (
+                    _LAST_FINEST if last else _FINEST
+                ):
                     return None
                 samples = _finer(samples, i)
                 continue
@@ -93,9 +103,11 @@ class Certifier:
                 progress(i / (len(samples) - 1))
         return chain
 
-    def _longest(self, samples: FloatArray, i: int, quick: bool) -> tuple[int, PathBox] | None:
+    def _longest(
+        self, samples: FloatArray, i: int, quick: bool, levels: tuple[tuple[float, float], ...]
+    ) -> tuple[int, PathBox] | None:
         """Sample that one box holds together with sample i, and that box."""
-        for pad, room in _LEVELS:
+        for pad, room in levels:
             quickest, longest, trials = longest_box(
                 self._boxes, self._walls, samples, i, self._guess, pad, room, self._margin
             )

@@ -35,6 +35,10 @@ KEPT = 0.75
 STRAIGHT = (0.1, 2_000), (0.05, 800)
 """Spacings [m] and moves with which it is straightened."""
 
+NARROW, FINE, REPEATS = 0.01, (0.02, 16_000), 3
+"""Below this clearance [m] a way is drawn from the walls again with samples so close [m], with so many moves,
+and so often."""
+
 MARGIN_SHARES = (0.8, 0.65, 0.5, 0.35)
 """Shares of a way's clearance that its boxes may keep as a margin, tried in this order [-]."""
 
@@ -70,6 +74,18 @@ def with_room(problem: PlanningProblem, path: FloatArray, gap: float) -> FloatAr
     clearance = max(KEPT * room_along(problem, path, most), LEAST_CLEARANCE)
     for spacing, moves in STRAIGHT:
         path = drawn_tight(problem, path, clearance, clearance, gap, spacing, moves)
+    return _through_narrows(problem, path, gap)
+
+
+def _through_narrows(problem: PlanningProblem, path: FloatArray, gap: float) -> FloatArray:
+    """The same way, if it is narrow in the middle of what there is: a millimetre there is a minute."""
+    room = room_along(problem, path, NARROW)
+    for _ in range(REPEATS if 0.0 < room < NARROW else 0):
+        wider = drawn_tight(problem, path, 0.8 * room, 0.0, gap, *FINE, WIDE_PRICE)
+        reached = room_along(problem, wider, NARROW)
+        if reached <= room:
+            break
+        path, room = wider, reached
     return path
 
 

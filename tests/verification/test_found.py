@@ -161,7 +161,7 @@ def moved_target(document):
             r"transitions\[0\].gains|cells\[0\].safe: .* may touch the wall",
         ),
         (grown_safe, r"cells\[0\].safe: .* may touch the wall from"),
-        (moved(0.05, "cells", 0, "tidied", "outer", 0, 0), r"transitions|cells"),
+        (moved(2.0, "cells", 0, "tidied", "outer", 0, 0), r"transitions|cells"),
         (moved_target, r"transitions\[0\].inradius: is .* expected"),
         (moved(1e-6, "transitions", 0, "inradius"), r"transitions\[0\].inradius: is"),
         (moved(0.05, "transitions", 0, "neck"), r"transitions\[0\].(neck: no way keeps|gains)"),
