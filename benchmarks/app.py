@@ -29,7 +29,7 @@ __all__ = ["app"]
 
 _RESULTS = Path("out/bench.json")
 _FAILED, _BAD_USE, _INTERRUPTED = 1, 2, 130
-_LIMIT = 20.0
+_LIMIT = 80.0
 _ABLATION_LIMIT = 5.0
 _COMPILING_LIMIT = 600.0
 _COMMANDED = ("base", "tight", "closed", "three", "elbow")
