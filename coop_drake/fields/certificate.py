@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,6 +49,11 @@ class MapCertificate:
     worst_place_description: str
     worst_angle: float | None = None
     worst_gap: float | None = None
+
+    def plain(self) -> dict[str, Any]:
+        """The same as plain values by name, as JSON holds them."""
+        values = asdict(self)
+        return values | {"worst_place": values["worst_place"].tolist()}
 
 
 class Fault(NamedTuple):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import json
 import platform
@@ -164,19 +163,12 @@ def _write(path: Path, key: str, solution: Solution) -> None:
         centre=solution.centre,
         rounding=solution.rounding,
         goal_image=solution.goal_image,
-        certificate=_text(solution.certificate),
+        certificate=json.dumps(solution.certificate.plain()),
     )
     with suppress(OSError):
         write_atomically(path, lambda file: np.savez(file, **entries))
 
 
-def _text(certificate: MapCertificate) -> str:
-    values = dataclasses.asdict(certificate)
-    return json.dumps({k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values.items()})
-
-
 def _certificate(text: str) -> MapCertificate:
     values: dict[str, Any] = json.loads(text)
-    for name, value in values.items():
-        values[name] = np.array(value) if isinstance(value, list) else value
-    return MapCertificate(**values)
+    return MapCertificate(**values | {"worst_place": np.array(values["worst_place"])})

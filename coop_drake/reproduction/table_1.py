@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.geometry.pose import FloatArray
-
 # Columns as printed: theta_l, theta_u, then lower and upper end of q_11, lower and upper end of q_21.
 PRINTED = np.array(
     [
@@ -50,26 +48,3 @@ CORRECTED[23, 5] = 0.050
 START = np.array([1.57, 0.0, 0.0])
 GOAL_ANGLE = 4.663
 ANGLE_TOLERANCE = 0.02
-
-
-def table_transitions(table: FloatArray) -> list[dict[str, FloatArray]]:
-    """Return, for every row, the slice's ends, the goal interval's ends and where the axes rest on entry.
-
-    Args:
-        table: Rows as printed, shape (m, 6) [rad].
-    """
-    lower, upper = table[:, 0::2].copy(), table[:, 1::2].copy()
-    goal_lower, goal_upper = lower.copy(), upper.copy()
-    goal_lower[:-1], goal_upper[:-1] = np.maximum(lower[:-1], lower[1:]), np.minimum(upper[:-1], upper[1:])
-    goal_lower[-1, 0], goal_upper[-1, 0] = GOAL_ANGLE - ANGLE_TOLERANCE, GOAL_ANGLE + ANGLE_TOLERANCE
-    resting = np.vstack([START, 0.5 * (goal_lower + goal_upper)[:-1]])
-    return [
-        {
-            "slice_lower": lower[i],
-            "slice_upper": upper[i],
-            "goal_lower": goal_lower[i],
-            "goal_upper": goal_upper[i],
-            "resting": resting[i],
-        }
-        for i in range(len(table))
-    ]

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-import numpy as np
 from shapely import Point
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
@@ -76,7 +74,6 @@ def certificate_rows(maps: Sequence[HarmonicMap]) -> list[dict[str, Any]]:
     """What every map is worth, as plain values by the names of `MapCertificate`, cells counted from 0."""
     rows = []
     for cell, harmonic_map in enumerate(maps):
-        values = dataclasses.asdict(harmonic_map.certificate)
-        plain = {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values.items()}
-        rows.append({"cell": cell, "vertices": len(harmonic_map.solution.arrays.edges), **plain})
+        vertices = len(harmonic_map.solution.arrays.edges)
+        rows.append({"cell": cell, "vertices": vertices, **harmonic_map.certificate.plain()})
     return rows

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from coop_drake.control import Funnel, ScheduledGains, funnel_walls, prescribed_acceleration, transition_gains
-from coop_drake.reproduction.table_1 import CORRECTED, table_transitions
+from coop_drake.reproduction.table_1 import CORRECTED
 from tests.support import printed
+from tests.support.table_1 import table_transitions
 
 ONE_AXIS = {
     "slice_lower": np.array([1.47]),

@@ -10,9 +10,9 @@ from coop_drake.reproduction.table_1 import (
     GOAL_ANGLE,
     PRINTED,
     START,
-    table_transitions,
 )
 from tests.support.axes_run import play
+from tests.support.table_1 import table_transitions
 
 JOINT_RANGE = 3.74
 OVERLAPS = np.array([0.1, 0.15, 0.2])
