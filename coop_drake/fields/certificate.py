@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coop_drake.fields.evaluation import evaluate_many
-from coop_drake.fields.layers import MapArrays
+from coop_drake.fields.flat_map import FlatMap, rounding_of, unflatten
 from coop_drake.fields.outline import ComplexArray, IntArray, Outline
 from coop_drake.fields.panels import Panels
 from coop_drake.fields.quadrature import FloatArray
@@ -73,26 +73,24 @@ class Fault(NamedTuple):
 def certify(
     outline: Outline,
     panels: Panels,
-    arrays: MapArrays,
+    flat: FlatMap,
     hole_images: FloatArray,
     condition: float,
-    tolerance: float,
 ) -> MapCertificate:
     """Sample the residual on every panel and far down every corner.
 
     Args:
         outline: The rings.
         panels: Where they are cut.
-        arrays: The map, evaluated as its users evaluate it.
+        flat: The map, evaluated as its users evaluate it.
         hole_images: c_k, shape (holes, 2).
         condition: Condition estimate to report.
-        tolerance: Rounding of coordinates [m].
     """
     position, expected, edge = _samples(outline, panels, hole_images)
     vertices = np.minimum(np.abs(position - outline.vertices[edge]), np.abs(position - outline.ends[edge]))
-    clear = vertices > 100.0 * tolerance  # rounding would move closer samples across the other wall
+    clear = vertices > 100.0 * rounding_of(flat)  # rounding would move closer samples across the other wall
     position, expected, edge = position[clear], expected[clear], edge[clear]
-    images, _ = evaluate_many(arrays, np.column_stack((position.real, position.imag)), tolerance)
+    images, _ = evaluate_many(flat, np.column_stack((position.real, position.imag)))
     residuals = np.abs(images[:, 0] + 1j * images[:, 1] - expected)
     residuals = np.where(np.isfinite(residuals), residuals, np.inf)
     worst = int(np.argmax(residuals))
@@ -102,7 +100,7 @@ def certify(
         residual=float(residuals[worst]),
         error_bound=float((2 * outline.holes + 1) * residuals[worst]),
         samples=len(position),
-        unknowns=arrays.sources.shape[1] + outline.holes,
+        unknowns=unflatten(flat).sources.shape[1] + outline.holes,
         condition=condition,
         worst_place=np.array([place.real, place.imag]),
         worst_place_description=fault.description,

@@ -8,14 +8,13 @@ import numpy as np
 
 from coop_drake.fields.compiled import compiled
 from coop_drake.fields.far_field import far_field, leaf_at
+from coop_drake.fields.flat_map import FlatMap, centre_of, rounding_of, unflatten
 from coop_drake.fields.layers import INSIDE, MapArrays
 from coop_drake.fields.near_field import Sums, add, corner, is_at_vertex, regular, ring
 from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.walls import is_inside, nearest_on_edges
 
-__all__ = ["evaluate_many", "evaluate_one", "velocities_at", "velocity_at"]
-
-_STRAIGHT = 1e-6  # part of the slowdown radius within which the line to a point goal is straight
+__all__ = ["evaluate_at", "evaluate_many", "evaluate_one"]
 
 
 @compiled
@@ -59,49 +58,25 @@ def evaluate_one(m: MapArrays, x: float, y: float, tolerance: float) -> Sums:
 
 
 @compiled
-def evaluate_many(m: MapArrays, points: FloatArray, tolerance: float) -> tuple[FloatArray, FloatArray]:
+def evaluate_at(flat: FlatMap, x: float, y: float) -> tuple[FloatArray, FloatArray]:
+    """Image (2,) and Jacobian (2, 2) of a point of W."""
+    centre = centre_of(flat)
+    values = evaluate_one(unflatten(flat), x - centre[0], y - centre[1], rounding_of(flat))
+    image, jacobian = np.empty(2), np.empty((2, 2))
+    for k in range(2):
+        image[k] = values[k]
+        jacobian[0, k], jacobian[1, k] = values[2 + k], values[4 + k]
+    return image, jacobian
+
+
+@compiled
+def evaluate_many(flat: FlatMap, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Images (n, 2) and Jacobians (n, 2, 2) of points (n, 2) relative to the map's centre."""
+    m, rounding = unflatten(flat), rounding_of(flat)
     images, jacobians = np.empty((len(points), 2)), np.empty((len(points), 2, 2))
     for i in range(len(points)):
-        values = evaluate_one(m, points[i, 0], points[i, 1], tolerance)
+        values = evaluate_one(m, points[i, 0], points[i, 1], rounding)
         for k in range(2):
             images[i, k] = values[k]
             jacobians[i, 0, k], jacobians[i, 1, k] = values[2 + k], values[4 + k]
     return images, jacobians
-
-
-@compiled
-def velocity_at(
-    arrays: MapArrays, x: float, y: float, rounding: float,
-    goal: FloatArray, image: FloatArray, radius: float, max_speed: float,
-) -> FloatArray:  # fmt: skip
-    """Direction times speed at a point relative to the map's centre."""
-    velocity = np.zeros(2)
-    gx, gy = nearest_on_edges(goal, x, y)
-    remaining = np.hypot(gx - x, gy - y)
-    if remaining == 0.0 or is_inside(goal, x, y):
-        return velocity
-    if len(goal) == 1 and remaining < _STRAIGHT * radius:
-        dx, dy = gx - x, gy - y
-    else:
-        u, v, u_x, u_y, v_x, v_y = evaluate_one(arrays, x, y, rounding)
-        du, dv = image[0] - u, image[1] - v
-        dx, dy = v_y * du - u_y * dv, u_x * dv - v_x * du
-    norm = np.hypot(dx, dy)
-    if norm > 0.0:
-        speed = max_speed * min(1.0, remaining / radius)
-        velocity[0], velocity[1] = speed * dx / norm, speed * dy / norm
-    return velocity
-
-
-@compiled
-def velocities_at(
-    arrays: MapArrays, points: FloatArray, rounding: float,
-    goal: FloatArray, image: FloatArray, radius: float, max_speed: float,
-) -> FloatArray:  # fmt: skip
-    """The same at many points (n, 2)."""
-    velocities = np.empty((len(points), 2))
-    for i in range(len(points)):
-        x, y = points[i, 0], points[i, 1]
-        velocities[i] = velocity_at(arrays, x, y, rounding, goal, image, radius, max_speed)
-    return velocities

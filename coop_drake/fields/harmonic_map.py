@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
 from numpy.typing import ArrayLike
 from shapely import Point, Polygon
 
 from coop_drake.fields.certificate import MapCertificate
-from coop_drake.fields.evaluation import evaluate_many
+from coop_drake.fields.evaluation import evaluate_at, evaluate_many
 from coop_drake.fields.goals import region_to_map
-from coop_drake.fields.layers import MapArrays
 from coop_drake.fields.outline import outline_of
 from coop_drake.fields.points import as_points
 from coop_drake.fields.quadrature import FloatArray
@@ -79,8 +77,9 @@ class HarmonicMap:
             T, shape (..., 2), and J = dT/dp, shape (..., 2, 2) [1/m].
         """
         p = as_points(points)
-        flat = np.ascontiguousarray(p.reshape(-1, 2) - self._solution.centre)
-        T, J = evaluate_many(self._solution.arrays, flat, self._solution.rounding)
+        if p.ndim == 1:
+            return evaluate_at(self._solution.flat, *p.tolist())
+        T, J = evaluate_many(self._solution.flat, p.reshape(-1, 2) - self._solution.centre)
         return T.reshape(p.shape), J.reshape(*p.shape, 2)
 
     @property
@@ -112,8 +111,3 @@ class HarmonicMap:
     def solution(self) -> Solution:
         """What solving left behind, see `from_solution`."""
         return self._solution
-
-    @property
-    def kernel_arguments(self) -> tuple[MapArrays, FloatArray, float]:
-        """Arrays, centre (2,) in W [m] and rounding [m], for kernels that evaluate the map themselves."""
-        return self._solution[:3]

@@ -26,7 +26,8 @@ def as_points(points: ArrayLike) -> FloatArray:
     if p.ndim == 0 or p.shape[-1] != 2:
         raise FieldError(f"points must have shape (..., 2), got {p.shape}")
     # The sum is quicker than a flag for each: it is finite unless a coordinate is not, or it overflows.
-    if not isfinite(p.sum()) and not np.isfinite(p).all():
+    total = sum(p.tolist()) if p.ndim == 1 else p.sum()
+    if not isfinite(total) and not np.isfinite(p).all():
         first = np.argwhere(~np.isfinite(p).all(axis=-1))[0].tolist()
         raise FieldError(f"points must be finite, but point {first or 0} is {p[tuple(first)].tolist()}")
     return p

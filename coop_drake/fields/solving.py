@@ -11,7 +11,8 @@ from coop_drake.errors import UnmappableError
 from coop_drake.fields.certificate import MapCertificate, certify, find_fault
 from coop_drake.fields.corners import leg_panels
 from coop_drake.fields.density import solve_density
-from coop_drake.fields.evaluation import evaluate_many
+from coop_drake.fields.evaluation import evaluate_at
+from coop_drake.fields.flat_map import FlatMap, centre_of, flatten, unflatten
 from coop_drake.fields.layers import MapArrays
 from coop_drake.fields.outline import Outline
 from coop_drake.fields.packing import pack_layers
@@ -42,18 +43,24 @@ class Solution(NamedTuple):
     """What solving leaves behind: all that evaluating a map takes, as plain arrays and numbers.
 
     Attributes:
-        arrays: The layers, for the kernels that evaluate them.
-        centre: Origin of their coordinates in W [m], shape (2,).
-        rounding: How far outside still counts as on the wall [m].
+        flat: The layers, for the kernels that evaluate them, see `flat_map`.
         goal_image: q_d, the goal's image in the disk, shape (2,).
         certificate: How far the map can be from the true one.
     """
 
-    arrays: MapArrays
-    centre: FloatArray
-    rounding: float
+    flat: FlatMap
     goal_image: FloatArray
     certificate: MapCertificate
+
+    @property
+    def arrays(self) -> MapArrays:
+        """The layers one by one, as views."""
+        return unflatten(self.flat)
+
+    @property
+    def centre(self) -> FloatArray:
+        """Origin of their coordinates in W [m], shape (2,)."""
+        return centre_of(self.flat)
 
 
 def solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solution:
@@ -115,13 +122,13 @@ def _solve(outline: Outline, goal: Point | Polygon, panels: Panels, attempt: Att
     rounding = 8.0 * float(np.finfo(float).eps) * (abs(outline.centre) + outline.diameter)
     density = solve_density(outline, panels, angles, *attempt)
     arrays = pack_layers(outline, panels, angles, density, attempt.closeness)
-    certificate = certify(outline, panels, arrays, density.hole_images, density.condition, rounding)
-    image = _goal_image(outline, goal, density.hole_images, arrays, rounding)
-    return Solution(arrays, centre, rounding, image, certificate)
+    flat = flatten(arrays, centre, rounding)
+    certificate = certify(outline, panels, flat, density.hole_images, density.condition)
+    return Solution(flat, _goal_image(outline, goal, density.hole_images, flat), certificate)
 
 
 def _goal_image(
-    outline: Outline, goal: Point | Polygon, hole_images: FloatArray, arrays: MapArrays, rounding: float
+    outline: Outline, goal: Point | Polygon, hole_images: FloatArray, flat: FlatMap
 ) -> FloatArray:
     """Where the goal goes: a point of the circle, a hole's image, or the image of a point."""
     image: FloatArray
@@ -129,10 +136,8 @@ def _goal_image(
         return np.array([np.cos(outline.goal_angle), np.sin(outline.goal_angle)])
     if outline.goal_ring is not None:
         image = hole_images[outline.goal_ring - 1].copy()
-        return image
-    point = np.array(goal.coords) - [outline.centre.real, outline.centre.imag]
-    images, _ = evaluate_many(arrays, point, rounding)
-    image = images[0]
+    else:
+        image, _ = evaluate_at(flat, *goal.coords[0][:2])
     return image
 
 

@@ -21,7 +21,6 @@ from shapely import Point, Polygon
 
 from coop_drake.fields.certificate import MapCertificate
 from coop_drake.fields.harmonic_map import HarmonicMap
-from coop_drake.fields.layers import MapArrays
 from coop_drake.fields.solving import Solution
 from coop_drake.files import write_atomically
 
@@ -143,9 +142,7 @@ def _read(path: Path, key: str) -> Solution | None:
             if file["key"].item() != key:
                 return None
             solution = Solution(
-                arrays=MapArrays(**{name: file[f"arrays.{name}"] for name in MapArrays._fields}),
-                centre=file["centre"],
-                rounding=file["rounding"].item(),
+                flat=file["flat"],
                 goal_image=file["goal_image"],
                 certificate=_certificate(file["certificate"].item()),
             )
@@ -157,16 +154,12 @@ def _read(path: Path, key: str) -> Solution | None:
 
 def _write(path: Path, key: str, solution: Solution) -> None:
     """Keep a solution; a folder that cannot be written keeps nothing."""
-    entries: dict[str, Any] = {f"arrays.{name}": value for name, value in solution.arrays._asdict().items()}
-    entries.update(
-        key=key,
-        centre=solution.centre,
-        rounding=solution.rounding,
-        goal_image=solution.goal_image,
-        certificate=json.dumps(solution.certificate.plain()),
-    )
+    flat, image = solution.flat, solution.goal_image
+    certificate = json.dumps(solution.certificate.plain())
     with suppress(OSError):
-        write_atomically(path, lambda file: np.savez(file, **entries))
+        write_atomically(
+            path, lambda file: np.savez(file, key=key, flat=flat, goal_image=image, certificate=certificate)
+        )
 
 
 def _certificate(text: str) -> MapCertificate:

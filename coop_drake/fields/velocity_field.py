@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from shapely import Point
 
-from coop_drake.fields.evaluation import velocities_at, velocity_at
+from coop_drake.fields.flat_field import flat_field, velocities_in_field, velocity_in_field
+from coop_drake.fields.flat_map import FlatMap
 from coop_drake.fields.harmonic_map import HarmonicMap
 from coop_drake.fields.points import as_points
 from coop_drake.fields.quadrature import FloatArray
@@ -43,17 +44,17 @@ class VelocityField:
     ) -> None:
         self.harmonic_map = harmonic_map
         self.max_speed = float(max_speed)
-        goal = harmonic_map.goal
-        self._arrays, self._centre, self._rounding = harmonic_map.kernel_arguments
+        goal, solution = harmonic_map.goal, harmonic_map.solution
         if isinstance(goal, Point):
             default = 0.5 * harmonic_map.region.boundary.distance(goal)
             edges = np.tile(np.array(goal.coords)[:, :2], 2)
         else:
             default = 0.5 * sqrt(goal.area / pi)
             edges = edges_of(goal)
-        self._goal = edges - np.tile(self._centre, 2)
         self.slowdown_radius = default if slowdown_radius is None else float(slowdown_radius)
-        self._image = harmonic_map.goal_image
+        around = edges - np.tile(solution.centre, 2)
+        self._map = solution.flat
+        self._field = flat_field(around, solution.goal_image, self.slowdown_radius, self.max_speed)
 
     def __call__(self, points: ArrayLike) -> FloatArray:
         """Velocity at one point or at many.
@@ -67,9 +68,12 @@ class VelocityField:
         Raises:
             FieldError: If the points have another shape or are not finite.
         """
-        p = as_points(points) - self._centre
-        rest = (self._rounding, self._goal, self._image, self.slowdown_radius, self.max_speed)
+        p = as_points(points)
         if p.ndim == 1:
-            x, y = p.tolist()
-            return velocity_at(self._arrays, x, y, *rest)
-        return velocities_at(self._arrays, p.reshape(-1, 2), *rest).reshape(p.shape)
+            return np.array(velocity_in_field(self._map, self._field, *p.tolist()))
+        return velocities_in_field(self._map, self._field, p.reshape(-1, 2)).reshape(p.shape)
+
+    @property
+    def kernel_arguments(self) -> tuple[FlatMap, FloatArray]:
+        """What `velocity_in_field` takes, for compiled code that evaluates the field itself."""
+        return self._map, self._field

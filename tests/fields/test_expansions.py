@@ -6,6 +6,7 @@ from shapely import Point, box
 
 from coop_drake.fields import HarmonicMap
 from coop_drake.fields.evaluation import evaluate_many
+from coop_drake.fields.flat_map import flatten, rounding_of
 from coop_drake.fields.layers import INSIDE, ON_BOUNDARY, OUTSIDE
 from tests.support import domains
 
@@ -40,18 +41,19 @@ def without_boxes(arrays):
 
 
 def test_series_change_nothing(mapped):
-    arrays, centre, rounding = mapped.kernel_arguments
+    flat, centre = mapped.solution.flat, mapped.solution.centre
+    alone = flatten(without_boxes(mapped.solution.arrays), centre, rounding_of(flat))
     walls, normals = domains.off_wall(mapped.region, 0.0)
     points = np.concatenate((domains.inside(mapped.region, 400), walls, walls + 1e-4 * normals)) - centre
-    T, J = evaluate_many(arrays, points, rounding)
-    T_all, J_all = evaluate_many(without_boxes(arrays), points, rounding)
+    T, J = evaluate_many(flat, points)
+    T_all, J_all = evaluate_many(alone, points)
     # Far panels act through the solved nodes or the refined ones: they agree as well as the map is certified.
     np.testing.assert_allclose(T, T_all, atol=mapped.certificate.error_bound + 1e-11)
     np.testing.assert_allclose(J, J_all, atol=1e-6 * np.abs(J_all).max())
 
 
 def test_little_is_near_any_point(mapped):
-    arrays = mapped.kernel_arguments[0]
+    arrays = mapped.solution.arrays
     count = np.diff(arrays.near_start)
     assert count.max() <= 24
     assert count[arrays.leaf_state == OUTSIDE].sum() == 0
@@ -59,7 +61,7 @@ def test_little_is_near_any_point(mapped):
 
 
 def test_leaves_share_out_the_square(mapped):
-    arrays = mapped.kernel_arguments[0]
+    arrays = mapped.solution.arrays
     area = 2.0 * arrays.leaf_square[:, 2] ** 2
     assert area.sum() == pytest.approx((2.0 * arrays.root[2]) ** 2)
     assert sorted(arrays.box_leaf[arrays.box_child < 0]) == list(range(len(area)))
@@ -68,7 +70,7 @@ def test_leaves_share_out_the_square(mapped):
 def test_sharp_corners_of_many_nodes_fit():
     domain, goal = domains.needle(1.05)
     harmonic_map = HarmonicMap(domain, goal)
-    assert harmonic_map.kernel_arguments[0].corner_index[:-1, 2].max() > 512
+    assert harmonic_map.solution.arrays.corner_index[:-1, 2].max() > 512
     T, J = harmonic_map(domains.inside(domain, 100))
     assert (np.hypot(*T.T) < 1.0).all()
     assert (np.linalg.det(J) > 0.0).all()
