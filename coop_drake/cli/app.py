@@ -14,6 +14,7 @@ from typing import Annotated
 
 import typer
 
+from coop_drake.cli.compare import compare_command
 from coop_drake.cli.diagram import diagram_command
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
@@ -164,4 +165,5 @@ app.command("why")(why_command)
 app.command("verify")(verify_command)
 app.command("maps")(maps_command)
 app.command("diagram")(diagram_command)
+app.command("compare")(compare_command)
 app.command("reproduce")(reproduce_command)

@@ -84,6 +84,7 @@ def simulation_measures(plan: Plan, log: SimulationLog) -> dict[str, Any]:
         "min_delta_e": float(log.energy_margin.min()),
         "max_acceleration_error": float(log.acceleration_error.max()),
         "max_wrench_error_n": float(log.wrench_error.max()),
+        "max_grasp_error_m": float(log.grasp_error.max()),
         "max_governor_spread_m": float(log.governor_spread.max()),
         "messages": ledger.messages,
         "message_bytes": ledger.message_bytes,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from time import perf_counter, process_time
 from typing import Any
@@ -76,11 +76,18 @@ class Reporter:
         """Show a line of text, with rich's markup."""
         self._console.print(text, soft_wrap=True)
 
-    def table(self, title: str, rows: list[tuple[str, str]]) -> None:
-        """Show the closing table."""
-        table = Table(title=title, title_justify="left", show_header=False)
+    def table(self, title: str, rows: Sequence[tuple[str, ...]], headings: Sequence[str] = ("",)) -> None:
+        """Show the closing table.
+
+        Args:
+            title: Above it.
+            rows: Label, then one value for each heading.
+            headings: Of the columns of values.
+        """
+        table = Table(title=title, title_justify="left", show_header=any(headings))
         table.add_column(style="bold")
-        table.add_column(justify="right")
+        for heading in headings:
+            table.add_column(heading, justify="right")
         for row in rows:
             table.add_row(*row)
         self._console.print(table)

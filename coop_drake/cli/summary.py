@@ -27,6 +27,7 @@ _ROWS: tuple[tuple[str, str, str], ...] = (
     ("smallest energy margin", "min_delta_e", "{:.2e} m²/s²"),
     ("largest acceleration error", "max_acceleration_error", "{:.1e} m/s²"),
     ("largest wrench error", "max_wrench_error_n", "{:.1e} N"),
+    ("largest grasp error", "max_grasp_error_m", "{:.1e} m"),
     ("messages between robots", "messages", "{}"),
     ("their payload", "message_bytes", "{} bytes"),
     ("peak base force", "peak_base_wrench_n", "{:.1f} N"),

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from coop_drake.plant import TeamPlant, build_team_plant
+from coop_drake.plant import SeparateTeam, TeamPlant, build_separate_team, build_team_plant
 from coop_drake.scenario import Scenario
-from coop_drake.systems import ObjectPoseSensor, RobotStateSensor, TeamActuation
+from coop_drake.systems import FreeRobotSensor, ObjectPoseSensor, RobotStateSensor, TeamActuation
 
 __all__ = ["TransportStation", "build_station"]
 
@@ -27,14 +27,14 @@ class TransportStation:
 
 
 def build_station(scenario: Scenario) -> TransportStation:
-    """Build the plant rooted at the object with one actuation port and one state port for each robot.
+    """Build the team's plant, as the scenario wants it, with an actuation and a state port for each robot.
 
     ======= =========================== ========== =========================================================
     input   ``robot_<k>_effort``        3 + n_k    base wrench and joint torques of robot k
     output  ``object_pose``             3          pose of L in W
     output  ``robot_<k>_state``         2(3+n_k)   z_k and its rate
-    output  ``generalized_acceleration``  3+n      the plant's accelerations, for the log alone
-    output  ``reaction_forces``         abstract   forces in the plant's joints, for the log alone
+    output  ``generalized_acceleration``  3+n      the plant's accelerations, for the log alone; 3 more for
+                                                   each base where robots are trees of their own
     output  ``query_object``            abstract   geometry, for visualization
     ======= =========================== ========== =========================================================
 
@@ -45,7 +45,7 @@ def build_station(scenario: Scenario) -> TransportStation:
         ScenarioError: The models do not make a team.
     """
     builder = DiagramBuilder()
-    team = build_team_plant(scenario, builder)
+    team = (build_team_plant if scenario.plant.ideal else build_separate_team)(scenario, builder)
     plant = team.plant
     pose = builder.AddNamedSystem("object_pose_sensor", ObjectPoseSensor(team))
     builder.Connect(plant.get_state_output_port(), pose.GetInputPort("team_state"))
@@ -54,12 +54,15 @@ def build_station(scenario: Scenario) -> TransportStation:
     builder.Connect(actuation.GetOutputPort("base_wrenches"), plant.get_applied_spatial_force_input_port())
     builder.Connect(actuation.GetOutputPort("joint_torques"), plant.get_actuation_input_port())
     for robot in team.robots:
-        sensor = builder.AddNamedSystem(f"robot_{robot.index}_sensor", RobotStateSensor(team, robot.index))
+        sensor = builder.AddNamedSystem(f"robot_{robot.index}_sensor", _sensor(team, robot.index))
         builder.Connect(plant.get_state_output_port(), sensor.GetInputPort("team_state"))
         builder.ExportOutput(sensor.GetOutputPort("robot_state"), f"robot_{robot.index}_state")
         effort = f"robot_{robot.index}_effort"
         builder.ExportInput(actuation.GetInputPort(effort), effort)
     builder.ExportOutput(plant.get_generalized_acceleration_output_port(), "generalized_acceleration")
-    builder.ExportOutput(plant.get_reaction_forces_output_port(), "reaction_forces")
     builder.ExportOutput(team.scene_graph.get_query_output_port(), "query_object")
     return TransportStation(builder.Build(), team)
+
+
+def _sensor(team: TeamPlant, robot: int) -> RobotStateSensor | FreeRobotSensor:
+    return FreeRobotSensor(team, robot) if isinstance(team, SeparateTeam) else RobotStateSensor(team, robot)

@@ -19,13 +19,8 @@ def set_configuration(
         z: (x, y, theta, q...), shape (3 + n,) [m, rad].
         z_rate: Rates of z, shape (3 + n,); at rest if None.
     """
-    positions = np.zeros(team.plant.num_positions())
-    velocities = np.zeros(team.plant.num_velocities())
-    positions[team.position_index] = z
-    if z_rate is not None:
-        velocities[team.velocity_index] = z_rate
-    team.plant.SetPositions(context, positions)
-    team.plant.SetVelocities(context, velocities)
+    rates = np.zeros(len(z)) if z_rate is None else z_rate
+    team.plant.SetPositionsAndVelocities(context, team.plant_state(z, rates))
 
 
 def get_configuration(team: TeamPlant, context: Context) -> FloatArray:

@@ -16,14 +16,14 @@ from pydrake.multibody.tree import (
     ModelInstanceIndex,
     PlanarJoint,
     RigidBody,
-    WeldJoint,
 )
 from pydrake.systems.framework import Context, DiagramBuilder
 
 from coop_drake.geometry.pose import FloatArray, PlanarPose
 from coop_drake.plant.chain import find_base, scoped
 from coop_drake.plant.flatness import check_flat, check_masses, object_frame, planar_pose
-from coop_drake.plant.parsing import add_models, bodies_of, finalize, joints_of, set_actuators
+from coop_drake.plant.grasps import Grasps, WeldedGrasps
+from coop_drake.plant.parsing import add_models, bodies_of, finalize, set_actuators
 from coop_drake.scenario import Assembly, RobotAssembly, Scenario, assemble
 
 
@@ -58,9 +58,6 @@ class RobotModel:
         joints: In the order of q_k, from the base outwards.
         joint_names: Their scoped names.
         gripper_frame: Ek, fixed on the robot's hand.
-        weld: The joint that grasps the object.
-        weld_index: Place of the weld in the plant's ``reaction_forces`` output.
-        weld_sign: +1: the object is the weld's parent, so the reaction on the child acts on the robot.
         X_LE: Pose of the grasp in the object's frame.
         q_slice: Where q_k stands in q.
     """
@@ -72,9 +69,6 @@ class RobotModel:
     joints: tuple[Joint, ...]
     joint_names: tuple[str, ...]
     gripper_frame: Frame
-    weld: WeldJoint
-    weld_index: int
-    weld_sign: int
     X_LE: PlanarPose
     q_slice: slice
 
@@ -94,6 +88,7 @@ class TeamPlant:
         object_joint: Moves L against the world; its coordinates are (x, y, theta).
         object_inertia: Mass properties of the object.
         robots: In the scenario's order.
+        grasps: What is read of the robots' hold on the object.
         assembly: Who is who in the directives.
         scenario: What it was built from.
     """
@@ -105,8 +100,26 @@ class TeamPlant:
     object_joint: PlanarJoint
     object_inertia: ObjectInertia
     robots: tuple[RobotModel, ...]
+    grasps: Grasps
     assembly: Assembly
     scenario: Scenario
+
+    @property
+    def as_tree(self) -> TeamPlant:
+        """The same team as one tree rooted at the object, which is how it is planned for."""
+        return self
+
+    def plant_state(self, z: FloatArray, z_rate: FloatArray) -> FloatArray:
+        """Positions and velocities of the whole plant.
+
+        Args:
+            z: (x, y, theta, q...), shape (3 + n,) [m, rad].
+            z_rate: Rates of z, shape (3 + n,).
+        """
+        state = np.zeros(self.plant.num_multibody_states())
+        state[self.position_index] = z
+        state[self.plant.num_positions() + self.velocity_index] = z_rate
+        return state
 
     @cached_property
     def joints(self) -> tuple[Joint, ...]:
@@ -160,8 +173,9 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
         first = robots[-1].q_slice.stop if robots else 0
         robots.append(_robot_model(scenario, robot, plant, context, frame, base, joints, len(robots), first))
     inertia = _object_inertia(plant, context, bodies_of(plant, [assembly.object_model]), frame)
+    grasps = WeldedGrasps(plant, assembly.robots)
     return TeamPlant(
-        plant, scene_graph, body, frame, object_joint, inertia, tuple(robots), assembly, scenario
+        plant, scene_graph, body, frame, object_joint, inertia, tuple(robots), grasps, assembly, scenario
     )
 
 
@@ -177,15 +191,6 @@ def _robot_model(
     first: int,
 ) -> RobotModel:
     gripper = GetScopedFrameByName(plant, robot.gripper_frame)
-    grasped = GetScopedFrameByName(plant, robot.object_frame).body().index()
-    ends = {int(gripper.body().index()), int(grasped)}
-    welds = [
-        (place, joint)
-        for place, joint in enumerate(joints_of(plant))
-        if joint.type_name() == "weld"
-        and {int(joint.parent_body().index()), int(joint.child_body().index())} == ends
-    ]
-    place, weld = welds[0]
     return RobotModel(
         index=index,
         name=robot.name,
@@ -194,9 +199,6 @@ def _robot_model(
         joints=joints,
         joint_names=tuple(scoped(plant, joint) for joint in joints),
         gripper_frame=gripper,
-        weld=weld,
-        weld_index=place,
-        weld_sign=1,
         X_LE=planar_pose(gripper.CalcPose(context, object_frame)),
         q_slice=slice(first, first + len(joints)),
     )

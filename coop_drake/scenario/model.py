@@ -126,6 +126,25 @@ class MapSettings:
 
 
 @dataclass(frozen=True)
+class PlantSettings:
+    """How the team that is simulated hangs together; controllers know nothing of it.
+
+    Attributes:
+        grasps: ``joints`` for one tree rooted at the object, its grasps exactly rigid, in continuous time;
+            ``constraints`` for a tree of every robot's own, held at the object by constraints, in steps.
+        time_step: Of the discrete plant, in place of the simulator's steps; the other has none [s].
+    """
+
+    grasps: Literal["joints", "constraints"] = "joints"
+    time_step: float = 0.001
+
+    @property
+    def ideal(self) -> bool:
+        """Whether grasps are exactly rigid."""
+        return self.grasps == "joints"
+
+
+@dataclass(frozen=True)
 class SimulatorSettings:
     """How the closed loop is integrated.
 
@@ -173,6 +192,7 @@ class Scenario:
         planner: How hard the planner tries.
         gains: The gain sets.
         maps: How well the cells are mapped.
+        plant: How the simulated team hangs together.
         simulator: How the closed loop is integrated.
         deployment: What keeps the team from being ideal.
         visualization: How recordings look.
@@ -188,6 +208,7 @@ class Scenario:
     planner: PlannerSettings = field(default_factory=PlannerSettings)
     gains: Gains = field(default_factory=Gains)
     maps: MapSettings = field(default_factory=MapSettings)
+    plant: PlantSettings = field(default_factory=PlantSettings)
     simulator: SimulatorSettings = field(default_factory=SimulatorSettings)
     deployment: Deployment = field(default_factory=Deployment)
     visualization: VisualizationSettings = field(default_factory=VisualizationSettings)
@@ -201,6 +222,11 @@ class Scenario:
     def load_share(self, robot: str, robots: int) -> float:
         """What part of the work a robot takes, one of ``robots`` [-]."""
         return self.load_shares.get(robot, 1.0 / robots)
+
+    @property
+    def ideal(self) -> bool:
+        """Whether the law's equations hold exactly in simulation."""
+        return self.plant.ideal and self.deployment.ideal
 
     @property
     def gain_sets(self) -> dict[str, GainSet]:

@@ -13,6 +13,7 @@ from coop_drake.scenario.rings import check_workspace
 
 _ROUNDING = 1e-9
 _COARSEST_MAP = 0.01  # An error of T beyond would turn the direction of motion.
+_LONGEST_STEP = 0.01  # Of a discrete plant [s]; forces held for longer are no model of anything.
 _MAY_BE_ZERO = frozenset({"planner.margin", "planner.slice_overlap"})
 
 
@@ -32,6 +33,8 @@ def validate(scenario: Scenario) -> None:
         raise ScenarioError(file, "planner.slice_overlap", scenario.planner.slice_overlap, "at most 1")
     if scenario.maps.tolerance >= _COARSEST_MAP:
         raise ScenarioError(file, "maps.tolerance", scenario.maps.tolerance, f"less than {_COARSEST_MAP:g}")
+    if scenario.plant.time_step > _LONGEST_STEP:
+        raise ScenarioError(file, "plant.time_step", scenario.plant.time_step, f"at most {_LONGEST_STEP:g} s")
     if scenario.simulator.accuracy >= 1.0:
         raise ScenarioError(file, "simulator.accuracy", scenario.simulator.accuracy, "less than 1")
     if scenario.gains.selected not in scenario.gains.sets:
@@ -65,6 +68,7 @@ def _positive_numbers(scenario: Scenario) -> Iterator[tuple[str, float]]:
         "goal.tolerances": scenario.goal.tolerances,
         "planner": scenario.planner,
         "maps": scenario.maps,
+        "plant": scenario.plant,
         "simulator": scenario.simulator,
         "visualization": scenario.visualization,
     }

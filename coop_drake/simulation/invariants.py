@@ -13,10 +13,13 @@ from coop_drake.planning.plan import Plan
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.telemetry import Sample
 
-__all__ = ["ACCELERATION_TOLERANCE", "WRENCH_TOLERANCE", "Invariants", "Margins"]
+__all__ = ["ACCELERATION_TOLERANCE", "GRASP_TOLERANCE", "WRENCH_TOLERANCE", "Invariants", "Margins"]
 
 #: Largest difference between realised and commanded acceleration of the object [m/s^2, rad/s^2].
 ACCELERATION_TOLERANCE = 1e-9
+#: Largest distance between a hand and its grasp where grasps are constraints [m]; clearances are those of
+#: bodies whose hands are in place.
+GRASP_TOLERANCE = 1e-5
 #: Largest difference between a grasp's measured and commanded wrench [N, N m].
 WRENCH_TOLERANCE = 1e-8
 
@@ -78,6 +81,8 @@ class Invariants:
             (f"distance of {self._worst(in_slice)} to its slice", float(in_slice.min()), "rad or m"),
         )
         broken = [f"{name} is {value:.3g} {unit}" for name, value, unit in strict if not value > 0.0]
+        if not sample.grasp_error <= GRASP_TOLERANCE:
+            broken.append(f"distance of a hand to its grasp is {sample.grasp_error:.3g} m")
         if self._exact:
             broken.extend(_inexact(sample, wrench_error))
         where = f"at t = {sample.time:.6g} s in cell {sample.cell}: "

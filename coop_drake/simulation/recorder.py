@@ -50,6 +50,7 @@ class Recorder:
             object_wrench=self._samples("object_wrench"),
             commanded_wrenches=self._samples("commanded_wrenches"),
             measured_wrenches=self._samples("measured_wrenches"),
+            grasp_error=self._samples("grasp_error"),
             base_wrenches=self._samples("base_wrenches"),
             joint_torques=self._samples("joint_torques"),
             ready_margins=self._samples("ready_margins"),

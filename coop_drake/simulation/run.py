@@ -12,7 +12,7 @@ from coop_drake.diagram import build_closed_loop
 from coop_drake.fields import HarmonicMap
 from coop_drake.planning.plan import Plan
 from coop_drake.plant import read_component_tree
-from coop_drake.scenario import Scenario, SimulatorSettings
+from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.invariants import Invariants
 from coop_drake.simulation.joint_limits import joint_limits_kept_by_funnels
@@ -49,17 +49,17 @@ def simulate(
         ScenarioError: The models do not make a team.
     """
     loop = build_closed_loop(scenario, plan, maps, meshcat)
-    clearance = TeamClearance(scenario.workspace.polygon, read_component_tree(loop.team))
+    clearance = TeamClearance(scenario.workspace.polygon, read_component_tree(loop.team.as_tree))
     root = loop.create_context()
     watch = Watch(
         loop,
-        Invariants(clearance, plan, exact=scenario.deployment.ideal),
+        Invariants(clearance, plan, exact=scenario.ideal),
         scenario.goal.tolerances.position,
         root,
         progress,
     )
     simulator = Simulator(loop.diagram, root)
-    _configure(simulator, scenario.simulator)
+    _configure(simulator, scenario)
     simulator.set_monitor(watch)
     with joint_limits_kept_by_funnels():
         simulator.Initialize()
@@ -73,7 +73,14 @@ def simulate(
     )
 
 
-def _configure(simulator: Simulator, settings: SimulatorSettings) -> None:
+def _configure(simulator: Simulator, scenario: Scenario) -> None:
+    if not scenario.plant.ideal:
+        # Between two steps of the plant only governors move, at a rate that is constant but for themselves.
+        step = scenario.plant.time_step
+        config = SimulatorConfig(integration_scheme="explicit_euler", max_step_size=step)
+        ApplySimulatorConfig(config, simulator)
+        return
+    settings = scenario.simulator
     # Schemes without an error estimate take the longest step always; Drake ignores the accuracy for them.
     config = SimulatorConfig(
         integration_scheme=settings.integration_scheme,

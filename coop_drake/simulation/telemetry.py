@@ -12,7 +12,7 @@ from pydrake.systems.framework import Context, System
 from coop_drake.control.load_sharing import rotate, total_wrench
 from coop_drake.diagram import TELEMETRY, ClosedLoop
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.plant import RobotModel, base_poses
+from coop_drake.plant import base_poses
 
 __all__ = ["Sample", "Telemetry"]
 
@@ -36,6 +36,7 @@ class Sample:
         object_wrench: Shape (3,).
         commanded_wrenches: Shape (N, 3).
         measured_wrenches: Shape (N, 3).
+        grasp_error: Largest over the robots.
         base_wrenches: Shape (N, 3).
         joint_torques: Shape (n,).
         acceleration_error: Largest component over all robots' commands.
@@ -57,6 +58,7 @@ class Sample:
     object_wrench: FloatArray
     commanded_wrenches: FloatArray
     measured_wrenches: FloatArray
+    grasp_error: float
     base_wrenches: FloatArray
     joint_torques: FloatArray
     acceleration_error: float
@@ -83,7 +85,6 @@ class Telemetry:
         self._current_cell = _reader(loop.cell_planner, "current_cell", root)
         self._arrived = _reader(loop.cell_planner, "arrived", root)
         self._accelerations = _reader(loop.station.diagram, "generalized_acceleration", root)
-        self._reactions = _reader(loop.station.diagram, "reaction_forces", root)
 
     def read(self) -> Sample:
         """Read the present instant."""
@@ -91,6 +92,7 @@ class Telemetry:
         z = plant.GetPositions(self._plant_context)[team.position_index]
         cell, entry = self._current_cell()
         efforts, hands = self._from_robots("robot_effort"), np.array(self._from_robots("hand_command"))
+        base_wrenches = np.array([effort[:3] for effort in efforts])
         lower, upper = self._funnels()
         governors = np.array(self._from_robots("governor_position"))
         offsets = np.array([rotate(z[2], grasp) for grasp in self._grasps])
@@ -109,8 +111,9 @@ class Telemetry:
             energy_margin=float(min(self._from_robots("energy_margin"))[0]),
             object_wrench=total_wrench(hands[:, 3:], offsets, com_offset=com_offset),
             commanded_wrenches=hands[:, 3:],
-            measured_wrenches=self._measured_wrenches(),
-            base_wrenches=np.array([effort[:3] for effort in efforts]),
+            measured_wrenches=team.grasps.wrenches(self._plant_context, base_wrenches),
+            grasp_error=float(team.grasps.errors(self._plant_context).max()),
+            base_wrenches=base_wrenches,
             joint_torques=np.concatenate([effort[3:] for effort in efforts]),
             acceleration_error=self._acceleration_error(),
             ready_margins=np.array([margin for _, margin in self._from_robots("ready")]),
@@ -132,24 +135,8 @@ class Telemetry:
         realised = self._accelerations()[self._team.velocity_index[:3]]
         return float(np.abs(np.array(self._from_robots("object_acceleration")) - realised).max())
 
-    def _measured_wrenches(self) -> FloatArray:
-        reactions = self._reactions()
-        return np.array(
-            [
-                _wrench_on_object(robot, reactions[robot.weld_index], self._plant_context)
-                for robot in self._team.robots
-            ]
-        )
-
 
 def _reader(system: System, output: str, root: Context) -> Callable[[], Any]:
     """A function that evaluates one output; looking ports and contexts up takes longer than reading them."""
     port, context = system.GetOutputPort(output), system.GetMyContextFromRoot(root)
     return lambda: port.Eval(context)
-
-
-def _wrench_on_object(robot: RobotModel, reaction: Any, plant_context: Context) -> FloatArray:
-    """From the reaction on the weld's child, in its frame, to the planar wrench on the object at Ek."""
-    R_WJc = robot.weld.frame_on_child().CalcRotationMatrixInWorld(plant_context).matrix()
-    force, torque = R_WJc @ reaction.translational(), R_WJc @ reaction.rotational()
-    return -robot.weld_sign * np.array([force[0], force[1], torque[2]])

@@ -3,6 +3,7 @@
 from coop_drake.systems.axis_laws import AxisLaw, axis_laws
 from coop_drake.systems.cell_planner import CellPlanner
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
+from coop_drake.systems.free_robot_sensor import FreeRobotSensor
 from coop_drake.systems.joint_ppc import JointPpc
 from coop_drake.systems.message_channel import MessageChannel, whole_periods
 from coop_drake.systems.object_estimator import ObjectEstimator
@@ -19,6 +20,7 @@ __all__ = [
     "READY_SIZE",
     "AxisLaw",
     "CellPlanner",
+    "FreeRobotSensor",
     "GovernedCell",
     "JointPpc",
     "MessageChannel",

@@ -94,7 +94,6 @@ def test_station_ports(loop):
         "object_pose": 3,
         **{f"robot_{k}_state": 2 * (3 + n_k) for k, n_k in enumerate(joints)},
         "generalized_acceleration": 3 + n,
-        "reaction_forces": "abstract",
         "query_object": "abstract",
     }
 

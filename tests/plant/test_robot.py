@@ -89,17 +89,14 @@ def test_effort_is_what_moves_the_robot_and_what_its_hand_gives_away(scenario):
     plant.get_applied_spatial_force_input_port().FixValue(context, Value(applied))
     acceleration = plant.get_generalized_acceleration_output_port().Eval(context)
     spatial = plant.get_body_spatial_accelerations_output_port().Eval(context)
-    reactions = plant.get_reaction_forces_output_port().Eval(context)
+    on_object = team.grasps.wrenches(context, wrenches)
     for robot in team.robots:
         own = build_robot_plant(scenario, robot.index)
         own.set_state(*own_state(team, robot, context, z, z_rate))
         base = spatial[int(robot.base_body.index())].get_coeffs()[PLANAR]
         joints = acceleration[[joint.velocity_start() for joint in robot.joints]]
-        R_WJc = robot.weld.frame_on_child().CalcRotationMatrixInWorld(context).matrix()
-        on_robot = reactions[robot.weld_index]
-        force, torque = R_WJc @ on_robot.translational(), R_WJc @ on_robot.rotational()
-        on_object = -robot.weld_sign * np.array([force[0], force[1], torque[2]])
-        effort = own.inertial_effort(np.concatenate([base, joints])) + own.grasp_jacobian().T @ on_object
+        reaction = own.grasp_jacobian().T @ on_object[robot.index]
+        effort = own.inertial_effort(np.concatenate([base, joints])) + reaction
         assert effort == pytest.approx(
             np.concatenate([wrenches[robot.index], torques[robot.q_slice]]), abs=1e-5
         )

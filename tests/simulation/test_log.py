@@ -15,6 +15,7 @@ SHAPES = {
     "commanded_wrenches": (ROBOTS, 3), "measured_wrenches": (ROBOTS, 3), "base_wrenches": (ROBOTS, 3),
     "joint_torques": (JOINTS,), "workspace_clearance": (), "body_clearance": (), "cell_clearance": (),
     "funnel_margin": (), "slice_margin": (), "acceleration_error": (), "wrench_error": (),
+    "grasp_error": (),
 }  # fmt: skip
 
 

@@ -63,6 +63,7 @@ def synthetic_log(problem: PlanningProblem, *, samples: int = 400) -> Simulation
         object_wrench=wrenches.sum(axis=1),
         commanded_wrenches=wrenches,
         measured_wrenches=wrenches,
+        grasp_error=np.zeros(samples),
         base_wrenches=2.0 * wrenches,
         joint_torques=0.1 * joints,
         ready_margins=np.tile(np.cos(times)[:, None], (1, robots)),

@@ -1,0 +1,102 @@
+"""The command compare: one plan on the exact plant and on one of separate robots, margins side by side."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.results import ResultFolder
+
+if TYPE_CHECKING:
+    from coop_drake.cli.reading import Task
+    from coop_drake.fields import HarmonicMap
+    from coop_drake.planning import Plan
+
+__all__ = ["compare_command"]
+
+_PLANTS: tuple[tuple[Literal["joints", "constraints"], str], ...] = (
+    ("joints", "one tree, grasps rigid"),
+    ("constraints", "a tree each, grasps constraints"),
+)
+_ROWS = (
+    ("simulated", "simulated_seconds", "{:.2f} s"),
+    ("final position error", "final_position_error_m", "{:.4f} m"),
+    ("final angle error", "final_angle_error_rad", "{:.4f} rad"),
+    ("smallest clearance to the walls", "min_workspace_clearance_m", "{:.4f} m"),
+    ("smallest clearance between bodies", "min_body_clearance_m", "{:.4f} m"),
+    ("smallest clearance in a cell", "min_cell_clearance_m", "{:.4f} m"),
+    ("smallest funnel margin", "min_funnel_margin", "{:.4f} rad"),
+    ("smallest energy margin", "min_delta_e", "{:.3e} m²/s²"),
+    ("largest grasp error", "max_grasp_error_m", "{:.1e} m"),
+    ("largest acceleration error", "max_acceleration_error", "{:.1e} m/s²"),
+    ("largest wrench error", "max_wrench_error_n", "{:.1e} N"),
+    ("governors' largest difference", "max_governor_spread_m", "{:.1e} m"),
+    ("peak base force", "peak_base_wrench_n", "{:.1f} N"),
+)
+
+
+def compare_command(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="DIR", file_okay=False, help="Where the plan goes; out/<scenario> by default."
+        ),
+    ] = None,
+    gains: Annotated[
+        str | None,
+        typer.Option("--gains", metavar="NAME", help="Gain set; the scenario's choice by default."),
+    ] = None,
+    machine: Annotated[
+        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+) -> None:
+    """Carry a plan out with exactly rigid grasps and with constraints as grasps; compare the margins."""
+    reporter = Reporter(machine=machine, quiet=quiet)
+    run_guarded(reporter, lambda: _compare(scenario, gains, out, reporter))
+
+
+def _compare(scenario: Path, gains: str | None, out: Path | None, reporter: Reporter) -> ExitCode:
+    # Here and not above: no other command should wait for Drake.
+    from coop_drake.cli.mapping import map_cells
+    from coop_drake.cli.planning import plan_question, without_plan
+    from coop_drake.cli.reading import read_task
+    from coop_drake.planning import Found
+
+    task = read_task(scenario, gains)
+    folder = ResultFolder.of(task.scenario.name, out)
+    result = plan_question(task.question, folder, reporter)
+    if not isinstance(result, Found):
+        return without_plan(task.question, result, folder, reporter)
+    maps = map_cells(task, result.plan, reporter, fresh=False)
+    measures = [_measures(task, result.plan, maps, grasps, reporter) for grasps, _ in _PLANTS]
+    reporter.facts.update({grasps: facts for (grasps, _), facts in zip(_PLANTS, measures, strict=True)})
+    rows = [(label, *(form.format(facts[key]) for facts in measures)) for label, key, form in _ROWS]
+    reporter.table(task.scenario.name, rows, [heading for _, heading in _PLANTS])
+    for (_, heading), facts in zip(_PLANTS, measures, strict=True):
+        if facts["violation"]:
+            reporter.complain(f"{heading}: {facts['violation']}")
+    return ExitCode.DONE if all(facts["reached"] for facts in measures) else ExitCode.FAILED_RUN
+
+
+def _measures(
+    task: Task,
+    plan: Plan,
+    maps: tuple[HarmonicMap, ...],
+    grasps: Literal["joints", "constraints"],
+    reporter: Reporter,
+) -> dict[str, Any]:
+    from coop_drake.cli.measures import simulation_measures
+    from coop_drake.simulation import simulate
+
+    plant = replace(task.scenario.plant, grasps=grasps)
+    with reporter.stage("simulating") as progress:
+        log = simulate(replace(task.scenario, plant=plant), plan, maps, progress=progress)
+    return simulation_measures(plan, log)

@@ -1,0 +1,83 @@
+"""Grasps that are constraints between bodies of different trees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, MultibodyForces, PlanarJoint, RigidBody
+from pydrake.systems.framework import Context
+
+from coop_drake.geometry.pose import FloatArray
+
+__all__ = ["ConstrainedGrasp", "ConstrainedGrasps"]
+
+
+@dataclass(frozen=True)
+class ConstrainedGrasp:
+    """One robot's hold on the object.
+
+    Attributes:
+        gripper_frame: Ek, fixed on the robot's hand.
+        object_body: The object's body that is grasped.
+        X_OE: Where Ek is to be on that body.
+        base_joint: Moves Bk against the world.
+    """
+
+    gripper_frame: Frame
+    object_body: RigidBody
+    X_OE: RigidTransform
+    base_joint: PlanarJoint
+
+    def constrain(self, plant: MultibodyPlant) -> None:
+        """Weld hand and object together, before the plant is finalized."""
+        hand = self.gripper_frame
+        plant.AddWeldConstraint(self.object_body, self.X_OE, hand.body(), hand.GetFixedPoseInBodyFrame())
+
+    def error(self, context: Context) -> float:
+        """Distance between Ek on the hand and on the object [m]."""
+        p_WE = self.gripper_frame.CalcPoseInWorld(context).translation()
+        wanted = self.object_body.EvalPoseInWorld(context).multiply(self.X_OE.translation())
+        return float(np.linalg.norm(p_WE - wanted))
+
+    def lever(self, context: Context) -> FloatArray:
+        """From Bk to Ek in W, shape (2,) [m]."""
+        p_WE = self.gripper_frame.CalcPoseInWorld(context).translation()
+        p_WB = self.base_joint.child_body().EvalPoseInWorld(context).translation()
+        lever: FloatArray = (p_WE - p_WB)[:2]
+        return lever
+
+
+class ConstrainedGrasps:
+    """The robots' hold on the object where it is a constraint: nearly rigid.
+
+    Drake does not say what a constraint transmits. It is what is left of a base's wrench when the force that
+    the robot's own motion takes is subtracted.
+
+    Args:
+        plant: Finalized.
+        grasps: One for each robot, in the scenario's order.
+    """
+
+    def __init__(self, plant: MultibodyPlant, grasps: Sequence[ConstrainedGrasp]) -> None:
+        self._plant, self._grasps = plant, tuple(grasps)
+        self._rows = [grasp.base_joint.velocity_start() + np.arange(3) for grasp in grasps]
+
+    def wrenches(self, context: Context, base_wrenches: FloatArray) -> FloatArray:
+        """As in :class:`coop_drake.plant.grasps.Grasps`, with the acceleration of the step that begins."""
+        forces = MultibodyForces(self._plant)
+        self._plant.CalcForceElementsContribution(context, forces)
+        acceleration = self._plant.get_generalized_acceleration_output_port().Eval(context)
+        needed = self._plant.CalcInverseDynamics(context, acceleration, forces)
+        wrenches: FloatArray = base_wrenches - np.array([needed[rows] for rows in self._rows])
+        for wrench, grasp in zip(wrenches, self._grasps, strict=True):
+            r = grasp.lever(context)
+            wrench[2] -= r[0] * wrench[1] - r[1] * wrench[0]
+        return wrenches
+
+    def errors(self, context: Context) -> FloatArray:
+        """As in :class:`coop_drake.plant.grasps.Grasps`."""
+        return np.array([grasp.error(context) for grasp in self._grasps])

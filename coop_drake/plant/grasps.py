@@ -1,0 +1,83 @@
+"""How the robots hold the object, and what is read of it: wrenches, and how far a hand is from its grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from pydrake.multibody.parsing import GetScopedFrameByName
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import WeldJoint
+from pydrake.systems.framework import Context
+
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.plant.parsing import joints_of
+from coop_drake.scenario import RobotAssembly
+
+__all__ = ["Grasps", "WeldedGrasps"]
+
+
+class Grasps(Protocol):
+    """The robots' hold on the object, in the scenario's order."""
+
+    def wrenches(self, context: Context, base_wrenches: FloatArray) -> FloatArray:
+        """Wrench on the object at every Ek in W, shape (N, 3) [N, N m].
+
+        Args:
+            context: The plant's, inside the diagram's, all inputs connected.
+            base_wrenches: What acts on every base at Bk in W, shape (N, 3) [N, N m].
+        """
+        ...
+
+    def errors(self, context: Context) -> FloatArray:
+        """Distance between every robot's Ek and the same point of the object, shape (N,) [m]."""
+        ...
+
+
+class WeldedGrasps:
+    """Grasps that are joints of one tree: exact, and their wrenches are the joints' reactions.
+
+    Args:
+        plant: Finalized.
+        robots: Who grasps what; the object is the parent of every grasp.
+    """
+
+    def __init__(self, plant: MultibodyPlant, robots: Sequence[RobotAssembly]) -> None:
+        self._plant = plant
+        welds = [_weld(plant, robot) for robot in robots]
+        self._places = [place for place, _ in welds]
+        self._frames = [weld.frame_on_child() for _, weld in welds]
+
+    def wrenches(self, context: Context, base_wrenches: FloatArray) -> FloatArray:
+        """As in :class:`Grasps`; the reaction on a weld's child acts on the robot, in the joint's frame."""
+        reactions = self._plant.get_reaction_forces_output_port().Eval(context)
+        return np.array(
+            [
+                _on_object(frame.CalcRotationMatrixInWorld(context).matrix(), reactions[place])
+                for place, frame in zip(self._places, self._frames, strict=True)
+            ]
+        )
+
+    def errors(self, context: Context) -> FloatArray:
+        """As in :class:`Grasps`: the hand is a body of the tree that the object is the root of."""
+        return np.zeros(len(self._places))
+
+
+def _weld(plant: MultibodyPlant, robot: RobotAssembly) -> tuple[int, WeldJoint]:
+    """A robot's grasp, and its place in the plant's ``reaction_forces`` output."""
+    ends = {
+        int(GetScopedFrameByName(plant, frame).body().index())
+        for frame in (robot.gripper_frame, robot.object_frame)
+    }
+    return next(
+        (place, joint)
+        for place, joint in enumerate(joints_of(plant))
+        if joint.type_name() == "weld"
+        and {int(joint.parent_body().index()), int(joint.child_body().index())} == ends
+    )
+
+
+def _on_object(R_WJc: FloatArray, reaction: Any) -> FloatArray:
+    force, torque = R_WJc @ reaction.translational(), R_WJc @ reaction.rotational()
+    return -np.array([force[0], force[1], torque[2]])
