@@ -153,7 +153,7 @@ def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
     reporter = Reporter(machine=False, quiet=quiet)
 
     def command() -> ExitCode:
-        from coop_drake.cli.simulating import warm_up
+        from coop_drake.cli.warming import warm_up
 
         return warm_up(scenario, reporter)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 from rich.markup import escape
@@ -18,13 +17,10 @@ from coop_drake.cli.summary import summary_rows
 from coop_drake.fields import HarmonicMap
 from coop_drake.memory import peak_memory_mb
 from coop_drake.planning import Found, Plan
-from coop_drake.planning.planner import plan
-from coop_drake.simulation import SimulationLog, build_maps, simulate
+from coop_drake.simulation import SimulationLog, simulate
 from coop_drake.viz import write_figures, write_recording
 
-__all__ = ["run_scenario", "simulate_scenario", "warm_up"]
-
-_WARM_UP_SECONDS = 0.05  # Simulated time that calls every kernel [s].
+__all__ = ["run_scenario", "simulate_scenario"]
 
 
 def run_scenario(
@@ -94,16 +90,3 @@ def _draw(task: Task, found: Plan, log: SimulationLog, folder: ResultFolder, rep
         write_figures(problem.workspace, problem.tree, found, log, folder.path)
     with reporter.stage("recording") as progress, reporter.stopwatch("recording"):
         write_recording(task.scenario, found, log, folder.recording, progress=progress)
-
-
-def warm_up(scenario: Path, reporter: Reporter) -> ExitCode:
-    """Go through the chain once without results: compiles every kernel, for later processes too."""
-    task = read_task(scenario, None)
-    question = task.question
-    with reporter.stage("compiling") as progress:
-        result = plan(question.problem, question.gain_sets[question.gains], gain_set_name=question.gains)
-        if isinstance(result, Found):
-            maps = build_maps(result.plan, progress=progress)
-            short = replace(task.scenario.simulator, max_time=_WARM_UP_SECONDS)
-            simulate(replace(task.scenario, simulator=short), result.plan, maps)
-    return ExitCode.DONE
