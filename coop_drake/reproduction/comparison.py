@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.reproduction.corridor import corridor_plan, corridor_scenario
+from coop_drake.reproduction.runs import GAIN_SETS, part_of
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import SimulationLog, build_maps, simulate
 
@@ -40,10 +42,20 @@ class GainFigures:
     acceleration_error: float
     violation: str
 
+    ROWS: ClassVar = (
+        ("duration", "seconds", "{:.1f} s"),
+        ("peak base force", "peak_force", "{:.0f} N"),
+        ("peak angular acceleration", "peak_angular_acceleration", "{:.1f} rad/s²"),
+        ("peak joint rate", "peak_joint_rate", "{:.2f} rad/s"),
+        ("smallest funnel margin", "funnel_margin", "{:.4f} rad"),
+        ("largest acceleration error", "acceleration_error", "{:.1e} m/s²"),
+    )
+    """Label, attribute and format of every figure, for tables."""
+
 
 def compare_gains(
     scenario: Scenario,
-    names: Sequence[str] = ("table_2", "scheduled"),
+    names: Sequence[str] = tuple(GAIN_SETS),
     progress: Callable[[str, float], None] | None = None,
 ) -> list[GainFigures]:
     """Play the thirty cells once with every gain set.
@@ -56,9 +68,9 @@ def compare_gains(
     hall = corridor_scenario(scenario)
     problem = planning_problem(hall, build_team_plant(hall, DiagramBuilder()))
     figures = []
-    for name in names:
+    for number, name in enumerate(names):
         found = corridor_plan(problem, hall.gain_sets[name], name)
-        log = simulate(hall, found, build_maps(found), progress=progress)
+        log = simulate(hall, found, build_maps(found), progress=part_of(progress, number, len(names)))
         figures.append(_figures(name, log))
     return figures
 

@@ -7,7 +7,8 @@ from pydrake.multibody.parsing import PackageMap
 import coop_drake
 from coop_drake.errors import ScenarioError
 
-_SHIPPED = Path(coop_drake.__file__).resolve().parent.parent / "models"
+SHIPPED = Path(coop_drake.__file__).resolve().parent.parent / "models"
+"""Where the shipped models and scenarios are."""
 
 
 def package_map(scenario_path: Path) -> PackageMap:
@@ -24,7 +25,7 @@ def package_map(scenario_path: Path) -> PackageMap:
     """
     packages = PackageMap()
     folders = scenario_path.resolve().parents
-    for file in reversed([folder / "package.xml" for folder in (*folders, _SHIPPED)]):
+    for file in reversed([folder / "package.xml" for folder in (*folders, SHIPPED)]):
         if file.is_file():
             _add(packages, file)
     return packages

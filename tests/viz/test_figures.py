@@ -11,26 +11,15 @@ from coop_drake.viz.place_figures import path_figure, start_and_goal_figure
 from coop_drake.viz.state_figures import angle_figure, joints_figure
 from coop_drake.viz.time_axes import break_at, switch_times
 from tests.support.cases import case
+from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
-
-COMMON = [
-    "fig04_start_and_goal",
-    "fig05_path",
-    "fig06_position",
-    "fig07_angle",
-    "fig08_velocity",
-    "fig09_angular_velocity",
-    "fig12_force",
-    "fig13_torque",
-    "summary",
-]
 
 
 @pytest.mark.parametrize(
     ("name", "robots"),
     [
-        ("elbow", ["fig10_joints_robot_0", "fig11_joints_robot_1"]),
-        ("three", ["fig10_joints_robot_0", "fig11_joints_robot_1", "fig11_joints_robot_2"]),
+        ("elbow", OF_TWO_ROBOTS),
+        ("three", (*OF_TWO_ROBOTS, "fig11_joints_robot_2")),
     ],
 )
 def test_a_run_gets_figures_4_to_13_and_a_summary_as_png(tmp_path, name, robots):
@@ -38,7 +27,7 @@ def test_a_run_gets_figures_4_to_13_and_a_summary_as_png(tmp_path, name, robots)
     written = write_figures(
         problem.workspace, problem.tree, synthetic_plan(problem), synthetic_log(problem), tmp_path
     )
-    assert sorted(path.name for path in written) == sorted(f"{stem}.png" for stem in COMMON + robots)
+    assert sorted(path.name for path in written) == sorted(f"{stem}.png" for stem in OF_EVERY_RUN + robots)
     assert sorted(tmp_path.iterdir()) == sorted(written)
     for path in written:
         with Image.open(path) as image:

@@ -1,0 +1,75 @@
+"""The picture of Figure 3: a system, and over and under what its slices keep it between."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import pi
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from shapely import union_all
+
+from coop_drake.drawing.canvas import new_figure
+from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK
+from coop_drake.drawing.floor import draw_polygon, draw_team, team_legend
+from coop_drake.geometry.swept_tree import Interval
+from coop_drake.geometry.tree import ComponentTree
+from coop_drake.reproduction.approximation import Approximation
+
+__all__ = ["approximation_figure"]
+
+_ROOM = 0.12  # Around the widest over-approximation [m].
+
+
+def approximation_figure(tree: ComponentTree, made: Sequence[Approximation]) -> Figure:
+    """Draw the system, and for every slice its over-approximation above its under-approximation.
+
+    Args:
+        tree: The system.
+        made: Its approximations.
+    """
+    caption = (
+        "Figure 3. A system of two components (a), the object with what is welded to it and what the joint "
+        "moves. For four slices of the angle θ and the joint q: above what encloses every configuration of "
+        "the slice, below what every configuration covers. Grey: some configurations."
+    )
+    figure = new_figure(11.0, 6.4, caption)
+    system, *upper = figure.subplots(2, 1 + len(made), sharex=True, sharey=True).flat
+    below = upper[len(made) :]
+    x_min, y_min, x_max, y_max = union_all([one.over for one in made]).bounds
+    system.set_xlim(x_min - _ROOM, x_max + _ROOM)
+    system.set_ylim(y_min - _ROOM, y_max + _ROOM)
+    draw_team(system, tree, np.zeros(3 + len(tree.joints)))
+    system.legend(handles=team_legend(tree), loc="lower left", fontsize=8, borderpad=0.2)
+    _name(system, "(a) the system")
+    below[0].axis("off")
+    for number, one in enumerate(made):
+        slice_name = f"θ {_range(one.intervals[0])}, q {_range(one.intervals[1])}"
+        over, under = upper[number], below[1 + number]
+        draw_polygon(over, one.over, facecolor=BLUE, edgecolor=BLUE, alpha=0.25)
+        draw_polygon(under, one.under, facecolor=GREEN, edgecolor=GREEN, alpha=0.7, zorder=4)
+        for ax in (over, under):
+            for shape in one.exact:
+                draw_polygon(ax, shape, facecolor="none", edgecolor=GREY, linewidth=0.4, alpha=0.35)
+            draw_polygon(ax, one.over, facecolor="none", edgecolor=BLUE, linewidth=1.2)
+        _name(over, f"({'bcde'[number]}) over\n{slice_name}")
+        _name(under, f"({'fghi'[number]}) under\n{slice_name}")
+    return figure
+
+
+def _name(ax: Axes, title: str) -> None:
+    ax.set_title(title, fontsize=9, color=INK)
+    ax.set_aspect("equal")
+    ax.set_xlabel("x [m]")
+    ax.set_ylabel("y [m]")
+    ax.label_outer()
+
+
+def _range(interval: Interval) -> str:
+    lower, upper = interval
+    if lower == upper:
+        return f"= {lower:g}"
+    if abs(upper - 0.5 * pi) < 1e-12:
+        return "±π/2"
+    return f"±{upper:g}"

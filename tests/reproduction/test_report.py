@@ -1,0 +1,141 @@
+"""The report on the paper's example: verdicts follow the runs, and the page stands alone."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from coop_drake.control import FixedGains
+from coop_drake.plant.team import ObjectInertia
+from coop_drake.reproduction import GainFigures, Material, Verdict, exhibits, pages, write_report
+from coop_drake.reproduction.approximation import approximations, two_components
+from coop_drake.reproduction.background import ASSUMPTIONS, ERRATA
+from coop_drake.reproduction.runs import GAIN_SETS, Run
+from coop_drake.reproduction.stated import FIGURE_3_SLICES
+from tests.support.cases import case
+from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
+from tests.support.synthetic_log import synthetic_log, synthetic_plan
+
+DOCS = Path(__file__).parents[2] / "docs"
+
+
+@pytest.fixture(scope="module")
+def material():
+    problem = case("base")
+    log = synthetic_log(problem)
+    pose = log.object_pose.copy()
+    pose[-1] = problem.goal_pose
+    log = replace(log, object_pose=pose, object_twist=0.0 * log.object_twist)
+    plan = synthetic_plan(problem)
+    return Material(
+        problem=problem,
+        inertia=ObjectInertia(1.0, 1.0, np.zeros(2)),
+        table_2=FixedGains(),
+        made=approximations(two_components(problem.tree), FIGURE_3_SLICES),
+        runs=tuple(Run(name, plan, log) for name in GAIN_SETS),
+        played=tuple(GainFigures(name, 20.0, 80.0, 9.0, 1.0, 0.01, 1e-13, "") for name in GAIN_SETS),
+    )
+
+
+def judged(material):
+    return {exhibit.name: exhibit for exhibit in exhibits(material)}
+
+
+def with_log(material, **changes):
+    first, second = material.runs
+    return replace(material, runs=(first, replace(second, log=replace(second.log, **changes))))
+
+
+def test_every_table_and_figure_of_the_example_has_its_exhibit(material):
+    found = judged(material)
+    figures_of_the_example = [f"Figure {number}" for number in range(3, 14)]
+    assert list(found) == ["Table 1", "Table 1, played", "Table 2", *figures_of_the_example]
+    assert found["Table 1"].verdict is Verdict.DIFFERS  # Five synthetic cells are not thirty.
+    assert {found[name].verdict for name in ("Table 2", "Figure 3", "Figure 4", "Figure 7")} == {
+        Verdict.AGREES
+    }
+
+
+def test_a_gain_or_mass_that_is_not_the_paper_s_differs(material):
+    assert judged(replace(material, table_2=FixedGains(damping=6.0)))["Table 2"].verdict is Verdict.DIFFERS
+    heavy = ObjectInertia(2.0, 1.0, np.zeros(2))
+    assert judged(replace(material, inertia=heavy))["Table 2"].verdict is Verdict.DIFFERS
+
+
+@pytest.mark.parametrize(
+    ("exhibit", "changes"),
+    [
+        ("Figure 5", {"reached": False}),
+        ("Figure 5", {"workspace_clearance": np.array([-0.01])}),
+        ("Figure 7", {"funnel_lower": np.full((400, 3), 9.0)}),
+        ("Figure 8", {"object_twist": np.ones((400, 3))}),
+        ("Figure 11", {"funnel_upper": np.full((400, 3), -9.0)}),
+        ("Figure 12", {"wrench_error": np.array([1e-3])}),
+    ],
+)
+def test_one_run_that_departs_is_enough_to_differ(material, exhibit, changes):
+    assert judged(material)[exhibit].verdict is Verdict.AGREES
+    assert judged(with_log(material, **changes))[exhibit].verdict is Verdict.DIFFERS
+
+
+def test_an_approximation_that_leaves_something_out_is_noticed(material):
+    first, *others = material.made
+    small = replace(first, over=first.over.buffer(-0.01))
+    assert first.encloses
+    assert not small.encloses
+    assert judged(replace(material, made=(small, *others)))["Figure 3"].verdict is Verdict.DIFFERS
+
+
+@pytest.fixture(scope="module")
+def report(material, tmp_path_factory):
+    """The report, every picture a dot: what a run leaves is drawn and tested elsewhere."""
+
+    def dot(_figure, path, **_options):
+        Image.new("RGB", (1, 1)).save(path)
+
+    def dots(_workspace, _tree, _plan, _log, directory):
+        for name in OF_EVERY_RUN + OF_TWO_ROBOTS:
+            dot(None, directory / f"{name}.png")
+
+    folder = tmp_path_factory.mktemp("reproduction")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pages, "save_figure", dot)
+        patch.setattr(pages, "write_figures", dots)
+        write_report(material, folder)
+    return folder
+
+
+def test_the_page_stands_alone_and_every_reason_is_explained(material, report):
+    page = (report / "index.html").read_text()
+    found = exhibits(material)
+    assert page.count("<section") == len(found) + 1
+    assert page.count("<img") == sum(len(exhibit.pictures) for exhibit in found)
+    assert set(re.findall(r'src="(.{20})', page)) == {"data:image/png;base64"[:20]}
+    links = set(re.findall(r'href="#([^"]+)"', page))
+    assert links == set(re.findall(r'id="([^"]+)"', page))
+    for file in re.findall(r'href="([^"#]+\.\w+)"', page):
+        assert (report / file).is_file()
+    for verdict in Verdict:
+        count = sum(one.verdict is verdict for exhibit in found for one in exhibit.statements)
+        assert f"{count} {verdict.value}" in page
+
+
+def test_the_markdown_says_the_same_and_its_pictures_are_there(material, report):
+    text = (report / "report.md").read_text()
+    pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
+    assert pictures == [picture.file for exhibit in exhibits(material) for picture in exhibit.pictures]
+    assert all((report / picture).is_file() for picture in pictures)
+    assert "-0.367 (0.367)" in (report / "table_1.md").read_text()
+
+
+def test_errata_are_those_of_the_documents_and_every_assumption_is_used(material):
+    in_documents = set(re.findall(r"^\| (E\w+) \|", (DOCS / "errata.md").read_text(), re.MULTILINE))
+    assert set(ERRATA) <= in_documents
+    used = {key for exhibit in exhibits(material) for key in exhibit.because}
+    assert used <= set(ERRATA) | set(ASSUMPTIONS)
+    assert set(ASSUMPTIONS) <= used
