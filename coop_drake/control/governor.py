@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from math import hypot, sqrt
-
 import numpy as np
 
+from coop_drake.control import kernels
 from coop_drake.control.gains import FloatArray
 
 ATTRACTION_RATE = 30.0
@@ -89,10 +88,8 @@ def governor_velocity(
     Returns:
         p_G', shape (2,) [m/s].
     """
-    vx, vy = float(field_velocity[0]), float(field_velocity[1])
-    length = hypot(vx, vy)
-    if margin <= 0.0 or length == 0.0:
-        return np.zeros(2)
-    root = sqrt(margin / stiffness + smoothing * smoothing) - smoothing
-    scale = governor_gain * min(1.0, root / length)
-    return np.array([scale * vx, scale * vy])
+    velocity = np.empty(2)
+    kernels.governor_velocity(
+        field_velocity[0], field_velocity[1], margin, stiffness, governor_gain, smoothing, velocity
+    )
+    return velocity

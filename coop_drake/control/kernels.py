@@ -1,5 +1,8 @@
 """Compiled inner loops of the laws; what they compute is explained in funnels.py, ppc.py and robot_effort.py.
 
+Laws that run in the loop read what they need of one cell from one table, one row for each axis: every array
+that is handed over takes longer than the law itself.
+
 One file, because a kernel's cache does not notice changes in kernels of other files.
 """
 
@@ -10,6 +13,7 @@ import numba
 import numpy as np
 
 from coop_drake.control.gains import FloatArray
+from coop_drake.geometry.boundary import signed_distance_compiled
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -19,6 +23,9 @@ Walls = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatA
 # trial steps of an integrator may stand there, and must get an answer that points back inside and does not
 # grow with the distance, or the next trial overflows before the integrator can shorten its step.
 SATURATION = 1e-7
+# Columns of the table of a cell's axes: slice, goal interval, lambda, whether the funnel is smooth, kappa,
+# k1, k2, and the largest V with which the cell is entered.
+LAW_COLUMNS = 10
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
@@ -144,6 +151,115 @@ def track_funnel(
     """Return the acceleration of every axis, shape (m,): both kernels above in one call."""
     walls = funnel_walls(time, slice_lower, slice_upper, goal_lower, goal_upper, decay_rate, smooth)
     return track_walls(position, rate, walls, log_gain, position_gain, rate_gain)[0]
+
+
+@compiled
+def track_row(row: FloatArray, time: float, position: float, rate: float) -> tuple[float, float]:
+    """Return acceleration and energy of one axis from its row of a table, see ``LAW_COLUMNS``."""
+    value, first, second = decay(time, row[4], row[5] != 0.0)
+    below, above = row[0] - row[2], row[1] - row[3]
+    return track_axis(
+        position,
+        rate,
+        row[2] + below * value,
+        row[3] + above * value,
+        below * first,
+        above * first,
+        below * second,
+        above * second,
+        row[6],
+        row[7],
+        row[8],
+    )
+
+
+@compiled
+def track_state(
+    table: FloatArray, time: float, state: FloatArray, first: int, first_rate: int, acceleration: FloatArray
+) -> None:
+    """Write the acceleration of every axis whose positions and rates stand in a state, shape (m,)."""
+    for i in range(table.shape[0]):
+        acceleration[i] = track_row(table[i], time, state[first + i], state[first_rate + i])[0]
+
+
+@compiled
+def hand_command(
+    share: FloatArray, state: FloatArray, linear: FloatArray, angular: FloatArray, command: FloatArray
+) -> None:
+    """Write the acceleration of a grasp, then its wrench on the object; see ``load_sharing``.
+
+    Args:
+        share: (p_LE, p_LLcm, mass, inertia, the robot's part of the work), shape (7,).
+        state: Pose and twist of the object, shape (6,).
+        linear: Desired acceleration of the object's origin, shape (2,).
+        angular: Desired angular acceleration, shape (1,).
+        command: Receives both, shape (6,).
+    """
+    c, s, turning = np.cos(state[2]), np.sin(state[2]), state[5] * state[5]
+    rx, ry = c * share[0] - s * share[1], s * share[0] + c * share[1]
+    mx, my = c * share[2] - s * share[3], s * share[2] + c * share[3]
+    ax, ay, alpha = linear[0], linear[1], angular[0]
+    command[0] = ax - alpha * ry - turning * rx
+    command[1] = ay + alpha * rx - turning * ry
+    command[2] = alpha
+    fx = share[6] * share[4] * (ax - alpha * my - turning * mx)
+    fy = share[6] * share[4] * (ay + alpha * mx - turning * my)
+    command[3], command[4] = fx, fy
+    command[5] = share[6] * share[5] * alpha - (my - ry) * fx + (mx - rx) * fy
+
+
+@compiled
+def governed_acceleration(
+    state: FloatArray, governor: FloatArray, stiffness: float, damping: float, acceleration: FloatArray
+) -> None:
+    """Write -K (p - p_G) - zeta p' of (14) from the object's state, shape (2,)."""
+    for i in range(2):
+        acceleration[i] = -stiffness * (state[i] - governor[i]) - damping * state[3 + i]
+
+
+@compiled
+def cell_margin(
+    edges: FloatArray, stiffness: float, state: FloatArray, governor: FloatArray, velocity_step: float
+) -> float:
+    """Return Delta E = (K / 2) d^2 - E of (15) and (16), the velocity in whole steps.
+
+    Args:
+        edges: Of the governed set, shape (edges, 4) [m].
+        stiffness: K [1/s^2].
+        state: Pose and twist of the object, shape (6,).
+        governor: p_G, shape (2,) [m].
+        velocity_step: What the velocity is rounded to [m/s].
+    """
+    vx = np.rint(state[3] / velocity_step) * velocity_step
+    vy = np.rint(state[4] / velocity_step) * velocity_step
+    x, y = state[0] - governor[0], state[1] - governor[1]
+    energy = 0.5 * (vx**2 + vy**2 + stiffness * (x * x + y * y))
+    clearance: float = signed_distance_compiled(edges, governor[0], governor[1])
+    return 0.5 * stiffness * clearance * abs(clearance) - energy
+
+
+@compiled
+def governor_velocity(
+    vx: float, vy: float, margin: float, stiffness: float, gain: float, smoothing: float, velocity: FloatArray
+) -> None:
+    """Write p_G' = K_G v^ min(|v|, root(Delta E / K)) of (14); see ``governor``."""
+    length = np.hypot(vx, vy)
+    if margin <= 0.0 or length == 0.0:
+        velocity[0], velocity[1] = 0.0, 0.0
+        return
+    root = np.sqrt(margin / stiffness + smoothing * smoothing) - smoothing
+    scale = gain * min(1.0, root / length)
+    velocity[0], velocity[1] = scale * vx, scale * vy
+
+
+@compiled
+def interval_margin(position: FloatArray, lower: FloatArray, upper: FloatArray, erosion: float) -> float:
+    """Return the smallest 1 - |x - middle| / half of all axes, the intervals eroded; see ``ready``."""
+    margin = np.inf
+    for i in range(position.size):
+        half = 0.5 * (upper[i] - lower[i]) * (1.0 - 2.0 * erosion)
+        margin = min(margin, 1.0 - abs(position[i] - 0.5 * (lower[i] + upper[i])) / half)
+    return margin
 
 
 @compiled

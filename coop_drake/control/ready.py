@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from coop_drake.control import kernels
 from coop_drake.control.funnels import Funnel, funnel_walls
 from coop_drake.control.gains import FloatArray, TransitionGains
 from coop_drake.control.governor import energy_margin, tracking_energy
@@ -30,8 +31,7 @@ def interval_margin(
         upper: Upper ends, above the lower ones, shape (m,).
         erosion: Part of the width taken away at each end, below one half.
     """
-    half = 0.5 * (upper - lower) * (1.0 - 2.0 * erosion)
-    return float(np.min(1.0 - np.abs(position - 0.5 * (lower + upper)) / half))
+    return kernels.interval_margin(position, lower, upper, erosion)
 
 
 def clearance_margin(margin: float, *, stiffness: float, inradius: float) -> float:

@@ -116,6 +116,25 @@ class RobotPlant:
         effort: FloatArray = self.plant.CalcInverseDynamics(self.context, ordered_acceleration, forces)
         return effort[self._order]
 
+    @cached_property
+    def has_springs(self) -> bool:
+        """Whether the model has force elements; gravity, which is zero, is one always."""
+        return self.plant.num_force_elements() > 1
+
+    def spring_effort(self) -> FloatArray:
+        """What holds the model's force elements, the joints' damping aside, shape (3 + n_k,) [N, N m]."""
+        forces = MultibodyForces(self.plant)
+        self.plant.CalcForceElementsContribution(self.context, forces)
+        rest = np.zeros(len(self.velocity_index))
+        with_them = self.plant.CalcInverseDynamics(self.context, rest, forces)
+        forces.SetZero()
+        without = self.plant.CalcInverseDynamics(self.context, rest, forces)
+        damping = [joint.GetDampingVector(self.context)[0] for joint in self.joints]
+        rates = self.plant.GetVelocities(self.context)[self.velocity_index[3:]]
+        effort: FloatArray = (with_them - without)[self._order]
+        effort[3:] -= damping * rates
+        return effort
+
     def grasp_jacobian(self) -> FloatArray:
         """J of E_k: planar twist of the grasp in W per rate of z_k, shape (3, 3 + n_k)."""
         return self.plant.CalcJacobianSpatialVelocity(self.context, *self._grasp_arguments)[_PLANAR][

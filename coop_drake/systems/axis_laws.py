@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from coop_drake.control.funnels import Funnel, FunnelWalls, funnel_walls
 from coop_drake.control.gains import TransitionGains
+from coop_drake.control.kernels import LAW_COLUMNS
 from coop_drake.control.ppc import funnel_acceleration
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.plan import Plan
@@ -27,6 +29,21 @@ class AxisLaw:
 
     funnel: Funnel
     gains: TransitionGains
+
+    @cached_property
+    def table(self) -> FloatArray:
+        """What the compiled laws read, shape (m, ``LAW_COLUMNS``), a row for each axis."""
+        funnel, gains, rows = self.funnel, self.gains, np.empty((self.axes, LAW_COLUMNS))
+        columns: tuple[FloatArray | float, ...] = (
+            *funnel.kernel_arguments,
+            gains.log_gain,
+            gains.position_gain,
+            gains.rate_gain,
+            gains.energy_bound,
+        )
+        for column, values in enumerate(columns):
+            rows[:, column] = values
+        return rows
 
     @property
     def axes(self) -> int:

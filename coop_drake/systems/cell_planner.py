@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
 
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
 
@@ -57,10 +57,13 @@ class CellPlanner(LeafSystem):
         reports = (port.Eval(context) for port in self._ready)
         return all(index == cell and margin >= 0.0 for index, margin in reports)
 
-    def _advance(self, context: Context, discrete_state: DiscreteValues) -> None:
+    def _advance(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         cell = context.get_discrete_state_vector().value()[0]
         if cell < self._cells - 1 and self._all_ready(context, cell):
             discrete_state.get_mutable_vector().SetFromVector([cell + 1.0, context.get_time()])
+            return EventStatus.Succeeded()
+        # What follows from the state stays valid: nobody computes it again.
+        return EventStatus.DidNothing()
 
     def _write_cell(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_discrete_state_vector().value())

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from coop_drake.control.kernels import track_state
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 
@@ -37,6 +38,7 @@ class JointPpc(LeafSystem):
         if not laws or len({law.axes for law in laws}) != 1:
             raise ValueError("JointPpc needs one law of the same joints for each cell")
         self._laws = tuple(laws)
+        self._tables = [law.table for law in laws]
         self._joints = n = laws[0].axes
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + n))
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
@@ -53,10 +55,9 @@ class JointPpc(LeafSystem):
         return self._laws[index_of(cell, len(self._laws))], context.get_time() - cell[1]
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
-        law, time = self._law(context)
-        state = self._state.Eval(context)
-        joints, rates = state[3 : 3 + self._joints], state[6 + self._joints :]
-        output.SetFromVector(law.acceleration(joints, rates, time))
+        cell = self._cell.Eval(context)
+        table, time = self._tables[index_of(cell, len(self._tables))], context.get_time() - cell[1]
+        track_state(table, time, self._state.Eval(context), 3, 6 + self._joints, output.get_mutable_value())
 
     def _write_funnels(self, context: Context, output: BasicVector) -> None:
         law, time = self._law(context)

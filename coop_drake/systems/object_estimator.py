@@ -5,13 +5,11 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from coop_drake.control.load_sharing import object_twist, rotate
+from coop_drake.control.planar_chain import object_state
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.plant import RobotPlant
+from coop_drake.plant import RobotPlant, robot_chain
 
 __all__ = ["ObjectEstimator"]
-
-_PLANAR = [3, 4, 2]  # Drake's spatial order is rotation first
 
 
 class ObjectEstimator(LeafSystem):
@@ -26,20 +24,22 @@ class ObjectEstimator(LeafSystem):
     No state. No other robot's state is needed.
 
     Args:
-        robot: The robot's model of itself; only its scratch context changes.
+        robot: The robot's model of itself.
         p_LE: The grasp in L, shape (2,) [m].
     """
 
     def __init__(self, robot: RobotPlant, p_LE: FloatArray) -> None:
         super().__init__()
-        self._robot, self._p_LE = robot, np.array(p_LE, dtype=float)
-        self._size = 3 + len(robot.joints)
-        self._state = self.DeclareVectorInputPort("robot_state", 2 * self._size)
+        self._chain, self._p_LE = robot_chain(robot), np.array(p_LE, dtype=float)
+        self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + len(robot.joints)))
         self._pose = self.DeclareVectorInputPort("object_pose", 3)
         self.DeclareVectorOutputPort("object_state", 6, self._write_state)
 
     def _write_state(self, context: Context, output: BasicVector) -> None:
-        state, pose = self._state.Eval(context), self._pose.Eval(context)
-        self._robot.set_state(state[: self._size], state[self._size :])
-        V_WE = self._robot.gripper_frame.CalcSpatialVelocityInWorld(self._robot.context).get_coeffs()[_PLANAR]
-        output.SetFromVector(np.concatenate([pose, object_twist(rotate(pose[2], self._p_LE), V_WE)]))
+        object_state(
+            self._chain,
+            self._p_LE,
+            self._state.Eval(context),
+            self._pose.Eval(context),
+            output.get_mutable_value(),
+        )

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from coop_drake.control.kernels import track_state
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 
@@ -36,6 +37,7 @@ class OrientationPpc(LeafSystem):
         if not laws or any(law.axes != 1 for law in laws):
             raise ValueError("OrientationPpc needs one law of one axis for each cell")
         self._laws = tuple(laws)
+        self._tables = [law.table for law in laws]
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self.DeclareVectorOutputPort("angle_acceleration", 1, self._write_acceleration)
@@ -51,9 +53,9 @@ class OrientationPpc(LeafSystem):
         return self._laws[index_of(cell, len(self._laws))], context.get_time() - cell[1]
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
-        law, time = self._law(context)
-        state = self._object.Eval(context)
-        output.SetFromVector(law.acceleration(state[2:3], state[5:6], time))
+        cell = self._cell.Eval(context)
+        table, time = self._tables[index_of(cell, len(self._tables))], context.get_time() - cell[1]
+        track_state(table, time, self._object.Eval(context), 2, 5, output.get_mutable_value())
 
     def _write_funnel(self, context: Context, output: BasicVector) -> None:
         law, time = self._law(context)

@@ -5,16 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from coop_drake.control import kernels
 from coop_drake.control.gains import TransitionGains
-from coop_drake.control.governor import (
-    energy_margin,
-    governed_acceleration,
-    governor_velocity,
-    tracking_energy,
-)
+from coop_drake.control.governor import energy_margin, tracking_energy
+from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 
@@ -30,12 +26,12 @@ class GovernedCell:
     """What the governor needs to know of one cell.
 
     Attributes:
-        clearance: Signed distance of a point to the boundary of the governed set, (2,) -> float [m].
+        clearance: Signed distance to the boundary of the governed set [m].
         field: Velocity field that leads to the cell's target, (2,) -> (2,) [m/s].
         gains: Gains of the transition.
     """
 
-    clearance: Callable[[FloatArray], float]
+    clearance: BoundaryDistance
     field: Callable[[FloatArray], FloatArray]
     gains: TransitionGains
 
@@ -79,36 +75,32 @@ class ReferenceGovernor(LeafSystem):
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self.DeclareVectorOutputPort("governor_velocity", 2, self._write_velocity)
         self.DeclareVectorOutputPort("position_acceleration", 2, self._write_acceleration)
-        self._margin = self.DeclareVectorOutputPort("energy_margin", 1, self._write_margin)
+        self.DeclareVectorOutputPort("energy_margin", 1, self._write_margin)
 
     def _cell(self, context: Context) -> GovernedCell:
         return self._cells[index_of(self._current.Eval(context), len(self._cells))]
 
     def _write_velocity(self, context: Context, output: BasicVector) -> None:
-        cell = self._cell(context)
-        output.SetFromVector(
-            governor_velocity(
-                cell.field(self._governor.Eval(context)),
-                self._margin.Eval(context)[0],
-                stiffness=cell.gains.stiffness,
-                governor_gain=cell.gains.governor_gain,
-                smoothing=cell.gains.smoothing,
-            )
+        cell, governor = self._cell(context), self._governor.Eval(context)
+        gains, (vx, vy) = cell.gains, cell.field(governor)
+        margin = self._margin_of(cell, context, governor)
+        velocity = output.get_mutable_value()
+        kernels.governor_velocity(
+            vx, vy, margin, gains.stiffness, gains.governor_gain, gains.smoothing, velocity
         )
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
-        gains, state = self._cell(context).gains, self._object.Eval(context)
-        output.SetFromVector(
-            governed_acceleration(
-                state[:2],
-                state[3:5],
-                self._governor.Eval(context),
-                stiffness=gains.stiffness,
-                damping=gains.damping,
-            )
+        gains, state, governor = (
+            self._cell(context).gains,
+            self._object.Eval(context),
+            self._governor.Eval(context),
         )
+        acceleration = output.get_mutable_value()
+        kernels.governed_acceleration(state, governor, gains.stiffness, gains.damping, acceleration)
 
     def _write_margin(self, context: Context, output: BasicVector) -> None:
-        cell, state = self._cell(context), self._object.Eval(context)
-        velocity = np.round(state[3:5] / VELOCITY_STEP) * VELOCITY_STEP
-        output.SetFromVector([cell.energy_margin(state[:2], velocity, self._governor.Eval(context))])
+        output[0] = self._margin_of(self._cell(context), context, self._governor.Eval(context))
+
+    def _margin_of(self, cell: GovernedCell, context: Context, governor: FloatArray) -> float:
+        state = self._object.Eval(context)
+        return kernels.cell_margin(cell.clearance.edges, cell.gains.stiffness, state, governor, VELOCITY_STEP)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from coop_drake.control.robot_effort import robot_acceleration
-from coop_drake.plant import RobotPlant
+from coop_drake.control.planar_chain import chain_effort
+from coop_drake.plant import RobotPlant, robot_chain
 
 __all__ = ["RobotEffort"]
 
@@ -29,20 +29,16 @@ class RobotEffort(LeafSystem):
 
     def __init__(self, robot: RobotPlant) -> None:
         super().__init__()
-        self._robot = robot
-        self._size = 3 + len(robot.joints)
-        self._state = self.DeclareVectorInputPort("robot_state", 2 * self._size)
+        self._robot, self._chain = robot, robot_chain(robot)
+        self._size = size = 3 + len(robot.joints)
+        self._state = self.DeclareVectorInputPort("robot_state", 2 * size)
         self._hand = self.DeclareVectorInputPort("hand_command", 6)
-        self._joints = self.DeclareVectorInputPort("joint_acceleration", self._size - 3)
-        self.DeclareVectorOutputPort("robot_effort", self._size, self._write_effort)
+        self._joints = self.DeclareVectorInputPort("joint_acceleration", size - 3)
+        self.DeclareVectorOutputPort("robot_effort", size, self._write_effort)
 
     def _write_effort(self, context: Context, output: BasicVector) -> None:
-        # Inputs first: evaluating them may move the shared scratch context.
-        state, hand = self._state.Eval(context), self._hand.Eval(context)
-        joints, robot = self._joints.Eval(context), self._robot
-        robot.set_state(state[: self._size], state[self._size :])
-        jacobian = robot.grasp_jacobian()
-        acceleration = robot_acceleration(
-            hand[:3], joints, jacobian=jacobian, jacobian_rate_term=robot.grasp_bias()
-        )
-        output.SetFromVector(robot.inertial_effort(acceleration) + hand[3:] @ jacobian)
+        state, effort = self._state.Eval(context), output.get_mutable_value()
+        chain_effort(self._chain, state, self._hand.Eval(context), self._joints.Eval(context), effort)
+        if self._robot.has_springs:
+            self._robot.set_state(state[: self._size], state[self._size :])
+            effort += self._robot.spring_effort()

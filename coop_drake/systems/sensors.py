@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from math import atan2
-
-import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from coop_drake.plant import TeamPlant
+from coop_drake.control.planar_chain import read_robot
+from coop_drake.plant import TeamPlant, base_chain
 
 __all__ = ["ObjectPoseSensor", "RobotStateSensor"]
 
@@ -58,20 +56,10 @@ class RobotStateSensor(LeafSystem):
         super().__init__()
         if not 0 <= robot < len(team.robots):
             raise IndexError(f"robot {robot} is not in the team of {len(team.robots)}")
-        model = team.robots[robot]
-        self._plant, self._base = team.plant, model.base_body
-        # Kinematics of this context cost a tenth of reading the plant's poses of all bodies as a list.
-        self._scratch = team.plant.CreateDefaultContext()
-        in_q = slice(3 + model.q_slice.start, 3 + model.q_slice.stop)
-        self._positions = team.position_index[in_q]
-        self._rates = team.plant.num_positions() + team.velocity_index[in_q]
+        way = base_chain(team, team.robots[robot])
+        self._way = way.chain, way.yaw, way.joints
         self._team = self.DeclareVectorInputPort("team_state", team.plant.num_multibody_states())
-        self.DeclareVectorOutputPort("robot_state", 2 * (3 + len(model.joints)), self._write_state)
+        self.DeclareVectorOutputPort("robot_state", 2 * (3 + way.joints.shape[1]), self._write_state)
 
     def _write_state(self, context: Context, output: BasicVector) -> None:
-        team = self._team.Eval(context)
-        self._plant.SetPositionsAndVelocities(self._scratch, team)
-        X = self._base.EvalPoseInWorld(self._scratch).GetAsMatrix34()
-        V = self._base.EvalSpatialVelocityInWorld(self._scratch).get_coeffs()
-        base, base_rate = (X[0, 3], X[1, 3], atan2(X[1, 0], X[0, 0])), (V[3], V[4], V[2])
-        output.SetFromVector(np.concatenate([base, team[self._positions], base_rate, team[self._rates]]))
+        read_robot(*self._way, self._team.Eval(context), output.get_mutable_value())

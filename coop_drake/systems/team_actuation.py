@@ -36,6 +36,7 @@ class TeamActuation(LeafSystem):
             self.DeclareVectorInputPort(f"robot_{robot.index}_effort", 3 + len(robot.joints))
             for robot in team.robots
         ]
+        self._wrench = np.zeros(6)
         self.DeclareAbstractOutputPort("base_wrenches", self._allocate, self._write_wrenches)
         self.DeclareVectorOutputPort("joint_torques", len(team.joints), self._write_torques)
 
@@ -43,9 +44,11 @@ class TeamActuation(LeafSystem):
         return Value[list[ExternallyAppliedSpatialForce]]()
 
     def _write_wrenches(self, context: Context, output: AbstractValue) -> None:
+        F = self._wrench
         for force, port in zip(self._forces, self._efforts, strict=True):
-            fx, fy, torque = port.Eval(context)[:3]
-            force.F_Bq_W = SpatialForce([0.0, 0.0, torque, fx, fy, 0.0])
+            effort = port.Eval(context)
+            F[3], F[4], F[2] = effort[0], effort[1], effort[2]  # Drake's spatial order is rotation first
+            force.F_Bq_W = SpatialForce(F)
         output.set_value(self._forces)
 
     def _write_torques(self, context: Context, output: BasicVector) -> None:

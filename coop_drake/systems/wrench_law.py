@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from coop_drake.control.load_sharing import acceleration_at, rotate, wrench_share
+from coop_drake.control.kernels import hand_command
 from coop_drake.geometry.pose import FloatArray
 
 __all__ = ["WrenchLaw"]
@@ -44,31 +44,21 @@ class WrenchLaw(LeafSystem):
             raise ValueError(f"WrenchLaw needs positive mass and inertia, not {mass} and {inertia}")
         if not 0.0 <= share <= 1.0:
             raise ValueError(f"WrenchLaw's share must lie in [0, 1], not {share}")
-        self._p_LE, self._p_LLcm = np.array(p_LE, dtype=float), np.array(p_LLcm, dtype=float)
-        self._mass, self._inertia, self._share = mass, inertia, share
+        self._parameters = np.array([*p_LE, *p_LLcm, mass, inertia, share], dtype=float)
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._linear = self.DeclareVectorInputPort("position_acceleration", 2)
         self._angular = self.DeclareVectorInputPort("angle_acceleration", 1)
         self.DeclareVectorOutputPort("object_acceleration", 3, self._write_object)
         self.DeclareVectorOutputPort("hand_command", 6, self._write_hand)
 
-    def _object_acceleration(self, context: Context) -> FloatArray:
-        return np.concatenate([self._linear.Eval(context), self._angular.Eval(context)])
-
     def _write_object(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._object_acceleration(context))
+        output.SetFromVector([*self._linear.Eval(context), *self._angular.Eval(context)])
 
     def _write_hand(self, context: Context, output: BasicVector) -> None:
-        state, acceleration = self._object.Eval(context), self._object_acceleration(context)
-        angle, rate = state[2], state[5]
-        offset = rotate(angle, self._p_LE)
-        wrench = wrench_share(
-            acceleration,
-            rate,
-            offset,
-            com_offset=rotate(angle, self._p_LLcm),
-            mass=self._mass,
-            inertia=self._inertia,
-            share=self._share,
+        hand_command(
+            self._parameters,
+            self._object.Eval(context),
+            self._linear.Eval(context),
+            self._angular.Eval(context),
+            output.get_mutable_value(),
         )
-        output.SetFromVector(np.concatenate([acceleration_at(acceleration, rate, offset), wrench]))

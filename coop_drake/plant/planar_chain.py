@@ -1,0 +1,170 @@
+"""Drake's models as the planar chains that the compiled kernels read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Frame, Joint, RigidBody
+from pydrake.systems.framework import Context
+
+from coop_drake.control.planar_chain import (
+    COLUMNS,
+    COM_X,
+    COM_Y,
+    DAMPING,
+    INERTIA,
+    MASS,
+    PARENT,
+    POSITION,
+    RATE,
+    ROTOR,
+    SLIDE_X,
+    SLIDE_Y,
+    TURN,
+    X,
+    Y,
+)
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.plant.robot import RobotPlant
+from coop_drake.plant.team import RobotModel, TeamPlant
+
+__all__ = ["BaseChain", "base_chain", "robot_chain"]
+
+
+@dataclass(frozen=True)
+class BaseChain:
+    """How a robot's base hangs on the object, through its grasp and its joints.
+
+    Attributes:
+        chain: Rows of ``control.planar_chain``, the object first, the base's frame last.
+        yaw: Angle of the base in the object where all joints are at zero [rad].
+        joints: Where the robot's joints and their rates stand in the team's state, shape (2, n).
+    """
+
+    chain: FloatArray
+    yaw: float
+    joints: FloatArray
+
+
+def robot_chain(robot: RobotPlant) -> FloatArray:
+    """A robot's own model, from its base to its hand; masses are those of its context.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        Shape (n + 2, ``COLUMNS``), joints in the order of q_k, their places those in (z_k, z_k').
+    """
+    plant, n = robot.plant, len(robot.joints)
+    context = _at_zero(plant, robot.context)
+    chain = np.zeros((n + 2, COLUMNS))
+    link_of: dict[int, int] = {}
+    for row, body in enumerate([robot.base_body, *(joint.child_body() for joint in robot.joints)]):
+        welded = plant.GetBodiesWeldedTo(body)
+        link_of.update({int(part.index()): row for part in welded})
+        chain[row, [MASS, COM_X, COM_Y, INERTIA]] = _inertia(plant, context, welded)
+    chain[0, RATE] = 3 + n
+    for row, joint in enumerate(robot.joints, 1):
+        chain[row, [X, Y, TURN, SLIDE_X, SLIDE_Y]] = _joint(context, joint)
+        chain[row, PARENT] = link_of[int(joint.parent_body().index())]
+        chain[row, [POSITION, RATE]] = 2 + row, 5 + n + row
+        chain[row, DAMPING] = joint.GetDampingVector(context)[0]
+        chain[row, ROTOR] = _rotor(plant, context, joint)
+    chain[-1, [X, Y]] = _origin(context, robot.gripper_frame)
+    chain[-1, PARENT] = link_of[int(robot.gripper_frame.body().index())]
+    return chain
+
+
+def base_chain(team: TeamPlant, robot: RobotModel) -> BaseChain:
+    """The way from the object to a robot's base in the team's plant, whose tree begins at the object.
+
+    Args:
+        team: The team.
+        robot: One of its robots.
+    """
+    plant = team.plant
+    context = _at_zero(plant, plant.CreateDefaultContext())
+    rates = plant.num_positions()
+    path = _to_base(plant, robot)
+    chain = np.zeros((len(path) + 2, COLUMNS))
+    chain[0, [POSITION, RATE]] = (
+        team.object_joint.position_start(),
+        rates + team.object_joint.velocity_start(),
+    )
+    for row, joint in enumerate(path, 1):
+        x, y, *motion = _joint(context, joint)
+        chain[row, [X, Y, TURN, SLIDE_X, SLIDE_Y]] = x, y, *(-part for part in motion)  # from hand to base
+        chain[row, PARENT] = row - 1
+        chain[row, [POSITION, RATE]] = joint.position_start(), rates + joint.velocity_start()
+    chain[-1, [X, Y]] = _origin(context, robot.base_body.body_frame())
+    chain[-1, PARENT] = len(path)
+    R = robot.base_body.EvalPoseInWorld(context).rotation().matrix()
+    joints = np.array(
+        [
+            [joint.position_start() for joint in robot.joints],
+            [rates + joint.velocity_start() for joint in robot.joints],
+        ],
+        dtype=float,
+    ).reshape(2, -1)
+    return BaseChain(chain, float(np.arctan2(R[1, 0], R[0, 0])), joints)
+
+
+def _to_base(plant: MultibodyPlant, robot: RobotModel) -> list[Joint]:
+    """The joints between a robot's hand and its base, from the hand inwards."""
+    leading = {
+        int(body.index()): joint
+        for joint in robot.joints
+        for body in plant.GetBodiesWeldedTo(joint.child_body())
+    }
+    path, body = [], robot.gripper_frame.body()
+    while (joint := leading.get(int(body.index()))) is not None:
+        path.append(joint)
+        body = joint.parent_body()
+    return path
+
+
+def _at_zero(plant: MultibodyPlant, context: Context) -> Context:
+    """A copy of a context with all positions and velocities zero."""
+    copy = context.Clone()
+    plant.SetPositionsAndVelocities(copy, np.zeros(plant.num_multibody_states()))
+    return copy
+
+
+def _origin(context: Context, frame: Frame) -> FloatArray:
+    origin: FloatArray = frame.CalcPoseInWorld(context).translation()[:2]
+    return origin
+
+
+def _joint(context: Context, joint: Joint) -> tuple[float, float, float, float, float]:
+    """Where a joint is, the sense in which it turns (0 if it slides) and the direction in which it slides."""
+    X_WF = joint.frame_on_parent().CalcPoseInWorld(context)
+    x, y, _ = X_WF.translation()
+    revolute = joint.type_name() == "revolute"
+    axis = X_WF.rotation().matrix() @ (joint.revolute_axis() if revolute else joint.translation_axis())
+    if revolute:
+        return float(x), float(y), float(np.sign(axis[2])), 0.0, 0.0
+    return float(x), float(y), 0.0, float(axis[0]), float(axis[1])
+
+
+def _inertia(
+    plant: MultibodyPlant, context: Context, bodies: list[RigidBody]
+) -> tuple[float, float, float, float]:
+    """Mass, centre of mass and inertia about it of bodies that move as one."""
+    whole = plant.CalcSpatialInertia(context, plant.world_frame(), [body.index() for body in bodies])
+    if whole.get_mass() == 0.0:
+        return 0.0, 0.0, 0.0, 0.0
+    com = whole.get_com()
+    about_com = whole.Shift(com).CalcRotationalInertia().get_moments()[2]
+    return float(whole.get_mass()), float(com[0]), float(com[1]), float(about_com)
+
+
+def _rotor(plant: MultibodyPlant, context: Context, joint: Joint) -> float:
+    """What the rotors that drive a joint add to its inertia."""
+    actuators = [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
+    return sum(
+        float(actuator.calc_reflected_inertia(context))
+        for actuator in actuators
+        if actuator.joint().index() == joint.index()
+    )

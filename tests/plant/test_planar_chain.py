@@ -1,0 +1,56 @@
+"""The compiled chains against Drake's own models of the same robots."""
+
+import numpy as np
+import pytest
+from pydrake.systems.framework import DiagramBuilder
+
+from coop_drake.control import robot_acceleration
+from coop_drake.control.planar_chain import chain_effort, frame_twist, read_robot
+from coop_drake.plant import base_chain, build_robot_plant, build_team_plant, robot_chain
+from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
+
+ARMS = [[REVOLUTE, PRISMATIC, REVOLUTE], [PRISMATIC], [REVOLUTE, REVOLUTE]]
+
+
+@pytest.fixture(scope="module")
+def scenario(tmp_path_factory):
+    return ring_team(tmp_path_factory.mktemp("ring"), ARMS)
+
+
+@pytest.mark.parametrize("k", range(len(ARMS)))
+def test_a_hand_moves_and_is_moved_as_in_drake(scenario, k):
+    robot, n = build_robot_plant(scenario, k), len(ARMS[k])
+    robot.scale_masses(1.3)
+    for joint in robot.joints:
+        joint.SetDampingVector(robot.context, [0.7])
+    robot.plant.get_joint_actuator(robot.plant.GetJointActuatorIndices()[0]).SetRotorInertia(robot.context, 0.4)
+    chain, generator = robot_chain(robot), np.random.default_rng(k)
+    for state, hand, joints in zip(
+        generator.normal(size=(20, 2 * (3 + n))), generator.normal(size=(20, 6)), generator.normal(size=(20, n))
+    ):
+        robot.set_state(*np.split(state, 2))
+        jacobian = robot.grasp_jacobian()
+        np.testing.assert_allclose(frame_twist(chain, state), jacobian @ state[3 + n :], atol=1e-14)
+        acceleration = robot_acceleration(
+            hand[:3], joints, jacobian=jacobian, jacobian_rate_term=robot.grasp_bias()
+        )
+        expected = robot.inertial_effort(acceleration) + hand[3:] @ jacobian
+        effort = np.empty(3 + n)
+        chain_effort(chain, state, hand, joints, effort)
+        np.testing.assert_allclose(effort, expected, atol=1e-13 * np.abs(expected).max())
+
+
+def test_a_base_is_where_the_teams_plant_has_it(scenario):
+    team = build_team_plant(scenario, DiagramBuilder())
+    context, generator = team.plant.CreateDefaultContext(), np.random.default_rng(1)
+    for robot in team.robots:
+        way, n = base_chain(team, robot), len(robot.joints)
+        for state in generator.normal(size=(20, team.plant.num_multibody_states())):
+            team.plant.SetPositionsAndVelocities(context, state)
+            X_WB = robot.base_body.EvalPoseInWorld(context).GetAsMatrix34()
+            V_WB = robot.base_body.EvalSpatialVelocityInWorld(context).get_coeffs()
+            found = np.empty(2 * (3 + n))
+            read_robot(way.chain, way.yaw, way.joints, state, found)
+            expected = [X_WB[0, 3], X_WB[1, 3], np.arctan2(X_WB[1, 0], X_WB[0, 0])]
+            np.testing.assert_allclose(found[:3], expected, atol=1e-14)
+            np.testing.assert_allclose(found[3 + n : 6 + n], V_WB[[3, 4, 2]], atol=1e-14)
