@@ -13,7 +13,6 @@ import numba
 import numpy as np
 
 from coop_drake.control.gains import FloatArray
-from coop_drake.geometry.boundary import signed_distance_compiled
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -215,27 +214,6 @@ def governed_acceleration(
     """Write -K (p - p_G) - zeta p' of (14) from the object's state, shape (2,)."""
     for i in range(2):
         acceleration[i] = -stiffness * (state[i] - governor[i]) - damping * state[3 + i]
-
-
-@compiled
-def cell_margin(
-    edges: FloatArray, stiffness: float, state: FloatArray, governor: FloatArray, velocity_step: float
-) -> float:
-    """Return Delta E = (K / 2) d^2 - E of (15) and (16), the velocity in whole steps.
-
-    Args:
-        edges: Of the governed set, shape (edges, 4) [m].
-        stiffness: K [1/s^2].
-        state: Pose and twist of the object, shape (6,).
-        governor: p_G, shape (2,) [m].
-        velocity_step: What the velocity is rounded to [m/s].
-    """
-    vx = np.rint(state[3] / velocity_step) * velocity_step
-    vy = np.rint(state[4] / velocity_step) * velocity_step
-    x, y = state[0] - governor[0], state[1] - governor[1]
-    energy = 0.5 * (vx**2 + vy**2 + stiffness * (x * x + y * y))
-    clearance: float = signed_distance_compiled(edges, governor[0], governor[1])
-    return 0.5 * stiffness * clearance * abs(clearance) - energy
 
 
 @compiled

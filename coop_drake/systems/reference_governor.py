@@ -4,21 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
+import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from coop_drake.control import kernels
 from coop_drake.control.gains import TransitionGains
 from coop_drake.control.governor import energy_margin, tracking_energy
+from coop_drake.fields import VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
+from coop_drake.systems.governor_kernels import VELOCITY_STEP, cell_margin, lead
 
-#: The energy is computed from a velocity in steps of this size [m/s]. Every robot knows the velocity through
-#: its own arm, with its own rounding; in steps they have the same number, and so the same p_G, bit by bit.
-VELOCITY_STEP = 2.0**-26
-
-__all__ = ["GovernedCell", "ReferenceGovernor"]
+__all__ = ["VELOCITY_STEP", "GovernedCell", "ReferenceGovernor"]
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,29 @@ class GovernedCell:
         stiffness = self.gains.stiffness
         energy = tracking_energy(position, velocity, governor_position, stiffness=stiffness)
         return energy_margin(energy, self.clearance(governor_position), stiffness=stiffness)
+
+    @cached_property
+    def gain_row(self) -> FloatArray:
+        """What the compiled governor reads of the gains: (K, zeta, K_G, c)."""
+        gains = self.gains
+        return np.array([gains.stiffness, gains.damping, gains.governor_gain, gains.smoothing])
+
+    def lead(self, state: FloatArray, governor_position: FloatArray, velocity: FloatArray) -> None:
+        """Write p_G' of (14) in this cell.
+
+        Args:
+            state: Pose and twist of the object, shape (6,).
+            governor_position: p_G, shape (2,) [m].
+            velocity: Receives p_G', shape (2,) [m/s].
+        """
+        edges = self.clearance.edges
+        if isinstance(self.field, VelocityField):
+            lead(self.gain_row, edges, *self.field.kernel_arguments, state, governor_position, velocity)
+            return
+        stiffness, _, gain, smoothing = self.gain_row
+        margin = cell_margin(edges, stiffness, state, governor_position)
+        vx, vy = self.field(governor_position)
+        kernels.governor_velocity(vx, vy, margin, stiffness, gain, smoothing, velocity)
 
 
 class ReferenceGovernor(LeafSystem):
@@ -81,26 +104,16 @@ class ReferenceGovernor(LeafSystem):
         return self._cells[index_of(self._current.Eval(context), len(self._cells))]
 
     def _write_velocity(self, context: Context, output: BasicVector) -> None:
-        cell, governor = self._cell(context), self._governor.Eval(context)
-        gains, (vx, vy) = cell.gains, cell.field(governor)
-        margin = self._margin_of(cell, context, governor)
-        velocity = output.get_mutable_value()
-        kernels.governor_velocity(
-            vx, vy, margin, gains.stiffness, gains.governor_gain, gains.smoothing, velocity
-        )
+        cell, state = self._cell(context), self._object.Eval(context)
+        cell.lead(state, self._governor.Eval(context), output.get_mutable_value())
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
-        gains, state, governor = (
-            self._cell(context).gains,
-            self._object.Eval(context),
-            self._governor.Eval(context),
-        )
-        acceleration = output.get_mutable_value()
+        gains, state = self._cell(context).gains, self._object.Eval(context)
+        governor, acceleration = self._governor.Eval(context), output.get_mutable_value()
         kernels.governed_acceleration(state, governor, gains.stiffness, gains.damping, acceleration)
 
     def _write_margin(self, context: Context, output: BasicVector) -> None:
-        output[0] = self._margin_of(self._cell(context), context, self._governor.Eval(context))
-
-    def _margin_of(self, cell: GovernedCell, context: Context, governor: FloatArray) -> float:
-        state = self._object.Eval(context)
-        return kernels.cell_margin(cell.clearance.edges, cell.gains.stiffness, state, governor, VELOCITY_STEP)
+        cell, state = self._cell(context), self._object.Eval(context)
+        output[0] = cell_margin(
+            cell.clearance.edges, cell.gains.stiffness, state, self._governor.Eval(context)
+        )

@@ -7,7 +7,9 @@ from pydrake.systems.framework import DiagramBuilder
 from coop_drake.control import robot_acceleration
 from coop_drake.control.planar_chain import chain_effort, frame_twist, read_robot
 from coop_drake.plant import base_chain, build_robot_plant, build_team_plant, robot_chain
+from coop_drake.systems import RobotEffort
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
+from tests.support.system_checks import evaluate
 
 ARMS = [[REVOLUTE, PRISMATIC, REVOLUTE], [PRISMATIC], [REVOLUTE, REVOLUTE]]
 
@@ -23,10 +25,15 @@ def test_a_hand_moves_and_is_moved_as_in_drake(scenario, k):
     robot.scale_masses(1.3)
     for joint in robot.joints:
         joint.SetDampingVector(robot.context, [0.7])
-    robot.plant.get_joint_actuator(robot.plant.GetJointActuatorIndices()[0]).SetRotorInertia(robot.context, 0.4)
+    robot.plant.get_joint_actuator(robot.plant.GetJointActuatorIndices()[0]).SetRotorInertia(
+        robot.context, 0.4
+    )
     chain, generator = robot_chain(robot), np.random.default_rng(k)
     for state, hand, joints in zip(
-        generator.normal(size=(20, 2 * (3 + n))), generator.normal(size=(20, 6)), generator.normal(size=(20, n))
+        generator.normal(size=(20, 2 * (3 + n))),
+        generator.normal(size=(20, 6)),
+        generator.normal(size=(20, n)),
+        strict=True,
     ):
         robot.set_state(*np.split(state, 2))
         jacobian = robot.grasp_jacobian()
@@ -54,3 +61,23 @@ def test_a_base_is_where_the_teams_plant_has_it(scenario):
             expected = [X_WB[0, 3], X_WB[1, 3], np.arctan2(X_WB[1, 0], X_WB[0, 0])]
             np.testing.assert_allclose(found[:3], expected, atol=1e-14)
             np.testing.assert_allclose(found[3 + n : 6 + n], V_WB[[3, 4, 2]], atol=1e-14)
+
+
+def test_springs_of_a_model_are_held(tmp_path):
+    dynamics = (
+        "<damping>0.3</damping><spring_stiffness>2</spring_stiffness><spring_reference>0.4</spring_reference>"
+    )
+    more = f"<limit><lower>-1</lower><upper>1</upper></limit><dynamics>{dynamics}</dynamics>"
+    robot = build_robot_plant(ring_team(tmp_path, [[("revolute", "0 0 1", more)], [REVOLUTE]]), 0)
+    assert robot.has_springs
+    state, hand, joints = np.linspace(0.1, 0.8, 8), np.linspace(-1.0, 1.0, 6), np.array([0.5])
+    inputs = {"robot_state": state, "hand_command": hand, "joint_acceleration": joints}
+    effort = evaluate(RobotEffort(robot), inputs, "robot_effort")
+    robot.set_state(*np.split(state, 2))
+    jacobian = robot.grasp_jacobian()
+    z = robot_acceleration(hand[:3], joints, jacobian=jacobian, jacobian_rate_term=robot.grasp_bias())
+    expected = robot.inertial_effort(z) + hand[3:] @ jacobian
+    np.testing.assert_allclose(effort, expected, atol=1e-13)
+    without = np.empty(4)
+    chain_effort(robot_chain(robot), state, hand, joints, without)
+    assert effort[3] - without[3] == pytest.approx(2.0 * (state[3] - 0.4))
