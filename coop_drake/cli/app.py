@@ -52,6 +52,10 @@ GainsName = Annotated[
 FreshMaps = Annotated[
     bool, typer.Option("--fresh-maps", help="Solve all maps anew; others come from the cache, see `maps`.")
 ]
+Live = Annotated[
+    bool,
+    typer.Option("--live", help="Show the run in a browser while it is simulated, at most in real time."),
+]
 Machine = Annotated[
     bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
 ]
@@ -87,6 +91,7 @@ def run_command(
     out: OutPath = None,
     gains: GainsName = None,
     fresh_maps: FreshMaps = False,
+    live: Live = False,
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
@@ -96,7 +101,7 @@ def run_command(
     def command() -> ExitCode:
         from coop_drake.cli.simulating import run_scenario
 
-        return run_scenario(scenario, gains, out, reporter, fresh_maps=fresh_maps)
+        return run_scenario(scenario, gains, out, reporter, fresh_maps=fresh_maps, live=live)
 
     run_guarded(reporter, command)
 
@@ -133,6 +138,7 @@ def simulate_command(
         str | None, typer.Option("--gains", metavar="NAME", help="Gain set; the plan's own by default.")
     ] = None,
     fresh_maps: FreshMaps = False,
+    live: Live = False,
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
@@ -142,7 +148,7 @@ def simulate_command(
     def command() -> ExitCode:
         from coop_drake.cli.simulating import simulate_scenario
 
-        return simulate_scenario(scenario, gains, plan, out, reporter, fresh_maps=fresh_maps)
+        return simulate_scenario(scenario, gains, plan, out, reporter, fresh_maps=fresh_maps, live=live)
 
     run_guarded(reporter, command)
 

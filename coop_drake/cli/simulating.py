@@ -7,6 +7,7 @@ from pathlib import Path
 from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.live import open_live_view
 from coop_drake.cli.mapping import map_cells, save_certificates
 from coop_drake.cli.measures import simulation_measures
 from coop_drake.cli.planning import plan_question, read_plan, without_plan
@@ -18,13 +19,19 @@ from coop_drake.fields import HarmonicMap
 from coop_drake.memory import peak_memory_mb
 from coop_drake.planning import Found, Plan
 from coop_drake.simulation import SimulationLog, simulate
-from coop_drake.viz import write_figures, write_recording
+from coop_drake.viz import LiveView, write_figures, write_recording
 
 __all__ = ["run_scenario", "simulate_scenario"]
 
 
 def run_scenario(
-    scenario: Path, gains: str | None, out: Path | None, reporter: Reporter, *, fresh_maps: bool = False
+    scenario: Path,
+    gains: str | None,
+    out: Path | None,
+    reporter: Reporter,
+    *,
+    fresh_maps: bool = False,
+    live: bool = False,
 ) -> ExitCode:
     """Plan and carry the plan out, with maps solved before unless fresh ones are asked for."""
     task = read_task(scenario, gains)
@@ -32,7 +39,7 @@ def run_scenario(
     result = plan_question(task.question, folder, reporter)
     if not isinstance(result, Found):
         return without_plan(task.question, result, folder, reporter)
-    return _carry_out(task, result.plan, folder, reporter, fresh_maps)
+    return _carry_out(task, result.plan, folder, reporter, fresh_maps=fresh_maps, live=live)
 
 
 def simulate_scenario(
@@ -43,20 +50,22 @@ def simulate_scenario(
     reporter: Reporter,
     *,
     fresh_maps: bool = False,
+    live: bool = False,
 ) -> ExitCode:
     """Carry out a plan made before: the file that is named, or the one among the scenario's results."""
     task = read_task(scenario, gains)
     folder = ResultFolder.of(task.scenario.name, out)
     found = read_plan(task.question, plan_file or folder.plan, reporter, gains_given=gains is not None)
-    return _carry_out(task, found, folder, reporter, fresh_maps)
+    return _carry_out(task, found, folder, reporter, fresh_maps=fresh_maps, live=live)
 
 
 def _carry_out(
-    task: Task, found: Plan, folder: ResultFolder, reporter: Reporter, fresh_maps: bool
+    task: Task, found: Plan, folder: ResultFolder, reporter: Reporter, *, fresh_maps: bool, live: bool
 ) -> ExitCode:
     """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run."""
     maps = map_cells(task, found, reporter, fresh=fresh_maps)
-    log = _simulate(task, found, maps, folder, reporter)
+    onlooker = open_live_view(task.scenario, found, reporter) if live else None
+    log = _simulate(task, found, maps, folder, reporter, onlooker)
     _draw(task, found, log, folder, reporter)
     reporter.table(task.scenario.name, summary_rows(reporter.facts))
     reporter.say(
@@ -70,11 +79,16 @@ def _carry_out(
 
 
 def _simulate(
-    task: Task, found: Plan, maps: tuple[HarmonicMap, ...], folder: ResultFolder, reporter: Reporter
+    task: Task,
+    found: Plan,
+    maps: tuple[HarmonicMap, ...],
+    folder: ResultFolder,
+    reporter: Reporter,
+    onlooker: LiveView | None,
 ) -> SimulationLog:
     """Run the closed loop, note how it went, and write the log and the maps' certificates."""
     with reporter.stage("simulating") as progress, reporter.stopwatch("simulation"):
-        log = simulate(task.scenario, found, maps, progress=progress)
+        log = simulate(task.scenario, found, maps, progress=progress, onlooker=onlooker)
     reporter.facts.update(simulation_measures(found, log), peak_memory_mb=peak_memory_mb())
     folder.make()
     folder.forget_simulation()

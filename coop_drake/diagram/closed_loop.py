@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pydrake.geometry import Meshcat, MeshcatVisualizer
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from coop_drake.control import slowdown_radius
@@ -66,16 +65,13 @@ class ClosedLoop:
         return context
 
 
-def build_closed_loop(
-    scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], meshcat: Meshcat | None = None
-) -> ClosedLoop:
+def build_closed_loop(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> ClosedLoop:
     """Wire the loop; nothing but ready reports crosses between robots.
 
     Args:
         scenario: The scenario.
         plan: A plan for it.
         maps: The harmonic map of every transition.
-        meshcat: Shows the run while it is simulated, if given.
 
     Raises:
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
@@ -98,8 +94,6 @@ def build_closed_loop(
         builder.AddNamedSystem(f"robot_{k}_controller", controller)
         _connect(builder, station.diagram, planner, controller, k)
         controllers.append(controller)
-    if meshcat is not None:
-        MeshcatVisualizer.AddToBuilder(builder, station.diagram.GetOutputPort("query_object"), meshcat)
     return ClosedLoop(builder.Build(), station, planner, tuple(controllers), tuple(deployed), plan)
 
 

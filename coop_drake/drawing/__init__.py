@@ -4,7 +4,17 @@ from coop_drake.drawing.camera import camera_pose
 from coop_drake.drawing.canvas import house_style, legend_above, new_figure, save_figure
 from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace, team_legend
 from coop_drake.drawing.footprints import BodyFootprint, team_footprints
-from coop_drake.drawing.solids import TriangleMesh, flat_mesh, parts_of, ring_lines, wall_mesh, wall_polygons
+from coop_drake.drawing.solids import (
+    TriangleMesh,
+    flat_mesh,
+    joined,
+    parts_of,
+    ribbon_mesh,
+    ring_lines,
+    slab_mesh,
+    wall_mesh,
+    wall_polygons,
+)
 
 __all__ = [
     "BodyFootprint",
@@ -15,11 +25,14 @@ __all__ = [
     "draw_workspace",
     "flat_mesh",
     "house_style",
+    "joined",
     "legend_above",
     "new_figure",
     "parts_of",
+    "ribbon_mesh",
     "ring_lines",
     "save_figure",
+    "slab_mesh",
     "team_footprints",
     "team_legend",
     "wall_mesh",

@@ -12,8 +12,7 @@ from coop_drake.geometry.pose import FloatArray
 
 __all__ = ["camera_pose"]
 
-_HALF_HEIGHT = tan(radians(75.0) / 2)  # Meshcat's vertical field of view.
-_HALF_WIDTH = _HALF_HEIGHT * 4 / 3  # Browser windows are seldom narrower than this.
+_ASPECT = 4 / 3  # Browser windows are seldom narrower than this.
 
 
 def camera_pose(
@@ -23,6 +22,7 @@ def camera_pose(
     elevation: float = radians(62.0),
     turn: float = 0.0,
     fill: float = 0.92,
+    field_of_view: float = radians(75.0),
 ) -> tuple[FloatArray, FloatArray]:
     """Return the camera's position and its target, from which the workspace just fills the picture.
 
@@ -32,10 +32,13 @@ def camera_pose(
         elevation: How steeply the camera looks down [rad].
         turn: How far round it stands, counter-clockwise, from where it looks along +y [rad].
         fill: Part of the picture that the floor and what stands on it may fill.
+        field_of_view: Of the camera, from bottom to top [rad]; Meshcat's own if not given.
 
     Returns:
         Position and target, each of shape (3,), in W [m].
     """
+    half_height = tan(field_of_view / 2)
+    half_width = half_height * _ASPECT
     outline = shapely.get_coordinates(workspace.convex_hull)[:-1]
     corners = np.array([[x, y, z] for x, y in outline for z in (0.0, height)])
     right = np.array([cos(turn), sin(turn), 0.0])
@@ -44,15 +47,15 @@ def camera_pose(
     away = np.cross(right, up)
     x_min, y_min, x_max, y_max = workspace.bounds
     target = np.array([0.5 * (x_min + x_max), 0.5 * (y_min + y_max), 0.0])
-    distance = x_max - x_min + y_max - y_min
+    distance = (x_max - x_min + y_max - y_min) / half_height
     for _ in range(40):
         offsets = corners - target
         depth = distance - offsets @ away
-        vertical = offsets @ up / depth / _HALF_HEIGHT
-        horizontal = offsets @ right / depth / _HALF_WIDTH
+        vertical = offsets @ up / depth / half_height
+        horizontal = offsets @ right / depth / half_width
         rise, drift = (0.5 * float(seen.max() + seen.min()) for seen in (vertical, horizontal))
-        target += 0.5 * rise * _HALF_HEIGHT * distance / sin(elevation) * ahead
-        target += 0.5 * drift * _HALF_WIDTH * distance * right
+        target += 0.5 * rise * half_height * distance / sin(elevation) * ahead
+        target += 0.5 * drift * half_width * distance * right
         extent = max(vertical.max() - rise, horizontal.max() - drift)
         distance *= (extent / fill) ** 0.5
     return target + distance * away, target

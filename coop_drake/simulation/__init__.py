@@ -6,6 +6,7 @@ from coop_drake.simulation.ledger import Ledger, communication
 from coop_drake.simulation.log import SimulationLog
 from coop_drake.simulation.maps import build_maps, certificate_rows
 from coop_drake.simulation.run import simulate
+from coop_drake.simulation.telemetry import Sample
 
 __all__ = [
     "ACCELERATION_TOLERANCE",
@@ -14,6 +15,7 @@ __all__ = [
     "Invariants",
     "Ledger",
     "Margins",
+    "Sample",
     "SimulationLog",
     "TeamClearance",
     "build_maps",

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from pydrake.geometry import Meshcat
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from coop_drake.diagram import build_closed_loop
@@ -17,6 +16,7 @@ from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.invariants import Invariants
 from coop_drake.simulation.joint_limits import joint_limits_kept_by_funnels
 from coop_drake.simulation.log import SimulationLog
+from coop_drake.simulation.telemetry import Sample
 from coop_drake.simulation.watch import Watch
 
 __all__ = ["simulate"]
@@ -30,7 +30,7 @@ def simulate(
     maps: Sequence[HarmonicMap],
     *,
     progress: Progress | None = None,
-    meshcat: Meshcat | None = None,
+    onlooker: Callable[[Sample], None] | None = None,
 ) -> SimulationLog:
     """Run the closed loop from the plan's start until the object rests at the goal, or the run fails.
 
@@ -42,13 +42,13 @@ def simulate(
         plan: A plan for it.
         maps: The harmonic map of every transition.
         progress: Told the stage and the fraction done, if given.
-        meshcat: Shows the run while it is simulated, if given.
+        onlooker: Called with every accepted step, for example a live view; it changes nothing about the run.
 
     Raises:
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
         ScenarioError: The models do not make a team.
     """
-    loop = build_closed_loop(scenario, plan, maps, meshcat)
+    loop = build_closed_loop(scenario, plan, maps)
     clearance = TeamClearance(scenario.workspace.polygon, read_component_tree(loop.team.as_tree))
     root = loop.create_context()
     watch = Watch(
@@ -57,6 +57,7 @@ def simulate(
         scenario.goal.tolerances.position,
         root,
         progress,
+        onlooker,
     )
     simulator = Simulator(loop.diagram, root)
     _configure(simulator, scenario)

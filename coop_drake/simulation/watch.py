@@ -24,6 +24,7 @@ class Watch:
         position_tolerance: How close to the goal counts as arrived [m].
         root: Context of the whole diagram in the simulator.
         progress: Told the stage and the fraction done, if given.
+        onlooker: Called with every accepted step, if given.
     """
 
     def __init__(
@@ -33,11 +34,13 @@ class Watch:
         position_tolerance: float,
         root: Context,
         progress: Callable[[str, float], None] | None,
+        onlooker: Callable[[Sample], None] | None = None,
     ) -> None:
         self.recorder = Recorder()
         self.reached = False
         self.violation = ""
-        self._loop, self._invariants, self._progress = loop, invariants, progress
+        self._loop, self._invariants = loop, invariants
+        self._progress, self._onlooker = progress, onlooker
         self._telemetry = Telemetry(loop, root)
         self._tolerance = position_tolerance
         self._last: Sample | None = None
@@ -54,6 +57,8 @@ class Watch:
         self.recorder.add(sample, margins)
         self._last = sample
         self._report(sample)
+        if self._onlooker is not None:
+            self._onlooker(sample)
         if margins.violation:
             self.violation = margins.violation
         elif sample.arrived:

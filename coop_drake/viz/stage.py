@@ -1,99 +1,128 @@
-"""The stage of a recording: floor, walls, light, the path, the outline of every cell."""
+"""The stage of the scene: floor with a metre grid, walls, shelves, light and camera."""
 
 from __future__ import annotations
 
+from math import radians
+
 import numpy as np
+import shapely
 from pydrake.geometry import Meshcat, Rgba
-from shapely import LineString, Point, Polygon
-from shapely.geometry.base import BaseGeometry
+from shapely import MultiLineString, Polygon, minimum_rotated_rectangle
 
 from coop_drake.drawing.camera import camera_pose
-from coop_drake.drawing.solids import flat_mesh, parts_of, ring_lines, wall_mesh, wall_polygons
+from coop_drake.drawing.solids import (
+    TriangleMesh,
+    flat_mesh,
+    joined,
+    parts_of,
+    ring_lines,
+    slab_mesh,
+    wall_mesh,
+    wall_polygons,
+)
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.plan import Plan
-from coop_drake.simulation.log import IntArray
 
-__all__ = ["place_camera", "set_cells", "set_floor", "set_light", "set_path", "switch_cells"]
+__all__ = ["place_camera", "set_mesh", "set_stage"]
 
-_FLOOR = Rgba(0.95, 0.95, 0.93, 1.0)
-_WALL = Rgba(0.45, 0.48, 0.52, 0.45)
-_EDGE = Rgba(0.13, 0.13, 0.13, 1.0)
-_PATH = Rgba(0.0, 0.45, 0.70, 1.0)
-_CELL = Rgba(0.90, 0.62, 0.0, 1.0)
+_FLOOR = Rgba(0.97, 0.96, 0.94, 1.0)
+_GRID = Rgba(0.72, 0.72, 0.72, 1.0)
+_WALL = Rgba(0.50, 0.55, 0.62, 0.42)
+_PILLAR = Rgba(0.42, 0.46, 0.52, 0.85)
+_SHELF = Rgba(0.72, 0.55, 0.36, 0.85)
+_EDGE = Rgba(0.13, 0.15, 0.18, 1.0)
 _WALL_THICKNESS = 0.08  # [m]
+_SHELF_LENGTH = 0.8  # From this length on an obstacle on the floor is drawn as shelves [m].
+_BOARDS = (0.12, 0.55, 1.0)  # Tops of a shelf's boards, as parts of the walls' height.
+_BOARD, _POST = 0.02, 0.025  # Thickness of boards, half the width of posts [m].
+_LENS = 30.0  # Field of view from bottom to top [degrees].
+_ELEVATION, _FILL = (
+    radians(56.0),
+    0.86,
+)  # How steeply the camera looks down, and the part of the picture filled.
+_BACKGROUND = {"top_color": (1.0, 1.0, 1.0), "bottom_color": (0.90, 0.92, 0.95)}
 _LIGHTS = {
-    "AmbientLight": 1.6,
-    "DirectionalLight": 0.8,
-    "FillLight": 0.5,
+    "AmbientLight": 2.7,
+    "FillLight": 1.6,
     "PointLightNegativeX": 0.0,
     "PointLightPositiveX": 0.0,
 }
 
 
 def place_camera(meshcat: Meshcat, workspace: Polygon, height: float) -> None:
-    """Look at the whole workspace from above at an angle."""
-    meshcat.SetCameraPose(*camera_pose(workspace, height))
+    """Look at the whole workspace from above at an angle, through a lens that keeps walls upright."""
+    position, target = camera_pose(
+        workspace, height, elevation=_ELEVATION, fill=_FILL, field_of_view=radians(_LENS)
+    )
+    distance = float(np.linalg.norm(position - target))
+    camera = Meshcat.PerspectiveCamera(fov=_LENS, near=0.01 * distance, far=10.0 * distance)
+    meshcat.SetCamera(camera)
+    meshcat.SetCameraPose(position, target)
 
 
-def set_floor(meshcat: Meshcat, workspace: Polygon, wall_height: float) -> None:
-    """Lay the floor and stand the walls up, translucent, so that nothing hides behind them.
+def set_stage(meshcat: Meshcat, workspace: Polygon, wall_height: float) -> None:
+    """Light the floor and put up what stands still on it, translucent where something may be behind.
 
     Args:
         meshcat: Where to draw.
         workspace: The floor [m].
-        wall_height: Height of the walls [m].
+        wall_height: Height of walls and shelves [m].
     """
-    _set_flat(meshcat, "/stage/floor", workspace, 0.0, _FLOOR)
-    walls = wall_polygons(workspace, _WALL_THICKNESS)
-    solid = wall_mesh(walls, wall_height)
-    meshcat.SetTriangleMesh("/stage/walls", solid.vertices, solid.faces, _WALL)
+    _set_light(meshcat)
+    set_mesh(meshcat, "/stage/floor", flat_mesh(parts_of(workspace), 0.0), _FLOOR)
+    meshcat.SetLineSegments("/stage/grid", *_grid(workspace, 0.002), 1.0, _GRID)
+    walls = wall_polygons(Polygon(workspace.exterior), _WALL_THICKNESS)
+    set_mesh(meshcat, "/stage/walls", wall_mesh(walls, wall_height), _WALL)
+    for index, hole in enumerate(Polygon(ring) for ring in workspace.interiors):
+        if _length(hole) < _SHELF_LENGTH:
+            set_mesh(meshcat, f"/stage/pillars/{index:02d}", wall_mesh([hole], wall_height), _PILLAR)
+        else:
+            set_mesh(meshcat, f"/stage/shelves/{index:02d}", _shelf(hole, wall_height), _SHELF)
     for name, height in (("foot", 0.005), ("top", wall_height)):
         meshcat.SetLineSegments(f"/stage/edges/{name}", *ring_lines([workspace], height), 2.0, _EDGE)
 
 
-def set_light(meshcat: Meshcat) -> None:
-    """Light the whole floor evenly, on white, without Meshcat's grid and axes."""
+def set_mesh(meshcat: Meshcat, path: str, mesh: TriangleMesh, colour: Rgba) -> None:
+    """Put a triangle mesh at a path."""
+    meshcat.SetTriangleMesh(path, mesh.vertices, mesh.faces, colour)
+
+
+def _set_light(meshcat: Meshcat) -> None:
+    """Light the whole floor evenly, on white, without Meshcat's own grid and axes."""
     for path in ("/Grid", "/Axes"):
         meshcat.SetProperty(path, "visible", False)
-    for name in ("top_color", "bottom_color"):
-        meshcat.SetProperty("/Background", name, [1.0, 1.0, 1.0])
+    for name, colour in _BACKGROUND.items():
+        meshcat.SetProperty("/Background/<object>", name, list(colour))
     for name, intensity in _LIGHTS.items():
         meshcat.SetProperty(f"/Lights/{name}/<object>", "intensity", intensity)
 
 
-def set_path(meshcat: Meshcat, positions: FloatArray) -> None:
-    """Draw the object's path on the floor, a dot if it never moved; positions of shape (T, 2) [m]."""
-    path = (LineString(positions) if len(positions) > 1 else Point(positions[0])).simplify(0.002)
-    _set_flat(meshcat, "/stage/path", path.buffer(0.015), 0.010, _PATH)
+def _grid(workspace: Polygon, height: float) -> tuple[FloatArray, FloatArray]:
+    """Ends of lines a metre apart on the floor, each of shape (3, m) [m]."""
+    x_min, y_min, x_max, y_max = workspace.bounds
+    upright = [[(x, y_min), (x, y_max)] for x in np.arange(np.ceil(x_min), x_max)]
+    level = [[(x_min, y), (x_max, y)] for y in np.arange(np.ceil(y_min), y_max)]
+    on_floor = MultiLineString(upright + level).intersection(workspace)
+    lines = [part for part in getattr(on_floor, "geoms", [on_floor]) if part.length > 0.0]
+    ends = np.array([[line.coords[0], line.coords[-1]] for line in lines]).reshape(-1, 2, 2)
+    raised = np.concatenate([ends, np.full((len(ends), 2, 1), height)], axis=2)
+    return np.asfortranarray(raised[:, 0].T), np.asfortranarray(raised[:, 1].T)
 
 
-def set_cells(meshcat: Meshcat, plan: Plan) -> None:
-    """Draw the outline of every cell, hidden but for the first one's."""
-    for index, cell in enumerate(plan.cells):
-        _set_flat(meshcat, _cell_path(index), cell.tidied.boundary.buffer(0.02), 0.015, _CELL)
-        meshcat.SetProperty(_cell_path(index), "visible", index == 0)
+def _length(shape: Polygon) -> float:
+    """Length of the longer side of the tightest rectangle round a shape [m]."""
+    corners = shapely.get_coordinates(minimum_rotated_rectangle(shape))
+    return float(np.linalg.norm(np.diff(corners, axis=0), axis=1).max())
 
 
-def switch_cells(meshcat: Meshcat, times: FloatArray, cell_index: IntArray) -> None:
-    """Record that every cell's outline is shown while the cell is the current one.
-
-    Args:
-        meshcat: A Meshcat that is recording.
-        times: Times of the recording's frames [s], shape (F,).
-        cell_index: Cell of each frame, shape (F,).
-    """
-    shown = np.unique(cell_index)
-    for index in shown:
-        meshcat.SetProperty(_cell_path(index), "visible", bool(index == cell_index[0]), float(times[0]))
-    for frame in np.flatnonzero(np.diff(cell_index)) + 1:
-        meshcat.SetProperty(_cell_path(cell_index[frame - 1]), "visible", False, float(times[frame]))
-        meshcat.SetProperty(_cell_path(cell_index[frame]), "visible", True, float(times[frame]))
-
-
-def _set_flat(meshcat: Meshcat, path: str, shape: BaseGeometry, height: float, colour: Rgba) -> None:
-    mesh = flat_mesh(parts_of(shape), height)
-    meshcat.SetTriangleMesh(path, mesh.vertices, mesh.faces, colour)
-
-
-def _cell_path(index: int) -> str:
-    return f"/stage/cells/{index:03d}"
+def _shelf(shape: Polygon, height: float) -> TriangleMesh:
+    """Boards of the obstacle's own outline, held by a post at every corner."""
+    corners = np.asarray(shape.exterior.coords)[:-1, :2]
+    posts = [
+        Polygon(
+            [(x - _POST, y - _POST), (x + _POST, y - _POST), (x + _POST, y + _POST), (x - _POST, y + _POST)]
+        )
+        for x, y in corners
+    ]
+    inside = [part for post in posts for part in parts_of(post & shape)]
+    boards = [slab_mesh([shape], part * height - _BOARD, part * height) for part in _BOARDS]
+    return joined([wall_mesh(inside, height), *boards])

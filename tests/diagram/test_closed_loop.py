@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from pydrake.geometry import Meshcat
 
 from coop_drake.diagram import TELEMETRY, build_closed_loop
 from coop_drake.errors import PlanError
@@ -145,10 +144,3 @@ def test_a_plan_for_another_team_is_refused():
         build_closed_loop(scenario, other, small_maps())
     with pytest.raises(PlanError, match="a plan of 3 cells needs as many maps, not 2"):
         build_closed_loop(scenario, plan, small_maps()[:2])
-
-
-def test_a_meshcat_shows_the_run_while_it_is_simulated():
-    scenario, plan = small_problem("base")
-    quiet, shown = small_loop("base"), build_closed_loop(scenario, plan, small_maps(), Meshcat())
-    names = [{system.get_name() for system in loop.diagram.GetSystems()} for loop in (quiet, shown)]
-    assert names[1] - names[0] == {"meshcat_visualizer(visualizer)"}

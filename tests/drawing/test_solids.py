@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from shapely import Polygon, box
 
-from coop_drake.drawing.solids import flat_mesh, ring_lines, wall_mesh, wall_polygons
+from coop_drake.drawing.solids import (
+    flat_mesh,
+    joined,
+    ribbon_mesh,
+    ring_lines,
+    slab_mesh,
+    wall_mesh,
+    wall_polygons,
+)
 
 FLOOR = Polygon([(0, 0), (4, 0), (4, 3), (2, 1), (0, 3)], [[(1, 0.5), (2, 0.5), (2, 0.8)]])
 
@@ -34,3 +42,23 @@ def test_ring_lines_run_once_round_every_ring():
     start, end = ring_lines([FLOOR, box(0, 0, 1, 1)], 0.2)
     assert start.shape == end.shape == (3, 5 + 3 + 4)
     assert np.linalg.norm(end - start, axis=0).sum() == pytest.approx(FLOOR.length + 4.0)
+
+
+def test_a_slab_stands_between_its_heights():
+    mesh = slab_mesh([FLOOR], 0.2, 0.3)
+    assert area(mesh) == pytest.approx(FLOOR.area + 0.1 * FLOOR.length)
+    assert (mesh.vertices[2].min(), mesh.vertices[2].max()) == (0.2, 0.3)
+
+
+def test_a_ribbon_has_two_triangles_a_piece_in_the_order_of_the_line():
+    points = np.column_stack([np.linspace(0.0, 3.0, 7), np.zeros(7)])
+    mesh = ribbon_mesh(points, 0.1, 0.02)
+    assert mesh.faces.shape == (3, 12)
+    assert area(mesh) == pytest.approx(0.3)
+    middles = mesh.vertices[0, mesh.faces].mean(axis=0).reshape(-1, 2).mean(axis=1)
+    np.testing.assert_allclose(middles, points[:-1, 0] + 0.25)
+
+
+def test_joined_meshes_keep_their_areas():
+    mesh = joined([flat_mesh([FLOOR], 0.0), slab_mesh([FLOOR], 0.2, 0.3)])
+    assert area(mesh) == pytest.approx(2.0 * FLOOR.area + 0.1 * FLOOR.length)

@@ -1,4 +1,4 @@
-"""The recording is one page that needs nothing else."""
+"""The recording is one small page that needs nothing else and shows what the log holds."""
 
 from __future__ import annotations
 
@@ -9,13 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from coop_drake.errors import CoopDrakeError
 from coop_drake.scenario import load_scenario
-from coop_drake.viz import inline_frame, write_recording
-from coop_drake.viz.recording import _interpolate
+from coop_drake.viz import inline_frame, recording_html, write_recording
+from coop_drake.viz.overlay import with_overlay
 from tests.support.cases import case
+from tests.support.recorded import paths, played, track
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 
 MODELS = Path(__file__).parents[2] / "models"
+OBJECT = "/team/illustration/object/body"
 
 
 @pytest.fixture(scope="module")
@@ -36,10 +39,98 @@ def page(tmp_path_factory):
     return path
 
 
-def test_the_page_is_self_contained_and_small(page):
-    text = page.read_text()
-    assert page.stat().st_size < 15e6
-    assert not re.search(r'<(?:script|link|img)[^>]+(?:src|href)="(?!data:)', text)
+@pytest.fixture(scope="module")
+def text(page):
+    return page.read_text()
+
+
+def test_the_page_asks_nobody_for_anything(text):
+    assert not re.search(r'<(?:script|link|img|iframe)[^>]+(?:src|href)="(?!data:)', text)
+    assert not re.search(r"\b(?:fetch|import|open|WebSocket)\([\"'`](?:https?|wss?):", text)
+
+
+def test_a_minute_of_motion_that_no_straight_line_follows_stays_under_6_mb():
+    problem = case("base")
+    plan, log = synthetic_plan(problem), synthetic_log(problem, samples=1500)
+    shaken = np.random.default_rng(0).normal(0.0, 0.1, (len(log.times), 3))
+    log = dataclasses.replace(
+        log,
+        times=log.times * (60.0 / log.times[-1]),
+        object_pose=log.object_pose + shaken,
+        measured_wrenches=20.0 * shaken[:, None] * np.ones((1, 2, 1)),
+    )
+    plan = dataclasses.replace(plan, cells=10 * plan.cells, transitions=10 * plan.transitions)
+    page = recording_html(load_scenario(MODELS / "base.scenario.yaml"), plan, log)
+    assert len(track(page, OBJECT, "position")[0]) > 1000
+    assert len(page.encode()) < 6e6
+
+
+def test_floor_walls_team_grasps_plan_trail_and_forces_are_in_the_scene(text):
+    shown = paths(text)
+    assert shown >= {"/stage/floor", "/stage/walls", "/stage/pillars/00", "/motion/trail"}
+    assert shown >= {f"{OBJECT}/grasps/robot_0", f"{OBJECT}/grasps/robot_1", f"{OBJECT}/object/visual"}
+    assert shown >= {f"/team/illustration/robot_1/base/robot_1/wheel_{k}" for k in range(3)}
+    assert shown >= {"/forces/robot_0/shaft", "/forces/robot_1/head", "/plan/goal_pose/area"}
+    for index in range(5):
+        assert shown >= {f"/plan/cells/{index:03d}/area", f"/plan/goal_regions/{index:03d}/target"}
+
+
+def test_the_object_moves_as_it_was_logged(text):
+    log = synthetic_log(case("base"))
+    times = np.linspace(0.0, 11.9, 60)
+    logged = np.column_stack([np.interp(times, log.times, column) for column in log.object_pose.T])
+    shown = played(text, OBJECT, "position", times)
+    np.testing.assert_allclose(shown[:, :2], logged[:, :2], rtol=0, atol=5e-3)
+    keys, turns = track(text, OBJECT, "quaternion")
+    angles = np.unwrap(2.0 * np.arctan2(turns[:, 2], turns[:, 3]))
+    np.testing.assert_allclose(np.interp(times, keys, angles), logged[:, 2], rtol=0, atol=1e-2)
+
+
+def test_the_cells_take_turns_as_they_were_logged(text):
+    log = synthetic_log(case("base"))
+    switches = log.times[np.flatnonzero(np.diff(log.cell_index)) + 1]
+    for index in (1, 2, 3):
+        for kind in ("cells", "goal_regions"):
+            times, visible = track(text, f"/plan/{kind}/{index:03d}", "visible")
+            seen = times[visible]
+            assert seen.min() == pytest.approx(switches[index - 1], abs=0.05)
+            assert times[times > seen.min()][0] == pytest.approx(switches[index], abs=0.05)
+
+
+def test_an_arrow_is_as_long_as_the_force_is_strong(text):
+    log = synthetic_log(case("base"))
+    times = np.linspace(1.0, 11.0, 40)
+    strength = np.linalg.norm(log.measured_wrenches[:, 0, :2], axis=1)
+    lengths = played(text, "/forces/robot_0", "scale", times)[:, 0]
+    # Half the weight of one kilogram is a metre, to the next round number.
+    np.testing.assert_allclose(lengths, np.interp(times, log.times, strength) / 5.0, rtol=0, atol=0.05)
+
+
+def test_the_trail_grows_from_nothing_to_the_whole_way(text):
+    _, drawn = track(text, "/motion/trail/<object>", "geometry[drawRange].count")
+    assert drawn[0] == 0.0
+    assert (np.diff(drawn) >= 0.0).all()
+    length = np.linalg.norm(np.diff(synthetic_log(case("base")).object_pose[:, :2], axis=0), axis=1).sum()
+    assert drawn[-1] == pytest.approx(6.0 * length / 0.03, rel=0.01)
+
+
+def test_every_track_lasts_as_long_as_the_slider(text):
+    ends = {
+        track(text, path, name)[0][-1]
+        for path, name in (
+            (OBJECT, "position"),
+            ("/forces/robot_0", "scale"),
+            ("/plan/cells/000", "visible"),
+            ("/motion/trail/<object>", "geometry[drawRange].count"),
+        )
+    }
+    (duration,) = re.findall(r'"duration": ([\d.]+)', text)
+    assert ends == {float(duration)}
+
+
+def test_a_page_of_another_make_is_refused():
+    with pytest.raises(CoopDrakeError, match="this version of Drake writes recordings in a way"):
+        with_overlay("<html><body></body></html>", {})
 
 
 def test_nothing_is_left_beside_the_page(page):
@@ -59,12 +150,6 @@ def _histories(log):
     return [
         field.name for field in dataclasses.fields(log) if isinstance(getattr(log, field.name), np.ndarray)
     ]
-
-
-def test_frames_lie_on_the_logged_motion():
-    log = synthetic_log(case("base"))
-    frames = _interpolate(log, log.times[::7])
-    np.testing.assert_allclose(frames, np.hstack([log.object_pose, log.joints])[::7], rtol=0, atol=1e-12)
 
 
 def test_a_page_goes_into_a_notebook_unharmed():

@@ -1,0 +1,65 @@
+"""The plan in the scene: every cell and its goal region as flat shapes on the floor, one shown at a time."""
+
+from __future__ import annotations
+
+from pydrake.geometry import Meshcat, Rgba
+from shapely import Point
+from shapely.geometry.base import BaseGeometry
+
+from coop_drake.drawing.colours import BLUE, GREEN, VERMILLION
+from coop_drake.drawing.solids import flat_mesh, parts_of
+from coop_drake.planning.plan import Plan
+from coop_drake.viz.stage import set_mesh
+
+__all__ = ["CELL_COLOUR", "GOAL_COLOUR", "GOAL_POSE_COLOUR", "cell_paths", "rgba", "set_cells", "set_goal"]
+
+CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR = BLUE, GREEN, VERMILLION
+
+_LINE = 0.03  # Width of outlines [m].
+_COARSE = 0.003  # What outlines may move by, so that the page stays small [m].
+_TARGET = 0.05  # Radius of the dot at a cell's target [m].
+
+
+def set_cells(meshcat: Meshcat, plan: Plan) -> None:
+    """Draw every cell, its goal region and its target, hidden but for the first one's."""
+    for index, (cell, transition) in enumerate(zip(plan.cells, plan.transitions, strict=True)):
+        of_cell, of_goal = cell_paths(index)
+        _set_area(meshcat, of_cell, cell.tidied, 0.004, CELL_COLOUR)
+        _set_area(meshcat, of_goal, transition.goal_region, 0.012, GOAL_COLOUR)
+        target = Point(transition.target).buffer(_TARGET, quad_segs=4)
+        _set_flat(meshcat, f"{of_goal}/target", target, 0.020, GOAL_COLOUR, 1.0)
+        for path in (of_cell, of_goal):
+            meshcat.SetProperty(path, "visible", index == 0)
+
+
+def set_goal(meshcat: Meshcat, footprint: BaseGeometry) -> None:
+    """Draw where the object is to stand in the end."""
+    for part in parts_of(footprint):
+        _set_area(meshcat, "/plan/goal_pose", part, 0.026, GOAL_POSE_COLOUR)
+
+
+def cell_paths(index: int) -> tuple[str, str]:
+    """Return the paths of a cell and of its goal region."""
+    return f"/plan/cells/{index:03d}", f"/plan/goal_regions/{index:03d}"
+
+
+def _set_area(meshcat: Meshcat, path: str, shape: BaseGeometry, height: float, colour: str) -> None:
+    """Draw an area with its outline, which lies inside, so that it is never larger than the area."""
+    shape = shape.simplify(_COARSE)
+    outline = shape.difference(shape.buffer(-_LINE, join_style="mitre")).simplify(_COARSE)
+    _set_flat(meshcat, f"{path}/area", shape, height, colour, 0.22)
+    _set_flat(meshcat, f"{path}/outline", outline, height + 0.003, colour, 0.9)
+
+
+def _set_flat(
+    meshcat: Meshcat, path: str, shape: BaseGeometry, height: float, colour: str, opacity: float
+) -> None:
+    parts = parts_of(shape)
+    if parts:
+        set_mesh(meshcat, path, flat_mesh(parts, height), rgba(colour, opacity))
+
+
+def rgba(colour: str, opacity: float = 1.0) -> Rgba:
+    """Return a colour ``#rrggbb`` as Drake takes it."""
+    red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    return Rgba(red, green, blue, opacity)

@@ -1,0 +1,102 @@
+"""What a recording says beside the scene: headline, time, cell, key of colours, and its player."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import Rgba
+from shapely import Polygon, box
+
+from coop_drake.errors import CoopDrakeError
+from coop_drake.planning.plan import Plan
+from coop_drake.scenario import Scenario
+from coop_drake.simulation import SimulationLog
+from coop_drake.viz.arrows import LONGEST
+from coop_drake.viz.cells import CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR
+from coop_drake.viz.trail import TRAIL_COLOUR
+
+__all__ = ["story_of", "with_overlay"]
+
+_PAGE = Path(__file__).with_name("overlay.html")
+_RATE = 10.0  # Clearances told a second.
+
+
+def story_of(
+    scenario: Scenario,
+    plan: Plan,
+    log: SimulationLog,
+    *,
+    duration: float,
+    colours: list[Rgba],
+    of_a_metre: float,
+) -> dict[str, Any]:
+    """Return what the page's script shows, as JSON has it.
+
+    Args:
+        scenario: Where it happened.
+        plan: What was executed.
+        log: What happened.
+        duration: Of the animation [s].
+        colours: Of the robots.
+        of_a_metre: The force that an arrow of a metre stands for [N].
+    """
+    times = np.arange(0.0, duration + 0.5 / _RATE, 1.0 / _RATE)
+    rows = np.maximum(np.searchsorted(log.times, times, side="right") - 1, 0)
+    first = np.flatnonzero(np.diff(log.cell_index, prepend=-1))
+    end = f"arrived after {log.times[-1]:.1f} s"
+    return {
+        "headline": f"{scenario.name}: {len(colours)} robots carry one object",
+        "duration": duration,
+        "switches": log.times[first].round(3).tolist(),
+        "cells": log.cell_index[first].tolist(),
+        "of_cells": len(plan.cells),
+        "rate": _RATE,
+        "clearance": log.workspace_clearance[rows].round(3).tolist(),
+        "reached": log.reached and not log.violation,
+        "verdict": log.violation or (end if log.reached else "the goal was not reached"),
+        "side": _emptier_side(scenario.workspace.polygon),
+        "key": [
+            ("area", CELL_COLOUR, "cell: the object's centre stays in here"),
+            ("area", GOAL_COLOUR, "goal region, the way into the next cell"),
+            ("area", GOAL_POSE_COLOUR, "where the object is to stand"),
+            ("line", TRAIL_COLOUR, "trail of the object's centre"),
+            *(
+                ("arrow", _hex(colour), f"force of {robot} on the object, {of_a_metre:g} N a metre")
+                for robot, colour in zip(log.robot_names, colours, strict=True)
+            ),
+            ("dot", "#888888", f"grasps, in their robots' colours; arrows end at {LONGEST:g} m"),
+        ],
+    }
+
+
+def with_overlay(page: str, story: dict[str, Any]) -> str:
+    """Add headline, key and player to a page that Drake's Meshcat wrote.
+
+    Raises:
+        CoopDrakeError: The page is not built as Drake builds it.
+    """
+    told = json.dumps(story).replace("</", "<\\/")
+    overlay = _PAGE.read_text(encoding="utf-8").replace("/*story*/", told)
+    body, end, rest = page.rpartition("</body>")
+    if not end or not re.search(r"\bvar viewer = new MeshCat\.Viewer\b", body):
+        raise CoopDrakeError("this version of Drake writes recordings in a way that coop_drake does not know")
+    return f"{body}{overlay}{end}{rest}"
+
+
+def _emptier_side(floor: Polygon) -> str:
+    """In which lower corner of the page the key hides less of the floor."""
+    x_min, y_min, x_max, y_max = floor.bounds
+    across, up = 0.35 * (x_max - x_min), y_min + 0.3 * (y_max - y_min)
+    hidden = {
+        "left": floor.intersection(box(x_min, y_min, x_min + across, up)).area,
+        "right": floor.intersection(box(x_max - across, y_min, x_max, up)).area,
+    }
+    return min(hidden, key=lambda side: hidden[side])
+
+
+def _hex(colour: Rgba) -> str:
+    return "#" + "".join(f"{round(255 * part):02x}" for part in (colour.r(), colour.g(), colour.b()))

@@ -1,0 +1,120 @@
+"""The team in the scene: its bodies as the models draw them, grasp points, colours of robots."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.geometry import (
+    GeometryId,
+    Meshcat,
+    MeshcatVisualizer,
+    MeshcatVisualizerParams,
+    Rgba,
+    Role,
+    Sphere,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import BodyIndex, RigidBody
+from pydrake.systems.framework import DiagramBuilder
+
+from coop_drake.drawing.colours import robot_colour
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.plant import TeamPlant, build_team_plant, set_configuration
+from coop_drake.scenario import Scenario
+from coop_drake.viz.cells import rgba
+
+__all__ = ["TeamView"]
+
+_SEE_THROUGH = 0.6  # Opacity of the object, under which its cell is to be seen.
+_GRASP = 0.07  # Radius of a grasp point [m].
+
+
+class TeamView:
+    """A team standing in a Meshcat, in any configuration, beside whatever simulates it.
+
+    Args:
+        scenario: Where the team comes from.
+        meshcat: Where it is shown.
+
+    Attributes:
+        team: A plant of its own.
+        colours: Every robot's colour, its base's own where the model gives it one.
+    """
+
+    def __init__(self, scenario: Scenario, meshcat: Meshcat) -> None:
+        builder = DiagramBuilder()
+        self.team: TeamPlant = build_team_plant(scenario, builder)
+        roles = [Role.kIllustration] + ([Role.kProximity] if scenario.visualization.show_collision else [])
+        self._prefixes = [f"/team/{role.name[1:].lower()}" for role in roles]
+        for role, prefix in zip(roles, self._prefixes, strict=True):
+            look = MeshcatVisualizerParams(role=role, prefix=prefix)
+            MeshcatVisualizer.AddToBuilder(builder, self.team.scene_graph, meshcat, look)
+        self._diagram = builder.Build()
+        self._context = self._diagram.CreateDefaultContext()
+        self._plant_context = self.team.plant.GetMyMutableContextFromRoot(self._context)
+        self.colours = [self._colour(robot.base_body, k) for k, robot in enumerate(self.team.robots)]
+        self.show(np.concatenate([[0.0] * 3, np.zeros(len(self.team.joint_names))]))
+        self._bodies = self._shown_bodies(meshcat)
+        self._set_grasps(meshcat)
+
+    def show(self, z: FloatArray) -> None:
+        """Put the team where z = (x, y, theta, q...) says, shape (3 + n,) [m, rad]."""
+        set_configuration(self.team, self._plant_context, z)
+        self._diagram.ForcedPublish(self._context)
+
+    def poses(self, z: FloatArray) -> list[RigidTransform]:
+        """Return the pose in W of the bodies of ``paths`` at z, shape (3 + n,)."""
+        set_configuration(self.team, self._plant_context, z)
+        return [body.EvalPoseInWorld(self._plant_context) for body, _ in self._bodies]
+
+    @property
+    def paths(self) -> list[list[str]]:
+        """Where in Meshcat every body is to be moved."""
+        return [paths for _, paths in self._bodies]
+
+    def grasp_points(self, z: FloatArray) -> FloatArray:
+        """Return where the robots hold the object at z, shape (N, 3), in W [m]."""
+        set_configuration(self.team, self._plant_context, z)
+        frames = [robot.gripper_frame for robot in self.team.robots]
+        return np.array([frame.CalcPoseInWorld(self._plant_context).translation() for frame in frames])
+
+    def _shown_bodies(self, meshcat: Meshcat) -> list[tuple[RigidBody, list[str]]]:
+        plant = self.team.plant
+        shown = []
+        for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
+            name = _path_of(body.scoped_name().get_full())
+            paths = [f"{prefix}/{name}" for prefix in self._prefixes if meshcat.HasPath(f"{prefix}/{name}")]
+            if paths:
+                shown.append((body, paths))
+        return shown
+
+    def _set_grasps(self, meshcat: Meshcat) -> None:
+        """Mark the grasps on the object's body, with which they move."""
+        body, inside = self.team.object_body, self._plant_context
+        path = f"{self._prefixes[0]}/{_path_of(body.scoped_name().get_full())}"
+        inspector = self.team.scene_graph.model_inspector()
+        for geometry in self._geometries(body):
+            own = f"{path}/{_path_of(inspector.GetName(geometry))}"
+            meshcat.SetProperty(own, "modulated_opacity", _SEE_THROUGH)
+        for robot, colour in zip(self.team.robots, self.colours, strict=True):
+            own = f"{path}/grasps/{robot.name}"
+            meshcat.SetObject(own, Sphere(_GRASP), colour)
+            meshcat.SetTransform(own, robot.gripper_frame.CalcPose(inside, body.body_frame()))
+
+    def _geometries(self, body: RigidBody) -> list[GeometryId]:
+        frame = self.team.plant.GetBodyFrameIdOrThrow(body.index())
+        ids = self.team.scene_graph.model_inspector().GetGeometries(frame, Role.kIllustration)
+        return sorted(ids, key=lambda one: one.get_value())
+
+    def _colour(self, base: RigidBody, index: int) -> Rgba:
+        inspector = self.team.scene_graph.model_inspector()
+        for geometry in self._geometries(base):
+            looks = inspector.GetIllustrationProperties(geometry)
+            if looks is not None and looks.HasProperty("phong", "diffuse"):
+                colour: Rgba = looks.GetProperty("phong", "diffuse")
+                return Rgba(colour.r(), colour.g(), colour.b(), 1.0)
+        return rgba(robot_colour(index))
+
+
+def _path_of(name: str) -> str:
+    """Where Drake puts what has a scoped name."""
+    return name.replace("::", "/")

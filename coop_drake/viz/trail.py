@@ -1,0 +1,48 @@
+"""The object's trail: a ribbon on the floor that grows as the object goes."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.geometry import Meshcat
+
+from coop_drake.drawing.colours import INK
+from coop_drake.drawing.solids import ribbon_mesh
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.viz.cells import rgba
+from coop_drake.viz.stage import set_mesh
+
+__all__ = ["INDICES", "STEP", "TRAIL_COLOUR", "set_trail", "trail_points"]
+
+TRAIL_COLOUR = INK
+
+STEP = 0.03
+"""Length of the pieces that a trail grows by [m]."""
+
+INDICES = 6
+"""Indices of vertices in the mesh of a piece."""
+
+_WIDTH, _HEIGHT = 0.035, 0.030  # [m]
+
+
+def set_trail(meshcat: Meshcat, path: str, points: FloatArray) -> None:
+    """Draw a stretch of the trail; points of shape (P, 2) [m], nothing if they are fewer than two."""
+    if len(points) > 1:
+        set_mesh(meshcat, path, ribbon_mesh(points, _WIDTH, _HEIGHT), rgba(TRAIL_COLOUR))
+
+
+def trail_points(positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Space points evenly along the way.
+
+    Args:
+        positions: Of the object at every frame, shape (F, 2) [m].
+
+    Returns:
+        The points, shape (P, 2) [m], and how many pieces between them are behind the object at every frame,
+        shape (F,).
+    """
+    gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
+    pieces = int(np.ceil(gone[-1] / STEP))
+    marks = np.linspace(0.0, gone[-1], pieces + 1)
+    moving = np.concatenate([[True], np.diff(gone) > 0.0])
+    points = np.column_stack([np.interp(marks, gone[moving], column[moving]) for column in positions.T])
+    return points, gone / max(gone[-1], 1e-12) * pieces
