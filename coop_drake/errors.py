@@ -5,6 +5,7 @@ from __future__ import annotations
 __all__ = [
     "CoopDrakeError",
     "FieldError",
+    "FloorPlanError",
     "GeometryError",
     "PlanError",
     "RefusalError",
@@ -35,6 +36,25 @@ class ScenarioError(CoopDrakeError):
     def __reduce__(self) -> tuple[type[ScenarioError], tuple[str, str, object, str]]:
         """Pickle the data and not the message: files are read in a process of their own."""
         return type(self), (self.file, self.key, self.value, self.allowed)
+
+
+class FloorPlanError(CoopDrakeError):
+    """A drawing or a map that gives no floor: says in which file, where, what is wrong, and what helps.
+
+    Args:
+        file: Path of the offending file as the user wrote it.
+        place: Where in it: a line, an element, a key, or coordinates in W.
+        finding: What is wrong there.
+        remedy: What would help.
+    """
+
+    def __init__(self, file: str, place: str, finding: str, remedy: str) -> None:
+        self.file, self.place, self.finding, self.remedy = file, place, finding, remedy
+        super().__init__(f"{file}: {place}: {finding}; {remedy}")
+
+    def __reduce__(self) -> tuple[type[FloorPlanError], tuple[str, str, str, str]]:
+        """Pickle the data and not the message: files are read in a process of their own."""
+        return type(self), (self.file, self.place, self.finding, self.remedy)
 
 
 class GeometryError(CoopDrakeError):

@@ -17,6 +17,7 @@ import typer
 from coop_drake.cli.compare import compare_command
 from coop_drake.cli.diagram import diagram_command
 from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.floor_plan import FLOOR_PLAN_EXAMPLES, floor_plan_command
 from coop_drake.cli.guard import run_guarded
 from coop_drake.cli.map_cache import maps_command
 from coop_drake.cli.question import read_apart
@@ -172,4 +173,5 @@ app.command("verify")(verify_command)
 app.command("maps")(maps_command)
 app.command("diagram")(diagram_command)
 app.command("compare")(compare_command)
+app.command("floor-plan", epilog=FLOOR_PLAN_EXAMPLES)(floor_plan_command)
 app.command("reproduce")(reproduce_command)

@@ -8,7 +8,7 @@ import typer
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.reporter import Reporter
-from coop_drake.errors import CoopDrakeError, FieldError, ScenarioError, StallError
+from coop_drake.errors import CoopDrakeError, FieldError, FloorPlanError, ScenarioError, StallError
 
 __all__ = ["run_guarded"]
 
@@ -39,6 +39,10 @@ def _attempt(reporter: Reporter, command: Callable[[], ExitCode]) -> ExitCode:
     except ScenarioError as error:
         details = {"file": error.file, "key": error.key, "value": repr(error.value), "allowed": error.allowed}
         reporter.complain(str(error), **details)
+        return ExitCode.BAD_INPUT
+    except FloorPlanError as error:
+        details = {"file": error.file, "place": error.place, "remedy": error.remedy}
+        reporter.complain(str(error), finding=error.finding, **details)
         return ExitCode.BAD_INPUT
     except (FieldError, StallError) as error:
         reporter.complain(str(error))

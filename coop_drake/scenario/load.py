@@ -5,6 +5,7 @@ from pathlib import Path
 
 from pydrake.common.yaml import yaml_dump_typed
 
+from coop_drake.scenario.floor import with_floor
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.reading import read_file
 from coop_drake.scenario.schema import draft, thaw
@@ -22,8 +23,9 @@ def load_scenario(path: Path | str) -> Scenario:
 
     Raises:
         ScenarioError: With file, key, value and what is allowed there.
+        FloorPlanError: The workspace names a floor plan that cannot be read.
     """
-    scenario = dataclasses.replace(read_file(Scenario, Path(path)), path=Path(path))
+    scenario = with_floor(dataclasses.replace(read_file(Scenario, Path(path)), path=Path(path)))
     validate(scenario)
     return scenario
 

@@ -17,15 +17,33 @@ from coop_drake.scenario.deployment import Deployment
 
 @dataclass(frozen=True)
 class Workspace:
-    """The floor W that bodies may use: inside the outer ring and outside every hole.
+    """The floor W that bodies may use: rings in the scenario, or a floor plan in a file of its own.
+
+    Loading a scenario reads the file, so that a loaded workspace always has rings and no file.
 
     Attributes:
         outer: Corners of the outer ring, each (x, y) in W [m]; the last is joined to the first.
         holes: Rings of obstacles inside, each like ``outer``.
+        file: In place of rings a drawing (``.svg``, ``.dxf``, ``.geojson``, ``.wkt``) or a ROS occupancy map
+            (``.yaml``): a path relative to the scenario, or ``package://``. The room is the start's.
+        unit: What one unit of the drawing is; null for what the file says.
+        scale: Factor on all lengths of the file, 50 for a drawing at 1:50 [-].
+        layers: Layers of the drawing that hold walls; empty for all that are shown.
+        tolerance: How far walls may grow where that saves corners [m]; null for 1 cm, or for one and a half
+            cells of a map.
+        gap: Lines of a drawing that end this close to another line are joined to it [m].
+        unknown_is_free: Whether the unknown cells of a map count as floor.
     """
 
-    outer: tuple[tuple[float, float], ...]
+    outer: tuple[tuple[float, float], ...] = ()
     holes: tuple[tuple[tuple[float, float], ...], ...] = ()
+    file: str | None = None
+    unit: Literal["mm", "cm", "dm", "m", "km", "in", "ft", "yd"] | None = None
+    scale: float = 1.0
+    layers: tuple[str, ...] = ()
+    tolerance: float | None = None
+    gap: float = 0.01
+    unknown_is_free: bool = False
 
     @property
     def polygon(self) -> Polygon:

@@ -1,0 +1,137 @@
+"""The command floor-plan: reads a drawing or a map, says what it is, writes a workspace and a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.reporter import Reporter
+
+if TYPE_CHECKING:
+    from coop_drake.floor_plans import FloorPlan
+
+__all__ = ["FLOOR_PLAN_EXAMPLES", "floor_plan_command"]
+
+_PICTURES = (".png", ".svg")
+_SECTIONS = (".yaml", ".yml")
+FLOOR_PLAN_EXAMPLES = """Examples:
+
+coop-drake floor-plan hall.dxf --unit mm --out hall.png
+
+coop-drake floor-plan map.yaml --inside 2 3 --tolerance 0.05 --out workspace.yaml --out workspace.png
+
+A scenario may name the file itself: workspace: {file: hall.dxf, unit: mm}
+"""
+
+
+def floor_plan_command(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="*.svg, *.dxf, *.geojson, *.wkt, or a ROS map's *.yaml.")
+    ],
+    unit: Annotated[
+        str | None, typer.Option("--unit", metavar="UNIT", help="Unit of the drawing: mm, cm, m, in, ft, …")
+    ] = None,
+    scale: Annotated[
+        float, typer.Option("--scale", metavar="S", help="Factor on lengths, 50 for a drawing at 1:50.")
+    ] = 1.0,
+    layer: Annotated[
+        list[str] | None, typer.Option("--layer", metavar="NAME", help="A layer to read; may be repeated.")
+    ] = None,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(
+            "--tolerance", metavar="M", help="How far walls may grow to save corners [m]; 0.01 by default."
+        ),
+    ] = None,
+    gap: Annotated[
+        float, typer.Option("--gap", metavar="M", help="Gaps in outlines up to this are closed [m].")
+    ] = 0.01,
+    inside: Annotated[
+        tuple[float, float] | None,
+        typer.Option("--inside", metavar="X Y", help="A point of the room [m]; the largest by default."),
+    ] = None,
+    unknown_is_free: Annotated[
+        bool, typer.Option("--unknown-is-free", help="Take a map's unknown cells for floor.")
+    ] = False,
+    out: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--out", metavar="FILE", dir_okay=False, help="*.yaml: workspace; *.png or *.svg: picture."
+        ),
+    ] = None,
+    machine: Annotated[
+        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+) -> None:
+    """Read a floor plan from elsewhere: preview it, or turn it into a scenario's workspace."""
+    targets = out or []
+    for target in targets:
+        if target.suffix.lower() not in (*_PICTURES, *_SECTIONS):
+            raise typer.BadParameter(f"{target} ends neither in .yaml nor in .png or .svg.")
+        if target.resolve() == file.resolve():
+            raise typer.BadParameter(f"{target} is the floor plan itself.")
+    reporter = Reporter(machine=machine, quiet=quiet)
+
+    def command() -> ExitCode:
+        from coop_drake.floor_plans import FloorPlanSettings, read_floor_plan
+
+        settings = FloorPlanSettings(unit, scale, tuple(layer or ()), tolerance, gap, unknown_is_free)
+        with reporter.stage("reading"):
+            plan = read_floor_plan(file, settings, inside)
+        _tell(plan, file, reporter)
+        for target in targets:
+            _write(plan, file, target, inside)
+            reporter.say(f"Written: {escape(str(target))}")
+        return ExitCode.DONE
+
+    run_guarded(reporter, command)
+
+
+def _tell(plan: FloorPlan, file: Path, reporter: Reporter) -> None:
+    """Note and show what was read."""
+    x, y, right, top = plan.polygon.bounds
+    taken = plan.drawn.area - plan.polygon.area
+    rings = (plan.polygon.exterior, *plan.polygon.interiors)
+    reporter.facts.update(
+        width_m=right - x,
+        height_m=top - y,
+        area_m2=plan.polygon.area,
+        taken_m2=taken,
+        obstacles=len(plan.polygon.interiors),
+        corners=sum(len(ring.coords) - 1 for ring in rings),
+        corners_drawn=sum(len(ring.coords) - 1 for ring in (plan.drawn.exterior, *plan.drawn.interiors)),
+        other_places=len(plan.others),
+        notes=list(plan.notes),
+    )
+    facts = reporter.facts
+    rows = [
+        ("from", f"({x:.3f}, {y:.3f}) m"),
+        ("to", f"({right:.3f}, {top:.3f}) m"),
+        ("floor", f"{plan.polygon.area:.2f} m²"),
+        ("taken by walls", f"{taken:.3g} m²"),
+        ("obstacles", f"{facts['obstacles']}"),
+        ("corners", f"{facts['corners']} of {facts['corners_drawn']} drawn"),
+    ]
+    if plan.others:
+        rows.append(("other enclosed places", f"{len(plan.others)}, the largest {plan.others[0]:.2f} m²"))
+    reporter.table(file.name, rows)
+    for note in plan.notes:
+        reporter.say(f"Note: {escape(note)}")
+
+
+def _write(plan: FloorPlan, file: Path, target: Path, inside: tuple[float, float] | None) -> None:
+    from coop_drake.files import write_atomically
+    from coop_drake.floor_plans import save_picture
+    from coop_drake.floor_plans.section import workspace_section
+
+    if target.suffix.lower() in _PICTURES:
+        save_picture(plan, target, file.name, inside)
+    else:
+        comment = f"Read from {file.name} by coop-drake floor-plan."
+        write_atomically(target, workspace_section(plan.polygon, comment).encode())

@@ -1,0 +1,162 @@
+"""Lines of a DXF drawing: its model space with all blocks put in, as CAD programs write them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import groupby
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from coop_drake.errors import FloorPlanError
+from coop_drake.floor_plans.curves import flatten
+from coop_drake.floor_plans.settings import FloorPlanSettings
+from coop_drake.floor_plans.walls import Drawing, Wall, refuse_many
+
+__all__ = ["read_dxf"]
+
+_UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 10: 0.9144, 14: 1e-1}
+"""Codes of $INSUNITS that a floor plan may be in [m]."""
+
+_MOST_ENTITIES = 200_000
+
+
+def read_dxf(path: Path, settings: FloorPlanSettings) -> Drawing:
+    """Read lines, polylines, arcs, circles, ellipses, splines and solids of the layers that are shown.
+
+    Raises:
+        FloorPlanError: The file is damaged, or does not say its unit.
+    """
+    file = str(path)
+    document, repairs = _document(path)
+    metre = settings.metres(_UNITS.get(int(document.header.get("$INSUNITS", 0))), file)
+    names = {layer.dxf.name: layer for layer in document.layers}
+    hidden = {name for name, layer in names.items() if layer.is_off() or layer.is_frozen()}
+    walls: list[Wall] = []
+    ignored: Counter[str] = Counter()
+    used: set[str] = set()
+    points = 0
+    for entity in _entities(document, file):
+        layer = str(entity.dxf.get("layer", "0"))
+        used.add(layer)
+        if layer in hidden or entity.dxf.get("invisible", 0):
+            continue
+        if settings.layers and layer not in settings.layers:
+            continue
+        made = _walls_of(entity, layer, metre, settings.sagitta, file)
+        if made is None:
+            ignored[entity.dxftype()] += 1
+            continue
+        points += sum(len(wall.points) for wall in made)
+        refuse_many(file, points)
+        walls += made
+    for layer in settings.layers:
+        if layer not in used:
+            known = ", ".join(sorted(used)) or "none"
+            raise FloorPlanError(file, "layers", f"nothing is drawn on layer {layer!r}", f"known: {known}")
+    notes = [f"{count} {kind} left out" for kind, count in sorted(ignored.items())]
+    if repairs:
+        notes.insert(0, f"{repairs} errors in the file were repaired")
+    return Drawing(tuple(walls), tuple(notes))
+
+
+def _document(path: Path) -> tuple[Any, int]:
+    """The drawing, with what can be mended mended, and how much that was."""
+    from ezdxf import recover
+    from ezdxf.lldxf.const import DXFError
+
+    file, remedy = str(path), "save it anew as DXF (R2000 or later) from the CAD program"
+    content = path.read_bytes()
+    if b"EOF" not in content[-64:]:
+        raise FloorPlanError(
+            file, "the end", "the drawing does not end with EOF; it is cut short or no DXF", remedy
+        )
+    try:
+        with path.open("rb") as stream:
+            document, auditor = recover.read(stream)
+    except (DXFError, ValueError, TypeError, AttributeError, LookupError, OverflowError) as error:
+        raise FloorPlanError(file, "the file", f"no readable DXF ({error})", remedy) from error
+    if auditor.has_errors:
+        worst = auditor.errors[0]
+        raise FloorPlanError(file, "the file", f"an error that cannot be repaired ({worst.message})", remedy)
+    return document, len(auditor.fixes)
+
+
+def _entities(document: Any, file: str) -> Iterator[Any]:
+    """All entities, blocks dissolved; refuses endless ones."""
+    from ezdxf.disassemble import recursive_decompose
+    from ezdxf.lldxf.const import DXFError
+
+    try:
+        for count, entity in enumerate(recursive_decompose(document.modelspace())):
+            if count >= _MOST_ENTITIES:
+                finding = f"more than {_MOST_ENTITIES:,} entities"
+                raise FloorPlanError(file, "the model space", finding, "delete what are no walls")
+            yield entity
+    except (DXFError, RecursionError, ValueError, ZeroDivisionError) as error:
+        raise FloorPlanError(
+            file, "a block", f"it cannot be dissolved ({error})", "explode the blocks in the CAD program"
+        ) from error
+
+
+def _walls_of(entity: Any, layer: str, metre: float, sagitta: float, file: str) -> list[Wall] | None:
+    """Lines of an entity, None if it has none."""
+    from ezdxf.lldxf.const import DXFError
+    from ezdxf.path import make_path
+
+    place = f"{entity.dxftype()} {entity.dxf.get('handle') or ''} on layer {layer!r}".replace("  ", " ")
+    try:
+        outline = make_path(entity)
+        pieces = [np.array(piece) * metre for subpath in outline.sub_paths() for piece in _pieces(subpath)]
+    except TypeError:
+        return None
+    except (DXFError, ValueError, ZeroDivisionError, OverflowError, LookupError) as error:
+        raise FloorPlanError(
+            file, place, f"its numbers make no line ({error})", "delete it or draw it anew"
+        ) from error
+    if not pieces:
+        return []
+    width = 0.5 * _width(entity) * metre
+    walls = []
+    for run in _runs(pieces):
+        points, strays = flatten(run, sagitta, from_arcs=True)
+        closed = len(points) > 3 and bool(np.hypot(*(points[0] - points[-1])) <= 1e-9)
+        walls.append(Wall(points[:-1] if closed else points, width + strays, closed, place))
+    return walls
+
+
+def _runs(pieces: list[Any]) -> Iterator[list[Any]]:
+    """Groups of pieces that follow each other."""
+    run = 0
+    numbered = []
+    for index, piece in enumerate(pieces):
+        if index and not (pieces[index - 1][-1] == piece[0]).all():
+            run += 1
+        numbered.append((run, piece))
+    for _, group in groupby(numbered, key=lambda item: item[0]):
+        yield [piece for _, piece in group]
+
+
+def _pieces(path: Any) -> Iterator[list[tuple[float, float]]]:
+    """Control points of every piece, seen from above."""
+    at = path.start
+    for command in path.commands():
+        controls = [getattr(command, name, None) for name in ("ctrl", "ctrl1", "ctrl2")]
+        yield [(p.x, p.y) for p in (at, *(c for c in controls if c is not None), command.end)]
+        at = command.end
+
+
+def _width(entity: Any) -> float:
+    """Widest width that a polyline is drawn with, in the file's unit."""
+    if entity.dxftype() == "LWPOLYLINE":
+        widths = [abs(entity.dxf.get("const_width", 0.0))]
+        widths += [abs(width) for corner in entity.get_points("se") for width in corner]
+    elif entity.dxftype() == "POLYLINE":
+        widths = [abs(entity.dxf.get(f"default_{end}_width", 0.0)) for end in ("start", "end")]
+        widths += [abs(v.dxf.get(f"{end}_width", 0.0)) for v in entity.vertices for end in ("start", "end")]
+    else:
+        return 0.0
+    return max((width for width in widths if isfinite(width)), default=0.0)

@@ -1,0 +1,175 @@
+"""ROS occupancy maps: a picture of cells and a YAML file that says what its shades mean."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from math import cos, isfinite, sin
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from coop_drake.errors import FloorPlanError
+from coop_drake.geometry.pose import FloatArray
+
+__all__ = ["BoolGrid", "OccupancyMap", "read_map"]
+
+BoolGrid = NDArray[np.bool_]
+
+_MODES = ("trinary", "scale", "raw")
+_MOST_CELLS = 64_000_000
+_REMEDY = "see the map_server's documentation for the file's keys"
+
+
+@dataclass(frozen=True)
+class OccupancyMap:
+    """Cells and where they lie.
+
+    Attributes:
+        free: Whether a cell is known to be free, shape (rows, columns); row 0 is the lowest.
+        unknown: Whether nothing is known of a cell, same shape.
+        resolution: Edge of a cell [m].
+        origin: Pose of the lower left corner of cell (0, 0) in W, (x, y, yaw) [m, rad].
+    """
+
+    free: BoolGrid
+    unknown: BoolGrid
+    resolution: float
+    origin: tuple[float, float, float]
+
+    def place(self, corners: FloatArray) -> FloatArray:
+        """Corners counted in cells, (column, row), in W, shape (n, 2) [m]."""
+        x, y, yaw = self.origin
+        # Not as a product of matrices: equal corners must come out equal to the last bit.
+        along, across = self.resolution * corners[:, 0], self.resolution * corners[:, 1]
+        return np.column_stack(
+            [x + cos(yaw) * along - sin(yaw) * across, y + sin(yaw) * along + cos(yaw) * across]
+        )
+
+    def cell(self, point: tuple[float, float]) -> tuple[int, int]:
+        """Row and column of the cell that holds a point of W; they may lie outside."""
+        x, y, yaw = self.origin
+        dx, dy = point[0] - x, point[1] - y
+        column = (cos(yaw) * dx + sin(yaw) * dy) / self.resolution
+        row = (-sin(yaw) * dx + cos(yaw) * dy) / self.resolution
+        return int(np.floor(row)), int(np.floor(column))
+
+
+def read_map(path: Path, scale: float) -> OccupancyMap:
+    """Read the YAML file and the picture that it names.
+
+    What is neither surely free nor surely occupied counts as unknown, also shades between in the modes
+    ``scale`` and ``raw``.
+
+    Args:
+        path: The YAML file.
+        scale: Factor on the resolution and the origin [-].
+
+    Raises:
+        FloorPlanError: A key or the picture is missing or wrong.
+    """
+    file = str(path)
+    document = _document(path)
+    resolution = _number(document, "resolution", file) * scale
+    if not 0.0 < resolution <= 10.0:
+        raise FloorPlanError(
+            file, "resolution", f"cells of {resolution:g} m cannot be meant", "give metres per cell"
+        )
+    origin = document.get("origin")
+    if not (isinstance(origin, list) and len(origin) == 3 and all(_is_number(value) for value in origin)):
+        raise FloorPlanError(file, "origin", f"{origin!r} is no pose", "give [x, y, yaw] in m and rad")
+    mode = document.get("mode", "trinary")
+    if mode not in _MODES:
+        raise FloorPlanError(file, "mode", f"{mode!r} is unknown", f"use one of {', '.join(_MODES)}")
+    shades, opaque = _picture(path, document)
+    free, occupied = _judged(document, mode, shades, file)
+    free, occupied = free & opaque, occupied & opaque
+    unknown = ~(free | occupied)
+    pose = (float(origin[0]) * scale, float(origin[1]) * scale, float(origin[2]))
+    return OccupancyMap(free[::-1], unknown[::-1], resolution, pose)
+
+
+def _document(path: Path) -> dict[str, Any]:
+    file = str(path)
+    try:
+        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
+        finding = f"no YAML ({' '.join(str(error).split())[:200]})"
+        raise FloorPlanError(file, "the file", finding, _REMEDY) from error
+    if not isinstance(document, dict):
+        raise FloorPlanError(file, "the file", "it holds no keys", _REMEDY)
+    return document
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6
+
+
+def _number(document: dict[str, Any], key: str, file: str, default: float | None = None) -> float:
+    value = document.get(key, default)
+    if isinstance(value, str):  # YAML 1.1 takes 5e-2 for a text.
+        try:
+            value = float(value)
+        except ValueError:
+            value = None
+    if not _is_number(value) or value is None or not isfinite(value):
+        raise FloorPlanError(file, key, f"{document.get(key)!r} is no number", "give a finite number")
+    return float(value)
+
+
+def _judged(document: dict[str, Any], mode: str, shades: FloatArray, file: str) -> tuple[BoolGrid, BoolGrid]:
+    """Which cells are surely free and which surely occupied."""
+    negate = document.get("negate", 0)
+    if negate not in (0, 1):
+        raise FloorPlanError(file, "negate", f"{negate!r} is neither 0 nor 1", "use 0 or 1")
+    occupied_from = _number(document, "occupied_thresh", file, 0.65)
+    free_below = _number(document, "free_thresh", file, 0.196)
+    if not 0.0 <= free_below <= occupied_from <= 1.0:
+        raise FloorPlanError(
+            file,
+            "free_thresh",
+            f"{free_below:g} and occupied_thresh {occupied_from:g} do not part the shades",
+            "use 0 <= free_thresh <= occupied_thresh <= 1",
+        )
+    if mode == "raw":
+        percent = np.rint(255.0 * shades)
+        return percent < 100.0 * free_below, (percent > 100.0 * occupied_from) & (percent <= 100.0)
+    occupancy = shades if negate else 1.0 - shades
+    return occupancy < free_below, occupancy > occupied_from
+
+
+def _picture(path: Path, document: dict[str, Any]) -> tuple[FloatArray, BoolGrid]:
+    """Shades from 0 to 1, and which cells are opaque, shape (rows, columns), the top row first."""
+    from PIL import Image, UnidentifiedImageError
+
+    file = str(path)
+    name = document.get("image")
+    if not isinstance(name, str) or not name:
+        raise FloorPlanError(file, "image", f"{name!r} names no picture", "name the picture beside the file")
+    picture = path.parent / name
+    if not picture.is_file():
+        raise FloorPlanError(file, "image", f"there is no {picture}", "put the picture beside the file")
+    try:
+        with warnings.catch_warnings(), Image.open(picture) as image:
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            if image.width * image.height > _MOST_CELLS:
+                finding = f"{image.width} by {image.height} cells"
+                raise FloorPlanError(str(picture), "the size", finding, f"use at most {_MOST_CELLS:,} cells")
+            return _shades(image)
+    except (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        finding = f"no readable picture ({error}); it may be cut short"
+        raise FloorPlanError(str(picture), "the picture", finding, "save it anew as PGM or PNG") from error
+
+
+def _shades(image: Any) -> tuple[FloatArray, BoolGrid]:
+    if image.mode.startswith("I"):
+        shades = np.asarray(image, dtype=float) / 65535.0
+        return shades, np.ones(shades.shape, dtype=bool)
+    if image.mode in ("L", "1"):
+        shades = np.asarray(image.convert("L"), dtype=float) / 255.0
+        return shades, np.ones(shades.shape, dtype=bool)
+    channels = np.asarray(image.convert("RGBA"), dtype=float)
+    return channels[..., :3].mean(axis=-1) / 255.0, channels[..., 3] == 255.0

@@ -1,0 +1,76 @@
+"""A picture of a floor that was read: what is free, what walls took, and what was said about it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from coop_drake.drawing import (
+    draw_polygon,
+    draw_workspace,
+    house_style,
+    legend_above,
+    new_figure,
+    save_figure,
+)
+from coop_drake.floor_plans.plan import FloorPlan
+from coop_drake.floor_plans.rooms import Place
+
+__all__ = ["save_picture"]
+
+_WIDTH = 8.0
+_TALLEST = 9.0
+_TAKEN = "#d55e00"
+_DRAWN = "#999999"
+
+
+def save_picture(plan: FloorPlan, path: Path, title: str, inside: Place | None = None) -> None:
+    """Write a preview as PNG or SVG.
+
+    Args:
+        plan: What was read.
+        path: Where to write.
+        title: Above the picture, for example the file's name.
+        inside: The point that chose the room, marked if given [m].
+    """
+    from matplotlib.patches import Patch
+
+    x, y, right, top = plan.polygon.bounds
+    height = float(np.clip(1.4 + _WIDTH * (top - y) / (right - x), 3.5, _TALLEST))
+    taken = plan.drawn.difference(plan.polygon)
+    with house_style():
+        figure = new_figure(_WIDTH, height, _caption(plan))
+        axes = figure.add_subplot()
+        draw_workspace(axes, plan.polygon)
+        if taken.area > 1e-9:
+            draw_polygon(axes, _areas(taken), facecolor=_TAKEN, edgecolor="none", zorder=2)
+        for ring in (plan.drawn.exterior, *plan.drawn.interiors):
+            axes.plot(*shapely.get_coordinates(ring).T, color=_DRAWN, linewidth=0.6, zorder=3)
+        if inside is not None:
+            axes.plot(*inside, marker="x", color="black", markersize=8, zorder=4)
+        axes.set_title(title, loc="left")
+        patches = [Patch(facecolor="white", edgecolor="black", label="floor")]
+        if taken.area > 1e-9:
+            patches.append(Patch(color=_TAKEN, label=f"taken by walls: {taken.area:.3g} m²"))
+        legend_above(axes, patches)
+        save_figure(figure, path)
+
+
+def _areas(shape: shapely.Geometry) -> shapely.MultiPolygon:
+    parts = [part for part in shapely.get_parts(shape) if part.geom_type == "Polygon"]
+    return shapely.MultiPolygon(parts)
+
+
+def _caption(plan: FloorPlan) -> str:
+    x, y, right, top = plan.polygon.bounds
+    corners = sum(len(ring.coords) - 1 for ring in (plan.polygon.exterior, *plan.polygon.interiors))
+    drawn = sum(len(ring.coords) - 1 for ring in (plan.drawn.exterior, *plan.drawn.interiors))
+    facts = [
+        f"{right - x:.2f} m by {top - y:.2f} m, {plan.polygon.area:.1f} m² of floor",
+        f"{len(plan.polygon.interiors)} obstacles, {corners} corners of {drawn} drawn",
+    ]
+    if plan.others:
+        facts.append(f"{len(plan.others)} other enclosed places, the largest of {plan.others[0]:.1f} m²")
+    return ". ".join([*facts, *plan.notes]) + "."

@@ -1,0 +1,168 @@
+"""Reads a floor plan of any kind, and saves corners where walls may grow a little."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from coop_drake.errors import FloorPlanError
+from coop_drake.floor_plans.cells import room_of_map
+from coop_drake.floor_plans.dxf_file import read_dxf
+from coop_drake.floor_plans.map_file import read_map
+from coop_drake.floor_plans.rooms import Place, Room, chosen_room, room_of
+from coop_drake.floor_plans.settings import FloorPlanSettings
+from coop_drake.floor_plans.shape_file import read_geojson, read_wkt
+from coop_drake.floor_plans.svg_file import read_svg
+
+__all__ = ["ENDINGS", "FloorPlan", "excess", "read_floor_plan"]
+
+_READERS = {
+    ".svg": read_svg,
+    ".dxf": read_dxf,
+    ".geojson": read_geojson,
+    ".json": read_geojson,
+    ".wkt": read_wkt,
+}
+_MAPS = (".yaml", ".yml")
+ENDINGS = (*_READERS, *_MAPS)
+"""Names of files that can be read end in one of these."""
+
+_LARGEST_FILE = 200_000_000
+_MANY_DRAWN, _MANY_TRACED = 4_000, 300
+"""Corners from which a quick pass goes before the careful one, whose work grows with their square. It takes a
+little off straight walls, too, which do not matter where walls are as rough as in maps."""
+
+_MOST_CORNERS = 20_000
+_SLOW = 1_000
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class FloorPlan:
+    """A floor that was read, with what became of it on the way.
+
+    Attributes:
+        polygon: The floor, holes and all, in W [m]; inside ``drawn`` to a nanometre.
+        drawn: The floor with every corner of the file.
+        others: Areas of the file's other enclosed places, largest first [m^2].
+        notes: What was left out, joined or taken for granted, in words.
+    """
+
+    polygon: Polygon
+    drawn: Polygon
+    others: tuple[float, ...]
+    notes: tuple[str, ...]
+
+
+def read_floor_plan(
+    path: Path | str, settings: FloorPlanSettings | None = None, inside: Place | None = None
+) -> FloorPlan:
+    """Read the room that holds a point from an SVG, DXF, GeoJSON or WKT file, or from an occupancy map.
+
+    In drawings every line is a wall; in maps every cell that is not surely free. What is returned lies inside
+    the drawn floor: curves are enclosed from the floor's side, and corners saved only where walls grow.
+
+    Args:
+        path: The file; its ending says what it is, ``.yaml`` for an occupancy map.
+        settings: How to understand it.
+        inside: A point of the room that is meant [m]; None for the largest room.
+
+    Raises:
+        FloorPlanError: The file cannot be read or used; with place, finding and remedy.
+    """
+    path, settings = Path(path), settings or FloorPlanSettings()
+    file = str(path)
+    settings.check(file)
+    _check_file(path)
+    try:
+        with np.errstate(invalid="ignore", over="ignore"):  # Such numbers are refused by name.
+            room, notes, tolerance = _room(path, settings, inside)
+    except ModuleNotFoundError as error:
+        remedy = "install it: pip install 'coop-drake[floor-plans]'"
+        raise FloorPlanError(file, "the reader", f"it needs the package {error.name}", remedy) from error
+    except shapely.GEOSException as error:
+        raise FloorPlanError(
+            file, "the lines", f"they cannot be combined ({error})", "clean the drawing up, or choose layers"
+        ) from error
+    many = _MANY_TRACED if path.suffix.lower() in _MAPS else _MANY_DRAWN
+    floor = _simplified(room.floor, tolerance, many, inside, file)
+    if (stray := excess(floor, room.floor)) > _ROUNDING:
+        raise FloorPlanError(
+            file, "the floor", f"it would grow by {stray:.2g} m", "change the tolerance a little"
+        )
+    notes = (*notes, *room.notes)
+    if (corners := shapely.get_num_coordinates(floor)) > _SLOW:
+        notes += (f"plans on {corners:,} corners take long; a larger tolerance saves corners",)
+    return FloorPlan(floor, room.floor, room.others, notes)
+
+
+def excess(floor: Polygon, drawn: Polygon) -> float:
+    """How far a floor reaches beyond the drawn one [m]; zero where it lies inside."""
+    if drawn.covers(floor):
+        return 0.0
+    outside = floor.difference(drawn)
+    return float(shapely.distance(shapely.points(shapely.get_coordinates(outside)), drawn).max(initial=0.0))
+
+
+def _check_file(path: Path) -> None:
+    file = str(path)
+    if path.suffix.lower() not in ENDINGS:
+        maps = path.suffix.lower() in (".pgm", ".png", ".bmp")
+        remedy = "name the map's YAML file" if maps else f"use one of {', '.join(ENDINGS)}"
+        raise FloorPlanError(file, "the name", f"{path.suffix or 'no ending'!r} is no floor plan", remedy)
+    try:
+        size = path.stat().st_size
+    except (OSError, ValueError) as error:
+        raise FloorPlanError(file, "the file", f"it cannot be read ({error})", "check the path") from error
+    if path.is_dir() or size == 0:
+        raise FloorPlanError(file, "the file", "it is empty or a folder", "name a file with a drawing")
+    if size > _LARGEST_FILE:
+        raise FloorPlanError(
+            file, "the file", f"{size / 1e6:.0f} MB", f"use at most {_LARGEST_FILE / 1e6:.0f} MB"
+        )
+
+
+def _room(
+    path: Path, settings: FloorPlanSettings, inside: Place | None
+) -> tuple[Room, tuple[str, ...], float]:
+    """The room as drawn, notes, and how far its walls may grow [m]."""
+    file, kind = str(path), path.suffix.lower()
+    if kind not in _MAPS:
+        drawing = _READERS[kind](path, settings)
+        return room_of(drawing, file, settings.gap, inside), drawing.notes, settings.growth()
+    for key in ("unit", "layers"):
+        if getattr(settings, key):
+            raise FloorPlanError(file, key, "an occupancy map has none", f"leave {key} away")
+    cells = read_map(path, settings.scale)
+    growth = settings.growth(cells.resolution)
+    free = settings.unknown_is_free
+    return room_of_map(cells, file, inside, unknown_is_free=free, closing=growth), (), growth
+
+
+def _simplified(drawn: Polygon, tolerance: float, many: int, inside: Place | None, file: str) -> Polygon:
+    """Fewer corners, inwards; the part that holds the point."""
+    from coop_drake.geometry.simplify import simplify_inward
+
+    floor = simplify_inward(drawn, _ROUNDING)  # Corners on straight edges
+    corners = shapely.get_num_coordinates
+    if tolerance > 0.0 and corners(floor) > many:
+        # Shrunk by half of what chords may stray, no chord reaches the drawn walls.
+        quick = 0.25 * tolerance
+        shrunk = shapely.simplify(floor.buffer(-quick, join_style="mitre"), quick * (1.0 - 1e-6))
+        parts = [part for part in shapely.get_parts(shrunk.buffer(0.0)) if part.area > 0.0]
+        floor = chosen_room(parts, file, inside, Polygon()) if parts else floor
+        tolerance *= 0.5
+    if corners(floor) > _MOST_CORNERS:
+        raise FloorPlanError(
+            file,
+            "the walls",
+            f"{corners(floor):,} corners",
+            "raise the tolerance, or leave out what are no walls",
+        )
+    if tolerance > 0.0:
+        floor = simplify_inward(floor, tolerance)
+    return shapely.orient_polygons(shapely.normalize(floor))

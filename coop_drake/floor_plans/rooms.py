@@ -1,0 +1,173 @@
+"""From lines to rooms: the faces that walls enclose, and the one that is meant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely import LinearRing, LineString, Point, Polygon
+from shapely.geometry.base import BaseGeometry
+from shapely.validation import explain_validity
+
+from coop_drake.errors import FloorPlanError
+from coop_drake.floor_plans.gaps import bridges, loose_ends
+from coop_drake.floor_plans.walls import Drawing, Wall
+
+__all__ = ["Room", "chosen_room", "room_of"]
+
+_LARGEST = 1000.0
+_SMALLEST = 0.1
+"""Floors beyond these widths are taken for a wrong unit [m]."""
+
+_THINNEST = 1e-3
+"""Half the width that a line gets that ends freely in a room [m]."""
+
+_LARGEST_COORDINATE = 1e6
+
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Room:
+    """One room of a plan.
+
+    Attributes:
+        floor: What its walls leave free, in W [m].
+        others: Areas of the plan's other enclosed places, largest first [m^2].
+        notes: What was done to the lines, in words.
+    """
+
+    floor: Polygon
+    others: tuple[float, ...]
+    notes: tuple[str, ...]
+
+
+def room_of(drawing: Drawing, file: str, gap: float, inside: Place | None) -> Room:
+    """Find the room that every line of a drawing bounds as a wall.
+
+    Args:
+        drawing: All lines; what has a width is a wall of that width, what has none is a thin wall.
+        file: For messages.
+        gap: Lines that end this close to another line are joined to it [m].
+        inside: A point of the room that is meant; None for the largest.
+
+    Raises:
+        FloorPlanError: Nothing is enclosed, an outline crosses itself, the point stands in a wall or outside,
+            or the size cannot be meant.
+    """
+    if not drawing.walls:
+        raise FloorPlanError(
+            file, "the drawing", "it holds no line", "choose other layers, or convert texts and pictures"
+        )
+    for wall in drawing.walls:
+        _check(wall, file)
+    _check_size(drawing, file)
+    thick = [_thick(wall) for wall in drawing.walls if wall.half_width > 0.0]
+    solid = shapely.union_all(thick)
+    lines = [_line(wall) for wall in drawing.walls if wall.half_width == 0.0]
+    noded = shapely.unary_union([*lines, solid.boundary])
+    joined = bridges(noded, gap)
+    if joined:
+        noded = shapely.unary_union([noded, *joined])
+    faces, cuts, dangles, _ = shapely.polygonize_full(shapely.get_parts(noded))
+    rooms = [face for face in shapely.get_parts(faces) if not solid.contains(face.representative_point())]
+    if not rooms:
+        raise _nothing_closed(noded, file, gap)
+    room = chosen_room(rooms, file, inside, solid)
+    loose: Any = [cuts, dangles]
+    free = shapely.union_all(loose).intersection(room)
+    floor = room
+    if not free.is_empty and free.length > 0.0:
+        parts = shapely.get_parts(room.difference(free.buffer(_THINNEST, join_style="mitre")))
+        floor = chosen_room([part for part in parts if isinstance(part, Polygon)], file, inside, solid)
+    others = sorted((float(other.area) for other in rooms if other is not room), reverse=True)
+    notes = [f"{len(joined)} gaps of up to {gap:g} m were closed"] if joined else []
+    if not free.is_empty and free.length > 0.0:
+        notes.append(f"lines that enclose nothing stand as walls of {2e3 * _THINNEST:g} mm")
+    return Room(shapely.orient_polygons(floor), tuple(others), tuple(notes))
+
+
+def chosen_room(rooms: list[Polygon], file: str, inside: Place | None, solid: BaseGeometry) -> Polygon:
+    """The room that holds a point, or the largest.
+
+    Raises:
+        FloorPlanError: No room holds the point.
+    """
+    if inside is None:
+        return max(rooms, key=lambda room: (room.area, room.bounds))
+    point = Point(inside)
+    for room in rooms:
+        if room.contains(point):
+            return room
+    where = "in a wall" if solid.intersects(point) else "in none of the enclosed places"
+    largest = max(rooms, key=lambda room: room.area)
+    x, y, right, top = largest.bounds
+    raise FloorPlanError(
+        file,
+        f"({inside[0]:g}, {inside[1]:g})",
+        f"the start stands {where}",
+        f"the largest place reaches from ({x:.3g}, {y:.3g}) to ({right:.3g}, {top:.3g}) m; move the start, "
+        "or mend unit, scale or outlines",
+    )
+
+
+def _check(wall: Wall, file: str) -> None:
+    points = wall.points
+    if not (np.isfinite(points).all() and np.abs(points).max(initial=0.0) <= _LARGEST_COORDINATE):
+        finding = "coordinates that are not finite, or beyond a thousand kilometres"
+        raise FloorPlanError(file, wall.place, finding, "delete it, or mend the unit")
+    if not (wall.closed and len(np.unique(points, axis=0)) > 2):
+        return
+    ring = LinearRing(points)
+    if not ring.is_simple:
+        reason = explain_validity(Polygon(points))
+        at = reason.partition("[")[2].rstrip("]").split()
+        where = f" at ({float(at[0]):.6g}, {float(at[1]):.6g}) m" if len(at) >= 2 else ""
+        raise FloorPlanError(
+            file, wall.place, f"the outline crosses or touches itself{where}", "draw it without crossings"
+        )
+
+
+def _check_size(drawing: Drawing, file: str) -> None:
+    points = np.vstack([wall.points for wall in drawing.walls])
+    width, height = np.ptp(points, axis=0)
+    size = max(width, height)
+    if not _SMALLEST <= size <= _LARGEST:
+        raise FloorPlanError(
+            file,
+            "the drawing",
+            f"it is {width:.4g} m by {height:.4g} m, which cannot be a floor",
+            f"mend unit or scale; {_SMALLEST:g} m to {_LARGEST:g} m are allowed",
+        )
+
+
+def _line(wall: Wall) -> LineString:
+    return LineString(wall.coordinates if len(wall.points) > 1 else np.repeat(wall.points, 2, axis=0))
+
+
+def _thick(wall: Wall) -> Any:
+    """The wall with its width; mitred corners lie outside round ones."""
+    line = LinearRing(wall.points) if wall.closed else _line(wall)
+    return shapely.buffer(line, wall.half_width, cap_style="square", join_style="mitre", mitre_limit=2.0)
+
+
+def _nothing_closed(noded: BaseGeometry, file: str, gap: float) -> FloorPlanError:
+    """Say where the outline is open."""
+    ends = loose_ends(noded)
+    if len(ends) < 2:
+        return FloorPlanError(
+            file, "the drawing", "its lines enclose nothing", "draw an outline that ends where it begins"
+        )
+    apart = np.hypot(*(ends[:, None] - ends[None]).transpose(2, 0, 1)) if len(ends) <= 2000 else np.eye(2)
+    np.fill_diagonal(apart, np.inf)
+    first, second = np.unravel_index(int(apart.argmin()), apart.shape)
+    a, b = ends[first], ends[second]
+    return FloorPlanError(
+        file,
+        f"({a[0]:.6g}, {a[1]:.6g})",
+        f"no outline is closed; this end lies {apart[first, second]:.3g} m from the one at "
+        f"({b[0]:.6g}, {b[1]:.6g})",
+        f"close it in the drawing, or allow a gap of more than that (it is {gap:g} m)",
+    )

@@ -1,0 +1,48 @@
+"""A floor as the section ``workspace`` of a scenario file."""
+
+from __future__ import annotations
+
+import shapely
+from shapely import Polygon
+
+__all__ = ["workspace_section"]
+
+_DECIMALS = 9
+_WIDTH = 100
+
+
+def workspace_section(floor: Polygon, comment: str) -> str:
+    """YAML text of a floor's rings, rounded to a nanometre.
+
+    Args:
+        floor: The floor [m].
+        comment: What stands above it, one line.
+    """
+    outer, *holes = (_ring(ring) for ring in (floor.exterior, *floor.interiors))
+    lines = [f"# {' '.join(comment.split())}", "workspace:", "  outer: [", *_indented(outer, 4), "  ]"]
+    if holes:
+        lines.append("  holes:")
+    for hole in holes:
+        lines += ["  - [", *_indented(hole, 4), "  ]"]
+    return "\n".join(lines) + "\n"
+
+
+def _ring(ring: shapely.LinearRing) -> list[str]:
+    corners = shapely.get_coordinates(ring)[:-1].round(_DECIMALS) + 0.0
+    return [f"[{_number(x)}, {_number(y)}]," for x, y in corners.tolist()]
+
+
+def _number(value: float) -> str:
+    """As YAML 1.1 reads a number back: never with an exponent alone."""
+    text = f"{value:.{_DECIMALS}f}".rstrip("0")
+    return text + "0" if text.endswith(".") else text
+
+
+def _indented(words: list[str], indent: int) -> list[str]:
+    """Words put into lines of a readable width."""
+    lines = [""]
+    for word in words:
+        if lines[-1] and len(lines[-1]) + len(word) + 1 > _WIDTH - indent:
+            lines.append("")
+        lines[-1] += f" {word}" if lines[-1] else word
+    return [" " * indent + line for line in lines]

@@ -1,0 +1,138 @@
+"""An SVG file as a tree, safe to walk, and where its page lies in W."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from math import isclose, isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from coop_drake.errors import FloorPlanError
+from coop_drake.floor_plans.settings import UNITS, FloorPlanSettings
+from coop_drake.geometry.pose import FloatArray
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+__all__ = ["SVG", "SvgPage", "length", "read_svg_page"]
+
+SVG = "{http://www.w3.org/2000/svg}"
+"""Namespace of all that is drawn."""
+
+_LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(px|pt|pc|mm|cm|in)?\s*")
+_PIXELS = {"px": 1.0, "pt": 96.0 / 72.0, "pc": 16.0, "mm": 96.0 / 25.4, "cm": 96.0 / 2.54, "in": 96.0}
+_PHYSICAL = ("mm", "cm", "in", "pt", "pc")
+_PIXEL = UNITS["in"] / 96.0
+
+
+@dataclass(frozen=True)
+class SvgPage:
+    """The tree and its page.
+
+    Attributes:
+        root: The ``svg`` element.
+        metre: Length of one user unit in W [m].
+        left: First coordinate of the page's left edge, in user units.
+        bottom: Second coordinate of its lower edge; SVG counts downwards.
+    """
+
+    root: Element
+    metre: float
+    left: float
+    bottom: float
+
+    def place(self, points: FloatArray) -> FloatArray:
+        """Points of the root's coordinates in W: the page's lower left corner is the origin, y goes up."""
+        return np.column_stack([points[:, 0] - self.left, self.bottom - points[:, 1]]) * self.metre
+
+
+def read_svg_page(path: Path, settings: FloorPlanSettings) -> SvgPage:
+    """Parse a file without opening anything that it names, and without expanding entities.
+
+    Raises:
+        FloorPlanError: The file is no SVG, is damaged, declares entities, or does not say its size.
+    """
+    from defusedxml import DefusedXmlException
+    from defusedxml.ElementTree import ParseError, fromstring
+
+    file = str(path)
+    try:
+        root = fromstring(path.read_bytes(), forbid_dtd=False, forbid_entities=True, forbid_external=True)
+    except DefusedXmlException as error:
+        finding = "it declares entities, which can blow up a small file or open others"
+        raise FloorPlanError(
+            file, "the head", finding, "save it anew as plain SVG from the drawing program"
+        ) from error
+    except ParseError as error:
+        line, column = error.position
+        raise FloorPlanError(
+            file,
+            f"line {line}, column {column + 1}",
+            f"no well-formed XML ({str(error).partition(':')[0]}); the file may be cut short",
+            "save it anew as plain SVG",
+        ) from error
+    except (ValueError, LookupError) as error:
+        raise FloorPlanError(file, "the file", f"no XML ({error})", "save it anew as plain SVG") from error
+    if root.tag not in (f"{SVG}svg", "svg"):
+        raise FloorPlanError(file, "the root", f"<{root.tag}> is no SVG drawing", "name an SVG file")
+    return _page(file, root, settings)
+
+
+def length(text: str, file: str, place: str) -> float:
+    """A length in pixels, which are user units inside the page.
+
+    Raises:
+        FloorPlanError: It is no number with an absolute unit.
+    """
+    match = _LENGTH.fullmatch(text)
+    if not match:
+        raise FloorPlanError(
+            file, place, f"{text!r} is no length", "give a number, with px, mm, cm, in, pt or pc if any unit"
+        )
+    value = float(match[1]) * _PIXELS[match[2] or "px"]
+    if not isfinite(value):
+        raise FloorPlanError(file, place, f"{text!r} is no finite length", "give a finite number")
+    return value
+
+
+def _page(file: str, root: Element, settings: FloorPlanSettings) -> SvgPage:
+    sizes = [root.get("width"), root.get("height")]
+    known = [size for size in sizes if size and not size.strip().endswith("%")]
+    pixels = [length(size, file, "<svg> width and height") for size in known]
+    view = _view(file, root, pixels if len(pixels) == 2 else None)
+    if view is None:
+        metre = settings.metres(_PIXEL if _physical(known) else None, file)
+        return SvgPage(root, metre, 0.0, 0.0)
+    physical = None
+    if _physical(known) and len(pixels) == 2 and settings.unit is None:
+        factors = [pixels[0] / view[2], pixels[1] / view[3]]
+        if not isclose(*factors, rel_tol=1e-3):
+            finding = "width, height and viewBox stretch the drawing in one direction"
+            raise FloorPlanError(file, "<svg> viewBox", finding, "make their ratios equal, or name the unit")
+        physical = min(factors) * _PIXEL
+    return SvgPage(root, settings.metres(physical, file), view[0], view[1] + view[3])
+
+
+def _physical(sizes: list[str]) -> bool:
+    return bool(sizes) and all(size.strip().endswith(_PHYSICAL) for size in sizes)
+
+
+def _view(file: str, root: Element, pixels: list[float] | None) -> tuple[float, float, float, float] | None:
+    """The viewBox, or the one that width and height stand for."""
+    text = root.get("viewBox")
+    if text is None:
+        return None if pixels is None else (0.0, 0.0, pixels[0], pixels[1])
+    try:
+        x, y, width, height = (float(part) for part in re.split(r"[\s,]+", text.strip()))
+    except ValueError:
+        raise FloorPlanError(
+            file, "<svg> viewBox", f"{text!r} is no box", "give four numbers: x, y, width, height"
+        ) from None
+    if not (all(map(isfinite, (x, y, width, height))) and width > 0.0 and height > 0.0):
+        raise FloorPlanError(
+            file, "<svg> viewBox", f"{text!r} has no area", "give a positive width and height"
+        )
+    return x, y, width, height

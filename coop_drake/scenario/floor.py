@@ -1,0 +1,51 @@
+"""The workspace of a scenario that names a floor plan: the room in which the transport starts."""
+
+import dataclasses
+from pathlib import Path
+
+import shapely
+
+from coop_drake.errors import ScenarioError
+from coop_drake.scenario.model import Scenario, Workspace
+from coop_drake.scenario.packages import package_map, resolve
+
+
+def with_floor(scenario: Scenario) -> Scenario:
+    """Put rings in place of a floor plan's file; a scenario that has rings already stays as it is.
+
+    Raises:
+        ScenarioError: Neither rings nor a file, or both, or a file that is not there.
+        FloorPlanError: The file cannot be read.
+    """
+    file, workspace = str(scenario.path), scenario.workspace
+    if workspace.file is None:
+        _check_rings_alone(file, workspace)
+        return scenario
+    for key in ("outer", "holes"):
+        if getattr(workspace, key):
+            raise ScenarioError(file, f"workspace.{key}", "rings", "nothing beside workspace.file")
+    # Here and not above: most scenarios have rings, and should not wait for readers of drawings.
+    from coop_drake.floor_plans.plan import read_floor_plan
+    from coop_drake.floor_plans.settings import FloorPlanSettings
+
+    found = resolve(workspace.file, scenario.path, package_map(scenario.path), file, "workspace.file")
+    start = scenario.start.object
+    path = Path(found.removeprefix("file://"))
+    names = [field.name for field in dataclasses.fields(FloorPlanSettings)]
+    settings = FloorPlanSettings(**{name: getattr(workspace, name) for name in names})
+    floor = read_floor_plan(path, settings, (start.x, start.y)).polygon
+    outer, *holes = (
+        tuple((float(x), float(y)) for x, y in shapely.get_coordinates(ring)[:-1])
+        for ring in (floor.exterior, *floor.interiors)
+    )
+    return dataclasses.replace(scenario, workspace=Workspace(outer, tuple(holes)))
+
+
+def _check_rings_alone(file: str, workspace: Workspace) -> None:
+    if not workspace.outer:
+        raise ScenarioError(file, "workspace", None, "the rings outer and holes, or a file")
+    usual = Workspace()
+    for field in dataclasses.fields(Workspace):
+        value = getattr(workspace, field.name)
+        if field.name not in ("outer", "holes") and value != getattr(usual, field.name):
+            raise ScenarioError(file, f"workspace.{field.name}", value, "nothing without workspace.file")

@@ -1,0 +1,173 @@
+"""Occupancy maps: what shades mean, where cells lie, and what is refused."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import Point, affinity, box, contains_xy, union_all
+
+from coop_drake.errors import FloorPlanError
+from coop_drake.floor_plans import FloorPlanSettings, excess, read_floor_plan
+from coop_drake.floor_plans.cells import room_of_map
+from coop_drake.floor_plans.map_file import OccupancyMap
+from tests.support.floor_plan_files import room_shades, write_map
+
+EXACT = FloorPlanSettings(tolerance=0.0)
+
+
+def test_free_cells_make_the_floor_row_zero_on_top(tmp_path):
+    shades = room_shades()
+    shades[3:6, 10:20] = 0  # A shelf near the top.
+    plan = read_floor_plan(write_map(tmp_path, shades), EXACT)
+    want = box(0.1, 0.1, 3.9, 2.9) - box(1.0, 2.4, 2.0, 2.7)
+    assert plan.polygon.symmetric_difference(want).area < 1e-9
+    assert len(plan.polygon.exterior.coords) == 5
+
+
+def test_the_origin_turns_and_moves_the_map(tmp_path):
+    pose = [1.0, -2.0, 0.5]
+    plan = read_floor_plan(write_map(tmp_path, room_shades(), origin=pose, ending="png"), EXACT)
+    turned = affinity.affine_transform(
+        box(0.1, 0.1, 3.9, 2.9), [cos(0.5), -sin(0.5), sin(0.5), cos(0.5), 1.0, -2.0]
+    )
+    assert plan.polygon.symmetric_difference(turned).area < 1e-9
+
+
+SHADES = {  # shade, keys of the file -> whether the cell is floor
+    "white": (254, {}, True),
+    "unknown": (205, {}, False),
+    "black": (0, {}, False),
+    "just free": (206, {}, True),  # 1 - 206/255 = 0.192
+    "negated white": (254, {"negate": 1}, False),
+    "negated black": (0, {"negate": 1}, True),
+    "free threshold moved": (205, {"free_thresh": 0.25}, True),
+    "scale, between": (180, {"mode": "scale"}, False),
+    "scale, free": (250, {"mode": "scale"}, True),
+    "raw, free": (0, {"mode": "raw"}, True),
+    "raw, ten percent": (10, {"mode": "raw"}, True),
+    "raw, half": (50, {"mode": "raw"}, False),
+    "raw, unknown": (255, {"mode": "raw"}, False),
+}
+
+
+@pytest.mark.parametrize(("shade", "keys", "is_floor"), SHADES.values(), ids=SHADES)
+def test_what_shades_mean(tmp_path, shade, keys, is_floor):
+    free = 0 if keys.get("mode") == "raw" or keys.get("negate") else 254
+    shades = np.full((12, 12), free)
+    shades[5:8, 5:8] = shade
+    plan = read_floor_plan(write_map(tmp_path, shades, **keys), EXACT, (0.15, 0.15))
+    assert plan.polygon.contains(Point(0.65, 0.55)) == is_floor
+
+
+def test_unknown_cells_are_floor_only_where_that_is_said(tmp_path):
+    shades = room_shades()
+    shades[10:20, 10:20] = 205
+    path = write_map(tmp_path, shades)
+    assert len(read_floor_plan(path, EXACT).polygon.interiors) == 1
+    assert not read_floor_plan(path, FloorPlanSettings(unknown_is_free=True)).polygon.interiors
+
+
+def test_transparent_cells_are_unknown(tmp_path):
+    from PIL import Image
+
+    path = write_map(tmp_path, room_shades(), ending="png")
+    pixels = np.full((30, 40, 4), 254, dtype=np.uint8)
+    pixels[..., 3] = 255
+    pixels[10:20, 10:20, 3] = 0
+    Image.fromarray(pixels).save(tmp_path / "map.png")
+    assert len(read_floor_plan(path, EXACT).polygon.interiors) == 1
+
+
+def test_the_room_of_the_start_is_meant_and_diagonal_cells_do_not_connect(tmp_path):
+    shades = np.zeros((21, 21))
+    shades[1:10, 1:10] = shades[10:20, 10:20] = 254
+    path = write_map(tmp_path, shades)
+    assert read_floor_plan(path, EXACT).polygon.area == pytest.approx(1.0)
+    other = read_floor_plan(path, EXACT, (0.5, 1.5))
+    assert other.polygon.area == pytest.approx(0.81)
+    assert other.others == pytest.approx((1.0,))
+    with pytest.raises(
+        FloorPlanError, match=r"\(0.5, 0.5\): the start stands on no free cell; the map reaches"
+    ):
+        read_floor_plan(path, EXACT, (0.5, 0.5))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.lists(st.booleans(), min_size=9, max_size=9), min_size=9, max_size=9),
+    st.floats(-pi, pi),
+    st.sampled_from([0.0, 0.1, 0.2]),
+)
+def test_the_floor_lies_inside_the_free_cells_and_its_rings_never_touch(rows, yaw, closing):
+    free = np.array(rows)
+    free[4, 4] = True
+    cells = OccupancyMap(free, ~free, 0.1, (3.0, -1.0, yaw))
+    centre = tuple(cells.place(np.array([[4.5, 4.5]]))[0])
+    try:
+        floor = room_of_map(cells, "map", centre, closing=closing).floor
+    except FloorPlanError:
+        return  # Closing or cutting corners off took the start's cell.
+    squares = [
+        box(column, row, column + 1, row + 1) for row in range(9) for column in range(9) if free[row, column]
+    ]
+    union = union_all(squares)
+    back = cells.place(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    (a, d), (b, e) = back[1] - back[0], back[2] - back[0]
+    placed = affinity.affine_transform(union, [a, b, d, e, *back[0]])
+    assert floor.is_valid
+    assert floor.difference(placed).area < 1e-12
+    assert floor.contains(Point(centre))
+    rings = [floor.exterior, *floor.interiors]
+    assert all(ring.is_simple for ring in rings)
+    assert all(a.disjoint(b) for place, a in enumerate(rings) for b in rings[:place])
+
+
+def test_rough_walls_of_a_large_map_are_saved_many_corners(tmp_path):
+    random = np.random.default_rng(0)
+    shades = room_shades(600, 800)
+    shades[200:400, 300:320] = 0
+    near = np.zeros_like(shades, dtype=bool)
+    near[:4] = near[-4:] = near[:, :4] = near[:, -4:] = near[197:403, 297:323] = True
+    shades[near & (random.random(shades.shape) < 0.4)] = 0
+    path = write_map(tmp_path, shades, resolution=0.02)
+    plan = read_floor_plan(path, FloorPlanSettings(tolerance=0.1), (2.0, 2.0))
+    corners = sum(len(ring.coords) - 1 for ring in (plan.polygon.exterior, *plan.polygon.interiors))
+    assert corners < 60
+    assert excess(plan.polygon, plan.drawn) < 1e-9
+    rows, columns = np.nonzero(shades == 0)
+    centres = np.column_stack([columns + 0.5, 600 - rows - 0.5]) * 0.02
+    assert not contains_xy(plan.polygon, centres).any()
+    assert plan.polygon.area > 0.97 * plan.drawn.area
+
+
+def test_a_map_cut_short_is_refused(tmp_path):
+    path = write_map(tmp_path, room_shades())
+    picture = tmp_path / "map.pgm"
+    picture.write_bytes(picture.read_bytes()[:-300])
+    with pytest.raises(FloorPlanError, match=r"map.pgm: the picture: no readable picture"):
+        read_floor_plan(path)
+
+
+REFUSED = {
+    "no resolution": ({"resolution": ...}, "resolution: None is no number"),
+    "resolution of zero": ({"resolution": 0}, "cells of 0 m"),
+    "resolution not finite": ({"resolution": float("nan")}, "resolution: nan is no number"),
+    "origin too short": ({"origin": [0, 0]}, r"origin: \[0, 0\] is no pose"),
+    "origin not finite": ({"origin": [0, 0, float("inf")]}, "is no pose"),
+    "mode": ({"mode": "quaternary"}, "'quaternary' is unknown; use one of trinary, scale, raw"),
+    "negate": ({"negate": 2}, "negate: 2 is neither 0 nor 1"),
+    "thresholds": ({"free_thresh": 0.8}, "do not part the shades"),
+    "no image": ({"image": ...}, "names no picture"),
+    "gone": ({"image": "gone.pgm"}, "there is no .*gone.pgm"),
+    "nothing free": ({"negate": 1, "free_thresh": 0.0}, "no cell is free"),
+}
+
+
+@pytest.mark.parametrize(("keys", "message"), REFUSED.values(), ids=REFUSED)
+def test_wrong_keys_are_refused(tmp_path, keys, message):
+    with pytest.raises(FloorPlanError, match=message):
+        read_floor_plan(write_map(tmp_path, room_shades(), **keys))
