@@ -18,6 +18,7 @@ __all__ = ["Fault", "MapCertificate", "certify", "find_fault"]
 # Chebyshev points of two degrees: denser than the nodes, and other points than they are.
 _ON_PANEL = np.sort(np.cos(np.pi * (np.arange(23) + 0.5) / 23))
 _ON_RING = np.cos(np.pi * (np.arange(5) + 0.5) / 5)
+_NARROW = 0.01  # of a corner's walls: a gap beside it that is narrower is what is at fault
 _RINGS = np.array([0, 1, 2, 3, 5, 8, 13, 21, 33])
 
 
@@ -134,12 +135,27 @@ def find_fault(outline: Outline, panels: Panels, place: complex, edge: int) -> F
     """Name the corner or the gap at a place of the boundary."""
     for vertex in (edge, int(outline.following[edge])):
         if abs(place - outline.vertices[vertex]) <= 1.5 * panels.legs[vertex]:
-            where = outline.vertices[vertex] + outline.centre
-            angle = float(np.rad2deg(outline.corner_angles[vertex]))
-            corner = f"the corner at ({where.real:.6g}, {where.imag:.6g}) m"
-            return Fault(f"{corner} with interior angle {angle:.4g} degrees", angle, None)
+            return _fault_at_corner(outline, vertex)
     along = abs(place - outline.vertices[edge])
     own = np.flatnonzero(panels.edge == edge)
     nearest = own[np.argmin(np.abs(0.5 * (panels.start + panels.end)[own] - along))]
-    where, gap = place + outline.centre, float(panels.gap[nearest])
-    return Fault(f"the gap of {gap:.3g} m at ({where.real:.6g}, {where.imag:.6g}) m", None, gap)
+    return _gap_of(float(panels.gap[nearest]), place + outline.centre)
+
+
+def _fault_at_corner(outline: Outline, vertex: int) -> Fault:
+    """The corner, or a gap between it and another wall that is far narrower than its own walls are long."""
+    place, starts, ends = outline.vertices[vertex], outline.vertices, outline.ends
+    along = np.clip(np.real((place - starts) / (ends - starts)), 0.0, 1.0)
+    distance = np.abs(starts + along * (ends - starts) - place)
+    own = [int(outline.preceding[vertex]), vertex]
+    gap = float(np.delete(distance, own).min(initial=np.inf))
+    where = place + outline.centre
+    if gap < _NARROW * np.abs(ends - starts)[own].min():
+        return _gap_of(gap, where)
+    angle = float(np.rad2deg(outline.corner_angles[vertex]))
+    corner = f"the corner at ({where.real:.6g}, {where.imag:.6g}) m"
+    return Fault(f"{corner} with interior angle {angle:.4g} degrees", angle, None)
+
+
+def _gap_of(width: float, where: complex) -> Fault:
+    return Fault(f"the gap of {width:.3g} m at ({where.real:.6g}, {where.imag:.6g}) m", None, width)

@@ -19,7 +19,7 @@ from coop_drake.fields.quadrature import FloatArray, gauss_nodes, interpolation
 __all__ = ["CornerOperator", "corner_operator", "leg_panels"]
 
 _BROAD = 4.0 * pi / 9.0  # gap between the legs from which one panel resolves the other leg at every scale
-_DOUBLINGS = 8  # 2^8 dyadic levels: below rounding for every angle that a polygon can have
+_DOUBLINGS = 7  # 2^7 dyadic levels: what the next would add is below rounding for every angle
 
 
 @dataclass(frozen=True)
@@ -119,10 +119,11 @@ def _wedge_kernel(angle: float, target: FloatArray, source: FloatArray, weight: 
 
 def _fixed_point(Z: FloatArray, U: FloatArray, V: FloatArray, X: FloatArray) -> FloatArray:
     """Fixed point of R -> Z + U R (I - X R)^-1 V by composing the map with itself; stacks of matrices."""
-    identity = np.eye(Z.shape[-1])
-    for _ in range(_DOUBLINGS):
+    n = Z.shape[-1]
+    identity = np.eye(n)
+    for _ in range(_DOUBLINGS - 1):
         DV = np.linalg.solve(identity - X @ Z, np.concatenate((V, X @ U), axis=-1))
-        n = Z.shape[-1]
         D_V, D_XU = DV[..., :n], DV[..., n:]
         Z, U, V, X = Z + U @ Z @ D_V, U @ (U + Z @ D_XU), V @ D_V, X + V @ D_XU
-    return Z
+    R: FloatArray = Z + U @ Z @ np.linalg.solve(identity - X @ Z, V)
+    return R

@@ -24,6 +24,7 @@ __all__ = ["Solution", "solve"]
 _GAIN = 4.0  # by which the error falls with every node a panel, about
 _PROGRESS = 0.7  # share of the error that an attempt must undercut, or more would not help either
 _LARGE = 2_000  # unknowns from which the first attempt is left out
+_EPSILON = float(np.finfo(float).eps)
 _MAX_UNKNOWNS = 40_000  # some ten seconds
 
 
@@ -72,7 +73,8 @@ def solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solution
         tolerance: Largest certified error.
 
     Raises:
-        UnmappableError: If more nodes do not help any more, or would be too many.
+        UnmappableError: If more nodes do not help any more, or would be too many, or the first attempt fails
+            at a system so near to singular, as narrow gaps make it, that rounding alone may cost more.
     """
     best: MapCertificate | None = None
     last = _FEWEST
@@ -92,6 +94,8 @@ def solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solution
         if best is not None and bound > _PROGRESS * best.error_bound:
             break
         best, last = solution.certificate, attempt
+        if _EPSILON * best.condition > tolerance:  # rounding stands in the way, which more nodes do not move
+            break
     _refuse(best, tolerance, outline, panels, unknowns)
 
 
@@ -119,7 +123,7 @@ def _solve(outline: Outline, goal: Point | Polygon, panels: Panels, attempt: Att
     angles = _angles(outline)
     centre = np.array([outline.centre.real, outline.centre.imag])
     # Coordinates come rounded: what lies outside by less than this counts as on the wall.
-    rounding = 8.0 * float(np.finfo(float).eps) * (abs(outline.centre) + outline.diameter)
+    rounding = 8.0 * _EPSILON * (abs(outline.centre) + outline.diameter)
     density = solve_density(outline, panels, angles, *attempt)
     arrays = pack_layers(outline, panels, angles, density, attempt.closeness)
     flat = flatten(arrays, centre, rounding)
@@ -146,9 +150,11 @@ def _refuse(
 ) -> NoReturn:
     """Name the place where the best attempt is worst; without one, the narrowest gap."""
     if best is not None:
+        rounding = _EPSILON * best.condition
+        why = f", and rounding alone may cost {rounding:.2g}" if rounding > tolerance else ""
         raise UnmappableError(
-            f"the harmonic map is certified to {best.error_bound:.2g} only, {tolerance:.2g} was asked for; "
-            f"at fault is {best.worst_place_description}",
+            f"the harmonic map is certified to {best.error_bound:.2g} only, {tolerance:.2g} was asked for"
+            f"{why}; at fault is {best.worst_place_description}",
             (float(best.worst_place[0]), float(best.worst_place[1])),
             angle=best.worst_angle,
             width=best.worst_gap,

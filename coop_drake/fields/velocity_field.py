@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from shapely import Point
 
+from coop_drake.fields.certainty import check_certainty
 from coop_drake.fields.flat_field import flat_field, velocities_in_field, velocity_in_field
 from coop_drake.fields.flat_map import FlatMap
 from coop_drake.fields.harmonic_map import HarmonicMap
@@ -37,11 +38,15 @@ class VelocityField:
         max_speed: Largest magnitude [m/s].
         slowdown_radius: Where slowing down begins [m]; by default half the distance of a point goal to the
             boundary, or half the radius of the disc that is as large as a goal region.
+
+    Raises:
+        FieldError: If the map's error leaves the direction open in more than a hundredth of the region.
     """
 
     def __init__(
         self, harmonic_map: HarmonicMap, max_speed: float = 1.0, *, slowdown_radius: float | None = None
     ) -> None:
+        check_certainty(harmonic_map)
         self.harmonic_map = harmonic_map
         self.max_speed = float(max_speed)
         goal, solution = harmonic_map.goal, harmonic_map.solution

@@ -1,11 +1,9 @@
-import re
-
 import numpy as np
 import pytest
 from shapely import Point, Polygon, box
 
-from coop_drake.errors import FieldError
-from coop_drake.fields import HarmonicMap
+from coop_drake.errors import FieldError, UnmappableError
+from coop_drake.fields import HarmonicMap, solving
 from tests.support import domains
 
 ELL = Polygon([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
@@ -43,10 +41,30 @@ def test_more_is_spent_where_more_is_asked():
 
 
 def test_refusal_names_the_corner_at_fault():
-    message = "1e-16 was asked for; at fault is the corner at ("
-    with pytest.raises(FieldError, match=re.escape(message)) as caught:
+    message = r"certified to .* only, 1e-16 was asked for.*; at fault is the corner at \("
+    with pytest.raises(FieldError, match=message):
         HarmonicMap(ELL, Point(0.5, 0.5), tolerance=1e-16)
-    assert "certified to" in str(caught.value)
+
+
+@pytest.mark.parametrize("gap", [1e-6, 1e-7])
+def test_a_gap_too_narrow_for_any_number_of_nodes_is_refused_at_the_first_attempt(monkeypatch, gap):
+    attempts = []
+    one_attempt = solving._solve
+    monkeypatch.setattr(solving, "_solve", lambda *a: attempts.append(a[-1]) or one_attempt(*a))
+    with pytest.raises(
+        UnmappableError, match=r"and rounding alone may cost .*; at fault is the gap of"
+    ) as caught:
+        HarmonicMap(*domains.two_rooms(gap))
+    assert len(attempts) == 1
+    assert caught.value.width == pytest.approx(gap, rel=0.01)
+    assert box(0.98, 0.49, 1.12, 0.51).contains(Point(caught.value.place))
+
+
+def test_a_narrow_gap_that_does_no_harm_is_mapped():
+    between_pillars = box(0, 0, 4, 3).difference(box(1, 1, 2, 2)).difference(box(2 + 1e-6, 1, 3, 2))
+    certificate = HarmonicMap(between_pillars, Point(3.5, 0.5)).certificate
+    assert certificate.error_bound <= 1e-8
+    assert certificate.condition * np.finfo(float).eps > 1e-8
 
 
 def test_refusal_of_a_domain_too_fine_names_the_gap():

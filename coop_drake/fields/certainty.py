@@ -1,0 +1,75 @@
+"""How far the direction of a field can be from the true one: in crowded places it drowns in rounding."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+import shapely
+
+from coop_drake.errors import FieldError
+from coop_drake.fields.harmonic_map import HarmonicMap
+from coop_drake.fields.points import as_points
+from coop_drake.fields.quadrature import FloatArray
+
+__all__ = ["check_certainty", "direction_error"]
+
+_UNCERTAIN = 0.1  # a direction that may err by more does not count as known [rad]
+_MOST = 0.01  # part of the region where the direction may be unknown
+_LEAST_ROOM = 0.1  # of a leaf's size: sampled directions are judged as if walls were no closer
+
+
+def direction_error(harmonic_map: HarmonicMap, points: FloatArray) -> FloatArray:
+    """Bound on the error of the direction of adj(J) (q_d - T), small angles.
+
+    The error of T is harmonic and nowhere above the certificate's bound e, so that of J is at most
+    4 e / (pi r) in the spectral norm of each row at a distance r from the boundary.
+
+    Args:
+        harmonic_map: The map.
+        points: Points inside its region, shape (n, 2) [m].
+
+    Returns:
+        Angles, shape (n,) [rad]; what is not small against one says that the direction is not known.
+    """
+    p = as_points(points)
+    room = np.asarray(shapely.distance(harmonic_map.region.boundary, shapely.points(p)))
+    return _bound(harmonic_map, p, room)
+
+
+def check_certainty(harmonic_map: HarmonicMap) -> None:
+    """Refuse a map whose field points anywhere in more than a hundredth of the region.
+
+    It does in aisles between holes, far longer than wide, whose images lie in line with the goal's: there the
+    direction depends on what is as small as exp(-pi length / width). Sampled at the leaves of the map's
+    quadtree, which are as small as the walls around them are close.
+
+    Raises:
+        FieldError: With the part of the region and the place there that is farthest from walls.
+    """
+    leaves = harmonic_map.solution.arrays.leaf_square
+    centres, sizes = leaves[:, :2] + harmonic_map.solution.centre, leaves[:, 2]
+    inside = shapely.contains_xy(harmonic_map.region, *centres.T)
+    centres, sizes = centres[inside], sizes[inside]
+    room = shapely.distance(harmonic_map.region.boundary, shapely.points(centres))
+    unknown = _bound(harmonic_map, centres, np.maximum(room, _LEAST_ROOM * sizes)) > _UNCERTAIN
+    part = float((sizes * sizes)[unknown].sum() / (sizes * sizes).sum())
+    if part > _MOST:
+        x, y = centres[np.argmax(np.where(unknown, room, -1.0))]
+        raise FieldError(
+            f"the direction of the field is not known in {100.0 * part:.2g} % of the region, for example at "
+            f"({x:.6g}, {y:.6g}) m: there the Jacobian's determinant is below the map's error; cut the "
+            "domain open (`cut_open`), move the goal, or ask for a smaller tolerance"
+        )
+
+
+def _bound(harmonic_map: HarmonicMap, points: FloatArray, room: FloatArray) -> FloatArray:
+    """The bound, with the distances from the boundary given (n,) [m]."""
+    T, J = harmonic_map(points)
+    line = harmonic_map.goal_image - T
+    x = J[:, 1, 1] * line[:, 0] - J[:, 0, 1] * line[:, 1]
+    y = J[:, 0, 0] * line[:, 1] - J[:, 1, 0] * line[:, 0]
+    error = harmonic_map.certificate.error_bound
+    of_J = 4.0 * np.sqrt(2.0) * error / (pi * np.maximum(room, 1e-300))
+    lost = of_J * np.hypot(*line.T) + np.linalg.norm(J, axis=(1, 2)) * error
+    return np.asarray(lost / np.maximum(np.hypot(x, y), 1e-300))
