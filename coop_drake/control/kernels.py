@@ -241,6 +241,39 @@ def interval_margin(position: FloatArray, lower: FloatArray, upper: FloatArray, 
 
 
 @compiled
+def funnel_margin(
+    slice_lower: FloatArray,
+    slice_upper: FloatArray,
+    goal_lower: FloatArray,
+    goal_upper: FloatArray,
+    decay_rate: FloatArray,
+    smooth: bool,
+    position: FloatArray,
+    rate: FloatArray,
+    log_gain: FloatArray,
+    position_gain: float,
+    bound: FloatArray,
+) -> float:
+    """Return the smallest (bound - V) / max(V, bound) of all axes when their funnels begin; see ``ready``."""
+    walls = funnel_walls(0.0, slice_lower, slice_upper, goal_lower, goal_upper, decay_rate, smooth)
+    energy = track_walls(position, rate, walls, log_gain, position_gain, 0.0)[1]
+    margin = np.inf
+    for i in range(position.size):
+        margin = min(margin, (bound[i] - energy[i]) / max(energy[i], bound[i]))
+    return margin
+
+
+@compiled
+def write_walls(rows: FloatArray, time: float, walls: FloatArray) -> None:
+    """Write the lower, then the upper walls of all axes, shape (2 m,)."""
+    m = rows.shape[0]
+    for i in range(m):
+        value = decay(time, rows[i, 4], rows[i, 5] != 0.0)[0]
+        walls[i] = rows[i, 2] + (rows[i, 0] - rows[i, 2]) * value
+        walls[m + i] = rows[i, 3] + (rows[i, 1] - rows[i, 3]) * value
+
+
+@compiled
 def robot_acceleration(
     end_effector: FloatArray, joints: FloatArray, jacobian: FloatArray, rate_term: FloatArray
 ) -> FloatArray:

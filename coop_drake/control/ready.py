@@ -9,10 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from coop_drake.control import kernels
-from coop_drake.control.funnels import Funnel, funnel_walls
+from coop_drake.control.funnels import Funnel
 from coop_drake.control.gains import FloatArray, TransitionGains
 from coop_drake.control.governor import energy_margin, tracking_energy
-from coop_drake.control.ppc import prescribed_energy
 
 #: Part of a goal interval's width, at each end, in which an axis does not count as arrived: erratum E17b.
 EROSION = 0.1
@@ -57,10 +56,14 @@ def funnel_margin(position: FloatArray, rate: FloatArray, *, funnel: Funnel, gai
         funnel: The next transition's funnels of these axes.
         gains: The next transition's gains of these axes.
     """
-    energy = prescribed_energy(
-        position, rate, funnel_walls(funnel, 0.0), log_gain=gains.log_gain, position_gain=gains.position_gain
+    return kernels.funnel_margin(
+        *funnel.kernel_arguments,
+        position,
+        rate,
+        gains.log_gain,
+        gains.position_gain,
+        gains.energy_bound,
     )
-    return float(np.min((gains.energy_bound - energy) / np.maximum(energy, gains.energy_bound)))
 
 
 def ready_margin(

@@ -10,10 +10,13 @@ from math import hypot, inf
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from coop_drake.geometry.pose import FloatArray
 
-__all__ = ["core_distance", "place_vertices", "wall_distance"]
+__all__ = ["core_distance", "nearest_pair", "nearest_to_walls", "place_vertices", "wall_distance"]
+
+IntArray = NDArray[np.int64]
 
 
 @njit(cache=True)
@@ -93,6 +96,53 @@ def core_distance(first: FloatArray, second: FloatArray) -> float:
             depth = max(depth, _ring_distance(first, second[j, 0], second[j, 1]))
             nearest = 0.0
     return nearest if nearest > 0.0 else -depth
+
+
+@njit(cache=True)
+def nearest_to_walls(
+    placed: FloatArray, bounds: IntArray, radii: FloatArray, walls: FloatArray
+) -> tuple[float, int]:
+    """Smallest signed distance of several footprints to the walls, and whose it is.
+
+    Args:
+        placed: Vertices of all cores in W, shape (v, 2) [m].
+        bounds: First vertex of every core and the one after its last, shape (cores, 2).
+        radii: By how much each core is grown, shape (cores,) [m].
+        walls: As in `wall_distance`.
+    """
+    nearest, which = inf, 0
+    for i in range(bounds.shape[0]):
+        distance = wall_distance(placed[bounds[i, 0] : bounds[i, 1]], walls) - radii[i]
+        if distance < nearest:
+            nearest, which = distance, i
+    return nearest, which
+
+
+@njit(cache=True)
+def nearest_pair(
+    placed: FloatArray, bounds: IntArray, radii: FloatArray, pairs: IntArray
+) -> tuple[float, int]:
+    """Smallest signed distance of some pairs of footprints, shape (pairs, 2), and which pair's it is.
+
+    Other arguments as in `nearest_to_walls`. Pairs whose boxes are farther apart are not looked at.
+    """
+    boxes = np.empty((bounds.shape[0], 4))
+    for i in range(bounds.shape[0]):
+        core = placed[bounds[i, 0] : bounds[i, 1]]
+        boxes[i, 0], boxes[i, 1] = core[:, 0].min() - radii[i], core[:, 1].min() - radii[i]
+        boxes[i, 2], boxes[i, 3] = core[:, 0].max() + radii[i], core[:, 1].max() + radii[i]
+    nearest, which = inf, 0
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        apart_x = max(boxes[i, 0] - boxes[j, 2], boxes[j, 0] - boxes[i, 2])
+        apart_y = max(boxes[i, 1] - boxes[j, 3], boxes[j, 1] - boxes[i, 3])
+        if max(apart_x, apart_y) > nearest:
+            continue
+        first, second = placed[bounds[i, 0] : bounds[i, 1]], placed[bounds[j, 0] : bounds[j, 1]]
+        distance = core_distance(first, second) - radii[i] - radii[j]
+        if distance < nearest:
+            nearest, which = distance, k
+    return nearest, which
 
 
 @njit(cache=True)

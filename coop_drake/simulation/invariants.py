@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.plan import Plan
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.telemetry import Sample
@@ -73,33 +72,41 @@ class Invariants:
         in_slice = np.minimum(axes - cell.lower, cell.upper - axes)
         wrench_error = float(np.abs(sample.measured_wrenches - sample.commanded_wrenches).max())
         in_cell = self._cells[sample.cell](sample.z[:2])
-        strict = (
-            (f"clearance between {walls.place}", walls.distance, "m"),
-            (f"clearance between {bodies.place}", bodies.distance, "m"),
-            (f"distance of the object to the boundary of cell {sample.cell}", in_cell, "m"),
-            (f"distance of {self._worst(in_funnel)} to its funnel", float(in_funnel.min()), "rad or m"),
-            (f"distance of {self._worst(in_slice)} to its slice", float(in_slice.min()), "rad or m"),
-        )
-        broken = [f"{name} is {value:.3g} {unit}" for name, value, unit in strict if not value > 0.0]
+        funnel_axis, slice_axis = int(in_funnel.argmin()), int(in_slice.argmin())
+        funnel_margin, slice_margin = float(in_funnel[funnel_axis]), float(in_slice[slice_axis])
+        broken = []
+        if not walls.distance > 0.0:
+            broken.append(f"clearance between {walls.place} is {walls.distance:.3g} m")
+        if not bodies.distance > 0.0:
+            broken.append(f"clearance between {bodies.place} is {bodies.distance:.3g} m")
+        if not in_cell > 0.0:
+            where = f"the boundary of cell {sample.cell}"
+            broken.append(f"distance of the object to {where} is {in_cell:.3g} m")
+        if not funnel_margin > 0.0:
+            axis = self._axes[funnel_axis]
+            broken.append(f"distance of {axis} to its funnel is {funnel_margin:.3g} rad or m")
+        if not slice_margin > 0.0:
+            axis = self._axes[slice_axis]
+            broken.append(f"distance of {axis} to its slice is {slice_margin:.3g} rad or m")
         if not sample.grasp_error <= GRASP_TOLERANCE:
             broken.append(f"distance of a hand to its grasp is {sample.grasp_error:.3g} m")
         if self._exact:
             broken.extend(_inexact(sample, wrench_error))
-        where = f"at t = {sample.time:.6g} s in cell {sample.cell}: "
         return Margins(
             workspace_clearance=walls.distance,
             body_clearance=bodies.distance,
             cell_clearance=in_cell,
-            funnel_margin=float(in_funnel.min()),
-            slice_margin=float(in_slice.min()),
+            funnel_margin=funnel_margin,
+            slice_margin=slice_margin,
             energy_margin=sample.energy_margin,
             acceleration_error=sample.acceleration_error,
             wrench_error=wrench_error,
-            violation=where + "; ".join(broken) if broken else "",
+            violation=_told(sample, broken) if broken else "",
         )
 
-    def _worst(self, margins: FloatArray) -> str:
-        return self._axes[int(np.argmin(margins))]
+
+def _told(sample: Sample, broken: list[str]) -> str:
+    return f"at t = {sample.time:.6g} s in cell {sample.cell}: {'; '.join(broken)}"
 
 
 def _inexact(sample: Sample, wrench_error: float) -> Iterator[str]:

@@ -12,7 +12,6 @@ from pydrake.systems.framework import Context, System
 from coop_drake.control.load_sharing import rotate, total_wrench
 from coop_drake.diagram import TELEMETRY, ClosedLoop
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.plant import base_poses
 
 __all__ = ["Sample", "Telemetry"]
 
@@ -77,7 +76,11 @@ class Telemetry:
     def __init__(self, loop: ClosedLoop, root: Context) -> None:
         self._team, self._root = loop.team, root
         self._plant_context = self._team.plant.GetMyContextFromRoot(root)
-        self._grasps = [np.array([robot.X_LE.x, robot.X_LE.y]) for robot in self._team.robots]
+        self._grasps = np.array([[robot.X_LE.x, robot.X_LE.y] for robot in self._team.robots])
+        self._states = [
+            _reader(loop.station.diagram, f"robot_{robot.index}_state", root) for robot in self._team.robots
+        ]
+        self._lower, self._upper = _funnel_places([len(robot.joints) for robot in self._team.robots])
         self._of_robots = {
             name: [_reader(law, name, root) for law in loop.laws] for name in ("ready", *TELEMETRY)
         }
@@ -88,26 +91,26 @@ class Telemetry:
 
     def read(self) -> Sample:
         """Read the present instant."""
-        plant, team = self._team.plant, self._team
-        z = plant.GetPositions(self._plant_context)[team.position_index]
+        team, state = self._team, self._team.plant.GetPositionsAndVelocities(self._plant_context)
+        z = state[team.position_index]
         cell, entry = self._current_cell()
         efforts, hands = self._from_robots("robot_effort"), np.array(self._from_robots("hand_command"))
         base_wrenches = np.array([effort[:3] for effort in efforts])
-        lower, upper = self._funnels()
+        funnels = np.concatenate([self._of_robots["angle_funnel"][0](), *self._from_robots("joint_funnels")])
         governors = np.array(self._from_robots("governor_position"))
-        offsets = np.array([rotate(z[2], grasp) for grasp in self._grasps])
+        offsets = rotate(z[2], self._grasps.T).T
         com_offset = rotate(z[2], team.object_inertia.p_LLcm)
         return Sample(
             time=self._root.get_time(),
             cell=int(cell),
             entry=float(entry),
             z=z,
-            rates=plant.GetVelocities(self._plant_context)[team.velocity_index],
-            base_poses=base_poses(team, self._plant_context),
+            rates=state[team.plant.num_positions() + team.velocity_index],
+            base_poses=np.array([read()[:3] for read in self._states]),
             governor_position=governors[0],
             governor_spread=float(np.abs(governors - governors[0]).max()),
-            funnel_lower=lower,
-            funnel_upper=upper,
+            funnel_lower=funnels[self._lower],
+            funnel_upper=funnels[self._upper],
             energy_margin=float(min(self._from_robots("energy_margin"))[0]),
             object_wrench=total_wrench(hands[:, 3:], offsets, com_offset=com_offset),
             commanded_wrenches=hands[:, 3:],
@@ -123,17 +126,19 @@ class Telemetry:
     def _from_robots(self, output: str) -> list[FloatArray]:
         return [read() for read in self._of_robots[output]]
 
-    def _funnels(self) -> tuple[FloatArray, FloatArray]:
-        angle = self._from_robots("angle_funnel")[0]
-        halves = [np.split(funnels, 2) for funnels in self._from_robots("joint_funnels")]
-        return (
-            np.concatenate([angle[:1], *(lower for lower, _ in halves)]),
-            np.concatenate([angle[1:], *(upper for _, upper in halves)]),
-        )
-
     def _acceleration_error(self) -> float:
         realised = self._accelerations()[self._team.velocity_index[:3]]
         return float(np.abs(np.array(self._from_robots("object_acceleration")) - realised).max())
+
+
+def _funnel_places(joints: list[int]) -> tuple[list[int], list[int]]:
+    """Where lower and upper walls stand when the angle's and every robot's funnels are put in one row."""
+    lower, upper, first = [0], [1], 2
+    for n in joints:
+        lower.extend(range(first, first + n))
+        upper.extend(range(first + n, first + 2 * n))
+        first += 2 * n
+    return lower, upper
 
 
 def _reader(system: System, output: str, root: Context) -> Callable[[], Any]:

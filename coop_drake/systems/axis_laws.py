@@ -8,10 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from coop_drake.control.funnels import Funnel, FunnelWalls, funnel_walls
+from coop_drake.control.funnels import Funnel
 from coop_drake.control.gains import TransitionGains
 from coop_drake.control.kernels import LAW_COLUMNS
-from coop_drake.control.ppc import funnel_acceleration
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.plan import Plan
 
@@ -49,22 +48,6 @@ class AxisLaw:
     def axes(self) -> int:
         """Number of axes m."""
         return int(self.funnel.goal_lower.size)
-
-    def walls(self, time: float) -> FunnelWalls:
-        """Funnel walls ``time`` seconds after the cell was entered."""
-        return funnel_walls(self.funnel, time)
-
-    def acceleration(self, position: FloatArray, rate: FloatArray, time: float) -> FloatArray:
-        """Acceleration of every axis, (18) and (38), shape (m,)."""
-        return funnel_acceleration(
-            position,
-            rate,
-            self.funnel,
-            time,
-            log_gain=self.gains.log_gain,
-            position_gain=self.gains.position_gain,
-            rate_gain=self.gains.rate_gain,
-        )
 
 
 def axis_laws(plan: Plan, axes: Sequence[int]) -> tuple[AxisLaw, ...]:

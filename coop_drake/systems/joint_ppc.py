@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from coop_drake.control.kernels import track_state
+from coop_drake.control.kernels import track_state, write_walls
+from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 
@@ -37,7 +37,6 @@ class JointPpc(LeafSystem):
         super().__init__()
         if not laws or len({law.axes for law in laws}) != 1:
             raise ValueError("JointPpc needs one law of the same joints for each cell")
-        self._laws = tuple(laws)
         self._tables = [law.table for law in laws]
         self._joints = n = laws[0].axes
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + n))
@@ -50,16 +49,13 @@ class JointPpc(LeafSystem):
             {self.time_ticket(), self.input_port_ticket(self._cell.get_index())},
         )
 
-    def _law(self, context: Context) -> tuple[AxisLaw, float]:
+    def _table(self, context: Context) -> tuple[FloatArray, float]:
         cell = self._cell.Eval(context)
-        return self._laws[index_of(cell, len(self._laws))], context.get_time() - cell[1]
+        return self._tables[index_of(cell, len(self._tables))], context.get_time() - cell[1]
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
-        cell = self._cell.Eval(context)
-        table, time = self._tables[index_of(cell, len(self._tables))], context.get_time() - cell[1]
+        table, time = self._table(context)
         track_state(table, time, self._state.Eval(context), 3, 6 + self._joints, output.get_mutable_value())
 
     def _write_funnels(self, context: Context, output: BasicVector) -> None:
-        law, time = self._law(context)
-        walls = law.walls(time)
-        output.SetFromVector(np.concatenate([walls.lower, walls.upper]))
+        write_walls(*self._table(context), output.get_mutable_value())

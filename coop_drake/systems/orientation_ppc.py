@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
-from coop_drake.control.kernels import track_state
+from coop_drake.control.kernels import track_state, write_walls
+from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 
@@ -36,7 +37,6 @@ class OrientationPpc(LeafSystem):
         super().__init__()
         if not laws or any(law.axes != 1 for law in laws):
             raise ValueError("OrientationPpc needs one law of one axis for each cell")
-        self._laws = tuple(laws)
         self._tables = [law.table for law in laws]
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
@@ -48,16 +48,13 @@ class OrientationPpc(LeafSystem):
             {self.time_ticket(), self.input_port_ticket(self._cell.get_index())},
         )
 
-    def _law(self, context: Context) -> tuple[AxisLaw, float]:
+    def _table(self, context: Context) -> tuple[FloatArray, float]:
         cell = self._cell.Eval(context)
-        return self._laws[index_of(cell, len(self._laws))], context.get_time() - cell[1]
+        return self._tables[index_of(cell, len(self._tables))], context.get_time() - cell[1]
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
-        cell = self._cell.Eval(context)
-        table, time = self._tables[index_of(cell, len(self._tables))], context.get_time() - cell[1]
+        table, time = self._table(context)
         track_state(table, time, self._object.Eval(context), 2, 5, output.get_mutable_value())
 
     def _write_funnel(self, context: Context, output: BasicVector) -> None:
-        law, time = self._law(context)
-        walls = law.walls(time)
-        output.SetFromVector([walls.lower[0], walls.upper[0]])
+        write_walls(*self._table(context), output.get_mutable_value())
