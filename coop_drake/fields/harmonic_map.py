@@ -13,7 +13,10 @@ from coop_drake.fields.points import as_points
 from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.solving import Solution, solve
 
-__all__ = ["HarmonicMap", "Solution"]
+__all__ = ["TOLERANCE", "HarmonicMap", "Solution"]
+
+TOLERANCE = 1e-8
+"""Largest certified error of a map that is accepted, if none is given."""
 
 
 class HarmonicMap:
@@ -46,7 +49,7 @@ class HarmonicMap:
         domain: Polygon,
         goal: Point | Polygon,
         *,
-        tolerance: float = 1e-8,
+        tolerance: float = TOLERANCE,
         inside: Point | None = None,
     ) -> None:
         self._goal = goal

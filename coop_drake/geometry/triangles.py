@@ -19,6 +19,9 @@ IndexArray = NDArray[np.intp]
 PER_GAP = 1.0
 """Longest piece of a ring, over its distance to the opposite wall [-]."""
 
+AT_ONCE = 250_000
+"""Pairs of points and walls that are measured at once, lest large floors fill the memory."""
+
 FINEST = 500
 """Pieces are not shorter than this part of the polygon's size; finer passages get oblique diagonals."""
 
@@ -74,14 +77,12 @@ def triangulate(polygon: Polygon) -> Triangles:
 def _cut_up(walls: FloatArray, finest: float) -> FloatArray:
     """Starts of the pieces of all walls in order, and the wall of each: rows (x, y, wall)."""
     z = walls @ np.array([[1.0, 0.0], [1.0j, 0.0], [0.0, 1.0], [0.0, 1.0j]])
-    starts, ends = z[:, None, :], z[None, :, :]
-    touching = (starts[..., :, None] == ends[..., None, :]).any(axis=(2, 3))
     wall, part = np.arange(len(z)), np.array([[0.0, 1.0]] * len(z))
     done = []
     while len(wall):
         middle = z[wall, 0] + part.mean(axis=1) * (z[wall, 1] - z[wall, 0])
         length = (part[:, 1] - part[:, 0]) * np.abs(z[wall, 1] - z[wall, 0])
-        long = length > np.maximum(PER_GAP * _opposite(middle, z, touching[wall]), finest)
+        long = length > np.maximum(PER_GAP * _opposite(middle, wall, z), finest)
         done.append(np.column_stack((wall[~long], part[~long, 0])))
         low, high = part[long].T
         half = 0.5 * (low + high)
@@ -94,12 +95,23 @@ def _cut_up(walls: FloatArray, finest: float) -> FloatArray:
     return np.column_stack((places, of))
 
 
-def _opposite(
-    points: NDArray[np.complex128], walls: NDArray[np.complex128], own: NDArray[np.bool_]
-) -> FloatArray:
-    """Distance of points to the nearest wall but ``own`` (points, walls), shape (points,)."""
+def _opposite(points: NDArray[np.complex128], wall: IndexArray, walls: NDArray[np.complex128]) -> FloatArray:
+    """Distance of points on walls to the nearest wall that does not touch their own, shape (points,)."""
     along = walls[:, 1] - walls[:, 0]
+    squared = np.maximum(np.abs(along) ** 2, 1e-300)
+    nearest = [
+        _nearest(points[rows], walls[wall[rows]], walls, along, squared)
+        for rows in np.array_split(np.arange(len(points)), 1 + len(points) * len(walls) // AT_ONCE)
+    ]
+    return np.concatenate(nearest)
+
+
+def _nearest(
+    points: NDArray[np.complex128], own: NDArray[np.complex128], walls: NDArray[np.complex128],
+    along: NDArray[np.complex128], squared: FloatArray,
+) -> FloatArray:  # fmt: skip
+    """The same for some of them, with the wall of each, shape (points, 2), and what is known of all walls."""
+    touching = (own[:, None, :, None] == walls[None, :, None, :]).any(axis=(2, 3))
     offset = points[:, None] - walls[:, 0]
-    part = np.clip((np.conj(along) * offset).real / np.maximum(np.abs(along) ** 2, 1e-300), 0.0, 1.0)
-    distance = np.where(own, np.inf, np.abs(offset - part * along))
-    return np.asarray(distance.min(axis=1))
+    part = np.clip((np.conj(along) * offset).real / squared, 0.0, 1.0)
+    return np.asarray(np.where(touching, np.inf, np.abs(offset - part * along)).min(axis=1))

@@ -8,6 +8,7 @@ from pydrake.multibody.parsing import ModelDirective
 from shapely import Polygon
 
 from coop_drake.control.gains import FixedGains, GainSet, ScheduledGains
+from coop_drake.fields.harmonic_map import TOLERANCE
 from coop_drake.geometry.pose import PlanarPose
 from coop_drake.planning.problem import PlannerSettings
 from coop_drake.scenario.deployment import Deployment
@@ -140,7 +141,7 @@ class MapSettings:
             as well as that are refused. The disk they are mapped to has radius 1 [-].
     """
 
-    tolerance: float = 1e-8
+    tolerance: float = TOLERANCE
 
 
 @dataclass(frozen=True)

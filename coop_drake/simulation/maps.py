@@ -12,12 +12,10 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from coop_drake.errors import FieldError
 from coop_drake.fields import HarmonicMap, MapStore
+from coop_drake.fields.harmonic_map import TOLERANCE
 from coop_drake.planning.plan import Plan
 
-__all__ = ["TOLERANCE", "build_maps", "certificate_rows"]
-
-TOLERANCE = 1e-8
-"""Largest certified error of a map that is accepted, if none is given; a scenario's is ``maps.tolerance``."""
+__all__ = ["build_maps", "certificate_rows"]
 
 _MOST_WORKERS = 8  # More of them wait for one another: between kernels they share one interpreter.
 
@@ -36,7 +34,7 @@ def build_maps(
 
     Args:
         plan: The plan.
-        tolerance: Largest certified error accepted [-].
+        tolerance: Largest certified error accepted; a scenario's is ``maps.tolerance`` [-].
         store: Where maps are looked up first and kept; by default all are solved.
         workers: How many maps are solved at the same time; by default one a core, eight at most.
         progress: Told the stage and the fraction done, if given.
