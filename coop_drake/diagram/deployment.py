@@ -55,10 +55,11 @@ class DeployedController:
 
 
 def deploy(controller: Diagram, deployment: Deployment, robot: int) -> DeployedController:
-    """Put noise, delays, holds, limits and a radio round a robot's controller, those that are switched on.
+    """Put a limit round a robot's controller, and noise, delays, a hold and a radio as far as switched on.
 
     In the order of the signals: ``robot_state`` and ``object_pose`` get noise, then a delay; ``robot_effort``
-    is held for a period, then limited; ``ready`` goes through a :class:`MessageChannel`.
+    is held for a period, then limited; ``ready`` goes through a :class:`MessageChannel`. The limit is always
+    there: that of the actuators, or where none is given one so high that only a run that is lost meets it.
 
     Args:
         controller: From :func:`build_robot_controller`, with the same period.

@@ -7,6 +7,7 @@ import pytest
 
 from coop_drake.control import FixedGains, ScheduledGains
 from coop_drake.simulation import communication, simulate
+from tests.support.hand_over import assert_certified
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_plan import ANGLE_TOLERANCE, POSITION_TOLERANCE
 
@@ -88,6 +89,10 @@ def test_at_every_switch_the_next_goal_was_reached(run):
         axes = np.concatenate([log.object_pose[row, 2:], log.joints[row]])
         assert np.all(axes > transition.goal_lower)
         assert np.all(axes < transition.goal_upper)
+
+
+def test_at_every_switch_the_next_cell_with_its_own_gains_was_certified(run):
+    assert_certified(*run)
 
 
 def test_funnels_start_on_the_slice_and_hold_the_axes(run):

@@ -1,5 +1,7 @@
 """The law is exact whatever the size of the team, its arms, its grasps and who carries how much."""
 
+from math import pi
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ ONE, TWO, THREE = (REVOLUTE,), (REVOLUTE, REVOLUTE), (REVOLUTE, REVOLUTE, REVOLU
 SLIDE, MIXED = (PRISMATIC,), (PRISMATIC, REVOLUTE)
 TEAMS = {
     "two": [ONE, MIXED],
+    "three": [TWO, SLIDE, THREE],
     "four": [ONE, TWO, SLIDE, THREE],
     "eight": [ONE, TWO, (), SLIDE, ONE, MIXED, THREE, ONE],
 }
@@ -19,7 +22,9 @@ TEAMS = {
 
 @pytest.fixture(scope="module", params=TEAMS)
 def run(request, tmp_path_factory):
-    scenario = ring_team(tmp_path_factory.mktemp(request.param), TEAMS[request.param])
+    folder = tmp_path_factory.mktemp(request.param)
+    # Three robots all hold the same half of the object.
+    scenario = ring_team(folder, TEAMS[request.param], arc=pi if request.param == "three" else 2.0 * pi)
     log = simulate(scenario, small_plan(joint_names(scenario)), small_maps())
     return scenario, log
 

@@ -1,9 +1,10 @@
 import numpy as np
 import pytest
+from pydrake.systems.analysis import Simulator
 
 from coop_drake.diagram import TELEMETRY, build_closed_loop
 from coop_drake.errors import PlanError
-from coop_drake.plant import get_configuration, get_rates
+from coop_drake.plant import get_configuration, get_rates, set_configuration
 from tests.support.small_loop import TEAMS, small_loop, small_maps, small_problem
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import port_sizes
@@ -50,6 +51,57 @@ def test_no_robot_is_told_anothers_state(loop):
     for (_, port), sink in heard:
         assert port.split("_")[1] == sink.split("_")[1]
     assert len(heard) == len(loop.controllers)
+
+
+def outputs_of(controller, context):
+    """Everything that leaves a controller, its telemetry too, bit by bit."""
+    own = controller.GetMyContextFromRoot(context)
+    ports = [controller.get_output_port(i) for i in range(controller.num_output_ports())]
+    return {port.get_name(): port.Eval(own).tobytes() for port in ports}
+
+
+def test_what_one_robot_does_changes_nothing_that_another_computes(loop):
+    """Whatever the wires are called: another arm's posture and motion reach no output of this robot."""
+    team, context = loop.team, loop.create_context()
+    plant_context = team.plant.GetMyMutableContextFromRoot(context)
+    z, rates = loop.plan.start.copy(), np.zeros(len(loop.plan.start))
+    rates[:3] = 0.1, -0.2, 0.05
+    set_configuration(team, plant_context, z, rates)
+    before = [outputs_of(controller, context) for controller in loop.controllers]
+    for robot in team.robots:
+        moved, moving = z.copy(), rates.copy()
+        moved[3:][robot.q_slice] += 0.05
+        moving[3:][robot.q_slice] += 0.1
+        set_configuration(team, plant_context, moved, moving)
+        after = [outputs_of(controller, context) for controller in loop.controllers]
+        for k, controller in enumerate(loop.controllers):
+            if k == robot.index:
+                assert after[k]["robot_effort"] != before[k]["robot_effort"]
+            else:
+                assert after[k] == before[k], controller.get_name()
+
+
+def test_of_a_report_only_its_cell_and_its_sign_count():
+    """A margin's size tells the cell planner nothing: one bit and an index are what crosses."""
+    planner = small_loop("base").cell_planner
+    outcomes = set()
+    for margin in (0.0, 1e-9, 0.3, 1e6, np.inf):
+        context = planner.CreateDefaultContext()
+        for k in range(2):
+            planner.GetInputPort(f"robot_{k}_ready").FixValue(context, [0.0, margin])
+        simulator = Simulator(planner, context)
+        simulator.AdvanceTo(0.01)
+        outcomes.add(tuple(simulator.get_context().get_discrete_state_vector().value()))
+    assert outcomes == {(1.0, 0.0)}
+
+
+def test_nothing_enters_or_leaves_the_whole(loop):
+    assert (loop.diagram.num_input_ports(), loop.diagram.num_output_ports()) == (0, 0)
+    assert {system.get_name() for system in loop.diagram.GetSystems()} == {
+        "transport_station",
+        "cell_planner",
+        *(f"robot_{k}_controller" for k in range(len(loop.controllers))),
+    }
 
 
 def test_a_controller_hears_three_things_and_no_more(loop):

@@ -50,7 +50,7 @@ def test_an_ideal_team_has_nothing_round_its_controllers():
         ),
     ],
 )
-def test_only_what_is_switched_on_is_there(deployment, more):
+def test_only_what_is_switched_on_is_there_beside_a_limit(deployment, more):
     loop = loop_of(**deployment)
     for deployed, controller in zip(loop.deployed, loop.controllers, strict=True):
         assert deployed.diagram is controller
@@ -103,6 +103,15 @@ def test_actuators_give_no_more_than_their_limits():
         limits = np.array([0.5, 0.5, 0.25, 0.125])
         np.testing.assert_array_equal(given, np.clip(wanted, -limits, limits))
         assert np.any(given != wanted)
+
+
+def test_where_no_limit_is_given_the_limit_lets_every_effort_pass_but_those_of_a_lost_run():
+    loop = loop_of(mass_error=0.1)
+    limit = loop.controllers[0].GetSubsystemByName("actuator_limits")
+    context = limit.CreateDefaultContext()
+    for asked, given in ((5e4, 5e4), (1e9, 1e5), (-np.inf, -1e5)):
+        limit.get_input_port().FixValue(context, np.full(4, asked))
+        np.testing.assert_array_equal(limit.get_output_port().Eval(context), np.full(4, given))
 
 
 def test_robots_that_overestimate_masses_push_harder():

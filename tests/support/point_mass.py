@@ -27,7 +27,8 @@ from coop_drake.geometry import BoundaryDistance
 class Transport:
     """How a plan went: duration of every transition [s], extremes over all steps, the final state.
 
-    ``stuck`` is the index of a cell that was not left within the time limit, None where the goal was reached.
+    ``stuck`` is the index of a cell that was not left within the time limit, None where the goal was reached;
+    ``hand_overs`` is the state (p, p', p_G, axes, their rates) at the end of every transition.
     """
 
     durations: np.ndarray
@@ -39,6 +40,7 @@ class Transport:
     peak_acceleration: float
     position: np.ndarray
     axes: np.ndarray
+    hand_overs: tuple[np.ndarray, ...]
 
 
 def build_fields(plan, *, tolerance=1e-4):
@@ -84,7 +86,7 @@ def carry_out(plan, fields, *, position_tolerance=0.01, step=0.004, time_limit=6
         _funnel(cell, transition) for cell, transition in zip(plan.cells, plan.transitions, strict=True)
     ]
     seen = {"energy": np.inf, "cell": np.inf, "gap": np.inf, "axis": 0.0, "force": 0.0}
-    durations, stuck = [], None
+    durations, hand_overs, stuck = [], [], None
     for index in range(len(plan.cells)):
         state, elapsed, left = _play(
             plan,
@@ -97,12 +99,13 @@ def carry_out(plan, fields, *, position_tolerance=0.01, step=0.004, time_limit=6
             (position_tolerance, step, time_limit),
         )
         durations.append(elapsed)
+        hand_overs.append(state)
         if not left:
             stuck = index
             break
     return Transport(
         np.array(durations), stuck, seen["energy"], seen["cell"], seen["gap"], seen["axis"], seen["force"],
-        state[:2], state[6 : 6 + n],
+        state[:2], state[6 : 6 + n], tuple(hand_overs),
     )  # fmt: skip
 
 

@@ -28,19 +28,28 @@ goal:
 """
 
 
-def ring_team(folder: Path, arms: list[tuple[tuple[str, str, str], ...]], seed: int = 0) -> Scenario:
+def ring_team(
+    folder: Path,
+    arms: list[tuple[tuple[str, str, str], ...]],
+    seed: int = 0,
+    *,
+    arc: float = 2.0 * pi,
+    mass: float = 9.0,
+) -> Scenario:
     """Write models and scenario of one robot for each list of joints, and load it.
 
     Args:
         folder: Where the files are written.
         arms: The joints of every robot's arm.
         seed: Of the angles, lengths and shares.
+        arc: The part of the circle round the object that is grasped [rad].
+        mass: Of the object [kg].
     """
     rng, n = np.random.default_rng(seed), len(arms)
-    angles = 2.0 * pi * (np.arange(n) + rng.uniform(-0.15, 0.15, n)) / n
+    angles = arc * (np.arange(n) + rng.uniform(-0.15, 0.15, n)) / n
     corners = [(RADIUS * cos(a), RADIUS * sin(a)) for a in 2.0 * pi * (np.arange(12) + 0.5) / 12]
     offsets = [(r * cos(a), r * sin(a), a) for a, r in zip(angles, rng.uniform(1.2, 1.3, n), strict=True)]
-    write_polygon_body(polygon_body_files(corners, 9.0, "object", grasps=offsets), folder)
+    write_polygon_body(polygon_body_files(corners, mass, "object", grasps=offsets), folder)
     shares = rng.dirichlet(np.full(n, 4.0))
     robots = []
     for k, joints in enumerate(arms):

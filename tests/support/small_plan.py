@@ -25,21 +25,40 @@ CELLS = (
 def small_plan(joint_names: tuple[str, ...], gain_set: GainSet | None = None) -> Plan:
     """The plan for a team with these joints, gains scheduled unless told otherwise."""
     n = len(joint_names)
-    gain_set = gain_set if gain_set is not None else ScheduledGains()
     cells = tuple(_cell(polygon, angle, joint, n) for polygon, angle, joint in CELLS)
     start = np.array([*START_POSE, *[0.0] * n])
+    return plan_by_hand(cells, start, np.array(GOAL_POSE), joint_names, gain_set)
+
+
+def plan_by_hand(
+    cells: tuple[Cell, ...],
+    start: np.ndarray,
+    goal_pose: np.ndarray,
+    joint_names: tuple[str, ...],
+    gain_set: GainSet | None = None,
+) -> Plan:
+    """The plan through some cells, joints free at the end, each target in the middle of an overlap.
+
+    Args:
+        cells: Each overlaps the next in all axes.
+        start: z in the first of them.
+        goal_pose: In the last.
+        joint_names: Names of the joints.
+        gain_set: Gains, scheduled unless told otherwise.
+    """
+    gain_set = gain_set if gain_set is not None else ScheduledGains()
     transitions = []
     position, resting = start[:2], start[2:]
     for index in range(len(cells)):
-        transition = _transition(cells, index, position, resting, gain_set)
+        transition = _transition(cells, index, position, resting, goal_pose, gain_set)
         transitions.append(transition)
         position, resting = transition.target, 0.5 * (transition.goal_lower + transition.goal_upper)
     return Plan(
         cells=cells,
         transitions=tuple(transitions),
         start=start,
-        goal_pose=np.array(GOAL_POSE),
-        goal_joints=(None,) * n,
+        goal_pose=goal_pose,
+        goal_joints=(None,) * len(joint_names),
         joint_names=joint_names,
         margin=0.1,
         gain_set="by hand",
@@ -52,15 +71,20 @@ def _cell(polygon: Polygon, angle: tuple[float, float], joint: tuple[float, floa
 
 
 def _transition(
-    cells: tuple[Cell, ...], index: int, position: np.ndarray, resting: np.ndarray, gain_set: GainSet
+    cells: tuple[Cell, ...],
+    index: int,
+    position: np.ndarray,
+    resting: np.ndarray,
+    goal_pose: np.ndarray,
+    gain_set: GainSet,
 ) -> Transition:
     cell, last = cells[index], index == len(cells) - 1
     if last:
-        target = np.array(GOAL_POSE[:2])
+        target = goal_pose[:2]
         region = Point(target).buffer(POSITION_TOLERANCE)
         inradius = POSITION_TOLERANCE
         lower, upper = cell.lower.copy(), cell.upper.copy()
-        lower[0], upper[0] = GOAL_POSE[2] - ANGLE_TOLERANCE, GOAL_POSE[2] + ANGLE_TOLERANCE
+        lower[0], upper[0] = goal_pose[2] - ANGLE_TOLERANCE, goal_pose[2] + ANGLE_TOLERANCE
     else:
         region = cell.safe & cells[index + 1].safe
         target = np.array(region.centroid.coords[0])

@@ -1,0 +1,68 @@
+"""A cell that can never be left: the run stops, and the command says which margin blocks."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from coop_drake.cli import app, simulating
+from coop_drake.planning import load_plan, save_plan
+from coop_drake.simulation import SimulationLog, stall
+from tests.support.scenarios import write_scenario
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def planned(tmp_path_factory):
+    """A scenario and its plan, of more than one cell."""
+    folder = tmp_path_factory.mktemp("stall")
+    goal = {"object": {"x": 3.2, "y": 2.2, "theta": 0.9}}
+    room = write_scenario(folder / "room.scenario.yaml", goal=goal)
+    assert invoke("plan", room, "--out", folder).exit_code == 0
+    assert len(load_plan(folder / "plan.json").cells) > 1
+    return room, folder / "plan.json", goal
+
+
+@pytest.fixture(autouse=True)
+def impatient(monkeypatch):
+    monkeypatch.setattr(stall, "PATIENCE_FACTOR", 1.0)
+    monkeypatch.setattr(stall, "PATIENCE_ALLOWANCE", 0.5)
+    monkeypatch.setattr(simulating, "_draw", lambda *_: None)
+
+
+def assert_stalled(result, out, complaint):
+    assert result.exit_code == 1, result.output
+    violation = json.loads(result.stdout)["violation"]
+    assert violation.startswith("stalled at t = ")
+    assert complaint in violation
+    assert complaint in " ".join(result.stderr.split())
+    log = SimulationLog.load(out / "log.npz")
+    assert not log.reached
+    assert set(log.cell_index) == {0}
+    assert log.energy_margin.min() >= 0.0 < log.funnel_margin.min()
+
+
+def test_an_energy_that_no_axis_can_fall_below_is_named(planned, tmp_path):
+    room, path, _ = planned
+    plan = load_plan(path)
+    first, second, *others = plan.transitions
+    shut = replace(second.gains, energy_bound=np.full_like(second.gains.energy_bound, 1e-12))
+    never = replace(plan, transitions=(first, replace(second, gains=shut), *others))
+    save_plan(never, tmp_path / "never.json")
+    result = invoke("simulate", room, "--plan", tmp_path / "never.json", "--out", tmp_path, "--json")
+    assert_stalled(result, tmp_path, "falls below the next funnel's bound (margin -")
+
+
+def test_reports_that_never_arrive_are_named(planned, tmp_path):
+    _, path, goal = planned
+    deployment = {"control_rate": 100.0, "messages": {"loss": 1.0}}
+    deaf = write_scenario(tmp_path / "deaf.scenario.yaml", goal=goal, deployment=deployment)
+    result = invoke("simulate", deaf, "--plan", path, "--out", tmp_path, "--json")
+    assert_stalled(result, tmp_path, "it waits until the cell planner hears that every robot is ready")
