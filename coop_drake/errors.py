@@ -11,6 +11,7 @@ __all__ = [
     "RefusalError",
     "ScenarioError",
     "StallError",
+    "TuningError",
     "UnmappableError",
 ]
 
@@ -106,3 +107,7 @@ class RefusalError(CoopDrakeError):
     def __init__(self, where: str, finding: str) -> None:
         self.where, self.finding = where, finding
         super().__init__(f"{where}: {finding}")
+
+
+class TuningError(CoopDrakeError):
+    """What gains are to be chosen for, or by, makes no sense; the message says what is allowed."""

@@ -23,6 +23,7 @@ from coop_drake.cli.map_cache import maps_command
 from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.reproduce import reproduce_command
+from coop_drake.cli.tune import tune_command
 from coop_drake.cli.verify import verify_command
 from coop_drake.cli.watch import watch_command
 from coop_drake.cli.why import why_command
@@ -48,7 +49,12 @@ OutPath = Annotated[
     ),
 ]
 GainsName = Annotated[
-    str | None, typer.Option("--gains", metavar="NAME", help="Gain set; the scenario's choice by default.")
+    str | None,
+    typer.Option(
+        "--gains",
+        metavar="NAME|FILE",
+        help="Gain set, by name or from a file as `tune` writes it; the scenario's choice by default.",
+    ),
 ]
 FreshMaps = Annotated[
     bool, typer.Option("--fresh-maps", help="Solve all maps anew; others come from the cache, see `maps`.")
@@ -136,7 +142,8 @@ def simulate_command(
     ] = None,
     out: OutPath = None,
     gains: Annotated[
-        str | None, typer.Option("--gains", metavar="NAME", help="Gain set; the plan's own by default.")
+        str | None,
+        typer.Option("--gains", metavar="NAME|FILE", help="Gain set or its file; the plan's own by default."),
     ] = None,
     fresh_maps: FreshMaps = False,
     live: Live = False,
@@ -175,3 +182,4 @@ app.command("diagram")(diagram_command)
 app.command("compare")(compare_command)
 app.command("floor-plan", epilog=FLOOR_PLAN_EXAMPLES)(floor_plan_command)
 app.command("reproduce")(reproduce_command)
+app.command("tune")(tune_command)

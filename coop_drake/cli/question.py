@@ -45,10 +45,10 @@ def read_apart(path: Path, gains: str | None = None) -> Question:
 
     Args:
         path: The scenario file.
-        gains: Name of the gain set to use, None for the one the file selects.
+        gains: Name of the gain set to use, or a file that holds one; None for the one the scenario selects.
 
     Raises:
-        ScenarioError: The file, a model or the name of the gain set is wrong.
+        ScenarioError: The file, a model or the gain set is wrong.
     """
     if "pydrake" in sys.modules:
         from coop_drake.cli.reading import read_task

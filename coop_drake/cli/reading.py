@@ -12,9 +12,9 @@ from pathlib import Path
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.cli.question import Question
-from coop_drake.errors import CoopDrakeError, ScenarioError
+from coop_drake.errors import CoopDrakeError
 from coop_drake.plant import build_team_plant, planning_problem
-from coop_drake.scenario import Scenario, load_scenario
+from coop_drake.scenario import Scenario, load_scenario, with_gains
 
 __all__ = ["Task", "main", "read_task"]
 
@@ -37,16 +37,13 @@ def read_task(path: Path, gains: str | None) -> Task:
 
     Args:
         path: The scenario file.
-        gains: Name of the gain set to use, None for the one the file selects.
+        gains: Name of the gain set to use, or a file that holds one; None for the one the scenario selects.
 
     Raises:
-        ScenarioError: The file, a model or the name of the gain set is wrong.
+        ScenarioError: The file, a model or the gain set is wrong.
     """
-    scenario = load_scenario(path)
-    name = scenario.selected_gains if gains is None else gains
-    if name not in scenario.gain_sets:
-        allowed = "one of " + ", ".join(sorted(scenario.gain_sets))
-        raise ScenarioError(str(path), "--gains", name, allowed)
+    scenario = with_gains(load_scenario(path), gains)
+    name = scenario.selected_gains
     problem = planning_problem(scenario, build_team_plant(scenario, DiagramBuilder()))
     return Task(scenario, Question(scenario.name, scenario.path, problem, scenario.gain_sets, name))
 

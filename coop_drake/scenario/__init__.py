@@ -2,6 +2,7 @@
 
 from coop_drake.scenario.assembly import Assembly, RobotAssembly, assemble
 from coop_drake.scenario.deployment import ActuatorLimits, Deployment, Measurements, Messages
+from coop_drake.scenario.gain_file import dump_gains, with_gains
 from coop_drake.scenario.load import dump_scenario, load_scenario
 from coop_drake.scenario.model import (
     Gains,
@@ -37,7 +38,9 @@ __all__ = [
     "VisualizationSettings",
     "Workspace",
     "assemble",
+    "dump_gains",
     "dump_scenario",
     "load_scenario",
     "package_map",
+    "with_gains",
 ]

@@ -1,0 +1,84 @@
+"""The command tune: chooses gains for a scenario against named criteria."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.reporter import Reporter
+
+__all__ = ["tune_command"]
+
+
+def tune_command(
+    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")],
+    criteria: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--criterion",
+            "-c",
+            metavar="NAME[=WEIGHT]",
+            help="What to improve: time, peak_force, mean_force, peak_base_torque, peak_torque, "
+            "peak_turning, clearance, cell_margin, funnel_margin. Several are weighed; default peak_force.",
+        ),
+    ] = None,
+    limits: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            "-l",
+            metavar="LIMIT",
+            help="What must be kept: time<=16, clearance>=0.1, or time<=1.1x for 1.1 times the value before. "
+            "time<=1x by default.",
+        ),
+    ] = None,
+    gains: Annotated[
+        str | None,
+        typer.Option(
+            "--gains", metavar="NAME|FILE", help="Gain set to begin with; the scenario's by default."
+        ),
+    ] = None,
+    vary: Annotated[
+        list[str] | None, typer.Option("--vary", metavar="GAIN", help="Gains to turn; all by default.")
+    ] = None,
+    budget: Annotated[int, typer.Option("--budget", metavar="N", min=1, help="Runs to try.")] = 120,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the search.")] = 0,
+    workers: Annotated[
+        int | None, typer.Option("--workers", metavar="N", min=1, help="Processes; one a core by default.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="DIR", file_okay=False, help="Where results go; out/<scenario>/tuned by default."
+        ),
+    ] = None,
+    machine: Annotated[
+        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+) -> None:
+    """Choose gains: less force, less time or more room, judged by simulating the whole transport.
+
+    The best gain set is written as gains.yaml, which run, plan and simulate take with --gains. Ctrl-C ends
+    the search with the best so far.
+    """
+    reporter = Reporter(machine=machine, quiet=quiet)
+
+    def command() -> ExitCode:
+        from coop_drake.cli.advice import Wishes, advise
+
+        wishes = Wishes(
+            tuple(criteria or ("peak_force",)),
+            tuple(limits if limits is not None else ("time<=1x",)),
+            tuple(vary or ()),
+            budget,
+            seed,
+            workers,
+        )
+        return advise(scenario, gains, wishes, out, reporter)
+
+    run_guarded(reporter, command)

@@ -1,0 +1,43 @@
+"""A gain set in a file of its own: the ``gains`` section of a scenario, as `coop-drake tune` writes it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from pydrake.common.yaml import yaml_dump_typed
+
+from coop_drake.control.gains import GainSet
+from coop_drake.errors import ScenarioError
+from coop_drake.scenario.model import Gains, Scenario
+from coop_drake.scenario.reading import read_file
+from coop_drake.scenario.schema import draft, thaw
+
+__all__ = ["dump_gains", "with_gains"]
+
+
+def with_gains(scenario: Scenario, choice: str | None) -> Scenario:
+    """The scenario with a gain set selected.
+
+    Args:
+        scenario: As in its file.
+        choice: Name of one of its gain sets, or a file with a ``gains`` section; None for what it selects.
+
+    Raises:
+        ScenarioError: There is no such set and no such file, or the file is wrong.
+    """
+    if choice is None:
+        return scenario
+    if choice in scenario.gain_sets:
+        return replace(scenario, gains=replace(scenario.gains, selected=choice))
+    if not Path(choice).is_file():
+        allowed = f"one of {', '.join(sorted(scenario.gain_sets))}, or a file with a gain set"
+        raise ScenarioError(str(scenario.path), "--gains", choice, allowed)
+    read: Gains = read_file(Gains, Path(choice))
+    if read.selected not in read.sets:
+        raise ScenarioError(choice, "selected", read.selected, "one of " + ", ".join(sorted(read.sets)))
+    return replace(scenario, gains=replace(read, sets={**scenario.gain_sets, **read.sets}))
+
+
+def dump_gains(name: str, gain_set: GainSet) -> str:
+    """Write a gain set as YAML text that ``--gains`` reads, and that fits a scenario under ``gains``."""
+    text: str = yaml_dump_typed(thaw(Gains(name, {name: gain_set})), schema=draft(Gains))
+    return text

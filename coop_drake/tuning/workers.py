@@ -1,0 +1,70 @@
+"""Trials in processes of their own, side by side: Drake's Diagrams with Python parts leak a little each."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+from coop_drake.control import GainSet
+from coop_drake.fields import HarmonicMap
+from coop_drake.planning import Plan
+from coop_drake.scenario import load_scenario
+from coop_drake.tuning.trial import Trial, Workbench
+
+__all__ = ["Workers"]
+
+_TRIALS_EACH = 100
+"""A process is replaced after so many trials, which keeps memory flat."""
+
+_bench: Workbench | None = None
+
+
+class Workers:
+    """Processes that try gain sets; as a context they end with it, also at Ctrl-C.
+
+    Args:
+        scenario: The scenario file; processes read it for themselves.
+        plan: Its plan.
+        maps: The plan's maps.
+        longest: Runs that last longer count as failed [s].
+        count: How many processes.
+    """
+
+    def __init__(
+        self, scenario: Path, plan: Plan, maps: Sequence[HarmonicMap], *, longest: float, count: int
+    ) -> None:
+        self._pool = ProcessPoolExecutor(
+            count,
+            mp_context=multiprocessing.get_context("spawn"),  # Forks of a process with threads may hang.
+            initializer=_prepare,
+            initargs=(scenario, plan, tuple(maps), longest),
+            max_tasks_per_child=_TRIALS_EACH,
+        )
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        processes = list((self._pool._processes or {}).values())
+        self._pool.shutdown(wait=False, cancel_futures=True)
+        for process in processes:
+            process.terminate()
+
+    def try_all(self, gain_sets: Sequence[GainSet]) -> Iterator[Trial]:
+        """Try gain sets side by side; results come in their order, whichever is ready first."""
+        return self._pool.map(_try, gain_sets)
+
+
+def _prepare(scenario: Path, plan: Plan, maps: tuple[HarmonicMap, ...], longest: float) -> None:
+    """Set a process up."""
+    global _bench
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is answered by the process that waits for it.
+    _bench = Workbench(load_scenario(scenario), plan, maps, longest)
+
+
+def _try(gains: GainSet) -> Trial:
+    assert _bench is not None
+    return _bench.try_gains(gains)

@@ -1,0 +1,45 @@
+"""What a search leaves: the gain set as YAML that ``--gains`` reads, and every trial as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+
+from coop_drake.control import GainSet
+from coop_drake.files import write_atomically
+from coop_drake.scenario import dump_gains
+from coop_drake.tuning.search import Search
+
+__all__ = ["TUNED", "write_gains", "write_trials"]
+
+TUNED = "tuned"
+"""What the gain set is called."""
+
+
+def write_gains(gains: GainSet, remarks: Sequence[str], path: Path) -> Path:
+    """Write a gain set, with what is to be known about it in front.
+
+    Args:
+        gains: The gain set.
+        remarks: Lines without line breaks.
+        path: The file.
+    """
+    comments = "".join(f"# {remark}\n" for remark in remarks)
+    return write_atomically(path, (comments + dump_gains(TUNED, gains)).encode())
+
+
+def write_trials(found: Search, path: Path) -> Path:
+    """Write every trial in the order of the search, the gains there were before first."""
+    rows = [
+        {"score": score, **asdict(trial.outcome), "gains": asdict(trial.gains)}
+        for trial, score in zip(found.trials, found.scores, strict=True)
+    ]
+    document = {
+        "weights": dict(found.objective.weights),
+        "limits": [asdict(limit) for limit in found.objective.limits],
+        "best": found.trials.index(found.best),
+        "trials": rows,
+    }
+    return write_atomically(path, json.dumps(document, indent=1).encode() + b"\n")
