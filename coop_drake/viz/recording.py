@@ -70,4 +70,5 @@ def recording_html(
 def inline_frame(page: str, *, height: int = 600) -> str:
     """Return HTML that shows a page inside a notebook's cell, ``height`` pixels tall."""
     escaped = page.replace("&", "&amp;").replace('"', "&quot;")
-    return f'<iframe srcdoc="{escaped}" width="100%" height="{height}" style="border: 0"></iframe>'
+    frame = f'<iframe srcdoc="{escaped}" width="100%" height="{height}" style="border: 0"></iframe>'
+    return f"<div>{frame}</div>"

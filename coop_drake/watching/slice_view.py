@@ -1,0 +1,95 @@
+"""One slice of the angles: what the team may and must cover in it, and what that leaves of the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from shapely import Polygon, union_all
+from shapely.geometry.base import BaseGeometry
+
+from coop_drake.drawing.canvas import new_figure
+from coop_drake.drawing.colours import FLOOR, INK
+from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace
+from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.planning.cells import CellMaker, Region
+from coop_drake.planning.problem import PlanningProblem
+from coop_drake.watching import look
+from coop_drake.watching.floor_view import draw_section
+
+__all__ = ["slice_figure"]
+
+_SAMPLES = 3  # Values of every axis at which the team is drawn.
+
+
+def slice_figure(problem: PlanningProblem, slices: Sequence[Intervals]) -> Figure:
+    """Draw slices one under the other: footprints (6) at the left, cells (5), (8) at the right.
+
+    Args:
+        problem: Floor and team.
+        slices: Intervals (lower, upper) of the axes (theta, q...) of every slice [rad, m].
+    """
+    figure = new_figure(
+        10.0,
+        4.4 * len(slices) + 0.5,
+        "Left: the team at some angles of the slice (light), what it may cover (outline) and what it covers "
+        "at all of them (dark). Right: where the object may stand, by what these leave of the floor.",
+    )
+    rows = figure.subplots(len(slices), 2, squeeze=False, sharex="col", sharey="col")
+    for (left, right), intervals in zip(rows, slices, strict=True):
+        swept = SweptTree(problem.tree)
+        _draw_footprints(left, problem, swept, intervals)
+        _draw_cells(right, problem, CellMaker(swept, BodyPairs(swept), problem.workspace), intervals)
+    return figure
+
+
+def _draw_footprints(ax: Axes, problem: PlanningProblem, swept: SweptTree, intervals: Intervals) -> None:
+    for angles in product(*(np.linspace(lower, upper, _SAMPLES) for lower, upper in intervals)):
+        draw_team(ax, problem.tree, np.array([0.0, 0.0, *angles]), alpha=0.07, zorder=2.0)
+    pieces = range(len(swept.pieces))
+    over = union_all([Polygon(swept.over(index, intervals)) for index in pieces])
+    under = [swept.under(index, intervals) for index in pieces]
+    draw_polygon(ax, over, facecolor="none", edgecolor=INK, linewidth=1.6, zorder=4.0)
+    _draw_filled(ax, union_all([Polygon(ring) for ring in under if ring is not None]))
+    ax.autoscale_view()
+    ax.set_aspect("equal")
+    ax.set_xlabel("x from the object [m]")
+    ax.set_ylabel("y [m]")
+    ax.set_title(_named(problem, intervals), fontsize=9, loc="left")
+
+
+def _draw_filled(ax: Axes, shape: BaseGeometry) -> None:
+    if not shape.is_empty:
+        draw_polygon(ax, shape, facecolor=INK, edgecolor="none", alpha=0.75, zorder=3.5)
+
+
+def _draw_cells(ax: Axes, problem: PlanningProblem, cells: CellMaker, intervals: Intervals) -> None:
+    draw_workspace(ax, problem.workspace)
+    over, under = cells.over_cells(intervals), cells.under_cells(intervals)
+    for regions, colour in ((over, look.MIXED), (under, look.FREE)):
+        for region in regions:
+            draw_section(ax, region.section, colour, 0.55)
+    ax.legend(
+        handles=[
+            Patch(color=look.FREE, alpha=0.6, label=f"proved free: {_area(under):.1f} m²"),
+            Patch(color=look.MIXED, alpha=0.6, label=f"may be free: {_area(over):.1f} m²"),
+            Patch(facecolor=FLOOR, edgecolor=INK, label="no configuration is free"),
+        ],
+        fontsize=8,
+        loc="lower right",
+    )
+
+
+def _area(regions: Sequence[Region]) -> float:
+    return sum(region.area for region in regions)
+
+
+def _named(problem: PlanningProblem, intervals: Intervals) -> str:
+    names = ["θ", *(joint.name.replace("::", " ") for joint in problem.tree.joints)]
+    bounds = [f"{np.degrees(lower):.0f}° to {np.degrees(upper):.0f}°" for lower, upper in intervals]
+    return ",  ".join(f"{name} {span}" for name, span in zip(names, bounds, strict=True))
