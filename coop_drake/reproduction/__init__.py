@@ -2,6 +2,7 @@
 
 from coop_drake.reproduction.comparison import GainFigures, compare_gains
 from coop_drake.reproduction.corridor import corridor_plan, corridor_scenario
+from coop_drake.reproduction.errata_figure import write_errata_figure
 from coop_drake.reproduction.exhibits import Exhibit, Statement, Verdict
 from coop_drake.reproduction.material import Material, gather
 from coop_drake.reproduction.pages import write_report
@@ -21,5 +22,6 @@ __all__ = [
     "corridor_scenario",
     "exhibits",
     "gather",
+    "write_errata_figure",
     "write_report",
 ]

@@ -29,7 +29,10 @@ class GainFigures:
         peak_angular_acceleration: Of the object, between accepted steps [rad/s^2].
         peak_joint_rate: Largest rate of a joint [rad/s].
         funnel_margin: Smallest distance of an axis to its funnel [rad].
+        energy_margin: Smallest Delta E [m^2/s^2].
         acceleration_error: Realised less commanded acceleration [m/s^2 or rad/s^2].
+        wrench_error: Largest difference between a grasp's wrench in the plant and (31) [N or N m].
+        governor_spread: Largest difference of p_G between the robots' copies [m].
         violation: What was violated; empty if nothing was.
     """
 
@@ -39,7 +42,10 @@ class GainFigures:
     peak_angular_acceleration: float
     peak_joint_rate: float
     funnel_margin: float
+    energy_margin: float
     acceleration_error: float
+    wrench_error: float
+    governor_spread: float
     violation: str
 
     ROWS: ClassVar = (
@@ -48,7 +54,10 @@ class GainFigures:
         ("peak angular acceleration", "peak_angular_acceleration", "{:.1f} rad/s²"),
         ("peak joint rate", "peak_joint_rate", "{:.2f} rad/s"),
         ("smallest funnel margin", "funnel_margin", "{:.4f} rad"),
+        ("smallest energy margin", "energy_margin", "{:.1e} m²/s²"),
         ("largest acceleration error", "acceleration_error", "{:.1e} m/s²"),
+        ("largest wrench error", "wrench_error", "{:.1e} N"),
+        ("governors' largest difference", "governor_spread", "{:.1e} m"),
     )
     """Label, attribute and format of every figure, for tables."""
 
@@ -85,6 +94,9 @@ def _figures(name: str, log: SimulationLog) -> GainFigures:
         peak_angular_acceleration=float(np.abs(turning).max()),
         peak_joint_rate=float(np.abs(log.joint_rates).max()),
         funnel_margin=float(log.funnel_margin.min()),
+        energy_margin=float(log.energy_margin.min()),
         acceleration_error=float(log.acceleration_error.max()),
+        wrench_error=float(log.wrench_error.max()),
+        governor_spread=float(log.governor_spread.max()),
         violation=log.violation if not log.reached else "",
     )

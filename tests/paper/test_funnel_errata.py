@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from coop_drake.control import Funnel, ScheduledGains, funnel_walls, prescribed_acceleration, transition_gains
+from coop_drake.control.ready import interval_margin
+from coop_drake.reproduction import printed
 from coop_drake.reproduction.table_1 import CORRECTED
-from tests.support import printed
 from tests.support.table_1 import table_transitions
 
 ONE_AXIS = {
@@ -43,9 +44,12 @@ def test_e17b_an_axis_handed_over_on_the_border_of_its_new_slice_is_thrown_off()
     assert on_the_border == -np.inf
     just_inside, _, _ = printed.axis_law(1.47 + 1e-6, 0.0, begin)
     assert just_inside > 1e7
-    # A tenth of the overlap of 0.2 that the ready margin asks for.
-    eroded, _, _ = printed.axis_law(1.47 + 0.02, 0.0, begin)
-    assert eroded < 200.0
+    # The next slice begins where the goal interval of the last cell, as wide as their overlap, ends.
+    goal = np.array([1.47]), np.array([1.67])
+    assert interval_margin(np.array([1.47 + 1e-6]), *goal) < 0.0
+    place = next(x for x in np.linspace(1.47, 1.57, 1001) if interval_margin(np.array([x]), *goal) >= 0.0)
+    ready, _, _ = printed.axis_law(place, 0.0, begin)
+    assert ready < 200.0
 
 
 def test_e18_towards_a_point_the_printed_log_term_has_no_bound():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from coop_drake.control import consistent_projector, robot_acceleration, robot_torque
-from tests.support import printed
+from coop_drake.reproduction import printed
 from tests.support.planar_arm import random_arm, random_state
 
 JOINTS = [1, 2, 3]

@@ -38,7 +38,9 @@ def material():
         table_2=FixedGains(),
         made=approximations(two_components(problem.tree), FIGURE_3_SLICES),
         runs=tuple(Run(name, plan, log) for name in GAIN_SETS),
-        played=tuple(GainFigures(name, 20.0, 80.0, 9.0, 1.0, 0.01, 1e-13, "") for name in GAIN_SETS),
+        played=tuple(
+            GainFigures(name, 20.0, 80.0, 9.0, 1.0, 0.01, 0.1, 1e-13, 1e-12, 0.0, "") for name in GAIN_SETS
+        ),
     )
 
 

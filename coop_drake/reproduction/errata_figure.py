@@ -1,0 +1,171 @@
+"""What the paper's formulas do as they are printed, beside what they do as corrected: a picture of errata."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from coop_drake.control import energy_margin, total_wrench, tracking_energy, wrench_share
+from coop_drake.control.ready import EROSION, clearance_margin
+from coop_drake.drawing.canvas import house_style, new_figure, save_figure
+from coop_drake.drawing.colours import BLUE, GREY, VERMILLION
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.reproduction import printed
+from coop_drake.reproduction.funnel_errata_panels import (
+    draw_hand_over_acceleration,
+    draw_log_decay,
+    draw_log_term,
+    draw_walls,
+)
+from coop_drake.reproduction.governor_run import (
+    Clearance,
+    GovernorRun,
+    Margin,
+    box_clearance,
+    run_governor,
+    straight_field,
+)
+
+__all__ = ["errata_figure", "write_errata_figure"]
+
+_TABLE_2 = (50.0, 5.0, 5.0, 0.0)
+_TOLERANCE = 1e-7  # Of the integration; a line in a picture needs no more.
+_ROOM = box_clearance(np.array([0.0, -1.0]), np.array([4.0, 1.0]))
+_NARROW = box_clearance(np.array([2.0, -1.0]), np.array([2.3, 1.0]))
+
+
+def write_errata_figure(folder: Path) -> Path:
+    """Draw the picture into a folder, which is made if it is missing, and return where it is."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "errata.png"
+    with house_style():
+        save_figure(errata_figure(), path)
+    return path
+
+
+def errata_figure() -> Figure:
+    """Draw eight errata: red as printed, blue as corrected."""
+    caption = (
+        "Errata. Red as the paper prints it, blue as corrected. Above, the position: the spring's energy "
+        "(E15a), the wall that the goal's boundary would be (E15b), a hand-over to a cell 30 cm wide (E10), "
+        "and the torque that two robots give together (E21). Below, an angle in its funnel: walls (E17a), "
+        "the acceleration on entering (E17b), the log term towards a goal (E18), the log that should "
+        "decay (E20)."
+    )
+    figure = new_figure(12.0, 6.4, caption)
+    above, below = figure.subplots(2, 4)
+    for ax, draw in zip(above, (_draw_wall, _draw_goal, _draw_take_over, _draw_torque), strict=True):
+        draw(ax)
+    draw_walls(below[0])
+    draw_hand_over_acceleration(below[1], EROSION)
+    draw_log_term(below[2])
+    draw_log_decay(below[3])
+    above[0].plot([], [], color=VERMILLION, label="as printed")
+    above[0].plot([], [], color=BLUE, label="as corrected")
+    above[0].legend(loc="upper right")
+    return figure
+
+
+def _from_rest(
+    x: float,
+    y: float,
+    target: FloatArray,
+    seconds: float,
+    *,
+    clearance: Clearance = _ROOM,
+    margin: Margin = energy_margin,
+) -> GovernorRun:
+    """From rest at (x, y) to a target with Table 2's gains."""
+    return run_governor(
+        clearance,
+        straight_field(target),
+        position=np.array([x, y]),
+        velocity=np.zeros(2),
+        governor=np.array([x, y]),
+        gains=_TABLE_2,
+        seconds=seconds,
+        margin=margin,
+        tolerance=_TOLERANCE,
+    )
+
+
+def _draw_wall(ax: Axes) -> None:
+    """A target 2 cm before a wall: as printed, the spring may store more than it can before the wall."""
+    for margin, colour in ((printed.energy_margin, VERMILLION), (energy_margin, BLUE)):
+        run = _from_rest(2.0, 0.0, np.array([3.98, 0.0]), 6.0, margin=margin)
+        ax.plot(run.times, 100.0 * (4.0 - run.position[:, 0]), color=colour)
+    ax.axhline(0.0, color=GREY, linestyle="--")
+    ax.set(title="E15a: through the wall", xlabel="time [s]", ylabel="distance to the wall [cm]")
+    ax.set_ylim(-12.0, 60.0)
+
+
+def _draw_goal(ax: Axes) -> None:
+    """The boundary of F has the goal's in it: the way in is closed."""
+    target, radius = np.array([3.0, 0.0]), 0.3
+
+    def to_boundary_of_f(point: FloatArray) -> float:
+        return min(_ROOM(point), abs(float(np.hypot(*(point - target))) - radius))
+
+    for clearance, colour in ((to_boundary_of_f, VERMILLION), (_ROOM, BLUE)):
+        run = _from_rest(1.0, 0.2, target, 12.0, clearance=clearance)
+        ax.plot(run.times, np.hypot(*(run.position - target).T), color=colour)
+    ax.axhline(radius, color=GREY, linestyle="--")
+    ax.set(title="E15b: never in the goal", xlabel="time [s]", ylabel="distance to the target [m]")
+
+
+def _draw_take_over(ax: Axes) -> None:
+    """A fast object enters a narrow cell: as printed the cell takes over at once, and is left again."""
+    target = np.array([2.15, 0.0])
+    run = _from_rest(0.5, 0.0, target, 12.0)
+    inside = next(i for i, p in enumerate(run.position) if _NARROW(p) > 0.0)
+    certified = next(i for i in range(len(run.times)) if _certified(run, i))
+    for index, colour in ((inside, VERMILLION), (certified, BLUE)):
+        after = run_governor(
+            _NARROW,
+            straight_field(target),
+            position=run.position[index],
+            velocity=run.velocity[index],
+            governor=run.governor[index],
+            gains=_TABLE_2,
+            seconds=5.0,
+            tolerance=_TOLERANCE,
+        )
+        ax.plot(run.times[index] + after.times, after.position[:, 0], color=colour)
+        ax.plot(run.times[index], run.position[index, 0], "o", color=colour, markersize=4)
+    for wall in (2.0, 2.3):
+        ax.axhline(wall, color=GREY, linestyle="--")
+    ax.set(title="E10: out of the next cell", xlabel="time [s]", ylabel="x [m], walls dashed")
+
+
+def _certified(run: GovernorRun, index: int) -> bool:
+    stiffness = _TABLE_2[0]
+    energy = tracking_energy(
+        run.position[index], run.velocity[index], run.governor[index], stiffness=stiffness
+    )
+    margin = energy_margin(energy, _NARROW(run.governor[index]), stiffness=stiffness)
+    return clearance_margin(margin, stiffness=stiffness, inradius=0.15) >= 0.0
+
+
+def _draw_torque(ax: Axes) -> None:
+    """Two grasps on one side, a force of 5 N that turns: the torque that arrives, none being asked for."""
+    offsets = np.array([[0.4, 0.0], [0.0, 0.25]])
+    directions = np.linspace(0.0, 2.0 * np.pi, 73)
+    torques = []
+    for direction in directions:
+        force = 5.0 * np.array([np.cos(direction), np.sin(direction)])
+        wrong = [printed.wrench_share(force, 0.0, -offset, robots=2) for offset in offsets]
+        right = [
+            wrench_share(
+                np.array([*force, 0.0]), 0.0, offset, com_offset=np.zeros(2), mass=1.0, inertia=1.0, share=0.5
+            )
+            for offset in offsets
+        ]
+        torques.append(
+            [total_wrench(np.array(s), offsets, com_offset=np.zeros(2))[2] for s in (wrong, right)]
+        )
+    for torque, colour in zip(np.transpose(torques), (VERMILLION, BLUE), strict=True):
+        ax.plot(np.degrees(directions), torque, color=colour)
+    ax.set(title="E21: unwanted torque", xlabel="direction of 5 N [°]", ylabel="torque [N m], 0 wanted")

@@ -1,0 +1,94 @@
+"""The panels of the errata's picture that show one angle in its funnel: the first cell of Table 1."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from scipy.integrate import solve_ivp
+
+from coop_drake.control import Funnel, funnel_walls
+from coop_drake.drawing.colours import BLUE, GREY, VERMILLION
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.reproduction import printed
+from coop_drake.reproduction.table_1 import CORRECTED, START
+
+__all__ = ["draw_hand_over_acceleration", "draw_log_decay", "draw_log_term", "draw_walls"]
+
+_LOWER, _UPPER = float(CORRECTED[0, 0]), float(CORRECTED[0, 1])
+_GOAL_LOWER, _GOAL_UPPER = float(CORRECTED[1, 0]), _UPPER
+_DECAY = 2.0
+_TIMES = np.linspace(0.0, 3.0, 121)
+
+
+def _walls(time: float, goal: tuple[float, float] = (_GOAL_LOWER, _GOAL_UPPER)) -> list[float]:
+    """Lower and upper wall of (17) corrected, their rates and accelerations."""
+    lower, upper, goal_lower, goal_upper, decay = np.array(
+        [[_LOWER], [_UPPER], [goal[0]], [goal[1]], [_DECAY]]
+    )
+    funnel = Funnel(lower, upper, goal_lower, goal_upper, decay, shape="exponential")
+    return [float(wall[0]) for wall in funnel_walls(funnel, time)]
+
+
+def draw_walls(ax: Axes) -> None:
+    """(17): as printed both walls start at theta_l, and the start lies outside."""
+    names = {
+        "theta_l": _LOWER,
+        "theta_u": _UPPER,
+        "goal_l": _GOAL_LOWER,
+        "goal_u": _GOAL_UPPER,
+        "decay_rate": _DECAY,
+    }
+    wrong = np.array([printed.angle_walls(t, **names) for t in _TIMES])
+    right = np.array([_walls(t)[:2] for t in _TIMES])
+    for walls, colour in ((wrong, VERMILLION), (right, BLUE)):
+        ax.plot(_TIMES, walls, color=colour)
+        ax.fill_between(_TIMES, walls[:, 0], walls[:, 1], color=colour, alpha=0.12, linewidth=0)
+    ax.plot(0.0, START[0], "o", color=GREY, markersize=5, label="start")
+    ax.set(title="E17a: no room at first", xlabel="time [s]", ylabel="angle [rad]")
+    ax.legend(loc="lower right")
+
+
+def draw_hand_over_acceleration(ax: Axes, erosion: float) -> None:
+    """(18) where a cell is entered: without bound at the slice's end, which is where the last goal ends."""
+    distances = np.geomspace(1e-6, 0.1, 60)
+    begin = _walls(0.0)
+    pull = np.array([abs(printed.axis_law(_LOWER + d, 0.0, begin)[0]) for d in distances])
+    allowed = distances >= erosion * (_GOAL_UPPER - _GOAL_LOWER)
+    ax.loglog(distances, pull, color=VERMILLION)
+    ax.loglog(distances[allowed], pull[allowed], color=BLUE, linewidth=2.5)
+    ax.set(
+        title="E17b: thrown off on entering",
+        xlabel="distance to the slice's end [rad]",
+        ylabel="acceleration [rad/s²]",
+    )
+
+
+def draw_log_term(ax: Axes) -> None:
+    """The log term a quarter into the funnel, towards a point without gain and towards goal +- tolerance."""
+    for half_width, log_gain, colour in ((0.0, 1.0, VERMILLION), (0.02, 0.1, BLUE)):
+        goal = (1.7 - half_width, 1.7 + half_width)
+        pulls = []
+        for time in 2.0 * _TIMES:
+            walls = _walls(time, goal)
+            x = 0.75 * walls[0] + 0.25 * walls[1]
+            terms = [printed.axis_law(x, 0.0, walls, log_gain=gain)[0] for gain in (log_gain, 0.0)]
+            pulls.append(abs(terms[0] - terms[1]))
+        ax.semilogy(2.0 * _TIMES, pulls, color=colour)
+    ax.set(title="E18: pulled ever harder", xlabel="time [s]", ylabel="log term [rad/s²]")
+
+
+def draw_log_decay(ax: Axes) -> None:
+    """The log s along x' = v: it decays like exp(-k1 t) only if b follows both walls' rates."""
+    for missing_dot, colour in ((True, VERMILLION), (False, BLUE)):
+
+        def rate(time: float, x: FloatArray, missing_dot: bool = missing_dot) -> list[float]:
+            walls = _walls(time)
+            return [printed.axis_law(x[0], 0.0, walls, first_rate=walls[0] if missing_dot else None)[1]]
+
+        start = [0.3 * _LOWER + 0.7 * _UPPER]
+        run = solve_ivp(rate, (0.0, _TIMES[-1]), start, t_eval=_TIMES, rtol=1e-9, atol=1e-12)
+        walls = np.array([_walls(t)[:2] for t in run.t])
+        with np.errstate(invalid="ignore"):
+            s = np.log((run.y[0] - walls[:, 0]) / (walls[:, 1] - run.y[0]))
+        ax.plot(run.t, s, color=colour)
+    ax.set(title="E20: pressed to a wall", xlabel="time [s]", ylabel="s, 0 in the middle")

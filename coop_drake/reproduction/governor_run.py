@@ -1,0 +1,117 @@
+"""A point mass behind its reference governor, with the clearance and the margin as the caller has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from coop_drake.control import energy_margin, governed_acceleration, governor_velocity, tracking_energy
+from coop_drake.geometry.pose import FloatArray
+
+__all__ = ["Clearance", "GovernorRun", "Margin", "box_clearance", "run_governor", "straight_field"]
+
+
+Clearance = Callable[[FloatArray], float]
+
+
+class Margin(Protocol):
+    """Delta E from the energy, the clearance and the stiffness."""
+
+    def __call__(self, energy: float, clearance: float, /, *, stiffness: float) -> float:
+        """Return Delta E [m^2/s^2]."""
+        ...
+
+
+@dataclass(frozen=True)
+class GovernorRun:
+    """Samples of one run.
+
+    Attributes:
+        times: Shape (T,) [s].
+        position: p, shape (T, 2) [m].
+        velocity: p', shape (T, 2) [m/s].
+        governor: p_G, shape (T, 2) [m].
+        margin: Delta E as the run has it, shape (T,) [m^2/s^2].
+    """
+
+    times: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    governor: FloatArray
+    margin: FloatArray
+
+
+def box_clearance(lower: FloatArray, upper: FloatArray) -> Clearance:
+    """Return the signed distance to the boundary of a box, exact inside and on the sides."""
+
+    def clearance(point: FloatArray) -> float:
+        return float(min(np.min(point - lower), np.min(upper - point)))
+
+    return clearance
+
+
+def straight_field(target: FloatArray, max_speed: float = 1.0) -> Callable[[FloatArray], FloatArray]:
+    """Return a velocity field that points to the target, proportional to the distance near it."""
+
+    def field(point: FloatArray) -> FloatArray:
+        error = target - point
+        return error * min(1.0, max_speed / max(float(np.hypot(*error)), 1e-300))
+
+    return field
+
+
+def run_governor(
+    clearance: Clearance,
+    field: Callable[[FloatArray], FloatArray],
+    *,
+    position: FloatArray,
+    velocity: FloatArray,
+    governor: FloatArray,
+    gains: tuple[float, float, float, float],
+    seconds: float,
+    margin: Margin = energy_margin,
+    tolerance: float = 1e-10,
+) -> GovernorRun:
+    """Integrate (14) with any clearance, field and margin.
+
+    Args:
+        clearance: Signed distance of p_G to what must not be reached [m].
+        field: Velocity field, (2,) -> (2,) [m/s].
+        position: p at the beginning, shape (2,) [m].
+        velocity: p' there, shape (2,) [m/s].
+        governor: p_G there, shape (2,) [m].
+        gains: (K, zeta, K_G, c).
+        seconds: Duration [s].
+        margin: Delta E; (15) corrected unless given.
+        tolerance: Relative and absolute, of the integration.
+    """
+    stiffness, damping, governor_gain, smoothing = gains
+
+    def margin_of(state: FloatArray) -> float:
+        energy = tracking_energy(state[:2], state[2:4], state[4:], stiffness=stiffness)
+        return margin(energy, clearance(state[4:]), stiffness=stiffness)
+
+    def derivative(_: float, state: FloatArray) -> FloatArray:
+        acceleration = governed_acceleration(
+            state[:2], state[2:4], state[4:], stiffness=stiffness, damping=damping
+        )
+        rate = governor_velocity(
+            field(state[4:]),
+            margin_of(state),
+            stiffness=stiffness,
+            governor_gain=governor_gain,
+            smoothing=smoothing,
+        )
+        return np.concatenate([state[2:4], acceleration, rate])
+
+    start = np.concatenate([position, velocity, governor])
+    solution = solve_ivp(
+        derivative, (0.0, seconds), start, method="DOP853", rtol=tolerance, atol=tolerance, max_step=0.05
+    )
+    states = solution.y.T
+    margins = np.array([margin_of(state) for state in states])
+    return GovernorRun(solution.t, states[:, :2], states[:, 2:4], states[:, 4:], margins)
