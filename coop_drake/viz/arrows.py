@@ -33,7 +33,7 @@ def force_of_a_metre(team: TeamPlant) -> float:
 
 
 def set_arrows(meshcat: Meshcat, colours: list[Rgba]) -> None:
-    """Make an arrow along x for every robot, a metre long, to be turned and stretched."""
+    """Make an arrow along x for every robot, to be turned and stretched from nearly nothing."""
     along_x, back = RotationMatrix.MakeYRotation(pi / 2), RotationMatrix.MakeYRotation(-pi / 2)
     middle, tip = np.array([0.5 * (1.0 - _HEAD), 0.0, 0.0]), np.array([1.0, 0.0, 0.0])
     for index, colour in enumerate(colours):
@@ -43,6 +43,7 @@ def set_arrows(meshcat: Meshcat, colours: list[Rgba]) -> None:
         # A cone of Meshcat's stands on its tip, at its frame's origin.
         meshcat.SetObject(head, MeshcatCone(_HEAD, 0.09, 0.09), colour)
         meshcat.SetTransform(head, RigidTransform(back, tip))
+        meshcat.SetProperty(arrow_path(index), "scale", [_SHORTEST] * 3)
 
 
 def arrow_path(index: int) -> str:

@@ -133,7 +133,8 @@ def _extent(places: dict[str, _Place]) -> Point:
 def _draw(ax: Axes, flow: SignalFlow, places: dict[str, _Place], width: float, height: float) -> None:
     back = [s for s in flow.signals if places[s.sink].x <= places[s.source].x]
     lanes = sorted({(s.source, s.output) for s in back})
-    ax.set(xlim=(-0.6, width + 0.6), ylim=(-height - 0.35 - 0.14 * len(lanes), 0.3), aspect="equal")
+    aside = max(0.6, 0.3 + 0.1 * len(lanes))
+    ax.set(xlim=(-aside, width + aside), ylim=(-height - 0.35 - 0.14 * len(lanes), 0.3), aspect="equal")
     ax.axis("off")
     ax.set_title(flow.name, loc="left", fontsize=11, color=INK)
     blocks = {block.name: block for block in flow.blocks}

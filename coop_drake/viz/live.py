@@ -44,6 +44,7 @@ class LiveView:
         until = monotonic() + seconds
         while self._scene.meshcat.GetNumActiveConnections() == 0 and monotonic() < until:
             sleep(0.1)
+        self._scene.meshcat.Flush()
         return bool(self._scene.meshcat.GetNumActiveConnections())
 
     def __call__(self, sample: Sample) -> None:
@@ -56,7 +57,6 @@ class LiveView:
         self._show_cell(sample.cell)
         self._show_forces(sample)
         self._show_trail(sample.z[:2])
-        self._scene.meshcat.Flush()
 
     def _keep_pace(self, time: float) -> None:
         if self._began is None:
