@@ -13,8 +13,10 @@ from typer.testing import CliRunner
 
 from coop_drake.cli import app, simulating
 from coop_drake.cli.reporter import Reporter
+from coop_drake.errors import PlanError
 from coop_drake.planning import load_plan
 from coop_drake.simulation import SimulationLog
+from coop_drake.viz import LiveView
 from tests.support.scenarios import MODELS, ROOM, write_scenario
 
 PLAN_KEYS = {
@@ -161,6 +163,24 @@ def test_a_violation_ends_in_exit_code_1_and_says_which(finished, room, tmp_path
     assert facts["violation"] == facts["error"] == broken.violation
     assert broken.violation in result.stderr
     assert (tmp_path / "log.npz").exists()
+
+
+def test_a_live_run_is_looked_at_and_says_where_without_waiting_for_anybody(
+    finished, room, tmp_path, monkeypatch
+):
+    looking = []
+
+    def simulated(*_, onlooker, **__):
+        looking.append(onlooker)
+        raise PlanError("far enough")
+
+    monkeypatch.setattr(simulating, "simulate", simulated)
+    plan = finished[0] / "plan.json"
+    result = invoke("simulate", room, "--plan", plan, "--out", tmp_path / "live", "--live", "--json")
+    assert isinstance(looking[0], LiveView)
+    address = json.loads(result.stdout)["live_url"]
+    assert address.startswith("http://localhost:")
+    assert f"Live view: open {address}" in result.stderr
 
 
 def test_warming_up_leaves_nothing_behind(room, tmp_path, monkeypatch):
