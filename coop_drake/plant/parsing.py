@@ -1,20 +1,16 @@
 """Models from directives into a plant: no gravity, one actuator for each joint of q."""
 
-import logging
-import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from pathlib import Path
 
 from pydrake.geometry import SceneGraph
-from pydrake.multibody.parsing import ModelDirectives, PackageMap, Parser, ProcessModelDirectives
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Joint, JointActuator, ModelInstanceIndex, RigidBody
 
 from coop_drake.errors import ScenarioError
+from coop_drake.plant.model_text import fault_of
+from coop_drake.plant.processing import process
 from coop_drake.scenario import Assembly, RobotAssembly, Scenario
-
-_REPLACED = re.compile(r"invalid inertia|inertia matrix|central inertia|Using default value")
-"""Warnings by which Drake says that it went on with a mass or a size other than the file's."""
 
 
 def add_models(
@@ -36,50 +32,32 @@ def add_models(
     Raises:
         ScenarioError: Drake refuses a model or a directive, or would replace a mass or size by its own.
     """
-    complaint = _process(assembly, indices, plant, scene_graph)
+    for index in indices:
+        model = assembly.directives[index].add_model
+        fault = fault_of(Path(model.file.removeprefix("file://"))) if model else ""
+        if fault:
+            raise _refusal(scenario, assembly, index, fault)
+    complaint = process(assembly, indices, plant, scene_graph)
     if complaint:
-        at = _culprit(assembly, indices)
-        raise ScenarioError(
-            str(scenario.path),
-            assembly.keys[at],
-            _subject(assembly, at),
-            f"what Drake can read ({complaint})",
-        )
+        raise _refusal(scenario, assembly, _culprit(assembly, indices, complaint), complaint)
     plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])
 
 
-def _process(
-    assembly: Assembly, indices: Sequence[int], plant: MultibodyPlant, scene_graph: SceneGraph | None
-) -> str:
-    """Process directives; what Drake complained about, or nothing."""
-    parser = Parser(plant, scene_graph) if scene_graph else Parser(plant)
-    parser.package_map().AddMap(_missing(assembly, parser))
-    try:
-        with _warnings() as said:
-            ProcessModelDirectives(
-                ModelDirectives(directives=[assembly.directives[index] for index in indices]), parser
-            )
-    except (RuntimeError, ValueError, SystemExit) as error:  # pydrake exits where Drake's C++ would abort
-        return " ".join(str(error).split())
-    replaced = (" ".join(message.split()) for message in said if _REPLACED.search(message))
-    return "; ".join(dict.fromkeys(replaced))
+def _refusal(scenario: Scenario, assembly: Assembly, at: int, complaint: str) -> ScenarioError:
+    subject, allowed = _subject(assembly, at), f"what Drake can read ({complaint})"
+    return ScenarioError(str(scenario.path), assembly.keys[at], subject, allowed)
 
 
-def _missing(assembly: Assembly, parser: Parser) -> PackageMap:
-    """The scenario's packages without those that the parser has already."""
-    packages = PackageMap(assembly.packages)
-    for name in packages.GetPackageNames():
-        if parser.package_map().Contains(name):
-            packages.Remove(name)
-    return packages
-
-
-def _culprit(assembly: Assembly, indices: Sequence[int]) -> int:
-    """Index of the first directive that Drake refuses when they are added one after the other."""
+def _culprit(assembly: Assembly, indices: Sequence[int], complaint: str) -> int:
+    """Index of the directive whose file Drake names, or else of the first that it refuses when added."""
+    models = [(index, assembly.directives[index].add_model) for index in indices]
+    named = [index for index, model in models if model and model.file.removeprefix("file://") in complaint]
+    if len({_subject(assembly, index) for index in named}) == 1:
+        return named[0]
     for count in range(1, len(indices)):
         plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
         plant.RegisterAsSourceForSceneGraph(scene_graph)
-        if _process(assembly, indices[:count], plant, scene_graph):
+        if process(assembly, indices[:count], plant, scene_graph):
             return indices[count - 1]
     return indices[-1]
 
@@ -93,34 +71,6 @@ def _subject(assembly: Assembly, index: int) -> str:
         return f"{directive.add_weld.parent}, {directive.add_weld.child}"
     named = directive.add_frame or directive.add_model_instance or directive.add_collision_filter_group
     return str(named.name)
-
-
-@contextmanager
-def _warnings() -> Iterator[list[str]]:
-    """Collect what Drake warns about meanwhile, also while its logger keeps silent or is switched off."""
-    records: list[logging.LogRecord] = []
-    said: list[str] = []
-
-    class Collector(logging.Handler):
-        def emit(self, record: logging.LogRecord) -> None:
-            records.append(record)
-            said.append(record.getMessage())
-
-    logger = logging.getLogger("drake")
-    ours = {"handlers": [Collector()], "filters": [], "propagate": False, "disabled": False}
-    theirs = {name: getattr(logger, name) for name in (*ours, "level")}
-    switched_off = logging.root.manager.disable
-    vars(logger).update(ours)
-    logging.disable(logging.NOTSET)
-    logger.setLevel(logging.WARNING)
-    try:
-        yield said
-    finally:
-        vars(logger).update(theirs)
-        logging.disable(switched_off)  # This lets Drake know of the level put back, too.
-        for record in records:
-            if logger.isEnabledFor(record.levelno) and not _REPLACED.search(record.getMessage()):
-                logger.handle(record)
 
 
 def finalize(scenario: Scenario, plant: MultibodyPlant) -> None:
