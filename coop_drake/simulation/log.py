@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coop_drake.errors import PlanError
 from coop_drake.files import write_atomically
+from coop_drake.simulation.log_reader import read_arrays
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -107,13 +107,9 @@ class SimulationLog:
             path: The ``.npz`` file.
 
         Raises:
-            PlanError: The file lacks an array; the message names it.
+            PlanError: The file is no log, or an array in it is missing, damaged or misshapen; names it.
         """
-        with np.load(Path(path), allow_pickle=False) as archive:
-            missing = [f.name for f in fields(cls) if f.name not in archive]
-            if missing:
-                raise PlanError(f"{path}: not a simulation log; it lacks {', '.join(missing)}")
-            values = {f.name: archive[f.name] for f in fields(cls)}
+        values: dict[str, Any] = read_arrays(Path(path), [f.name for f in fields(cls)])
         return cls(
             **{
                 **values,
