@@ -117,6 +117,8 @@ class _Reader:
     def assembly(self) -> Assembly:
         """Group the models into robots and find the grasps."""
         object_model = self.scenario.object
+        if not self.models:
+            raise self._refuse("directives", [], "add_model for the object and for two or more robots")
         if object_model not in self.models:
             raise self._refuse(
                 "object", object_model, "the name of a model, one of " + ", ".join(self.models)

@@ -5,7 +5,8 @@ from typing import TypeVar
 
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.document import DocumentError
-from coop_drake.scenario.schema import SchemaError, departures, read
+from coop_drake.scenario.scalars import SchemaError
+from coop_drake.scenario.schema import departures, read
 
 T = TypeVar("T")
 

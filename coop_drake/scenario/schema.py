@@ -6,38 +6,16 @@ the draft, and the frozen value is made from it.
 """
 
 import dataclasses
-import math
 import types
 import typing
-from collections.abc import Iterator
 from functools import cache
 from typing import Any
 
-from pydrake.common.yaml import yaml_dump, yaml_load_typed
+from pydrake.common.yaml import yaml_load_typed
 
 from coop_drake.scenario.document import parse
-
-
-class SchemaError(ValueError):
-    """A place where a file departs from its schema.
-
-    Args:
-        key: Dotted path of the key.
-        value: What stands there.
-        allowed: What may stand there.
-    """
-
-    def __init__(self, key: str, value: object, allowed: str) -> None:
-        self.key, self.value, self.allowed = key, value, allowed
-        super().__init__(f"{key}: {value!r}; expected {allowed}")
-
-
-Check = Iterator[SchemaError]
-
-LARGEST = 1e6
-"""Numbers beyond are slips of the pen in metres, radians, seconds and gains alike."""
-
-_SCALARS = {bool: "true or false", int: "a whole number", float: "a finite number", str: "a text"}
+from coop_drake.scenario.foreign import check_foreign
+from coop_drake.scenario.scalars import SCALARS, Check, SchemaError, below, check_scalar
 
 
 def in_file(cls: type) -> tuple[dataclasses.Field[Any], ...]:
@@ -143,7 +121,7 @@ def freeze(value: Any, kind: Any, key: str = "") -> Any:
     if origin is tuple:
         return tuple(freeze(item, arguments[0], f"{key}[{index}]") for index, item in enumerate(value))
     if origin is dict:
-        return {name: freeze(item, arguments[1], _below(key, name)) for name, item in value.items()}
+        return {name: freeze(item, arguments[1], below(key, name)) for name, item in value.items()}
     if _is_union(kind):
         frozen = [a for a in arguments if isinstance(a, type) and _drafted(a) is type(value)]
         return freeze(value, frozen[0], key) if frozen and _drafted(frozen[0]) is not frozen[0] else value
@@ -152,23 +130,21 @@ def freeze(value: Any, kind: Any, key: str = "") -> Any:
 
 def _freeze_fields(value: Any, cls: type, key: str) -> Any:
     hints = typing.get_type_hints(cls)
-    fields = {
-        f.name: freeze(getattr(value, f.name), hints[f.name], _below(key, f.name)) for f in in_file(cls)
-    }
+    fields = {f.name: freeze(getattr(value, f.name), hints[f.name], below(key, f.name)) for f in in_file(cls)}
     try:
         return cls(**fields)
     except ValueError as error:  # by custom the message begins with the field's name
         name = str(error).partition(" ")[0]
         raise SchemaError(
-            _below(key, name) if name in fields else key, fields.get(name), str(error)
+            below(key, name) if name in fields else key, fields.get(name), str(error)
         ) from error
 
 
 def _check(value: object, kind: Any, key: str) -> Check:
     """Dispatch on the kind of schema."""
     origin = typing.get_origin(kind)
-    if kind in _SCALARS:
-        yield from _check_scalar(value, kind, key)
+    if kind in SCALARS:
+        yield from check_scalar(value, kind, key)
     elif origin is typing.Literal:
         if value not in typing.get_args(kind):
             yield SchemaError(key, value, "one of " + ", ".join(typing.get_args(kind)))
@@ -184,31 +160,7 @@ def _check(value: object, kind: Any, key: str) -> Check:
         schema = {f.name: hints[f.name] for f in in_file(cls)}
         yield from _check_fields(value, schema, _required(cls), key)
     else:
-        yield from _check_foreign(value, kind, key)
-
-
-def _check_scalar(value: object, kind: type, key: str) -> Check:
-    if kind is str or kind is bool:
-        fits = type(value) is kind
-    else:
-        number = _as_number(value)
-        fits = number is not None and math.isfinite(number) and (kind is float or number.is_integer())
-        if fits and number is not None and abs(number) > LARGEST:
-            yield SchemaError(key, value, f"a number between {-LARGEST:g} and {LARGEST:g}")
-    if not fits:
-        yield SchemaError(key, value, _SCALARS[kind])
-
-
-def _as_number(value: object) -> float | None:
-    """A number as Drake would read it; YAML 1.1 takes ``1e-3`` for a text."""
-    if isinstance(value, bool) or not isinstance(value, int | float | str):
-        return None
-    try:
-        return float(value)
-    except ValueError:
-        return None
-    except OverflowError:
-        return math.inf
+        yield from check_foreign(value, kind, key)
 
 
 def _check_sequence(value: object, kind: Any, key: str) -> Check:
@@ -229,9 +181,9 @@ def _check_mapping(value: object, kind: Any, key: str) -> Check:
         return
     for name, item in value.items():
         if not isinstance(name, str):
-            yield SchemaError(_below(key, name), name, "a text as the name")
+            yield SchemaError(below(key, name), name, "a text as the name")
         else:
-            yield from _check(item, kind, _below(key, name))
+            yield from _check(item, kind, below(key, name))
 
 
 def _check_union(value: object, kind: Any, key: str) -> Check:
@@ -258,42 +210,9 @@ def _check_fields(value: object, schema: dict[str, Any], required: frozenset[str
         return
     for name in value:
         if name not in schema:
-            yield SchemaError(_below(key, name), value[name], "one of the keys " + ", ".join(schema))
+            yield SchemaError(below(key, name), value[name], "one of the keys " + ", ".join(schema))
     for name, kind in schema.items():
         if name in value:
-            yield from _check(value[name], kind, _below(key, name))
+            yield from _check(value[name], kind, below(key, name))
         elif name in required:
-            yield SchemaError(_below(key, name), None, "a value; this key is required")
-
-
-def _check_foreign(value: object, kind: type, key: str) -> Check:
-    """What Drake's own schemas describe Drake checks; its numbers must be finite and not huge."""
-    wrong = list(_infinite(value, key))
-    if wrong:
-        yield from wrong
-        return
-    try:
-        yaml_load_typed(schema=kind, data=yaml_dump(value))
-    except (AssertionError, AttributeError, RuntimeError, TypeError, ValueError) as error:
-        reason = "a vector of the wrong size" if "incompatible function" in str(error) else str(error)
-        yield SchemaError(key, value, f"a {kind.__name__} as Drake describes it ({reason})")
-
-
-def _infinite(value: object, key: str) -> Check:
-    if isinstance(value, dict):
-        for name, item in value.items():
-            yield from _infinite(item, _below(key, name))
-    elif isinstance(value, list):
-        for index, item in enumerate(value):
-            yield from _infinite(item, f"{key}[{index}]")
-    elif isinstance(value, int | float):
-        number = _as_number(value)
-        if number is not None and not abs(number) <= LARGEST:
-            kind = (
-                f"a number between {-LARGEST:g} and {LARGEST:g}" if math.isfinite(number) else _SCALARS[float]
-            )
-            yield SchemaError(key, value, kind)
-
-
-def _below(key: str, name: object) -> str:
-    return f"{key}.{name}" if key else str(name)
+            yield SchemaError(below(key, name), None, "a value; this key is required")

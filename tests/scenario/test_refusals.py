@@ -235,7 +235,7 @@ CASES = {
         "positive",
     ),
     "object": (("object: object", "object: box"), "object", "box", "one of object, robot_0, robot_1"),
-    "directive": (("add_weld", "add_wold"), "directives[3]", ..., "add_wold"),
+    "directive": (("add_weld", "add_wold"), "directives[3].add_wold", ..., "one of the keys add_model"),
     "empty directive": (("- add_weld: " + WELD, "- {}"), "directives[3]", [], "exactly one of add_model"),
     "two directives in one": (
         ("add_model: " + MODEL, "add_model: " + MODEL + "\n  add_model_instance: {name: x}"),
@@ -388,16 +388,16 @@ def test_one_robot_is_not_enough(tmp_path):
 @pytest.mark.parametrize(
     ("text", "place", "problem"),
     [
-        ("workspace:\n  outer: [[0, 0]\nstart: 3\n", "line 3, column 1", "but got '<scalar>'"),
+        ("workspace:\n  outer: [[0, 0]\nstart: 3\n", "line 3, column 1", "did not find expected"),
         ("workspace: {}\nworkspace: {}\n", "line 2, column 1", "workspace"),
         ("\tworkspace: {}\n", "line 1, column 1", "cannot start any token"),
         ("workspace: {}\n3: {}\n", "line 2, column 1", "3"),
         ("~: {}\n", "line 1, column 1", "~"),
-        ("? [1, 2]\n: {}\n", "line 1, column 3", "ScalarNode"),
+        ("? [1, 2]\n: {}\n", "line 1, column 3", "a list or a mapping"),
         ("workspace: !!int floor\n", "the file", "invalid literal for int"),
         ("workspace: 2026-13-41\n", "the file", "month must be in 1..12"),
-        ("workspace: &floor {outer: *floor}\n", "the file", "endless nesting"),
-        ("workspace: " + 2000 * "[" + 2000 * "]", "the file", "endless nesting"),
+        ("workspace: &floor {outer: *floor}\n", "line 1, column 12", "endless nesting"),
+        ("workspace: " + 2000 * "[" + 2000 * "]", "line 1, column 61", "endless nesting"),
     ],
 )
 def test_text_that_does_not_parse_is_refused_with_its_line(text, place, problem, tmp_path):
