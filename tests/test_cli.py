@@ -241,7 +241,7 @@ def test_a_plan_of_another_scenario_and_a_file_that_is_no_plan_are_bad_input(fin
     )
     result = invoke("simulate", other, "--plan", out / "plan.json", "--json")
     assert result.exit_code == 2
-    assert "the plan starts at" in json.loads(result.stdout)["error"]
+    assert "start: [2.5, " in json.loads(result.stdout)["error"]
     goal = write_scenario(
         tmp_path / "goal.scenario.yaml", goal={"object": {**ROOM["goal"]["object"], "x": 2.0, "y": 2.0}}
     )

@@ -29,6 +29,7 @@ from coop_drake.planning import (
     save_plan,
     table_1,
 )
+from coop_drake.planning.digest import problem_digest
 from coop_drake.planning.planner import plan
 from coop_drake.planning.separation_file import save_separation
 from coop_drake.planning.warm_up import main as load_kernels
@@ -99,11 +100,20 @@ def read_plan(question: Question, path: Path, reporter: Reporter, *, gains_given
     names = tuple(joint.name for joint in problem.tree.joints)
     if found.joint_names != names:
         raise PlanError(
-            f"{path}: the plan moves {_listed(found.joint_names)}; the scenario has {_listed(names)}"
+            f"{path}: joint_names: {_listed(found.joint_names)} is not allowed; expected the scenario's, "
+            f"{_listed(names)}"
         )
     if not np.array_equal(found.start, problem.start):
-        raise PlanError(f"{path}: the plan starts at {found.start}; the scenario starts at {problem.start}")
+        raise PlanError(
+            f"{path}: start: {found.start.tolist()} is not allowed; expected the scenario's, "
+            f"{problem.start.tolist()}"
+        )
     _check_goal(problem, found, path)
+    if found.problem != (asked := problem_digest(problem)):
+        raise PlanError(
+            f"{path}: problem: {found.problem!r} is not allowed; expected {asked!r}, the scenario's digest: "
+            "the plan was made for another floor, team or tolerance"
+        )
     if gains_given:  # Also by the same name: a file may hold other gains than those of the plan.
         found = reschedule(found, question.gain_sets[question.gains], question.gains)
     reporter.facts.update(
@@ -117,8 +127,9 @@ def _check_goal(problem: PlanningProblem, found: Plan, path: Path) -> None:
     away[2] = remainder(away[2], tau)
     if found.goal_joints != problem.goal_joints or np.abs(away).max() > _SAME_GOAL:
         raise PlanError(
-            f"{path}: the plan ends at {found.goal_pose} with joints {found.goal_joints}; "
-            f"the scenario's goal is {problem.goal_pose} with joints {problem.goal_joints}"
+            f"{path}: goal_pose: {found.goal_pose.tolist()} with goal_joints {list(found.goal_joints)} is "
+            f"not allowed; expected the scenario's, {problem.goal_pose.tolist()} with "
+            f"{list(problem.goal_joints)}"
         )
 
 

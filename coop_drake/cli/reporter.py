@@ -36,10 +36,13 @@ class Reporter:
         self._machine = machine
         self._console = Console(stderr=machine, quiet=quiet, highlight=False)
         self._errors = Console(stderr=True, highlight=False)
+        # Colours may be forced on a file, bars that are drawn over and over may not.
+        stream = self._console.file
+        self._moving = not quiet and stream.isatty() and not self._console.is_dumb_terminal
 
     @contextmanager
     def stage(self, name: str) -> Iterator[ProgressCallback]:
-        """Show a progress bar while a stage runs; yields the callback that moves it."""
+        """Show a progress bar while a stage runs, on a terminal only; yields the callback that moves it."""
         columns = (
             TextColumn("{task.description:<11}"),
             BarColumn(),
@@ -47,7 +50,7 @@ class Reporter:
             TimeElapsedColumn(),
             TextColumn("[dim]{task.fields[doing]}"),
         )
-        with Progress(*columns, console=self._console, disable=self._console.quiet) as bars:
+        with Progress(*columns, console=self._console, disable=not self._moving) as bars:
             bar = bars.add_task(name, total=1.0, doing="")
             drawn = ("", 0.0)
 

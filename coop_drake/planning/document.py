@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from functools import partial
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -52,12 +52,16 @@ class Entry:
         try:
             text = Path(path).read_text(encoding="utf-8")
             return cls(file, "", json.loads(text, object_pairs_hook=partial(_without_repetitions, file)))
-        except (OSError, UnicodeDecodeError, RecursionError) as error:
-            raise PlanError(f"{file}: cannot be read: {error}") from error
         except json.JSONDecodeError as error:
             raise PlanError(
                 f"{file}: line {error.lineno}: {error.msg}; expected the JSON of {what}"
             ) from error
+        except (
+            OSError,
+            RecursionError,
+            ValueError,
+        ) as error:  # ValueError: no UTF-8, or a number without end
+            raise PlanError(f"{file}: cannot be read: {error}; expected the JSON of {what}") from error
 
     def check_digest(self) -> None:
         """Refuse a document whose entry ``digest`` is not that of its other entries.
@@ -128,15 +132,17 @@ class Entry:
         """A finite number."""
         allowed = "a finite number"
         allowed += ", positive" if positive else f", at least {at_least}" if at_least is not None else ""
-        if (
-            isinstance(self.value, bool)
-            or not isinstance(self.value, int | float)
-            or not isfinite(self.value)
-        ):
+        if isinstance(self.value, bool) or not isinstance(self.value, int | float):
             self.refuse(allowed)
-        if (positive and self.value <= 0.0) or (at_least is not None and self.value < at_least):
+        try:
+            number = float(self.value)
+        except OverflowError:
+            number = inf
+        if not isfinite(number) or (positive and number <= 0.0):
             self.refuse(allowed)
-        return float(self.value)
+        if at_least is not None and number < at_least:
+            self.refuse(allowed)
+        return number
 
     def numbers(self, count: int, *, positive: bool = False) -> FloatArray:
         """A list of exactly so many finite numbers, as an array."""
