@@ -43,7 +43,7 @@ def with_floor(scenario: Scenario) -> Scenario:
 
 def _check_rings_alone(file: str, workspace: Workspace) -> None:
     if not workspace.outer:
-        raise ScenarioError(file, "workspace", None, "the rings outer and holes, or a file")
+        raise ScenarioError(file, "workspace.outer", [], "a ring of three or more corners, or workspace.file")
     usual = Workspace()
     for field in dataclasses.fields(Workspace):
         value = getattr(workspace, field.name)
