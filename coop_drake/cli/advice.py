@@ -32,6 +32,7 @@ from coop_drake.tuning import (
     write_gains,
     write_trials,
 )
+from coop_drake.viz.tuning_figure import write_tuning_figure
 
 __all__ = ["Wishes", "advise"]
 
@@ -78,6 +79,7 @@ def advise(
     objective = Objective(weights, limits, before.outcome.values)
     found = _search(task, bench, before, knobs, objective, wishes, reporter)
     write_trials(found, folder.path / "trials.json")
+    write_tuning_figure(found, folder.path / "tuning.png")
     if found.interrupted:
         return _interrupted(found, wishes, folder.path, reporter)
     return _verified(task, bench, found, wishes, folder.path, reporter)

@@ -83,6 +83,11 @@ class Exhibit:
         return Verdict.NO_FIGURE
 
     @property
+    def differing(self) -> tuple[Statement, ...]:
+        """Statements that our runs do not bear out."""
+        return tuple(statement for statement in self.statements if statement.verdict is Verdict.DIFFERS)
+
+    @property
     def because(self) -> tuple[str, ...]:
         """Errata and assumptions of all its statements, each once, in order."""
         return tuple(dict.fromkeys(key for statement in self.statements for key in statement.because))

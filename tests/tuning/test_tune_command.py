@@ -34,6 +34,7 @@ def test_a_gain_set_comes_out_that_the_scenario_takes(room, tmp_path):
     trials = json.loads((tmp_path / "trials.json").read_text())
     assert len(trials["trials"]) == 3
     assert tuned.gain_sets["tuned"].rate_gain == trials["trials"][trials["best"]]["gains"]["rate_gain"]
+    assert (tmp_path / "tuning.png").stat().st_size > 10_000
     assert "seed 0. Verified" in (tmp_path / "gains.yaml").read_text()
 
 
