@@ -16,6 +16,7 @@ from coop_drake.planning import Plan, table_1
 from coop_drake.reproduction.approximation import two_components
 from coop_drake.reproduction.approximation_figure import approximation_figure
 from coop_drake.reproduction.background import explanation
+from coop_drake.reproduction.errata_figure import write_errata_figure
 from coop_drake.reproduction.exhibits import Exhibit, Statement, Verdict
 from coop_drake.reproduction.interval_figure import interval_figure
 from coop_drake.reproduction.material import Material
@@ -73,10 +74,12 @@ def _write_pictures(material: Material, folder: Path, tell: Progress) -> None:
         save_figure(approximation_figure(system, material.made), folder / "fig03_approximations.png")
         save_figure(interval_figure(runs[0].plan), folder / "table_1.png")
     for number, run in enumerate(runs):
-        tell(run.gains, (0.1 + number) / (len(runs) + 0.2))
+        tell(run.gains, (0.1 + number) / (len(runs) + 0.6))
         pictures = folder / run.gains
         pictures.mkdir(exist_ok=True)
         write_figures(problem.workspace, problem.tree, run.plan, run.log, pictures)
+    tell("errata", 0.8)
+    write_errata_figure(folder)
 
 
 def _write_tables(material: Material, found: Sequence[Exhibit], folder: Path) -> None:

@@ -108,6 +108,7 @@ def report(material, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pages, "save_figure", dot)
         patch.setattr(pages, "write_figures", dots)
+        patch.setattr(pages, "write_errata_figure", lambda directory: dot(None, directory / "errata.png"))
         write_report(material, folder)
     return folder
 
@@ -116,7 +117,7 @@ def test_the_page_stands_alone_and_every_reason_is_explained(material, report):
     page = (report / "index.html").read_text()
     found = exhibits(material)
     assert page.count("<section") == len(found) + 1
-    assert page.count("<img") == sum(len(exhibit.pictures) for exhibit in found)
+    assert page.count("<img") == sum(len(exhibit.pictures) for exhibit in found) + 1
     assert set(re.findall(r'src="(.{20})', page)) == {"data:image/png;base64"[:20]}
     links = set(re.findall(r'href="#([^"]+)"', page))
     assert links == set(re.findall(r'id="([^"]+)"', page))
@@ -130,7 +131,8 @@ def test_the_page_stands_alone_and_every_reason_is_explained(material, report):
 def test_the_markdown_says_the_same_and_its_pictures_are_there(material, report):
     text = (report / "report.md").read_text()
     pictures = re.findall(r"!\[.*?\]\((.*?)\)", text)
-    assert pictures == [picture.file for exhibit in exhibits(material) for picture in exhibit.pictures]
+    found = [picture.file for exhibit in exhibits(material) for picture in exhibit.pictures]
+    assert pictures == [*found, "errata.png"]
     assert all((report / picture).is_file() for picture in pictures)
     assert "-0.367 (0.367)" in (report / "table_1.md").read_text()
 
