@@ -9,6 +9,7 @@ the tips inwards (recursive Newton-Euler); the base's share of the motion is rig
 from math import atan2
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coop_drake.control.gains import FloatArray
 from coop_drake.control.kernels import compiled
@@ -19,6 +20,8 @@ from coop_drake.control.kernels import compiled
 #: damping and inertia that the joint itself adds [N s/m or N m s; kg or kg m^2].
 PARENT, X, Y, TURN, SLIDE_X, SLIDE_Y, POSITION, RATE, MASS, COM_X, COM_Y, INERTIA, DAMPING, ROTOR = range(14)
 COLUMNS = 14
+
+IntArray = NDArray[np.int64]
 
 _COS, _SIN, _X, _Y, _VX, _VY, _W, _AX, _AY, _ALPHA = range(10)
 
@@ -104,9 +107,7 @@ def object_state(
 
 
 @compiled
-def read_robot(
-    chain: FloatArray, yaw: float, joints: FloatArray, state: FloatArray, robot: FloatArray
-) -> None:
+def read_robot(chain: FloatArray, yaw: float, joints: IntArray, state: FloatArray, robot: FloatArray) -> None:
     """Write z_k and z_k' of a robot whose base is the frame of a chain that begins at the object.
 
     Args:
@@ -127,7 +128,7 @@ def read_robot(
     robot[3 + n], robot[4 + n] = state[rate] + moved[last, _VX], state[rate + 1] + moved[last, _VY]
     robot[5 + n] = moved[last, _W]
     for i in range(n):
-        robot[3 + i], robot[6 + n + i] = state[int(joints[0, i])], state[int(joints[1, i])]
+        robot[3 + i], robot[6 + n + i] = state[joints[0, i]], state[joints[1, i]]
 
 
 @compiled

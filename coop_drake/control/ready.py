@@ -17,6 +17,10 @@ from coop_drake.control.governor import energy_margin, tracking_energy
 EROSION = 0.1
 #: Part of the goal region's inradius within which the object must provably stay in the next cell.
 CLEARANCE_FRACTION = 0.5
+#: Largest speed of the object's origin at rest [m/s] ...
+SPEED_TOLERANCE = 0.01
+#: ... and largest rate of any axis [rad/s or m/s].
+RATE_TOLERANCE = 0.02
 
 
 def interval_margin(
@@ -115,8 +119,8 @@ def arrival_margin(
     goal_lower: FloatArray,
     goal_upper: FloatArray,
     position_tolerance: float,
-    speed_tolerance: float = 0.01,
-    rate_tolerance: float = 0.02,
+    speed_tolerance: float = SPEED_TOLERANCE,
+    rate_tolerance: float = RATE_TOLERANCE,
 ) -> float:
     """Return the margin by which, in the last cell, one robot sees the goal reached and the motion ended.
 

@@ -14,7 +14,7 @@ from coop_drake.geometry.pose import FloatArray
 from coop_drake.scenario import Deployment
 from coop_drake.systems import MessageChannel, whole_periods
 
-__all__ = ["DeployedController", "deploy"]
+__all__ = ["DeployedController", "build_radio", "deploy"]
 
 
 #: Nothing gives more than this, whatever the law asks for once it has lost its funnel [N, N m]: a plant
@@ -75,11 +75,31 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int) -> DeployedC
     builder.ExportInput(controller.GetInputPort("current_cell"), "current_cell")
     effort = wrapping.actuate(controller.GetOutputPort("robot_effort"), joints)
     builder.ExportOutput(effort, "robot_effort")
-    seed = int(np.random.SeedSequence([deployment.seed, robot]).generate_state(1)[0])
+    seed = _seed(deployment, robot)
     builder.ExportOutput(wrapping.send(controller.GetOutputPort("ready"), seed), "ready")
     for name in TELEMETRY:
         builder.ExportOutput(controller.GetOutputPort(name), name)
     return DeployedController(builder.Build(), controller, tuple(wrapping.noises), wrapping.delays, seed)
+
+
+def build_radio(deployment: Deployment, robot: int) -> MessageChannel:
+    """The channel of a robot's reports in a team that is sampled."""
+    return _radio(deployment, _seed(deployment, robot))
+
+
+def _radio(deployment: Deployment, seed: int) -> MessageChannel:
+    messages = deployment.messages
+    return MessageChannel(
+        deployment.period or 0.0,
+        delay=messages.delay,
+        loss=messages.loss,
+        repeat=messages.repeat,
+        seed=seed,
+    )
+
+
+def _seed(deployment: Deployment, robot: int) -> int:
+    return int(np.random.SeedSequence([deployment.seed, robot]).generate_state(1)[0])
 
 
 class _Wrapping:
@@ -134,15 +154,7 @@ class _Wrapping:
         """The reports as the cell planner hears them."""
         if self._deployment.period is None:
             return ready
-        messages = self._deployment.messages
-        channel = MessageChannel(
-            self._deployment.period,
-            delay=messages.delay,
-            loss=messages.loss,
-            repeat=messages.repeat,
-            seed=seed,
-        )
-        self._builder.AddNamedSystem("radio", channel)
+        channel = self._builder.AddNamedSystem("radio", _radio(self._deployment, seed))
         self._builder.Connect(ready, channel.get_input_port())
         return channel.get_output_port()
 

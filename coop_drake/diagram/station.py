@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import pi
 
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import Propeller, PropellerInfo
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from coop_drake.plant import SeparateTeam, TeamPlant, build_separate_team, build_team_plant
 from coop_drake.scenario import Scenario
 from coop_drake.systems import FreeRobotSensor, ObjectPoseSensor, RobotStateSensor, TeamActuation
 
-__all__ = ["TransportStation", "build_station"]
+__all__ = ["TransportStation", "build_driven_station", "build_station"]
 
 
 @dataclass(frozen=True)
@@ -50,18 +53,74 @@ def build_station(scenario: Scenario) -> TransportStation:
     pose = builder.AddNamedSystem("object_pose_sensor", ObjectPoseSensor(team))
     builder.Connect(plant.get_state_output_port(), pose.GetInputPort("team_state"))
     builder.ExportOutput(pose.GetOutputPort("object_pose"), "object_pose")
-    actuation = builder.AddNamedSystem("team_actuation", TeamActuation(team))
-    builder.Connect(actuation.GetOutputPort("base_wrenches"), plant.get_applied_spatial_force_input_port())
-    builder.Connect(actuation.GetOutputPort("joint_torques"), plant.get_actuation_input_port())
+    _drive_robots(builder, team)
     for robot in team.robots:
         sensor = builder.AddNamedSystem(f"robot_{robot.index}_sensor", _sensor(team, robot.index))
         builder.Connect(plant.get_state_output_port(), sensor.GetInputPort("team_state"))
         builder.ExportOutput(sensor.GetOutputPort("robot_state"), f"robot_{robot.index}_state")
-        effort = f"robot_{robot.index}_effort"
-        builder.ExportInput(actuation.GetInputPort(effort), effort)
     builder.ExportOutput(plant.get_generalized_acceleration_output_port(), "generalized_acceleration")
     builder.ExportOutput(team.scene_graph.get_query_output_port(), "query_object")
     return TransportStation(builder.Build(), team)
+
+
+def build_driven_station(scenario: Scenario) -> TransportStation:
+    """Build the ideal team's plant without sensors, for one block that drives all robots.
+
+    ======= ============================ ========== ========================================================
+    input   ``base_forces``              3 N        wrench on every base in its own axes
+    input   ``joint_torques``            n          torques of all joints in the order of q, if there are any
+    output  ``team_state``               2 (3 + n)  the plant's positions and velocities, its own order
+    output  ``generalized_acceleration`` 3 + n      the plant's accelerations, for the log alone
+    output  ``query_object``             abstract   geometry, for visualization
+    ======= ============================ ========== ========================================================
+
+    Where efforts are held between samples, the inputs are those of :func:`build_station`.
+
+    Args:
+        scenario: The scenario.
+
+    Raises:
+        ScenarioError: The models do not make a team.
+    """
+    builder = DiagramBuilder()
+    team = build_team_plant(scenario, builder)
+    if scenario.deployment.period is None:
+        _drive_bases(builder, team)
+    else:
+        _drive_robots(builder, team)
+    builder.ExportOutput(team.plant.get_state_output_port(), "team_state")
+    builder.ExportOutput(team.plant.get_generalized_acceleration_output_port(), "generalized_acceleration")
+    builder.ExportOutput(team.scene_graph.get_query_output_port(), "query_object")
+    return TransportStation(builder.Build(), team)
+
+
+def _drive_robots(builder: DiagramBuilder, team: TeamPlant) -> None:
+    actuation, plant = builder.AddNamedSystem("team_actuation", TeamActuation(team)), team.plant
+    builder.Connect(actuation.GetOutputPort("base_wrenches"), plant.get_applied_spatial_force_input_port())
+    builder.Connect(actuation.GetOutputPort("joint_torques"), plant.get_actuation_input_port())
+    for robot in team.robots:
+        effort = f"robot_{robot.index}_effort"
+        builder.ExportInput(actuation.GetInputPort(effort), effort)
+
+
+def _drive_bases(builder: DiagramBuilder, team: TeamPlant) -> None:
+    """Let Drake's own block put wrenches on bases: thrusts along x and y, a moment about z."""
+    plant = team.plant
+    thrusters = [
+        PropellerInfo(robot.base_body.index(), RigidTransform(R_BP), thrust, moment)
+        for robot in team.robots
+        for R_BP, thrust, moment in (
+            (RotationMatrix.MakeYRotation(0.5 * pi), 1.0, 0.0),
+            (RotationMatrix.MakeXRotation(-0.5 * pi), 1.0, 0.0),
+            (RotationMatrix(), 0.0, 1.0),
+        )
+    ]
+    bases = builder.AddNamedSystem("base_thrusters", Propeller(thrusters))
+    builder.Connect(plant.get_body_poses_output_port(), bases.get_body_poses_input_port())
+    builder.Connect(bases.get_spatial_forces_output_port(), plant.get_applied_spatial_force_input_port())
+    builder.ExportInput(bases.get_command_input_port(), "base_forces")
+    if team.joints:
+        builder.ExportInput(plant.get_actuation_input_port(), "joint_torques")
 
 
 def _sensor(team: TeamPlant, robot: int) -> RobotStateSensor | FreeRobotSensor:

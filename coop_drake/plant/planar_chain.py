@@ -23,6 +23,7 @@ from coop_drake.control.planar_chain import (
     SLIDE_X,
     SLIDE_Y,
     TURN,
+    IntArray,
     X,
     Y,
 )
@@ -45,7 +46,7 @@ class BaseChain:
 
     chain: FloatArray
     yaw: float
-    joints: FloatArray
+    joints: IntArray
 
 
 def robot_chain(robot: RobotPlant) -> FloatArray:
@@ -106,7 +107,7 @@ def base_chain(team: TeamPlant, robot: RobotModel) -> BaseChain:
             [joint.position_start() for joint in robot.joints],
             [rates + joint.velocity_start() for joint in robot.joints],
         ],
-        dtype=float,
+        dtype=np.int64,
     ).reshape(2, -1)
     return BaseChain(chain, float(np.arctan2(R[1, 0], R[0, 0])), joints)
 

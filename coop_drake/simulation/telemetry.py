@@ -13,7 +13,7 @@ from coop_drake.control.load_sharing import rotate, total_wrench
 from coop_drake.diagram import TELEMETRY, ClosedLoop
 from coop_drake.geometry.pose import FloatArray
 
-__all__ = ["Sample", "Telemetry"]
+__all__ = ["Sample", "Telemetry", "port_reader"]
 
 
 @dataclass(frozen=True)
@@ -78,16 +78,17 @@ class Telemetry:
         self._plant_context = self._team.plant.GetMyContextFromRoot(root)
         self._grasps = np.array([[robot.X_LE.x, robot.X_LE.y] for robot in self._team.robots])
         self._states = [
-            _reader(loop.station.diagram, f"robot_{robot.index}_state", root) for robot in self._team.robots
+            port_reader(loop.station.diagram, f"robot_{robot.index}_state", root)
+            for robot in self._team.robots
         ]
         self._lower, self._upper = _funnel_places([len(robot.joints) for robot in self._team.robots])
         self._of_robots = {
-            name: [_reader(law, name, root) for law in loop.laws] for name in ("ready", *TELEMETRY)
+            name: [port_reader(law, name, root) for law in loop.laws] for name in ("ready", *TELEMETRY)
         }
-        self._of_robots["robot_effort"] = [_reader(c, "robot_effort", root) for c in loop.controllers]
-        self._current_cell = _reader(loop.cell_planner, "current_cell", root)
-        self._arrived = _reader(loop.cell_planner, "arrived", root)
-        self._accelerations = _reader(loop.station.diagram, "generalized_acceleration", root)
+        self._of_robots["robot_effort"] = [port_reader(c, "robot_effort", root) for c in loop.controllers]
+        self._current_cell = port_reader(loop.cell_planner, "current_cell", root)
+        self._arrived = port_reader(loop.cell_planner, "arrived", root)
+        self._accelerations = port_reader(loop.station.diagram, "generalized_acceleration", root)
 
     def read(self) -> Sample:
         """Read the present instant."""
@@ -141,7 +142,7 @@ def _funnel_places(joints: list[int]) -> tuple[list[int], list[int]]:
     return lower, upper
 
 
-def _reader(system: System, output: str, root: Context) -> Callable[[], Any]:
+def port_reader(system: System, output: str, root: Context) -> Callable[[], Any]:
     """A function that evaluates one output; looking ports and contexts up takes longer than reading them."""
     port, context = system.GetOutputPort(output), system.GetMyContextFromRoot(root)
     return lambda: port.Eval(context)

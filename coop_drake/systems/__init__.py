@@ -13,6 +13,8 @@ from coop_drake.systems.reference_governor import GovernedCell, ReferenceGoverno
 from coop_drake.systems.robot_effort import RobotEffort
 from coop_drake.systems.sensors import ObjectPoseSensor, RobotStateSensor
 from coop_drake.systems.team_actuation import TeamActuation
+from coop_drake.systems.team_controller import TeamController
+from coop_drake.systems.team_kernels import FusedCell, FusedTeam
 from coop_drake.systems.wrench_law import WrenchLaw
 
 __all__ = [
@@ -21,6 +23,8 @@ __all__ = [
     "AxisLaw",
     "CellPlanner",
     "FreeRobotSensor",
+    "FusedCell",
+    "FusedTeam",
     "GovernedCell",
     "JointPpc",
     "MessageChannel",
@@ -32,6 +36,7 @@ __all__ = [
     "RobotEffort",
     "RobotStateSensor",
     "TeamActuation",
+    "TeamController",
     "WrenchLaw",
     "axis_laws",
     "whole_periods",

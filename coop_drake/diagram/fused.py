@@ -1,0 +1,204 @@
+"""The fused mode: one block drives the whole team."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import (
+    Demultiplexer,
+    DiscreteTimeIntegrator,
+    Integrator,
+    Multiplexer,
+    ZeroOrderHold,
+)
+
+from coop_drake.diagram.deployment import build_radio
+from coop_drake.diagram.robot_controller import RobotKnowledge
+from coop_drake.diagram.station import TransportStation
+from coop_drake.errors import ScenarioError
+from coop_drake.fields import VelocityField
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.plant import TeamPlant, base_chain, robot_chain
+from coop_drake.scenario import Deployment, Scenario
+from coop_drake.systems import READY_SIZE, CellPlanner, FusedCell, FusedTeam, TeamController, axis_laws
+
+__all__ = ["FusedControllers", "add_fused_controllers", "build_team_controller"]
+
+
+@dataclass(frozen=True)
+class FusedControllers:
+    """What drives a team in the fused mode.
+
+    Attributes:
+        driver: Computes everything.
+        governor: Keeps p_G.
+        efforts: What drives each robot where efforts are held; empty in continuous time.
+    """
+
+    driver: TeamController
+    governor: Integrator | DiscreteTimeIntegrator
+    efforts: tuple[OutputPort, ...]
+
+
+def add_fused_controllers(
+    builder: DiagramBuilder,
+    scenario: Scenario,
+    station: TransportStation,
+    planner: CellPlanner,
+    knowledge: Sequence[RobotKnowledge],
+) -> FusedControllers:
+    """Add the block that drives a team and the integrator of p_G, and connect them.
+
+    Args:
+        builder: Holds station and planner.
+        scenario: The scenario.
+        station: Built for the fused mode.
+        planner: The supervisor.
+        knowledge: What every robot knows.
+
+    Raises:
+        ScenarioError: The scenario asks for what only named blocks do.
+    """
+    _check(scenario, knowledge)
+    team, robots, period = station.team, len(knowledge), scenario.deployment.period
+    driver = builder.AddNamedSystem("team_controller", build_team_controller(team, knowledge))
+    sizes = [3 * robots, len(team.joints), 2]
+    parts = builder.AddNamedSystem("command_parts", Demultiplexer([size for size in sizes if size]))
+    governor = builder.AddNamedSystem(
+        "governor_state", Integrator(2) if period is None else DiscreteTimeIntegrator(2, period)
+    )
+    builder.Connect(driver.GetOutputPort("team_command"), parts.get_input_port())
+    builder.Connect(parts.get_output_port(parts.num_output_ports() - 1), governor.get_input_port())
+    builder.Connect(governor.get_output_port(), driver.GetInputPort("governor_position"))
+    builder.Connect(station.diagram.GetOutputPort("team_state"), driver.GetInputPort("team_state"))
+    builder.Connect(planner.GetOutputPort("current_cell"), driver.GetInputPort("current_cell"))
+    _report(builder, scenario.deployment, planner, driver, robots)
+    if period is not None:
+        return FusedControllers(driver, governor, _hold(builder, station, parts, period))
+    builder.Connect(parts.get_output_port(0), station.diagram.GetInputPort("base_forces"))
+    if team.joints:
+        builder.Connect(parts.get_output_port(1), station.diagram.GetInputPort("joint_torques"))
+    return FusedControllers(driver, governor, ())
+
+
+def build_team_controller(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> TeamController:
+    """The block that computes what the controllers of all robots compute.
+
+    Args:
+        team: The simulated team, one tree rooted at the object.
+        knowledge: What every robot knows.
+    """
+    known = knowledge[0]
+    laws = axis_laws(known.plan, range(1 + len(team.joints)))
+    cells = []
+    for cell, law in zip(known.cells, laws, strict=True):
+        if not isinstance(cell.field, VelocityField):
+            raise TypeError("fused blocks need the velocity fields of harmonic maps")
+        cells.append(FusedCell(cell.gain_row, cell.clearance.edges, *cell.field.kernel_arguments, law.table))
+    return TeamController(
+        cells,
+        _stacked(team, knowledge),
+        [transition.inradius for transition in known.plan.transitions],
+        known.plan.goal_pose[:2],
+        known.position_tolerance,
+        on_bases=known.period is None,
+    )
+
+
+def _stacked(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> FusedTeam:
+    chains = [robot_chain(known.robot) for known in knowledge]
+    ways = [base_chain(team, robot) for robot in team.robots]
+    counts = [
+        [len(chain) for chain in chains],
+        [len(way.chain) for way in ways],
+        [robot.q_slice.stop - robot.q_slice.start for robot in team.robots],
+    ]
+    return FusedTeam(
+        places=np.array([team.position_index, team.plant.num_positions() + team.velocity_index]),
+        first=np.array([[0, *np.cumsum(row)] for row in counts]),
+        chains=np.vstack(chains),
+        ways=np.vstack([way.chain for way in ways]),
+        yaws=np.array([way.yaw for way in ways]),
+        shares=np.array([_share(known) for known in knowledge]),
+    )
+
+
+def _share(known: RobotKnowledge) -> FloatArray:
+    inertia = known.object_inertia
+    p_LE = known.X_LE.x, known.X_LE.y
+    return np.array([*p_LE, *inertia.p_LLcm, inertia.mass, inertia.inertia_about_com, known.load_share])
+
+
+def _report(
+    builder: DiagramBuilder, deployment: Deployment, planner: CellPlanner, driver: TeamController, robots: int
+) -> None:
+    reports = builder.AddNamedSystem("reports", Demultiplexer([READY_SIZE] * robots))
+    builder.Connect(driver.GetOutputPort("ready"), reports.get_input_port())
+    for k in range(robots):
+        heard = reports.get_output_port(k)
+        if deployment.period is not None:
+            radio = builder.AddNamedSystem(f"radio_{k}", build_radio(deployment, k))
+            builder.Connect(heard, radio.get_input_port())
+            heard = radio.get_output_port()
+        builder.Connect(heard, planner.GetInputPort(f"robot_{k}_ready"))
+
+
+def _hold(
+    builder: DiagramBuilder, station: TransportStation, parts: Demultiplexer, period: float
+) -> tuple[OutputPort, ...]:
+    """Hold all efforts between samples; base wrenches in W, so they go through the station's actuation."""
+    held = []
+    for i in range(parts.num_output_ports() - 1):
+        size = parts.get_output_port(i).size()
+        hold = builder.AddNamedSystem(f"effort_hold_{i}", ZeroOrderHold(period, size))
+        builder.Connect(parts.get_output_port(i), hold.get_input_port())
+        held.append(hold.get_output_port())
+    joints = [len(robot.joints) for robot in station.team.robots]
+    bases = _split(builder, "base_wrenches", held[0], [3] * len(joints))
+    torques = _split(builder, "joint_torques", held[-1], joints) if any(joints) else [None] * len(joints)
+    efforts = []
+    for k, (base, torque) in enumerate(zip(bases, torques, strict=True)):
+        ports = [port for port in (base, torque) if port is not None]
+        effort = builder.AddNamedSystem(f"robot_{k}_effort", Multiplexer([port.size() for port in ports]))
+        for i, port in enumerate(ports):
+            builder.Connect(port, effort.get_input_port(i))
+        builder.Connect(effort.get_output_port(), station.diagram.GetInputPort(f"robot_{k}_effort"))
+        efforts.append(effort.get_output_port())
+    return tuple(efforts)
+
+
+def _split(
+    builder: DiagramBuilder, name: str, whole: OutputPort, sizes: Sequence[int]
+) -> list[OutputPort | None]:
+    """Parts of a port, None for those of no size."""
+    split = builder.AddNamedSystem(name, Demultiplexer([size for size in sizes if size]))
+    builder.Connect(whole, split.get_input_port())
+    ports = iter(range(split.num_output_ports()))
+    return [split.get_output_port(next(ports)) if size else None for size in sizes]
+
+
+def _check(scenario: Scenario, knowledge: Sequence[RobotKnowledge]) -> None:
+    deployment = scenario.deployment
+    allowed = Deployment(
+        control_rate=deployment.control_rate,
+        mass_error=deployment.mass_error,
+        messages=deployment.messages,
+        seed=deployment.seed,
+    )
+    refused: tuple[str, object] | None = None
+    if not scenario.plant.ideal:
+        refused = "plant.grasps", scenario.plant.grasps
+    elif deployment != allowed:
+        refused = "deployment", deployment
+    elif any(robot.robot.has_springs for robot in knowledge):
+        refused = "directives", "a robot with springs"
+    if refused is not None:
+        raise ScenarioError(
+            str(scenario.path),
+            *refused,
+            "for fused blocks an ideal plant without springs, and of a deployment control_rate, mass_error "
+            "and messages alone; named blocks do everything",
+        )

@@ -1,0 +1,80 @@
+"""What every robot is given before a run, from scenario, plan and maps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from coop_drake.control import slowdown_radius
+from coop_drake.diagram.robot_controller import RobotKnowledge
+from coop_drake.errors import PlanError
+from coop_drake.fields import HarmonicMap, VelocityField
+from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.planning.plan import Plan
+from coop_drake.plant import RobotPlant, TeamPlant, build_robot_plant
+from coop_drake.scenario import Scenario
+from coop_drake.systems import GovernedCell
+
+__all__ = ["robot_knowledge"]
+
+FIELD_SPEED = 1.0
+"""Largest magnitude of the velocity fields [m/s]; the governor scales it and bounds it by Delta E."""
+
+
+def robot_knowledge(
+    scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], team: TeamPlant
+) -> list[RobotKnowledge]:
+    """What each robot of a team knows.
+
+    Args:
+        scenario: The scenario.
+        plan: A plan for it.
+        maps: The harmonic map of every transition.
+        team: The simulated team.
+
+    Raises:
+        PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
+    """
+    _check(plan, maps, team)
+    cells = [
+        GovernedCell(
+            BoundaryDistance(cell.tidied), _field(field_map, transition.gains.governor_gain), transition.gains
+        )
+        for cell, transition, field_map in zip(plan.cells, plan.transitions, maps, strict=True)
+    ]
+    factor = 1.0 + scenario.deployment.mass_error
+    return [
+        RobotKnowledge(
+            robot=_robot(scenario, robot.index, factor),
+            X_LE=robot.X_LE,
+            joints=robot.q_slice,
+            object_inertia=team.object_inertia.scaled(factor),
+            load_share=scenario.load_share(robot.name, len(team.robots)),
+            plan=plan,
+            cells=cells,
+            position_tolerance=scenario.goal.tolerances.position,
+            period=scenario.deployment.period,
+        )
+        for robot in team.robots
+    ]
+
+
+def _robot(scenario: Scenario, index: int, factor: float) -> RobotPlant:
+    robot = build_robot_plant(scenario, index)
+    if factor != 1.0:
+        robot.scale_masses(factor)
+    return robot
+
+
+def _field(harmonic_map: HarmonicMap, governor_gain: float) -> VelocityField:
+    radius = slowdown_radius(FIELD_SPEED, governor_gain=governor_gain)
+    return VelocityField(harmonic_map, FIELD_SPEED, slowdown_radius=radius)
+
+
+def _check(plan: Plan, maps: Sequence[HarmonicMap], team: TeamPlant) -> None:
+    if plan.joint_names != team.joint_names:
+        raise PlanError(
+            f"the plan moves the joints {', '.join(plan.joint_names)}; the scenario's team has "
+            f"{', '.join(team.joint_names)}"
+        )
+    if len(maps) != len(plan.cells):
+        raise PlanError(f"a plan of {len(plan.cells)} cells needs as many maps, not {len(maps)}")

@@ -1,0 +1,266 @@
+"""What all robots of a team compute, in one call: the fused mode's law and its ready reports."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coop_drake.control.kernels import compiled, governed_acceleration, hand_command, track_row, write_walls
+from coop_drake.control.planar_chain import chain_effort, read_robot
+from coop_drake.control.ready import CLEARANCE_FRACTION, EROSION, RATE_TOLERANCE, SPEED_TOLERANCE
+from coop_drake.geometry.boundary import signed_distance_compiled
+from coop_drake.geometry.pose import FloatArray
+from coop_drake.systems.governor_kernels import cell_margin, lead
+
+__all__ = ["FusedCell", "FusedTeam", "team_arrival", "team_command", "team_ready", "team_telemetry"]
+
+IntArray = NDArray[np.int64]
+
+
+class FusedCell(NamedTuple):
+    """One cell for the whole team.
+
+    Attributes:
+        gains: (K, zeta, K_G, c).
+        edges: Of the governed set, shape (edges, 4) [m].
+        flat: The cell's map, as ``VelocityField.kernel_arguments`` has it.
+        field: What the velocity field adds to the map.
+        table: Laws of the axes (theta, q...), shape (1 + n, ``LAW_COLUMNS``).
+    """
+
+    gains: FloatArray
+    edges: FloatArray
+    flat: FloatArray
+    field: FloatArray
+    table: FloatArray
+
+
+class FusedTeam(NamedTuple):
+    """The robots side by side; row ``first[k]`` of what is stacked is robot k's first one.
+
+    Attributes:
+        places: Where z, then its rates stand in the plant's state, shape (2, 3 + n).
+        first: First rows in ``chains`` and ``ways``, first joint, shape (3, N + 1).
+        chains: From every robot's base to its hand.
+        ways: From the object to every robot's base.
+        yaws: Angle of every base in the object, joints at zero, shape (N,) [rad].
+        shares: What ``hand_command`` takes of every robot, shape (N, 7).
+    """
+
+    places: IntArray
+    first: IntArray
+    chains: FloatArray
+    ways: FloatArray
+    yaws: FloatArray
+    shares: FloatArray
+
+
+@compiled
+def team_law(
+    gains: FloatArray, table: FloatArray, places: IntArray, first: IntArray, chains: FloatArray,
+    ways: FloatArray, yaws: FloatArray, shares: FloatArray, time: float, state: FloatArray,
+    governor: FloatArray, acceleration: FloatArray, hands: FloatArray, bases: FloatArray, efforts: FloatArray,
+) -> None:  # fmt: skip
+    """Write the law of (14) to (39) for every robot.
+
+    Args:
+        gains: (K, zeta, K_G, c) of the cell.
+        table: Laws of all axes in the cell.
+        places: With the next five a ``FusedTeam``.
+        first: First rows.
+        chains: From bases to hands.
+        ways: From the object to bases.
+        yaws: Of the bases.
+        shares: Of the work.
+        time: Since the cell was entered [s].
+        state: Of the plant.
+        governor: p_G, shape (2,) [m].
+        acceleration: Receives the object's, shape (3,).
+        hands: Receives what ``hand_command`` writes, shape (N, 6).
+        bases: Receives the poses of the bases in W, shape (N, 3).
+        efforts: Receives wrenches on all bases in W, then all joint torques, shape (3 N + n,).
+    """
+    robots, n, thing = yaws.size, table.shape[0] - 1, _object_state(places, state)
+    governed_acceleration(thing, governor, gains[0], gains[1], acceleration[:2])
+    acceleration[2] = track_row(table[0], time, thing[2], thing[5])[0]
+    joints, robot, effort = np.empty(n), np.empty(6 + 2 * n), np.empty(3 + n)
+    for i in range(n):
+        position, rate = state[places[0, 3 + i]], state[places[1, 3 + i]]
+        joints[i] = track_row(table[1 + i], time, position, rate)[0]
+    for k in range(robots):
+        start, stop = first[2, k], first[2, k + 1]
+        way, chain = ways[first[1, k] : first[1, k + 1]], chains[first[0, k] : first[0, k + 1]]
+        read_robot(way, yaws[k], places[:, 3 + start : 3 + stop], state, robot)
+        hand_command(shares[k], thing, acceleration[:2], acceleration[2:], hands[k])
+        chain_effort(chain, robot, hands[k], joints[start:stop], effort)
+        for i in range(3):
+            bases[k, i], efforts[3 * k + i] = robot[i], effort[i]
+        for i in range(stop - start):
+            efforts[3 * robots + start + i] = effort[3 + i]
+
+
+@compiled
+def team_command(
+    gains: FloatArray, edges: FloatArray, flat: FloatArray, field: FloatArray, table: FloatArray,
+    places: IntArray, first: IntArray, chains: FloatArray, ways: FloatArray, yaws: FloatArray,
+    shares: FloatArray, time: float, state: FloatArray, governor: FloatArray, on_bases: bool,
+    command: FloatArray,
+) -> None:  # fmt: skip
+    """Write the wrenches on all bases, all joint torques and p_G'.
+
+    Args:
+        gains: With the next four a ``FusedCell``.
+        edges: Of the governed set.
+        flat: The map.
+        field: The velocity field.
+        table: Laws of all axes.
+        places: With the next five a ``FusedTeam``.
+        first: First rows.
+        chains: From bases to hands.
+        ways: From the object to bases.
+        yaws: Of the bases.
+        shares: Of the work.
+        time: Since the cell was entered [s].
+        state: Of the plant.
+        governor: p_G, shape (2,) [m].
+        on_bases: Whether wrenches are told in the axes of the bases, not in those of W.
+        command: Receives them, shape (3 N + n + 2,).
+    """
+    robots, last = yaws.size, command.size - 2
+    acceleration, hands, bases = np.empty(3), np.empty((robots, 6)), np.empty((robots, 3))
+    team_law(
+        gains, table, places, first, chains, ways, yaws, shares, time, state, governor,
+        acceleration, hands, bases, command[:last],
+    )  # fmt: skip
+    if on_bases:
+        for k in range(robots):
+            c, s, fx, fy = np.cos(bases[k, 2]), np.sin(bases[k, 2]), command[3 * k], command[3 * k + 1]
+            command[3 * k], command[3 * k + 1] = c * fx + s * fy, c * fy - s * fx
+    lead(gains, edges, flat, field, _object_state(places, state), governor, command[last:])
+
+
+@compiled
+def team_telemetry(
+    gains: FloatArray, edges: FloatArray, table: FloatArray,
+    places: IntArray, first: IntArray, chains: FloatArray, ways: FloatArray, yaws: FloatArray,
+    shares: FloatArray, time: float, state: FloatArray, governor: FloatArray, walls: FloatArray,
+    acceleration: FloatArray, hands: FloatArray, bases: FloatArray, efforts: FloatArray,
+) -> float:  # fmt: skip
+    """Write what the robots' blocks would tell the log, and return Delta E; arguments as in ``team_law``.
+
+    Args:
+        gains: (K, zeta, K_G, c) of the cell.
+        edges: Of the governed set.
+        table: Laws of all axes in the cell.
+        places: Where z and its rates stand in the plant's state.
+        first: First rows.
+        chains: From bases to hands.
+        ways: From the object to bases.
+        yaws: Of the bases.
+        shares: Of the work.
+        time: Since the cell was entered [s].
+        state: Of the plant.
+        governor: p_G, shape (2,) [m].
+        walls: Receives lower, then upper walls of all funnels, shape (2 (1 + n),).
+        acceleration: Receives the object's, shape (3,).
+        hands: Receives commands of the hands, shape (N, 6).
+        bases: Receives poses of the bases, shape (N, 3).
+        efforts: Receives all efforts, shape (3 N + n,).
+    """
+    team_law(
+        gains, table, places, first, chains, ways, yaws, shares, time, state, governor,
+        acceleration, hands, bases, efforts,
+    )  # fmt: skip
+    write_walls(table, time, walls)
+    return cell_margin(edges, gains[0], _object_state(places, state), governor)
+
+
+@compiled
+def team_ready(
+    table: FloatArray, next_table: FloatArray, next_edges: FloatArray, next_gains: FloatArray,
+    inradius: float, places: IntArray, first: IntArray, state: FloatArray, governor: FloatArray,
+    margins: FloatArray,
+) -> None:  # fmt: skip
+    """Write every robot's margin of ``ready_margin``, shape (N,).
+
+    Args:
+        table: Laws of all axes in the current cell.
+        next_table: The same in the next one.
+        next_edges: Of the next cell.
+        next_gains: Of the next cell.
+        inradius: R of the present transition [m].
+        places: Where z and its rates stand in the plant's state.
+        first: First rows of a ``FusedTeam``.
+        state: Of the plant.
+        governor: p_G, shape (2,) [m].
+        margins: Receives them.
+    """
+    stiffness = next_gains[0]
+    x, y = state[places[0, 0]] - governor[0], state[places[0, 1]] - governor[1]
+    vx, vy = state[places[1, 0]], state[places[1, 1]]
+    energy = 0.5 * (vx**2 + vy**2 + stiffness * (x * x + y * y))
+    clearance = signed_distance_compiled(next_edges, governor[0], governor[1])
+    margin = 0.5 * stiffness * clearance * abs(clearance) - energy
+    floor = 0.5 * stiffness * CLEARANCE_FRACTION * inradius * abs(CLEARANCE_FRACTION * inradius)
+    common = min((margin - floor) / max(abs(margin), floor), _axis_ready(table, next_table, 0, places, state))
+    for k in range(margins.size):
+        margins[k] = common
+        for i in range(1 + first[2, k], 1 + first[2, k + 1]):
+            margins[k] = min(margins[k], _axis_ready(table, next_table, i, places, state))
+
+
+@compiled
+def team_arrival(
+    table: FloatArray, goal: FloatArray, tolerance: float, places: IntArray, first: IntArray,
+    state: FloatArray, margins: FloatArray,
+) -> None:  # fmt: skip
+    """Write every robot's margin of ``arrival_margin``, shape (N,).
+
+    Args:
+        table: Laws of all axes in the last cell.
+        goal: Where the object shall end, shape (2,) [m].
+        tolerance: How close to it counts as arrived [m].
+        places: Where z and its rates stand in the plant's state.
+        first: First rows of a ``FusedTeam``.
+        state: Of the plant.
+        margins: Receives them.
+    """
+    distance = np.hypot(state[places[0, 0]] - goal[0], state[places[0, 1]] - goal[1])
+    speed = np.hypot(state[places[1, 0]], state[places[1, 1]])
+    common = min(1.0 - distance / ((1.0 - EROSION) * tolerance), 1.0 - speed / SPEED_TOLERANCE)
+    common = min(common, _axis_rests(table, 0, places, state))
+    for k in range(margins.size):
+        margins[k] = common
+        for i in range(1 + first[2, k], 1 + first[2, k + 1]):
+            margins[k] = min(margins[k], _axis_rests(table, i, places, state))
+
+
+@compiled
+def _object_state(places: IntArray, state: FloatArray) -> FloatArray:
+    thing = np.empty(6)
+    for i in range(3):
+        thing[i], thing[3 + i] = state[places[0, i]], state[places[1, i]]
+    return thing
+
+
+@compiled
+def _axis_inside(row: FloatArray, position: float) -> float:
+    half = 0.5 * (row[3] - row[2]) * (1.0 - 2.0 * EROSION)
+    return 1.0 - abs(position - 0.5 * (row[2] + row[3])) / half
+
+
+@compiled
+def _axis_ready(
+    table: FloatArray, next_table: FloatArray, axis: int, places: IntArray, state: FloatArray
+) -> float:
+    position, rate = state[places[0, 2 + axis]], state[places[1, 2 + axis]]
+    energy, bound = track_row(next_table[axis], 0.0, position, rate)[1], next_table[axis, 9]
+    return min(_axis_inside(table[axis], position), (bound - energy) / max(energy, bound))
+
+
+@compiled
+def _axis_rests(table: FloatArray, axis: int, places: IntArray, state: FloatArray) -> float:
+    inside = _axis_inside(table[axis], state[places[0, 2 + axis]])
+    return min(inside, 1.0 - abs(state[places[1, 2 + axis]]) / RATE_TOLERANCE)
