@@ -79,6 +79,24 @@ CASES = {
         1.0,
         "less than 1",
     ),
+    "long steps of the plant": (
+        ("gains:", "plant: {grasps: constraints, time_step: 0.02}\ngains:"),
+        "plant.time_step",
+        0.02,
+        "at most 0.01 s",
+    ),
+    "no time between the plant's steps": (
+        ("gains:", "plant: {time_step: 0}\ngains:"),
+        "plant.time_step",
+        0.0,
+        "a positive number",
+    ),
+    "unknown kind of grasps": (
+        ("gains:", "plant: {grasps: glue}\ngains:"),
+        "plant.grasps",
+        "glue",
+        "one of joints, constraints",
+    ),
     "fraction of slices": (
         ("gains:", "planner: {max_slices: 1.5}\ngains:"),
         "planner.max_slices",

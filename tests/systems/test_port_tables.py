@@ -1,0 +1,80 @@
+"""Every block's docstring lists its ports and its state, and what it lists is so."""
+
+import inspect
+import re
+from dataclasses import replace
+
+import pytest
+from pydrake.systems.framework import Diagram, LeafSystem
+
+from coop_drake import systems
+from coop_drake.diagram import build_closed_loop
+from coop_drake.scenario import Deployment, PlantSettings
+from tests.support.small_loop import small_maps, small_problem
+from tests.support.system_checks import SIZE_OF_ABSTRACT, port_sizes, state_of
+
+ROW = re.compile(r"^ *(input|output) +``(\S+)`` +(\S(?:.*?\S)?)(?:  |$)", re.MULTILINE)
+BLOCKS = sorted(
+    name for name, thing in vars(systems).items() if inspect.isclass(thing) and issubclass(thing, LeafSystem)
+)
+
+
+def leaves(system):
+    if isinstance(system, Diagram):
+        return [leaf for part in system.GetSystems() for leaf in leaves(part)]
+    return [system]
+
+
+@pytest.fixture(scope="module")
+def blocks():
+    """One of each block, from a loop that is sampled and from one whose robots are separate."""
+    scenario, plan = small_problem("base")
+    found = {}
+    for changes in (
+        {"deployment": Deployment(control_rate=100.0)},
+        {"plant": PlantSettings(grasps="constraints")},
+    ):
+        loop = build_closed_loop(replace(scenario, **changes), plan, small_maps())
+        for leaf in leaves(loop.diagram):
+            found.setdefault(type(leaf).__name__, (leaf, loop))
+    return found
+
+
+def table(block):
+    """Name and size of every port that the docstring lists, inputs and outputs apart."""
+    listed = {"input": {}, "output": {}}
+    for kind, name, size in ROW.findall(type(block).__doc__):
+        for k in range(2) if "<k>" in name else (0,):
+            listed[kind][name.replace("<k>", str(k))] = size
+    return listed["input"], listed["output"]
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_the_table_lists_all_ports_and_no_others(blocks, name):
+    block, _ = blocks[name]
+    for listed, actual in zip(table(block), port_sizes(block), strict=True):
+        assert list(listed) == list(actual)
+        for port, size in listed.items():
+            if size.isdigit() or size == SIZE_OF_ABSTRACT:
+                assert str(actual[port]) == size, port
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_a_block_without_state_has_none_and_any_other_says_which(blocks, name):
+    block, _ = blocks[name]
+    continuous, discrete = state_of(block.CreateDefaultContext())
+    stateless = not continuous and not discrete
+    assert stateless == bool(re.search(r"^ *No state", type(block).__doc__, re.MULTILINE))
+    if not stateless:
+        assert re.search(r"^ *State: ", type(block).__doc__, re.MULTILINE)
+
+
+def test_only_the_cell_planner_and_the_radio_remember_anything(blocks):
+    remembering = {name for name in BLOCKS if any(map(len, state_of(blocks[name][0].CreateDefaultContext())))}
+    assert remembering == {"CellPlanner", "MessageChannel"}
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_a_block_is_small(name):
+    lines, _ = inspect.getsourcelines(getattr(systems, name))
+    assert len(lines) <= 110
