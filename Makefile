@@ -5,11 +5,11 @@ PYTHON ?= $(shell for python in python3 python3.11 python3.12 python3.13; do \
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-CODE := coop_drake tests benchmarks notebooks
+CODE := coop_drake tests benchmarks notebooks docs
 # The kernels are small; threads of BLAS would only get into each other's way.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test lint bench notebooks clean
+.PHONY: demo test lint bench notebooks docs clean
 
 demo: $(READY)  ## plan, simulate and record the paper's transport
 	$(BIN)/coop-drake run models/base.scenario.yaml
@@ -17,14 +17,18 @@ demo: $(READY)  ## plan, simulate and record the paper's transport
 test: $(READY)  ## run every test
 	$(BIN)/python -m pytest -n 2
 
-lint: $(READY)  ## formatting, lint, types, direction of imports
+lint: $(READY)  ## formatting, lint, types, direction of imports, documentation
 	$(BIN)/ruff format --check $(CODE)
 	$(BIN)/ruff check $(CODE)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/python -m docs.generate out/docs
 
 bench: $(READY)  ## measure speed and accuracy as ratios, into out/bench.json
 	$(BIN)/python -m benchmarks
+
+docs: $(READY)  ## build the documentation into out/docs, warnings being errors
+	$(BIN)/python -m docs.generate out/docs
 
 notebooks: $(READY)  ## execute every notebook into out/notebooks
 	$(BIN)/python -m notebooks out/notebooks

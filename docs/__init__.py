@@ -1,0 +1,1 @@
+"""The documentation: pages by hand here, and what builds them in `generate`."""

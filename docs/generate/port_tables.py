@@ -1,0 +1,48 @@
+"""An extension of griffe: tables of ports, ruled with equal signs in docstrings, become markdown."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from griffe import Extension, Object
+
+__all__ = ["PortTables", "as_markdown"]
+
+_RULER = re.compile(r"^\s*=+( +=+)+\s*$")
+_HEADS = ("", "port", "size", "meaning", "frame")
+
+
+class PortTables(Extension):
+    """Rewrites the docstrings that griffe reads."""
+
+    def on_instance(self, *, obj: Object, **kwargs: Any) -> None:
+        """Rewrite the docstring of whatever has one."""
+        if obj.docstring is not None:
+            obj.docstring.value = as_markdown(obj.docstring.value)
+
+
+def as_markdown(docstring: str) -> str:
+    """The docstring with every ruled table as markdown."""
+    lines, rulers = docstring.splitlines(), []
+    for number, line in enumerate(lines):
+        if _RULER.match(line):
+            rulers.append(number)
+    for first, last in reversed(list(zip(rulers[::2], rulers[1::2], strict=True))):
+        lines[first : last + 1] = _table(lines[first], lines[first + 1 : last])
+    return "\n".join(lines)
+
+
+def _table(ruler: str, rows: list[str]) -> list[str]:
+    """Rows by the columns of a ruler; a row whose first column is empty goes on with the one before."""
+    spans = [match.span() for match in re.finditer("=+", ruler)]
+    ends = [start for start, _ in spans[1:]] + [None]
+    cells: list[list[str]] = []
+    for row in rows:
+        parts = [row[start:end].strip() for (start, _), end in zip(spans, ends, strict=True)]
+        if parts[0] or not cells:
+            cells.append(parts)
+        else:
+            cells[-1] = [f"{above} {part}".strip() for above, part in zip(cells[-1], parts, strict=True)]
+    table = [_HEADS[: len(spans)], ("---",) * len(spans), *cells]
+    return ["", *("| " + " | ".join(row) + " |" for row in table), ""]

@@ -1,0 +1,114 @@
+"""The documentation: what it shows works, and what it lists is all there is."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from pydrake.systems.framework import DiagramBuilder
+
+from coop_drake.plant import build_team_plant, planning_problem
+from coop_drake.scenario import load_scenario
+from coop_drake.scenario.model import Scenario
+from coop_drake.scenario.packages import SHIPPED
+from coop_drake.scenario.schema import in_file
+from coop_drake.systems import OrientationPpc
+from docs.generate.api_pages import api_pages
+from docs.generate.port_tables import as_markdown
+from docs.generate.scenario_keys import sections
+
+ROOT = Path(__file__).parents[1]
+
+
+def shown(page, language):
+    """The first block of code of a language on a page."""
+    text = (ROOT / "docs" / "how_to" / page).read_text(encoding="utf-8")
+    return re.search(rf"```{language}\n(.*?)```", text, re.DOTALL)[1]
+
+
+@pytest.fixture(scope="module")
+def listed():
+    return {section.path: section for section in sections(load_scenario(SHIPPED / "base.scenario.yaml"))}
+
+
+def test_every_key_of_a_scenario_is_listed_with_its_meaning(listed):
+    assert [key.name for key in listed[""].keys] == [field.name for field in in_file(Scenario)]
+    assert {"start.object", "goal.tolerances", "deployment.messages"} <= set(listed)
+    for section in listed.values():
+        assert section.about
+        for key in section.keys:
+            assert key.meaning
+            assert key.kind
+
+
+def test_limits_are_those_that_the_checks_ask_for(listed):
+    def allowed(section, name):
+        return next(key.allowed for key in listed[section].keys if key.name == name)
+
+    assert allowed("maps", "tolerance") == "a positive number; less than 0.01"
+    assert allowed("planner", "margin") == "zero or a positive number"
+    assert allowed("deployment", "mass_error") == "a number between -0.9 and 10"
+    assert allowed("gains.sets.NAME: !FixedGains", "energy_factor") == "finite and positive; 1 or more"
+    assert allowed("gains", "selected") == "a gain set"
+
+
+def test_units_stand_apart(listed):
+    units = {key.name: key.unit for key in listed["deployment.actuators"].keys}
+    assert units == {"base_force": "N", "base_torque": "N m", "joint_effort": "N m or N"}
+
+
+def test_the_scenario_that_is_shown_can_be_carried_out(tmp_path):
+    path = tmp_path / "corridor.scenario.yaml"
+    path.write_text(shown("own_scenario.md", "yaml"), encoding="utf-8")
+    scenario = load_scenario(path)
+    problem = planning_problem(scenario, build_team_plant(scenario, DiagramBuilder()))
+    assert problem.workspace.area == pytest.approx(16.0 - 0.2 * 0.05)
+
+
+def test_the_robot_that_is_shown_makes_a_team(tmp_path):
+    (tmp_path / "short_arm.sdf").write_text(shown("own_robot.md", "xml"), encoding="utf-8")
+    path = tmp_path / "corridor.scenario.yaml"
+    ours = re.sub(
+        r"package://coop_drake_models/long_\w+.sdf", "short_arm.sdf", shown("own_scenario.md", "yaml")
+    )
+    path.write_text(ours, encoding="utf-8")
+    team = build_team_plant(load_scenario(path), DiagramBuilder())
+    assert len(team.joint_names) == 2
+
+
+def test_the_block_that_is_shown_stands_in_for_the_funnel():
+    names = {}
+    exec(shown("controller_block.md", "python"), names)  # the page's own code
+    block = names["SpringAngle"](0.5, stiffness=4.0, damping=2.0)
+    outputs = {block.get_output_port(i).get_name() for i in range(block.num_output_ports())}
+    assert outputs == set(re.findall(r"output  ``(\w+)``", OrientationPpc.__doc__))
+    context = block.CreateDefaultContext()
+    block.GetInputPort("object_state").FixValue(context, [0, 0, 0.7, 0, 0, 0.1])
+    assert block.GetOutputPort("angle_acceleration").Eval(context) == pytest.approx([-4 * 0.2 - 2 * 0.1])
+
+
+def test_tables_of_ports_become_tables_of_markdown():
+    table = """What it does.
+
+    ======= ===== ==== ========
+    input   ``a`` 2    the one
+                       and only
+    output  ``b`` 1    the other
+    ======= ===== ==== ========
+    """
+    rows = [line for line in as_markdown(re.sub("^    ", "", table, flags=re.MULTILINE)).splitlines() if line]
+    assert rows[1:] == [
+        "|  | port | size | meaning |",
+        "| --- | --- | --- | --- |",
+        "| input | ``a`` | 2 | the one and only |",
+        "| output | ``b`` | 1 | the other |",
+    ]
+
+
+def test_every_room_has_a_page():
+    pages = {page.title: page.text for page in api_pages(ROOT)}
+    rooms = {path.parent.name for path in (ROOT / "coop_drake").glob("*/__init__.py")}
+    assert set(pages) == rooms | {"coop_drake"}
+    assert "::: coop_drake.fields.harmonic_map\n" in pages["fields"]
+    assert "kernels" not in "".join(pages.values())
