@@ -5,17 +5,24 @@ from __future__ import annotations
 import numpy as np
 from pydrake.geometry import Meshcat
 from shapely import union_all
+from shapely.geometry.base import BaseGeometry
 
+from coop_drake.drawing.colours import INK
 from coop_drake.drawing.footprints import team_footprints
+from coop_drake.drawing.solids import flat_mesh, parts_of
+from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning.plan import Plan
 from coop_drake.plant import read_component_tree
 from coop_drake.scenario import Scenario
 from coop_drake.viz.arrows import force_of_a_metre, set_arrows
-from coop_drake.viz.cells import set_cells, set_goal
+from coop_drake.viz.cells import rgba, set_cells, set_goal
 from coop_drake.viz.stage import place_camera, set_stage
 from coop_drake.viz.team_view import TeamView
 
 __all__ = ["TransportScene"]
+
+
+_SHADOW_HEIGHT = 0.023  # Above cells, below the trail [m].
 
 
 class TransportScene:
@@ -40,10 +47,16 @@ class TransportScene:
         self.team = TeamView(scenario, meshcat)
         self.of_a_metre = force_of_a_metre(self.team.team)
         set_arrows(meshcat, self.team.colours)
-        at_goal = np.concatenate([plan.goal_pose, plan.start[3:]])
-        footprints = team_footprints(read_component_tree(self.team.team), at_goal)
-        set_goal(meshcat, union_all([one.shape for one in footprints if one.robot is None]))
+        set_goal(meshcat, self._footprint(plan.goal_pose))
+        shadow = flat_mesh(parts_of(self._footprint(np.zeros(3))), _SHADOW_HEIGHT)
+        self.team.fix_to_object("shadow", shadow, rgba(INK, 0.3))
         self.team.show(plan.start)
+
+    def _footprint(self, pose: FloatArray) -> BaseGeometry:
+        """What the object covers of the floor at a pose (x, y, theta)."""
+        z = np.concatenate([pose, np.zeros(len(self.team.team.joint_names))])
+        footprints = team_footprints(read_component_tree(self.team.team), z)
+        return union_all([footprint.shape for footprint in footprints if footprint.robot is None])
 
     def place_camera(self) -> None:
         """Look at the whole floor."""

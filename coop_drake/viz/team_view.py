@@ -17,10 +17,12 @@ from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.drawing.colours import robot_colour
+from coop_drake.drawing.solids import TriangleMesh
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant import TeamPlant, build_team_plant, set_configuration
 from coop_drake.scenario import Scenario
 from coop_drake.viz.cells import rgba
+from coop_drake.viz.stage import set_mesh
 
 __all__ = ["TeamView"]
 
@@ -41,6 +43,7 @@ class TeamView:
     """
 
     def __init__(self, scenario: Scenario, meshcat: Meshcat) -> None:
+        self._meshcat = meshcat
         builder = DiagramBuilder()
         self.team: TeamPlant = build_team_plant(scenario, builder)
         roles = [Role.kIllustration] + ([Role.kProximity] if scenario.visualization.show_collision else [])
@@ -52,9 +55,9 @@ class TeamView:
         self._context = self._diagram.CreateDefaultContext()
         self._plant_context = self.team.plant.GetMyMutableContextFromRoot(self._context)
         self.colours = [self._colour(robot.base_body, k) for k, robot in enumerate(self.team.robots)]
-        self.show(np.concatenate([[0.0] * 3, np.zeros(len(self.team.joint_names))]))
-        self._bodies = self._shown_bodies(meshcat)
-        self._set_grasps(meshcat)
+        self.show(np.zeros(3 + len(self.team.joint_names)))
+        self._bodies = self._shown_bodies()
+        self._set_grasps()
 
     def show(self, z: FloatArray) -> None:
         """Put the team where z = (x, y, theta, q...) says, shape (3 + n,) [m, rad]."""
@@ -77,20 +80,38 @@ class TeamView:
         frames = [robot.gripper_frame for robot in self.team.robots]
         return np.array([frame.CalcPoseInWorld(self._plant_context).translation() for frame in frames])
 
-    def _shown_bodies(self, meshcat: Meshcat) -> list[tuple[RigidBody, list[str]]]:
-        plant = self.team.plant
+    def fix_to_object(self, name: str, mesh: TriangleMesh, colour: Rgba) -> None:
+        """Let a mesh go with the object.
+
+        Args:
+            name: Its name.
+            mesh: Given in W as it lies while L is at W.
+            colour: Of the mesh.
+        """
+        set_configuration(self.team, self._plant_context, np.zeros(3 + len(self.team.joint_names)))
+        X_WB = self.team.object_body.EvalPoseInWorld(self._plant_context)
+        path = f"{self._object_path}/{name}"
+        set_mesh(self._meshcat, path, mesh, colour)
+        self._meshcat.SetTransform(path, X_WB.inverse())
+
+    @property
+    def _object_path(self) -> str:
+        return f"{self._prefixes[0]}/{_path_of(self.team.object_body.scoped_name().get_full())}"
+
+    def _shown_bodies(self) -> list[tuple[RigidBody, list[str]]]:
+        plant, has = self.team.plant, self._meshcat.HasPath
         shown = []
         for body in (plant.get_body(BodyIndex(index)) for index in range(plant.num_bodies())):
             name = _path_of(body.scoped_name().get_full())
-            paths = [f"{prefix}/{name}" for prefix in self._prefixes if meshcat.HasPath(f"{prefix}/{name}")]
+            paths = [f"{prefix}/{name}" for prefix in self._prefixes if has(f"{prefix}/{name}")]
             if paths:
                 shown.append((body, paths))
         return shown
 
-    def _set_grasps(self, meshcat: Meshcat) -> None:
+    def _set_grasps(self) -> None:
         """Mark the grasps on the object's body, with which they move."""
-        body, inside = self.team.object_body, self._plant_context
-        path = f"{self._prefixes[0]}/{_path_of(body.scoped_name().get_full())}"
+        meshcat, body, inside = self._meshcat, self.team.object_body, self._plant_context
+        path = self._object_path
         inspector = self.team.scene_graph.model_inspector()
         for geometry in self._geometries(body):
             own = f"{path}/{_path_of(inspector.GetName(geometry))}"

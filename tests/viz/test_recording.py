@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydrake.geometry import Rgba
 
 from coop_drake.errors import CoopDrakeError
 from coop_drake.scenario import load_scenario
 from coop_drake.viz import inline_frame, recording_html, write_recording
-from coop_drake.viz.overlay import with_overlay
+from coop_drake.viz.overlay import story_of, with_overlay
 from tests.support.cases import case
 from tests.support.recorded import paths, played, track
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
@@ -68,7 +69,12 @@ def test_a_minute_of_motion_that_no_straight_line_follows_stays_under_6_mb():
 def test_floor_walls_team_grasps_plan_trail_and_forces_are_in_the_scene(text):
     shown = paths(text)
     assert shown >= {"/stage/floor", "/stage/walls", "/stage/pillars/00", "/motion/trail"}
-    assert shown >= {f"{OBJECT}/grasps/robot_0", f"{OBJECT}/grasps/robot_1", f"{OBJECT}/object/visual"}
+    assert shown >= {
+        f"{OBJECT}/grasps/robot_0",
+        f"{OBJECT}/grasps/robot_1",
+        f"{OBJECT}/object/visual",
+        f"{OBJECT}/shadow",
+    }
     assert shown >= {f"/team/illustration/robot_1/base/robot_1/wheel_{k}" for k in range(3)}
     assert shown >= {"/forces/robot_0/shaft", "/forces/robot_1/head", "/plan/goal_pose/area"}
     for index in range(5):
@@ -95,6 +101,26 @@ def test_the_cells_take_turns_as_they_were_logged(text):
             seen = times[visible]
             assert seen.min() == pytest.approx(switches[index - 1], abs=0.05)
             assert times[times > seen.min()][0] == pytest.approx(switches[index], abs=0.05)
+
+
+def test_collision_geometry_moves_with_the_bodies_where_it_is_asked_for():
+    problem, scenario = case("base"), load_scenario(MODELS / "base.scenario.yaml")
+    look = dataclasses.replace(scenario.visualization, show_collision=True)
+    scenario = dataclasses.replace(scenario, visualization=look)
+    page = recording_html(scenario, synthetic_plan(problem), synthetic_log(problem, samples=40))
+    seen, solid = (
+        track(page, f"/team/{role}/object/body", "position") for role in ("illustration", "proximity")
+    )
+    np.testing.assert_array_equal(seen[1], solid[1])
+
+
+def test_the_page_says_how_it_ended():
+    problem, scenario = case("base"), load_scenario(MODELS / "base.scenario.yaml")
+    plan, log = synthetic_plan(problem), synthetic_log(problem)
+    told = {"duration": 12.0, "colours": [Rgba(0, 0, 1), Rgba(1, 0, 0)], "of_a_metre": 5.0}
+    lost = dataclasses.replace(log, violation="too near at t = 12 s", reached=False)
+    assert story_of(scenario, plan, log, **told)["verdict"] == "arrived after 12.0 s"
+    assert story_of(scenario, plan, lost, **told)["verdict"] == "too near at t = 12 s"
 
 
 def test_an_arrow_is_as_long_as_the_force_is_strong(text):
