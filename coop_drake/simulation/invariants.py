@@ -16,9 +16,10 @@ __all__ = ["ACCELERATION_TOLERANCE", "GRASP_TOLERANCE", "WRENCH_TOLERANCE", "Inv
 
 #: Largest difference between realised and commanded acceleration of the object [m/s^2, rad/s^2].
 ACCELERATION_TOLERANCE = 1e-9
-#: Largest distance between a hand and its grasp where grasps are constraints [m]; clearances are those of
-#: bodies whose hands are in place.
-GRASP_TOLERANCE = 1e-5
+#: Largest distance between a hand and its grasp where grasps are constraints [m]: clearances are those of
+#: bodies whose hands are in place, and would be wrong by more. At steps of a millisecond constraints give by
+#: some 1e-8 m for each newton.
+GRASP_TOLERANCE = 1e-4
 #: Largest difference between a grasp's measured and commanded wrench [N, N m].
 WRENCH_TOLERANCE = 1e-8
 
