@@ -24,6 +24,7 @@ from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.reproduce import reproduce_command
 from coop_drake.cli.tune import tune_command
+from coop_drake.cli.robot import ROBOT_EXAMPLES, robot_command
 from coop_drake.cli.verify import verify_command
 from coop_drake.cli.watch import watch_command
 from coop_drake.cli.why import why_command
@@ -181,5 +182,6 @@ app.command("maps")(maps_command)
 app.command("diagram")(diagram_command)
 app.command("compare")(compare_command)
 app.command("floor-plan", epilog=FLOOR_PLAN_EXAMPLES)(floor_plan_command)
+app.command("robot", epilog=ROBOT_EXAMPLES)(robot_command)
 app.command("reproduce")(reproduce_command)
 app.command("tune")(tune_command)

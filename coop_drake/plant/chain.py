@@ -85,10 +85,20 @@ def _check_kind(scenario: Scenario, robot: RobotAssembly, plant: MultibodyPlant,
     if kind == "weld":
         return
     if kind not in MOVABLE:
-        raise refusal(scenario, robot, name, f"fixed, revolute or prismatic joints, not {kind}")
+        raise refusal(
+            scenario,
+            robot,
+            name,
+            f"fixed, revolute or prismatic joints, not {kind}; or 0 for it under fixed_joints.{robot.name}",
+        )
     lower, upper = limits_of(joint)
     if not (isfinite(lower) and isfinite(upper)):
-        raise refusal(scenario, robot, name, "prismatic joints with two finite limits")
+        raise refusal(
+            scenario,
+            robot,
+            name,
+            f"prismatic joints with two finite limits; or a value for it under fixed_joints.{robot.name}",
+        )
     if lower >= upper:
         raise refusal(scenario, robot, name, f"a lower limit below the upper one, not {lower} and {upper}")
 

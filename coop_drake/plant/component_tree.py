@@ -16,6 +16,7 @@ from coop_drake.plant.chain import limits_of, scoped
 from coop_drake.plant.flatness import axis_in_world
 from coop_drake.plant.footprint import DIGITS, project
 from coop_drake.plant.parsing import bodies_of, joints_of, refusal
+from coop_drake.plant.shadows import without_covered
 from coop_drake.plant.team import TeamPlant
 
 _LARGEST = 1e4
@@ -58,6 +59,7 @@ class _TreeReader:
         self.inspector: SceneGraphInspector = team.scene_graph.model_inspector()
         self.context: Context = self.plant.CreateDefaultContext()
         self.plant.SetPositions(self.context, np.zeros(self.plant.num_positions()))
+        self.may_overlap = self._may_overlap()
         self.welds = [j for j in joints_of(self.plant) if j.type_name() == "weld"]
         self.robot_of = {
             int(body.index()): robot.index
@@ -80,7 +82,7 @@ class _TreeReader:
                     tree_joint = self._tree_joint(link, index, X_WP)
                     components.append(self._component(link.bodies, at, tree_joint, link.X_WC))
         self._check_solid(components)
-        return ComponentTree(tuple(components), self._may_overlap())
+        return ComponentTree(tuple(components), self.may_overlap)
 
     def _check_solid(self, components: list[Component]) -> None:
         """A team whose models nobody can run into is a slip: geometry under visual names alone, or none."""
@@ -145,7 +147,7 @@ class _TreeReader:
             Body(scoped(self.plant, body), self.robot_of.get(int(body.index())), self._shapes(body, X_CW))
             for body in bodies
         )
-        solid = tuple(body for body in footprints if body.shapes)
+        solid = tuple(body for body in without_covered(footprints, self.may_overlap) if body.shapes)
         return Component(footprints[0].name, parent, joint, solid)
 
     def _shapes(self, body: RigidBody, X_CW: RigidTransform) -> tuple[ConvexShape, ...]:

@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context
 from coop_drake.geometry.pose import FloatArray, PlanarPose
 from coop_drake.plant.chain import scoped
 from coop_drake.plant.parsing import bodies_of, joints_of, refusal
-from coop_drake.scenario import Assembly, Scenario
+from coop_drake.scenario import Assembly, RobotAssembly, Scenario
 
 TILT = 1e-5
 """Largest sine of a tilt that passes for round-off in a file; pi / 2 written with six digits passes [-]."""
@@ -87,10 +87,15 @@ def check_flat(
             axis = axis_in_world(joint, context)
             name = scoped(plant, joint)
             if joint.type_name() == "revolute" and not is_upright(axis):
-                raise refusal(scenario, robot, name, f"a vertical axis, not {_text(axis)} in the world")
+                raise refusal(
+                    scenario, robot, name, f"a vertical axis, not {_text(axis)} in the world{_or_fix(robot)}"
+                )
             if joint.type_name() == "prismatic" and abs(axis[2]) > TILT:
                 raise refusal(
-                    scenario, robot, name, f"an axis in the floor's plane, not {_text(axis)} in the world"
+                    scenario,
+                    robot,
+                    name,
+                    f"an axis in the floor's plane, not {_text(axis)} in the world{_or_fix(robot)}",
                 )
 
 
@@ -120,6 +125,10 @@ def axis_in_world(joint: Joint, context: Context) -> FloatArray:
     R_WF = joint.frame_on_parent().CalcRotationMatrixInWorld(context)
     axis = joint.revolute_axis() if joint.type_name() == "revolute" else joint.translation_axis()
     return np.asarray(R_WF.multiply(axis), dtype=float)
+
+
+def _or_fix(robot: RobotAssembly) -> str:
+    return f"; or a value for it under fixed_joints.{robot.name}"
 
 
 def _text(axis: FloatArray) -> str:

@@ -23,6 +23,7 @@ from pydrake.systems.framework import Context
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant.chain import find_base
+from coop_drake.plant.fixing import fix_joints
 from coop_drake.plant.parsing import add_models, bodies_of, finalize, set_actuators
 from coop_drake.scenario import Scenario, assemble
 
@@ -167,6 +168,7 @@ def build_robot_plant(scenario: Scenario, k: int) -> RobotPlant:
     robot = assembly.robots[k]
     plant = MultibodyPlant(0.0)
     add_models(scenario, assembly, assembly.of_robot(k), plant, None)
+    fix_joints(scenario, assembly, plant)
     base, joints = find_base(scenario, robot, plant)
     base_joint = plant.AddJoint(PlanarJoint("base_pose", plant.world_frame(), base.body_frame()))
     set_actuators(plant, joints)

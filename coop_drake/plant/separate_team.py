@@ -14,6 +14,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant.chain import find_base
 from coop_drake.plant.constrained_grasps import ConstrainedGrasp, ConstrainedGrasps
+from coop_drake.plant.fixing import fix_joints
 from coop_drake.plant.flatness import object_frame, planar_pose
 from coop_drake.plant.parsing import add_models, finalize, set_actuators
 from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
@@ -81,6 +82,7 @@ def build_separate_team(scenario: Scenario, builder: DiagramBuilder) -> Separate
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
     plant.SetUseSampledOutputPorts(False)
     add_models(scenario, assembly, _without_grasps(assembly), plant, scene_graph)
+    fix_joints(scenario, assembly, plant)
     frame, body = object_frame(scenario, assembly, plant)
     object_joint = plant.AddJoint(PlanarJoint("pose", plant.world_frame(), frame))
     chains = [find_base(scenario, robot, plant) for robot in assembly.robots]

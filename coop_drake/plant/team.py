@@ -21,6 +21,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 
 from coop_drake.geometry.pose import FloatArray, PlanarPose
 from coop_drake.plant.chain import find_base, scoped
+from coop_drake.plant.fixing import fix_joints
 from coop_drake.plant.flatness import check_flat, check_masses, object_frame, planar_pose
 from coop_drake.plant.grasps import Grasps, WeldedGrasps
 from coop_drake.plant.parsing import add_models, bodies_of, finalize, set_actuators
@@ -160,6 +161,7 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
     assembly = assemble(scenario)
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
     add_models(scenario, assembly, range(len(assembly.directives)), plant, scene_graph)
+    fix_joints(scenario, assembly, plant)
     frame, body = object_frame(scenario, assembly, plant)
     object_joint = plant.AddJoint(PlanarJoint("pose", plant.world_frame(), frame))
     chains = [find_base(scenario, robot, plant) for robot in assembly.robots]

@@ -207,6 +207,9 @@ class Scenario:
         start: Pose and joints at the beginning.
         goal: Pose, and joints if any, at the end.
         object: Name of the object's model.
+        fixed_joints: For some robots joints that stay as they are: values by names, or by patterns such as
+            ``*wheel*``, as joints must that would leave the plane; null for what a pattern shall not fix
+            [rad or m].
         load_shares: What part of the work each robot takes; they sum to one. Empty for equal parts.
         planner: How hard the planner tries.
         gains: The gain sets.
@@ -223,6 +226,7 @@ class Scenario:
     start: Start
     goal: Goal
     object: str = "object"
+    fixed_joints: dict[str, dict[str, float | None]] = field(default_factory=dict)
     load_shares: dict[str, float] = field(default_factory=dict)
     planner: PlannerSettings = field(default_factory=PlannerSettings)
     gains: Gains = field(default_factory=Gains)

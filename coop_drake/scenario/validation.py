@@ -43,7 +43,11 @@ def validate(scenario: Scenario) -> None:
     for index, directive in enumerate(scenario.directives):
         check_directive(file, f"directives[{index}]", directive)
     check_deployment(scenario)
-    _check_load_shares(scenario, [robot.name for robot in assemble(scenario).robots])
+    robots = [robot.name for robot in assemble(scenario).robots]
+    for name in scenario.fixed_joints:
+        if name not in robots:
+            raise ScenarioError(file, f"fixed_joints.{name}", name, "a robot, one of " + ", ".join(robots))
+    _check_load_shares(scenario, robots)
 
 
 def _check_load_shares(scenario: Scenario, robots: list[str]) -> None:

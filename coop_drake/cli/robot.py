@@ -1,0 +1,114 @@
+"""The command robot: makes a model from elsewhere ready, and says which joints stay in the plane."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.markup import escape
+
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.reporter import Reporter
+
+if TYPE_CHECKING:
+    from coop_drake.plant.joint_survey import SurveyedJoint
+
+__all__ = ["ROBOT_EXAMPLES", "robot_command"]
+
+ROBOT_EXAMPLES = """Examples:
+
+coop-drake robot stretch4.urdf --out models/stretch4
+
+coop-drake robot pr2.urdf --package pr2_description=../pr2 --fix r_upper_arm_roll_joint=-1.57 --out models
+
+A scenario then fixes what leaves the plane: fixed_joints: {robot_0: {"*": 0, wrist_yaw_joint: null}}
+"""
+
+
+def robot_command(
+    model: Annotated[Path, typer.Argument(metavar="MODEL", help="A *.urdf or *.sdf file; run xacro before.")],
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", file_okay=False, help="A folder for model and meshes.")
+    ],
+    package: Annotated[
+        list[str] | None,
+        typer.Option("--package", metavar="NAME=DIR", help="Where package://NAME leads; may be repeated."),
+    ] = None,
+    fix: Annotated[
+        list[str] | None,
+        typer.Option("--fix", metavar="JOINT=VALUE", help="Show the others' axes with this joint there."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace a model that is there already.")] = False,
+    machine: Annotated[
+        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+) -> None:
+    """Make a robot model from elsewhere ready: meshes as hulls, all in one folder, joints judged."""
+    packages = {name: Path(folder) for name, folder in _pairs(package, "--package")}
+    values = {name: _number(value) for name, value in _pairs(fix, "--fix")}
+    reporter = Reporter(machine=machine, quiet=quiet)
+
+    def command() -> ExitCode:
+        return _import(model, out, packages, values, reporter, force=force)
+
+    run_guarded(reporter, command)
+
+
+def _pairs(words: list[str] | None, option: str) -> list[tuple[str, str]]:
+    pairs = []
+    for word in words or []:
+        name, equals, value = word.partition("=")
+        if not (name and equals and value):
+            raise typer.BadParameter(f"{option} {word} is not of the form NAME=VALUE.")
+        pairs.append((name, value))
+    return pairs
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise typer.BadParameter(f"--fix: {text} is no number.") from None
+
+
+def _import(
+    model: Path,
+    out: Path,
+    packages: dict[str, Path],
+    values: dict[str, float],
+    reporter: Reporter,
+    *,
+    force: bool,
+) -> ExitCode:
+    # Here and not above: no other command should wait for Drake.
+    from coop_drake.errors import ScenarioError
+    from coop_drake.files import write_atomically
+    from coop_drake.plant.importing import import_robot
+    from coop_drake.plant.joint_survey import survey_joints
+
+    target = out / model.name
+    if target.exists() and not force:
+        raise ScenarioError(str(target), "--out", str(out), "a folder without this model, or --force")
+    with reporter.stage("reading"):
+        robot = import_robot(model, packages)
+    for name, content in robot.files.items():
+        write_atomically(out / name, content)
+    joints = survey_joints(target, values)
+    reporter.facts.update(
+        model=str(target),
+        notes=list(robot.notes),
+        joints={joint.name: joint.verdict for joint in joints},
+    )
+    reporter.table(f"{model.name}: joints", [(joint.name, _words(joint)) for joint in joints])
+    for note in robot.notes:
+        reporter.say(f"Note: {escape(note)}")
+    reporter.say(f"The model is {escape(str(target))}")
+    return ExitCode.DONE
+
+
+def _words(joint: SurveyedJoint) -> str:
+    axis = f" {joint.axis}, {joint.limits}" if joint.axis else ""
+    return f"{joint.kind}{axis}: {joint.verdict}"

@@ -1,0 +1,111 @@
+"""Joints that the scenario fixes: wheels, fingers and whatever would leave the plane."""
+
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from math import pi
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Joint, WeldJoint
+
+from coop_drake.errors import ScenarioError
+from coop_drake.plant.chain import MOVABLE, limits_of
+from coop_drake.plant.parsing import joints_of
+from coop_drake.scenario import Assembly, Scenario
+
+_ROUNDING = 1e-6
+
+
+def fix_joints(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant) -> None:
+    """Put a weld in place of every joint that the scenario fixes.
+
+    A name is that of a joint, or a pattern with ``*`` and ``?``; a joint's own name goes before patterns, and
+    null keeps it from being fixed by one.
+
+    Args:
+        scenario: Says which joints, and where they stand.
+        assembly: Who is who.
+        plant: Not finalized; robots that are not in it are passed over.
+
+    Raises:
+        ScenarioError: No joint, or one joint twice, is meant by a name, or the value cannot be taken.
+    """
+    models = {plant.GetModelInstanceName(joint.model_instance()) for joint in joints_of(plant)}
+    for robot in assembly.robots:
+        values = scenario.fixed_joints.get(robot.name, {})
+        if not values or models.isdisjoint(robot.models):
+            continue
+        joints = [joint for joint in joints_of(plant) if _model(plant, joint) in robot.models]
+        movable = {joint.name(): joint for joint in joints if joint.type_name() != "weld"}
+        key = f"fixed_joints.{robot.name}"
+        for name, value in _meant(scenario, key, values, list(movable)).items():
+            _fix(scenario, f"{key}.{name}", plant, movable[name], value)
+
+
+def _model(plant: MultibodyPlant, joint: Joint) -> str:
+    return str(plant.GetModelInstanceName(joint.model_instance()))
+
+
+def _meant(
+    scenario: Scenario, key: str, values: Mapping[str, float | None], joints: list[str]
+) -> dict[str, float]:
+    """Values by the joints' own names, in the joints' order."""
+    known = ", ".join(joints) or "none"
+    chosen: dict[str, str] = {name: name for name in values if name in joints}
+    for pattern in (name for name in values if name not in joints):
+        matching = [name for name in joints if fnmatchcase(name, pattern)]
+        if not matching:
+            allowed = f"a joint that can move, or a pattern of their names: {known}"
+            raise ScenarioError(str(scenario.path), f"{key}.{pattern}", pattern, allowed)
+        for name in matching:
+            if chosen.setdefault(name, pattern) not in (name, pattern):
+                allowed = f"one pattern for {name}; {chosen[name]} means it too"
+                raise ScenarioError(str(scenario.path), f"{key}.{pattern}", pattern, allowed)
+    meant = {name: values[chosen[name]] for name in joints if name in chosen}
+    return {name: value for name, value in meant.items() if value is not None}
+
+
+def _fix(scenario: Scenario, key: str, plant: MultibodyPlant, joint: Joint, value: float) -> None:
+    file = str(scenario.path)
+    if joint.type_name() in MOVABLE:
+        lower, upper = limits_of(joint)
+        if not lower - _ROUNDING <= value <= upper + _ROUNDING:
+            raise ScenarioError(
+                file, key, value, f"a value between the joint's limits {lower:g} and {upper:g}"
+            )
+    elif value != 0.0:
+        raise ScenarioError(
+            file, key, value, f"0, the only place where a {joint.type_name()} joint can be fixed"
+        )
+    for index in list(plant.GetJointActuatorIndices()):
+        actuator = plant.get_joint_actuator(index)
+        if int(actuator.joint().index()) == int(joint.index()):
+            plant.RemoveJointActuator(actuator)
+    name = str(joint.name())
+    parent, child, X_FM = joint.frame_on_parent(), joint.frame_on_child(), _moved(joint, value)
+    try:
+        plant.RemoveJoint(joint)
+    except RuntimeError as error:
+        allowed = f"a joint in a model without springs, mimics and other constraints ({error})"
+        raise ScenarioError(file, key, value, allowed) from error
+    plant.AddJoint(WeldJoint(name, parent, child, X_FM))
+
+
+def _moved(joint: Joint, value: float) -> RigidTransform:
+    """Pose of the joint's outer frame in its inner one."""
+    if joint.type_name() == "revolute":
+        quarters = round(value / (0.5 * pi))
+        if abs(value - quarters * 0.5 * pi) <= _ROUNDING:  # 1.570796 in a file means a right angle.
+            value = quarters * 0.5 * pi
+        return RigidTransform(_turn(np.asarray(joint.revolute_axis(), dtype=float), value), np.zeros(3))
+    if joint.type_name() == "prismatic":
+        return RigidTransform(value * np.asarray(joint.translation_axis(), dtype=float))
+    return RigidTransform()
+
+
+def _turn(axis: np.ndarray, angle: float) -> RotationMatrix:
+    """Rotation by Rodrigues' formula, exact at zero."""
+    x, y, z = axis
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return RotationMatrix(np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K))

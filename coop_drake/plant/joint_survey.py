@@ -1,0 +1,87 @@
+"""Which joints of a model stay in the plane, and which a scenario must fix."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import Joint
+
+from coop_drake.errors import ScenarioError
+from coop_drake.plant.chain import limits_of
+from coop_drake.plant.flatness import TILT, axis_in_world, is_upright
+from coop_drake.plant.parsing import joints_of
+
+__all__ = ["SurveyedJoint", "survey_joints"]
+
+
+@dataclass(frozen=True)
+class SurveyedJoint:
+    """One joint that can move.
+
+    Attributes:
+        name: Its name in the model.
+        kind: Drake's name for its type.
+        axis: In the base's frame, as text.
+        limits: As text [rad or m].
+        verdict: ``planar``, ``fix it`` for what leaves the plane, or ``fixed`` where a value was given.
+    """
+
+    name: str
+    kind: str
+    axis: str
+    limits: str
+    verdict: str
+
+
+def survey_joints(path: Path, values: Mapping[str, float] | None = None) -> tuple[SurveyedJoint, ...]:
+    """Judge every movable joint of a model whose base stands upright.
+
+    Args:
+        path: The model, with meshes that Drake reads.
+        values: Where some joints are fixed, all others stand at zero [rad or m].
+
+    Raises:
+        ScenarioError: Drake cannot read the model, or a value is for no joint of it.
+    """
+    values = dict(values or {})
+    plant = MultibodyPlant(0.0)
+    try:
+        Parser(plant).AddModels(str(path))
+        plant.Finalize()
+    except RuntimeError as error:
+        message = " ".join(str(error).split())
+        raise ScenarioError(str(path), "the model", path.name, f"what Drake can read ({message})") from error
+    joints = [joint for joint in joints_of(plant) if joint.type_name() not in ("weld", "quaternion_floating")]
+    context = plant.CreateDefaultContext()
+    known = {joint.name(): joint for joint in joints}
+    for name, value in values.items():
+        if name not in known or known[name].num_positions() != 1:
+            movable = ", ".join(known) or "none"
+            raise ScenarioError(str(path), "--fix", name, f"a joint that can be fixed, one of {movable}")
+        positions = plant.GetPositions(context)
+        positions[known[name].position_start()] = value
+        plant.SetPositions(context, positions)
+    return tuple(_judged(joint, context, joint.name() in values) for joint in joints)
+
+
+def _judged(joint: Joint, context: object, fixed: bool) -> SurveyedJoint:
+    kind = str(joint.type_name())
+    if kind not in ("revolute", "prismatic"):
+        return SurveyedJoint(joint.name(), kind, "", "", "fixed" if fixed else "fix it")
+    axis = axis_in_world(joint, context)
+    planar = is_upright(axis) if kind == "revolute" else abs(float(axis[2])) <= TILT
+    lower, upper = limits_of(joint)
+    endless = not (isfinite(lower) and isfinite(upper))
+    return SurveyedJoint(
+        joint.name(),
+        kind,
+        "(" + ", ".join(f"{value + 0.0:.3g}" for value in np.round(axis, 6)) + ")",
+        f"{lower:.4g} to {upper:.4g}",
+        "fixed" if fixed else "planar" if planar and not endless else "fix it",
+    )

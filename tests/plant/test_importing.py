@@ -1,0 +1,144 @@
+"""Robots from elsewhere: meshes become hulls, what cannot be used is left out or mended, and said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+from coop_drake.cli import app
+from coop_drake.cli.reading import read_task
+from coop_drake.errors import ScenarioError
+from coop_drake.plant.importing import import_robot
+from coop_drake.plant.joint_survey import survey_joints
+from tests.support.edited_scenario import exchanged, write_edited
+
+LINK = """<link name="{name}">
+  <inertial><mass value="{mass}"/><inertia ixx="{ixx}" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+  {shapes}
+</link>"""
+CAST = """<{kind}><geometry>
+  <mesh filename="package://maker/meshes/{file}" scale="0.001 0.001 0.001"/>
+</geometry></{kind}>"""
+ROBOT = """<robot name="maker">
+{links}
+<link name="tool"/>
+<joint name="wheel" type="continuous"><parent link="base"/><child link="wheel"/><axis xyz="0 1 0"/></joint>
+<joint name="lift" type="prismatic"><parent link="base"/><child link="mast"/><axis xyz="0 0 1"/>
+  <limit lower="0" upper="1" effort="100" velocity="1"/><dynamics friction="1" damping="0"/></joint>
+<joint name="arm" type="revolute"><parent link="mast"/><child link="arm"/><axis xyz="0 0 1"/>
+  <origin xyz="0.3 0 0.5"/>
+  <limit lower="-1" upper="1" effort="100" velocity="1"/><mimic joint="lift"/></joint>
+<joint name="grip" type="fixed"><parent link="arm"/><child link="tool"/>
+  <origin xyz="0.4 0 0" rpy="0 0 3.141592653589793"/></joint>
+<transmission name="drive"/><gazebo/>
+</robot>"""
+
+
+@pytest.fixture(scope="module")
+def maker(tmp_path_factory):
+    """A robot as makers publish it: STL meshes in millimetres, addressed by a package."""
+    folder = tmp_path_factory.mktemp("other") / "maker"
+    meshes = folder / "meshes"
+    meshes.mkdir(parents=True)
+    trimesh.creation.cylinder(radius=250.0, height=300.0, sections=48).export(meshes / "base.stl")
+    trimesh.creation.box((400.0, 80.0, 60.0)).apply_translation((200.0, 0.0, 0.0)).export(meshes / "arm.stl")
+    trimesh.creation.annulus(60.0, 100.0, 40.0).export(meshes / "wheel.stl")
+    links = [
+        LINK.format(name="base", mass=20, ixx=1, shapes=CAST.format(kind="collision", file="base.stl")),
+        LINK.format(name="wheel", mass=1, ixx=1, shapes=CAST.format(kind="visual", file="wheel.stl")),
+        LINK.format(name="mast", mass=2, ixx=5, shapes=""),
+        LINK.format(
+            name="arm",
+            mass=2,
+            ixx=1,
+            shapes=CAST.format(kind="visual", file="arm.stl") + CAST.format(kind="collision", file="arm.stl"),
+        ),
+    ]
+    path = folder / "urdf" / "maker.urdf"
+    path.parent.mkdir()
+    path.write_text(ROBOT.format(links="\n".join(links)))
+    return path
+
+
+def test_it_becomes_one_folder_that_a_team_can_be_built_of(maker, tmp_path):
+    done = CliRunner().invoke(app, ["robot", str(maker), "--out", str(tmp_path / "maker")])
+    assert done.exit_code == 0, done.output
+    path = write_edited(
+        tmp_path,
+        ("package://coop_drake_models/long_blue.sdf", "maker/maker.urdf"),
+        ("child: robot_0::gripper", "child: robot_0::tool"),
+        ("robot_0: [0.0]", "robot_0: [0.1]"),
+    )
+    path.write_text(path.read_text() + '\nfixed_joints: {robot_0: {"*": 0, arm: null}}\n')
+    tree = read_task(path, None).question.problem.tree
+    base = next(b for c in tree.components for b in c.bodies if b.name == "robot_0::base")
+    (shape,) = base.shapes
+    reach = np.hypot(*(shape.vertices - shape.vertices.mean(axis=0)).T)
+    assert 0.247 < reach.min() <= reach.max() < 0.2545  # The disc, enclosed by fewer corners, in metres.
+    assert len(shape.vertices) <= 24
+    names = {body.name for component in tree.components for body in component.bodies}
+    assert "robot_0::wheel" not in names  # Its shadow lies within the base's.
+    assert "robot_0::arm" in names
+
+
+def test_what_was_changed_is_said(maker):
+    notes = import_robot(maker).notes
+    assert "left out: friction, gazebo, mimic, transmission" in notes
+    assert "made solid by their pictures' hulls: wheel" in notes
+    assert "impossible inertia made round: mast" in notes
+
+
+def test_hulls_enclose_their_meshes(maker):
+    robot = import_robot(maker)
+    for name, source in (("arm_collision_0", "arm"), ("base_collision_0", "base")):
+        lines = robot.files[f"meshes/{name}.obj"].decode().splitlines()
+        corners = np.array([line.split()[1:] for line in lines if line.startswith("v")], dtype=float)
+        mesh = trimesh.load_mesh(maker.parents[1] / "meshes" / f"{source}.stl")
+        hull = trimesh.Trimesh(corners).convex_hull
+        assert hull.bounds == pytest.approx(mesh.bounds / 1000.0, abs=1e-6)
+        assert hull.volume == pytest.approx(mesh.convex_hull.volume / 1e9, rel=1e-5)
+
+
+def test_joints_are_judged_where_others_are_fixed(maker, tmp_path):
+    robot = import_robot(maker)
+    for name, content in robot.files.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_bytes(content)
+    verdicts = {joint.name: joint.verdict for joint in survey_joints(tmp_path / robot.name, {"wheel": 0.0})}
+    assert verdicts == {"wheel": "fixed", "lift": "fix it", "arm": "planar"}
+    with pytest.raises(ScenarioError, match="a joint that can be fixed, one of wheel, lift, arm"):
+        survey_joints(tmp_path / robot.name, {"hand": 0.0})
+
+
+def test_what_cannot_be_read_is_refused(maker, tmp_path):
+    text = maker.read_text()
+    cases = {
+        "cut.urdf": (text[:-40], "a readable URDF or SDF model"),
+        "bomb.urdf": ('<!DOCTYPE a [<!ENTITY b "c">]>' + text, "a readable URDF or SDF model"),
+        "where.urdf": (text.replace("maker/meshes", "lost/meshes"), "say --package lost=FOLDER"),
+        "gone.urdf": (exchanged(text, ("package://maker/meshes/base.stl", "gone.stl")), "a file that exists"),
+        "empty.urdf": ("<robot name='a'/>", "a model with links"),
+        "robot.xacro": (text, r"a .urdf or .sdf file"),
+    }
+    for name, (content, allowed) in cases.items():
+        (tmp_path / name).write_text(content)
+        with pytest.raises(ScenarioError, match=allowed):
+            import_robot(tmp_path / name)
+    broken = tmp_path / "broken.stl"
+    broken.write_text("no mesh at all")
+    (tmp_path / "mesh.urdf").write_text(exchanged(text, ("package://maker/meshes/base.stl", "broken.stl")))
+    with pytest.raises(ScenarioError, match="a readable mesh"):
+        import_robot(tmp_path / "mesh.urdf", {"maker": maker.parents[1]})
+
+
+def test_the_command_never_overwrites_and_refuses_wrong_words(maker, tmp_path):
+    call = ["robot", str(maker), "--out", str(tmp_path)]
+    (tmp_path / "maker.urdf").write_text("mine")
+    done = CliRunner().invoke(app, call)
+    assert done.exit_code == 2
+    assert (tmp_path / "maker.urdf").read_text() == "mine"
+    assert CliRunner().invoke(app, [*call, "--force"]).exit_code == 0
+    assert CliRunner().invoke(app, [*call, "--force", "--fix", "arm"]).exit_code == 2
+    assert CliRunner().invoke(app, [*call, "--force", "--fix", "arm=up"]).exit_code == 2
