@@ -23,8 +23,8 @@ from coop_drake.cli.map_cache import maps_command
 from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.reproduce import reproduce_command
-from coop_drake.cli.tune import tune_command
 from coop_drake.cli.robot import ROBOT_EXAMPLES, robot_command
+from coop_drake.cli.tune import tune_command
 from coop_drake.cli.verify import verify_command
 from coop_drake.cli.watch import watch_command
 from coop_drake.cli.why import why_command

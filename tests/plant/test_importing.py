@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from shapely import Point, Polygon
 from typer.testing import CliRunner
 
 from coop_drake.cli import app
@@ -75,9 +76,11 @@ def test_it_becomes_one_folder_that_a_team_can_be_built_of(maker, tmp_path):
     tree = read_task(path, None).question.problem.tree
     base = next(b for c in tree.components for b in c.bodies if b.name == "robot_0::base")
     (shape,) = base.shapes
-    reach = np.hypot(*(shape.vertices - shape.vertices.mean(axis=0)).T)
-    assert 0.247 < reach.min() <= reach.max() < 0.2545  # The disc, enclosed by fewer corners, in metres.
-    assert len(shape.vertices) <= 24
+    outline = Polygon(shape.vertices)
+    disc = Point(0.5 * (outline.bounds[0] + outline.bounds[2]), outline.centroid.y).buffer(0.2485, 64)
+    assert outline.covers(disc)  # The disc, in metres, less what 48 sides leave of it.
+    assert outline.area < np.pi * 0.254**2
+    assert len(shape.vertices) <= 32
     names = {body.name for component in tree.components for body in component.bodies}
     assert "robot_0::wheel" not in names  # Its shadow lies within the base's.
     assert "robot_0::arm" in names
