@@ -103,7 +103,7 @@ def _advance(simulator: Simulator, watch: Watch, max_time: float) -> None:
             simulator.AdvanceTo(max_time)
     except RuntimeError as error:
         # Drake's own failures, such as a step that shrinks to nothing; errors of Python keep their type.
-        watch.give_up(f"the integrator failed ({error})")
+        watch.fail(f"the integrator failed ({error})")
         return
     if not watch.ended:
         watch.give_up(f"no arrival within max_time = {max_time:g} s")

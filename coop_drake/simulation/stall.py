@@ -12,7 +12,7 @@ from coop_drake.planning.plan import Plan
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems import axis_laws
 
-__all__ = ["blocking_margin", "patience"]
+__all__ = ["blocking_margin", "narrowest_funnel", "patience"]
 
 #: A transition may take this many times its estimate ...
 PATIENCE_FACTOR = 10.0
@@ -39,6 +39,19 @@ def blocking_margin(plan: Plan, sample: Sample, position_tolerance: float) -> st
         return "the cell planner hears that every robot is ready"
     name = min(margins, key=lambda key: margins[key])
     return f"{name} (margin {margins[name]:.3g})"
+
+
+def narrowest_funnel(plan: Plan, sample: Sample) -> str:
+    """The axis that is nearest to a wall of its funnel, as a phrase with its margin and its rate.
+
+    Args:
+        plan: The plan.
+        sample: The present instant.
+    """
+    axes = sample.z[2:]
+    margins = np.minimum(axes - sample.funnel_lower, sample.funnel_upper - axes)
+    i = int(np.argmin(margins))
+    return f"{_axes(plan)[i]} (margin {margins[i]:.3g} rad or m, rate {sample.rates[2 + i]:.3g} per second)"
 
 
 def _axes(plan: Plan) -> tuple[str, ...]:

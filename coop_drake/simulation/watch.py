@@ -7,10 +7,11 @@ from collections.abc import Callable
 from pydrake.systems.framework import Context, EventStatus
 
 from coop_drake.diagram import ClosedLoop
+from coop_drake.planning.plan import Plan
 from coop_drake.simulation.fused_telemetry import FusedTelemetry
 from coop_drake.simulation.invariants import Invariants
 from coop_drake.simulation.recorder import Recorder
-from coop_drake.simulation.stall import blocking_margin, patience
+from coop_drake.simulation.stall import blocking_margin, narrowest_funnel, patience
 from coop_drake.simulation.telemetry import Sample, Telemetry
 
 __all__ = ["Watch"]
@@ -76,14 +77,25 @@ class Watch:
         Args:
             why: What happened, for example ``stalled``.
         """
+        self._end(why, lambda plan, last: f"it waits until {blocking_margin(plan, last, self._tolerance)}")
+
+    def fail(self, why: str) -> None:
+        """End a run that cannot be integrated further; the message names what was next to break.
+
+        Args:
+            why: What happened.
+        """
+        self._end(why, lambda plan, last: f"next to break was the funnel of {narrowest_funnel(plan, last)}")
+
+    def _end(self, why: str, explanation: Callable[[Plan, Sample], str]) -> None:
         if self._last is None:
             self.violation = why
             return
         sample, plan = self._last, self._loop.plan
         self.violation = (
             f"{why} at t = {sample.time:.6g} s in cell {sample.cell} of {len(plan.cells)}, entered at "
-            f"{sample.entry:.6g} s with {plan.transitions[sample.cell].estimated_time:.3g} s estimated; it "
-            f"waits until {blocking_margin(plan, sample, self._tolerance)}"
+            f"{sample.entry:.6g} s with {plan.transitions[sample.cell].estimated_time:.3g} s estimated; "
+            f"{explanation(plan, sample)}"
         )
 
     def _report(self, sample: Sample) -> None:

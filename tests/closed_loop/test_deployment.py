@@ -24,10 +24,17 @@ MILD = {
 }
 HARSH = {
     "sampling": (Deployment(control_rate=15.0), "to its funnel is"),
-    "saturation": (Deployment(control_rate=RATE, actuators=ActuatorLimits(10.0)), "to its funnel is"),
+    "saturation": (
+        Deployment(actuators=ActuatorLimits(base_force=10.0)),
+        "next to break was the funnel of robot_0::elbow (margin 0.0",
+    ),
+    "saturation, sampled": (
+        Deployment(control_rate=RATE, actuators=ActuatorLimits(base_force=10.0)),
+        "to its funnel is",
+    ),
     "noise": (Deployment(control_rate=RATE, measurements=Measurements(0.02, 0.01, 0.02)), "to its funnel is"),
     "delay": (Deployment(control_rate=RATE, measurements=Measurements(delay=0.1)), "to its funnel is"),
-    "model error": (Deployment(mass_error=-0.9), "the integrator failed"),
+    "model error": (Deployment(mass_error=-0.9), "next to break was the funnel of "),
     "lost reports": (
         Deployment(control_rate=RATE, messages=Messages(loss=1.0)),
         "waits until the cell planner hears that every robot is ready",
