@@ -12,7 +12,7 @@ from coop_drake.control import GainSet
 from coop_drake.fields import HarmonicMap
 from coop_drake.planning import Plan
 from coop_drake.scenario import load_scenario
-from coop_drake.tuning.trial import Trial, Workbench
+from coop_drake.tuning.trial import Trial, Workbench, quickest_blocks
 
 __all__ = ["Workers"]
 
@@ -62,7 +62,8 @@ def _prepare(scenario: Path, plan: Plan, maps: tuple[HarmonicMap, ...], longest:
     """Set a process up."""
     global _bench
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is answered by the process that waits for it.
-    _bench = Workbench(load_scenario(scenario), plan, maps, longest)
+    task = load_scenario(scenario)
+    _bench = Workbench(task, plan, maps, longest=longest, blocks=quickest_blocks(task, plan, maps))
 
 
 def _try(gains: GainSet) -> Trial:
