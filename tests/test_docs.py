@@ -11,7 +11,6 @@ from pydrake.systems.framework import DiagramBuilder
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.scenario import load_scenario
 from coop_drake.scenario.model import Scenario
-from coop_drake.scenario.packages import SHIPPED
 from coop_drake.scenario.schema import in_file
 from coop_drake.systems import OrientationPpc
 from docs.generate.api_pages import api_pages
@@ -29,7 +28,7 @@ def shown(page, language):
 
 @pytest.fixture(scope="module")
 def listed():
-    return {section.path: section for section in sections(load_scenario(SHIPPED / "base.scenario.yaml"))}
+    return {section.path: section for section in sections(load_scenario("base"))}
 
 
 def test_every_key_of_a_scenario_is_listed_with_its_meaning(listed):

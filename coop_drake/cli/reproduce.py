@@ -40,9 +40,8 @@ def _reproduce(scenario: Path | None, out: Path, reporter: Reporter) -> ExitCode
     from coop_drake.cli.map_cache import map_cache
     from coop_drake.reproduction import Verdict, gather, write_report
     from coop_drake.scenario import load_scenario
-    from coop_drake.scenario.packages import SHIPPED
 
-    task = load_scenario(scenario if scenario is not None else SHIPPED / "base.scenario.yaml")
+    task = load_scenario(scenario if scenario is not None else "base")
     with reporter.stage("simulating") as progress:
         material = gather(task, store=map_cache(), progress=progress)
     with reporter.stage("drawing") as progress:

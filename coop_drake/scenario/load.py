@@ -5,11 +5,13 @@ from pathlib import Path
 
 from pydrake.common.yaml import yaml_dump_typed
 
+from coop_drake.errors import ScenarioError
 from coop_drake.scenario.floor import with_floor
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.reading import read_file
 from coop_drake.scenario.schema import draft, thaw
 from coop_drake.scenario.validation import validate
+from coop_drake.shipped import scenario_file, shipped_scenarios
 
 
 def load_scenario(path: Path | str) -> Scenario:
@@ -19,13 +21,19 @@ def load_scenario(path: Path | str) -> Scenario:
     limits) is checked by :func:`coop_drake.plant.planning_problem`.
 
     Args:
-        path: The file, ``NAME.scenario.yaml`` by custom.
+        path: The file, ``NAME.scenario.yaml`` by custom; or the name of a shipped scenario, like ``base``.
 
     Raises:
         ScenarioError: With file, key, value and what is allowed there.
         FloorPlanError: The workspace names a floor plan that cannot be read.
     """
-    scenario = with_floor(dataclasses.replace(read_file(Scenario, Path(path)), path=Path(path)))
+    file = scenario_file(path)
+    if not file.exists():
+        known = ", ".join(shipped_scenarios())
+        raise ScenarioError(
+            str(path), "the file", None, f"a file that exists, or a shipped scenario: {known}"
+        )
+    scenario = with_floor(dataclasses.replace(read_file(Scenario, file), path=file))
     validate(scenario)
     return scenario
 

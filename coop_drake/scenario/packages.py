@@ -4,11 +4,8 @@ from pathlib import Path
 
 from pydrake.multibody.parsing import PackageMap
 
-import coop_drake
 from coop_drake.errors import ScenarioError
-
-SHIPPED = Path(coop_drake.__file__).resolve().parent.parent / "models"
-"""Where the shipped models and scenarios are."""
+from coop_drake.shipped import SHIPPED
 
 
 def package_map(scenario_path: Path) -> PackageMap:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from coop_drake.scenario import load_scenario
-from coop_drake.scenario.packages import SHIPPED
 from docs.generate.scenario_keys import Section, sections
 
 __all__ = ["scenario_page"]
@@ -21,7 +20,7 @@ This page is made from the classes that hold the values and from the checks that
 
 def scenario_page() -> str:
     """All sections, one table each."""
-    scenario = load_scenario(SHIPPED / "base.scenario.yaml")
+    scenario = load_scenario("base")
     return "\n".join([_TOP, *map(_section, sections(scenario))])
 
 

@@ -1,0 +1,26 @@
+"""Where the shipped models and scenarios are: beside the package in a checkout, inside it where it is installed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+__all__ = ["SHIPPED", "scenario_file", "shipped_scenarios"]
+
+_PACKAGE = Path(__file__).resolve().parent
+_SUFFIX = ".scenario.yaml"
+
+SHIPPED = next(
+    (f for f in (_PACKAGE / "models", _PACKAGE.parent / "models") if f.is_dir()), _PACKAGE / "models"
+)
+"""Folder of the shipped models and scenarios."""
+
+
+def shipped_scenarios() -> dict[str, Path]:
+    """The shipped scenarios by name."""
+    return {path.name.removesuffix(_SUFFIX): path for path in sorted(SHIPPED.glob("*" + _SUFFIX))}
+
+
+def scenario_file(given: Path | str) -> Path:
+    """The file that is meant: the one given, or, where there is none, the shipped scenario of that name."""
+    path = Path(given)
+    return path if path.exists() else shipped_scenarios().get(str(given), path)

@@ -1,0 +1,43 @@
+"""Scenarios that ship: found by name from anywhere, and carried by the wheel."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from coop_drake.errors import ScenarioError
+from coop_drake.scenario import load_scenario
+from coop_drake.shipped import SHIPPED, scenario_file, shipped_scenarios
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_shipped_scenarios_are_found_by_name_from_anywhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert {"base", "closed", "elbow", "three", "tight"} <= set(shipped_scenarios())
+    assert load_scenario("base") == load_scenario(SHIPPED / "base.scenario.yaml")
+    assert load_scenario("base").name == "base"
+
+
+def test_a_file_of_that_name_comes_first(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert scenario_file("base") == SHIPPED / "base.scenario.yaml"
+    (tmp_path / "base").write_text("mine", encoding="utf-8")
+    assert scenario_file("base") == Path("base")
+
+
+@pytest.mark.parametrize("name", ["bace", "models/none.scenario.yaml"])
+def test_what_is_neither_is_refused_with_the_names_there_are(name):
+    with pytest.raises(ScenarioError, match=r"a file that exists, or a shipped scenario: base, closed,"):
+        load_scenario(name)
+
+
+def test_the_wheel_carries_models_where_the_package_looks_for_them():
+    wheel = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["hatch"]["build"][
+        "targets"
+    ]["wheel"]
+    assert wheel["packages"] == ["coop_drake"]
+    assert wheel["force-include"] == {SHIPPED.name: f"coop_drake/{SHIPPED.name}"}
+    assert SHIPPED == ROOT / "models"
