@@ -1,4 +1,4 @@
-"""Where the shipped models and scenarios are: beside the package in a checkout, inside it where it is installed."""
+"""Where shipped models and scenarios are: beside the package in a checkout, inside it where installed."""
 
 from __future__ import annotations
 
