@@ -14,16 +14,22 @@ from typing import Annotated
 
 import typer
 
+from coop_drake.cli.bench import bench_command
 from coop_drake.cli.compare import compare_command
 from coop_drake.cli.diagram import diagram_command
+from coop_drake.cli.doctor import doctor_command
+from coop_drake.cli.examples import epilog
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.floor_plan import FLOOR_PLAN_EXAMPLES, floor_plan_command
 from coop_drake.cli.guard import run_guarded
 from coop_drake.cli.map_cache import maps_command
+from coop_drake.cli.options import GainsName, ScenarioPath
 from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.reproduce import reproduce_command
 from coop_drake.cli.robot import ROBOT_EXAMPLES, robot_command
+from coop_drake.cli.schema import schema_command
+from coop_drake.cli.show import show_command
 from coop_drake.cli.tune import tune_command
 from coop_drake.cli.verify import verify_command
 from coop_drake.cli.watch import watch_command
@@ -38,23 +44,14 @@ app = typer.Typer(
     help="Plan, map, control and simulate several mobile manipulators that carry one object.",
     epilog="Exit codes: 0 done, 1 failed run, 2 bad input, 3 infeasible, 4 undecided, 130 interrupted.",
     no_args_is_help=True,
-    add_completion=False,
+    rich_markup_mode="rich",
     pretty_exceptions_enable=False,
 )
 
-ScenarioPath = Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")]
 OutPath = Annotated[
     Path | None,
     typer.Option(
         "--out", metavar="DIR", file_okay=False, help="Where results go; out/<scenario> by default."
-    ),
-]
-GainsName = Annotated[
-    str | None,
-    typer.Option(
-        "--gains",
-        metavar="NAME|FILE",
-        help="Gain set, by name or from a file as `tune` writes it; the scenario's choice by default.",
     ),
 ]
 FreshMaps = Annotated[
@@ -93,7 +90,7 @@ def show_version(
         raise typer.Exit
 
 
-@app.command("run")
+@app.command("run", epilog=epilog("run"))
 def run_command(
     scenario: ScenarioPath,
     out: OutPath = None,
@@ -114,7 +111,7 @@ def run_command(
     run_guarded(reporter, command)
 
 
-@app.command("plan")
+@app.command("plan", epilog=epilog("plan"))
 def plan_command(
     scenario: ScenarioPath,
     out: OutPath = None,
@@ -134,7 +131,7 @@ def plan_command(
     run_guarded(reporter, command)
 
 
-@app.command("simulate")
+@app.command("simulate", epilog=epilog("simulate"))
 def simulate_command(
     scenario: ScenarioPath,
     plan: Annotated[
@@ -162,7 +159,7 @@ def simulate_command(
     run_guarded(reporter, command)
 
 
-@app.command("warm")
+@app.command("warm", epilog=epilog("warm"))
 def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
     """Compile all kernels, so that the next command starts at once; `make` does it when it sets up."""
     reporter = Reporter(machine=False, quiet=quiet)
@@ -175,13 +172,24 @@ def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
     run_guarded(reporter, command)
 
 
-app.command("watch")(watch_command)
-app.command("why")(why_command)
-app.command("verify")(verify_command)
-app.command("maps")(maps_command)
-app.command("diagram")(diagram_command)
-app.command("compare")(compare_command)
+for name, command in (
+    ("watch", watch_command),
+    ("why", why_command),
+    ("verify", verify_command),
+    ("show", show_command),
+    ("maps", maps_command),
+    ("diagram", diagram_command),
+    ("compare", compare_command),
+    ("reproduce", reproduce_command),
+    ("tune", tune_command),
+    ("schema", schema_command),
+    ("doctor", doctor_command),
+):
+    app.command(name, epilog=epilog(name))(command)
 app.command("floor-plan", epilog=FLOOR_PLAN_EXAMPLES)(floor_plan_command)
 app.command("robot", epilog=ROBOT_EXAMPLES)(robot_command)
-app.command("reproduce")(reproduce_command)
-app.command("tune")(tune_command)
+app.command(
+    "bench",
+    epilog=epilog("bench"),
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+)(bench_command)

@@ -10,6 +10,7 @@ import typer
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.options import ScenarioPath
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 
@@ -42,7 +43,7 @@ _ROWS = (
 
 
 def compare_command(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")],
+    scenario: ScenarioPath,
     out: Annotated[
         Path | None,
         typer.Option(

@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.options import ScenarioPath
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 
@@ -17,7 +18,7 @@ __all__ = ["diagram_command"]
 
 
 def diagram_command(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")],
+    scenario: ScenarioPath,
     robot: Annotated[
         int, typer.Option("--robot", metavar="K", min=0, help="Whose controller is opened.")
     ] = 0,

@@ -9,13 +9,14 @@ import typer
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.options import ScenarioPath
 from coop_drake.cli.reporter import Reporter
 
 __all__ = ["tune_command"]
 
 
 def tune_command(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")],
+    scenario: ScenarioPath,
     criteria: Annotated[
         list[str] | None,
         typer.Option(

@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.options import ScenarioPath
 from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.errors import RefusalError
@@ -25,7 +26,7 @@ def verify_command(
     certificate: Annotated[
         Path, typer.Argument(metavar="FILE", help="plan.json or certificate.json, as `plan` wrote it.")
     ],
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")],
+    scenario: ScenarioPath,
     machine: Annotated[
         bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
     ] = False,

@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.options import ScenarioPath
 from coop_drake.cli.question import Question, read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
@@ -25,7 +26,7 @@ _EXIT_CODES = {
 
 
 def why_command(
-    scenario: Annotated[Path, typer.Argument(metavar="SCENARIO", help="Scenario file (*.scenario.yaml).")],
+    scenario: ScenarioPath,
     out: Annotated[
         Path | None,
         typer.Option(

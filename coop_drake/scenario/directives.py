@@ -16,7 +16,7 @@ from coop_drake.scenario.reading import read_file
 
 # No `from __future__ import annotations` here: Drake's YAML loader reads the types of the fields.
 
-_REQUIRED = {
+REQUIRED = {
     "add_model": ("name", "file"),
     "add_model_instance": ("name",),
     "add_frame": ("name",),
@@ -43,12 +43,12 @@ def check_directive(file: str, key: str, directive: ModelDirective) -> None:
     Raises:
         ScenarioError: Naming the key inside the directive.
     """
-    kinds = [kind for kind in _REQUIRED if getattr(directive, kind) is not None]
+    kinds = [kind for kind in REQUIRED if getattr(directive, kind) is not None]
     if len(kinds) != 1:
-        raise ScenarioError(file, key, kinds, "exactly one of " + ", ".join(_REQUIRED))
+        raise ScenarioError(file, key, kinds, "exactly one of " + ", ".join(REQUIRED))
     kind = kinds[0]
     content = getattr(directive, kind)
-    for name in _REQUIRED[kind]:
+    for name in REQUIRED[kind]:
         if not getattr(content, name):
             raise ScenarioError(
                 file, f"{key}.{kind}.{name}", getattr(content, name), "a value; it is required"

@@ -37,7 +37,8 @@ def departures(cls: type, text: str) -> Check:
     yield from _check(parse(text), cls, "")
 
 
-def _required(cls: type) -> frozenset[str]:
+def required_fields(cls: type) -> frozenset[str]:
+    """Names of the fields that a file must have."""
     return frozenset(
         f.name
         for f in in_file(cls)
@@ -158,7 +159,7 @@ def _check(value: object, kind: Any, key: str) -> Check:
         cls = typing.cast(type, kind)
         hints = typing.get_type_hints(cls)
         schema = {f.name: hints[f.name] for f in in_file(cls)}
-        yield from _check_fields(value, schema, _required(cls), key)
+        yield from _check_fields(value, schema, required_fields(cls), key)
     else:
         yield from check_foreign(value, kind, key)
 

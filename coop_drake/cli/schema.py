@@ -1,0 +1,44 @@
+"""The command schema: the JSON Schema of scenario files, for editors."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.markup import escape
+
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.reporter import Reporter
+
+__all__ = ["schema_command"]
+
+
+def schema_command(
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE", dir_okay=False, help="Where to write; standard output by default."
+        ),
+    ] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+) -> None:
+    """Write the JSON Schema of scenario files, so that editors complete and check them."""
+    reporter = Reporter(machine=False, quiet=quiet)
+
+    def command() -> ExitCode:
+        from coop_drake.files import write_atomically
+        from coop_drake.scenario.json_schema import scenario_schema
+
+        text = json.dumps(scenario_schema(), indent=1) + "\n"
+        if out is None:
+            typer.echo(text, nl=False)
+            return ExitCode.DONE
+        write_atomically(out, text.encode())
+        reporter.say(f"The schema is in {escape(str(out))}. Begin scenarios with")
+        reporter.say(f"# yaml-language-server: $schema={escape(str(out))}")
+        return ExitCode.DONE
+
+    run_guarded(reporter, command)

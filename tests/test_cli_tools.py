@@ -1,0 +1,241 @@
+"""Commands round the chain: help with examples, completion, doctor, schema, show, bench; quiet when piped."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+import typer
+from PIL import Image
+from typer.testing import CliRunner
+
+import coop_drake
+from coop_drake.cli import app, health, show
+from coop_drake.cli.completion import complete_gains, complete_scenario
+from coop_drake.cli.examples import EXAMPLES
+from coop_drake.cli.question import Question
+from coop_drake.planning import save_plan
+from coop_drake.planning.digest import problem_digest
+from coop_drake.scenario import dump_scenario, load_scenario
+from coop_drake.scenario.document import parse
+from coop_drake.scenario.json_schema import scenario_schema
+from tests.support.cases import case
+from tests.support.mutants.mutant import sampled
+from tests.support.mutants.schema import schema_mutants
+from tests.support.small_plan import GOAL_POSE, ROOM, START_POSE, small_plan
+
+MODELS = Path(__file__).parents[1] / "models"
+SCENARIOS = sorted(MODELS.glob("*.scenario.yaml"))
+TYPED = [Path("models") / path.name for path in SCENARIOS]
+COMMAND = typer.main.get_command(app)
+BLIND = {"no number", "an infinity", "a negative infinity"}
+"""What JSON has no words for; loading refuses it all the same."""
+
+
+def invoke(*arguments, **environment):
+    return CliRunner(env=environment).invoke(app, [str(argument) for argument in arguments])
+
+
+def test_every_command_has_examples_and_its_help_shows_them():
+    for name, command in COMMAND.commands.items():
+        assert f"coop-drake {name}" in command.epilog
+    for name, examples in EXAMPLES.items():
+        text = " ".join(invoke(name, "--help", COLUMNS="300").output.split())
+        for line, what in examples:
+            assert f"coop-drake {line}" in text
+            assert what in text
+
+
+@pytest.mark.parametrize("line", [line for examples in EXAMPLES.values() for line, _ in examples])
+def test_examples_are_commands_as_they_are(line):
+    name, *arguments = line.split()
+    context = COMMAND.commands[name].make_context(name, arguments)
+    scenario = context.params.get("scenario")
+    assert scenario is None or scenario in TYPED
+
+
+@pytest.mark.parametrize(
+    ("shell", "word"), [("bash", "complete -o"), ("zsh", "#compdef coop-drake"), ("fish", "complete")]
+)
+def test_a_completion_script_for_every_usual_shell(shell, word):
+    environment = {**os.environ, "_COOP_DRAKE_COMPLETE": f"source_{shell}"}
+    program = "from coop_drake.cli import main; import sys; sys.argv = ['coop-drake']; main()"
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    assert word in done.stdout
+    assert "coop-drake" in done.stdout
+
+
+def test_scenarios_are_completed_from_folders_on_the_way(tmp_path, monkeypatch):
+    monkeypatch.chdir(MODELS.parent)
+    assert complete_scenario("models/b") == ["models/base.scenario.yaml"]
+    assert "models/" in complete_scenario("mod")
+    assert complete_scenario("nowhere/b") == []
+
+
+def test_gain_sets_are_completed_from_the_scenario(tmp_path):
+    path = tmp_path / "own.scenario.yaml"
+    path.write_text("gains: {sets: {gentle: !FixedGains {stiffness: 3}}}\n")
+    context = typer.Context(COMMAND.commands["run"])
+    context.params["scenario"] = path
+    assert complete_gains(context, "") == ["gentle", "scheduled", "table_2"]
+    assert complete_gains(context, "g") == ["gentle"]
+    path.write_text("gains: [")
+    assert complete_gains(context, "") == ["scheduled", "table_2"]
+
+
+def test_the_schema_holds_for_every_shipped_scenario_and_for_all_that_is_spelt_out():
+    validator = jsonschema.Draft202012Validator(scenario_schema())
+    validator.check_schema(validator.schema)
+    for path in SCENARIOS:
+        validator.validate(parse(path.read_text()))
+        validator.validate(parse(dump_scenario(load_scenario(path))))
+
+
+def test_the_schema_refuses_what_departs_from_it():
+    validator = jsonschema.Draft202012Validator(scenario_schema())
+    whole = parse(dump_scenario(load_scenario(MODELS / "base.scenario.yaml")))
+    mutants = [mutant for mutant in schema_mutants(whole) if not mutant.kind.startswith(tuple(BLIND))]
+    for mutant in sampled(mutants, 60, 1):
+        assert not validator.is_valid(parse(mutant.content.decode())), mutant
+
+
+def test_every_key_of_the_schema_says_what_it_means():
+    def silent(schema, path):
+        for name, inner in schema.get("properties", {}).items():
+            if "description" not in inner and name != "_tag":
+                yield (*path, name)
+            yield from silent(inner, (*path, name))
+
+    assert list(silent(scenario_schema(), ())) == []
+
+
+def test_the_schema_is_written_to_a_file_or_to_standard_output(tmp_path):
+    path = tmp_path / "scenario.schema.json"
+    said = invoke("schema", "--out", path)
+    assert said.exit_code == 0
+    assert "# yaml-language-server: $schema=" in said.output
+    assert json.loads(path.read_text()) == json.loads(invoke("schema").output) == scenario_schema()
+
+
+def test_the_doctor_finds_nothing_wrong_here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = invoke("doctor", "--json")
+    assert result.exit_code == 0, result.stderr
+    facts = json.loads(result.stdout)
+    assert facts["healthy"] is True
+    states = {finding["what"]: finding["state"] for finding in facts["findings"]}
+    assert "opens port" in states["Meshcat"]
+    assert states.keys() >= {"Python", "drake", "numpy", "shapely", "numba", "Drake", "fonts", "memory"}
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_doctor_says_what_is_wrong_and_what_to_do(monkeypatch):
+    def broken():
+        raise ImportError("libdrake.so is not there")
+
+    monkeypatch.setattr(health, "_LOOKS", (("Drake", broken, "install drake anew"),))
+    monkeypatch.setattr(health, "_PACKAGES", ("no-such-package",))
+    result = invoke("doctor", "--json")
+    assert result.exit_code == 1
+    facts = json.loads(result.stdout)
+    assert facts["healthy"] is False
+    for words in ("libdrake.so is not there: install drake anew", "no-such-package: missing: pip install"):
+        assert words in facts["error"]
+
+
+@pytest.mark.parametrize("ending", ["png", "svg"])
+def test_scenarios_and_plans_are_shown(ending, tmp_path, monkeypatch):
+    goal, start = np.array(GOAL_POSE), np.array([*START_POSE, 0.0, 0.0])
+    problem = replace(case("base"), workspace=ROOM, start=start, goal_pose=goal)
+    names = tuple(joint.name for joint in problem.tree.joints)
+    plan = replace(small_plan(names), problem=problem_digest(problem))
+    file = save_plan(plan, tmp_path / "plan.json")
+    question = Question("room", Path("room.scenario.yaml"), problem, {}, "scheduled")
+    monkeypatch.setattr(show, "read_apart", lambda _: question)
+    target = tmp_path / "pictures" / f"room.{ending}"
+    assert invoke("show", "room.scenario.yaml", "--out", target).exit_code == 0
+    bare = target.read_bytes()
+    assert invoke("show", "room.scenario.yaml", "--plan", file, "--out", target).exit_code == 0
+    assert target.read_bytes() != bare
+    if ending == "png":
+        with Image.open(target) as picture:
+            assert picture.size[0] > 600
+    else:
+        assert "<svg" in target.read_text()
+    assert list(target.parent.iterdir()) == [target]
+
+
+def test_no_other_kind_of_picture(tmp_path):
+    result = invoke("show", MODELS / "base.scenario.yaml", "--out", tmp_path / "room.gif")
+    assert result.exit_code == 2
+    assert "neither in .png nor in .svg" in " ".join(result.output.split())
+
+
+def test_benchmarks_that_are_not_there_are_an_error_that_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(coop_drake, "__file__", str(tmp_path / "coop_drake" / "__init__.py"))
+    result = invoke("bench", "planner")
+    assert result.exit_code == 2
+    assert "benchmarks: are not here" in result.stderr
+    assert "a clone of the repository" in result.stderr
+
+
+SHOWS = """
+import sys, time
+from coop_drake.cli.reporter import Reporter
+reporter = Reporter(machine=False, quiet="-q" in sys.argv)
+with reporter.stage("planning") as progress:
+    progress("searching", 0.5)
+reporter.say("[bold red]found[/]")
+"""
+
+
+def shown(*arguments, terminal, **environment):
+    """What a reporter writes to a terminal or to a pipe."""
+    clean = {key: value for key, value in os.environ.items() if key not in ("NO_COLOR", "FORCE_COLOR")}
+    env = {**clean, "TERM": "xterm-256color", **environment}
+    command = [sys.executable, "-c", SHOWS, *arguments]
+    if not terminal:
+        return subprocess.run(command, env=env, capture_output=True, text=True, check=True).stdout
+    master, slave = pty.openpty()
+    with subprocess.Popen(command, env=env, stdout=slave, stderr=slave) as process:
+        os.close(slave)
+        chunks = []
+        while chunk := _read(master):
+            chunks.append(chunk)
+    os.close(master)
+    assert process.returncode == 0
+    return b"".join(chunks).decode()
+
+
+def _read(master: int) -> bytes:
+    try:
+        return os.read(master, 4096)
+    except OSError:  # Linux says so where the other end is closed.
+        return b""
+
+
+def test_bars_and_colours_are_for_terminals():
+    assert shown(terminal=False) == "found\n"
+    seen = shown(terminal=True)
+    assert "planning" in seen
+    assert "\x1b[1;31mfound" in seen
+    assert shown("-q", terminal=True) == ""
+
+
+def test_colours_can_be_switched_off_and_forced():
+    assert "\x1b[1;31m" not in shown(terminal=True, NO_COLOR="1")
+    forced = shown(terminal=False, FORCE_COLOR="1")
+    assert "\x1b[1;31mfound" in forced
+    assert "planning" not in forced
+    dumb = shown(terminal=True, TERM="dumb")
+    assert "\x1b" not in dumb
+    assert "found" in dumb
