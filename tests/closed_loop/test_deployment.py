@@ -9,6 +9,7 @@ import pytest
 from coop_drake.control import FixedGains
 from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
 from coop_drake.simulation import simulate
+from tests.support.hand_over import assert_certified
 from tests.support.small_loop import small_maps, small_problem
 
 RATE = 100.0
@@ -61,6 +62,8 @@ def test_a_mild_departure_is_survived(name):
     assert min(log.workspace_clearance.min(), log.body_clearance.min(), log.cell_clearance.min()) > 0.0
     assert min(log.funnel_margin.min(), log.slice_margin.min()) > 0.0
     assert log.acceleration_error.max() > 1e-3  # it does depart
+    assert log.energy_margin.min() >= 0.0
+    assert_certified(small_problem("base")[1], log)
 
 
 @pytest.mark.parametrize("name", HARSH)
