@@ -22,6 +22,7 @@ from coop_drake.cli.examples import epilog
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.floor_plan import FLOOR_PLAN_EXAMPLES, floor_plan_command
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.kernel_cache import keep_kernels_somewhere
 from coop_drake.cli.map_cache import maps_command
 from coop_drake.cli.options import GainsName, ScenarioPath
 from coop_drake.cli.question import read_apart
@@ -70,6 +71,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")]
 def main() -> None:
     """Run the command line; wrong usage is answered like any bad input."""
     arguments = sys.argv[1:]
+    keep_kernels_somewhere()
     try:
         code = app(arguments, standalone_mode=False)
     except _UsageError as error:  # type: ignore[misc]
