@@ -21,7 +21,6 @@ from coop_drake.viz.team_view import TeamView
 
 __all__ = ["TransportScene"]
 
-
 _SHADOW_HEIGHT = 0.023  # Above cells, below the trail [m].
 
 
