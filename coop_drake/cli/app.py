@@ -10,7 +10,7 @@ import json
 import sys
 from importlib.metadata import version
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -62,6 +62,10 @@ Live = Annotated[
     bool,
     typer.Option("--live", help="Show the run in a browser while it is simulated, at most in real time."),
 ]
+BlocksName = Annotated[
+    Literal["named", "fused"],
+    typer.Option("--blocks", help="Blocks of every robot, or, for speed, one for the team: equal results."),
+]
 Machine = Annotated[
     bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
 ]
@@ -99,6 +103,7 @@ def run_command(
     gains: GainsName = None,
     fresh_maps: FreshMaps = False,
     live: Live = False,
+    blocks: BlocksName = "named",
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
@@ -108,7 +113,7 @@ def run_command(
     def command() -> ExitCode:
         from coop_drake.cli.simulating import run_scenario
 
-        return run_scenario(scenario, gains, out, reporter, fresh_maps=fresh_maps, live=live)
+        return run_scenario(scenario, gains, out, reporter, fresh_maps=fresh_maps, live=live, blocks=blocks)
 
     run_guarded(reporter, command)
 
@@ -147,6 +152,7 @@ def simulate_command(
     ] = None,
     fresh_maps: FreshMaps = False,
     live: Live = False,
+    blocks: BlocksName = "named",
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
@@ -156,7 +162,9 @@ def simulate_command(
     def command() -> ExitCode:
         from coop_drake.cli.simulating import simulate_scenario
 
-        return simulate_scenario(scenario, gains, plan, out, reporter, fresh_maps=fresh_maps, live=live)
+        return simulate_scenario(
+            scenario, gains, plan, out, reporter, fresh_maps=fresh_maps, live=live, blocks=blocks
+        )
 
     run_guarded(reporter, command)
 

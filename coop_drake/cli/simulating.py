@@ -15,6 +15,7 @@ from coop_drake.cli.reading import Task, read_task
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import summary_rows
+from coop_drake.diagram import Blocks
 from coop_drake.fields import HarmonicMap
 from coop_drake.memory import peak_memory_mb
 from coop_drake.planning import Found, Plan
@@ -32,6 +33,7 @@ def run_scenario(
     *,
     fresh_maps: bool = False,
     live: bool = False,
+    blocks: Blocks = "named",
 ) -> ExitCode:
     """Plan and carry the plan out, with maps solved before unless fresh ones are asked for."""
     task = read_task(scenario, gains)
@@ -39,7 +41,7 @@ def run_scenario(
     result = plan_question(task.question, folder, reporter)
     if not isinstance(result, Found):
         return without_plan(task.question, result, folder, reporter)
-    return _carry_out(task, result.plan, folder, reporter, fresh_maps=fresh_maps, live=live)
+    return _carry_out(task, result.plan, folder, reporter, fresh_maps=fresh_maps, live=live, blocks=blocks)
 
 
 def simulate_scenario(
@@ -51,21 +53,29 @@ def simulate_scenario(
     *,
     fresh_maps: bool = False,
     live: bool = False,
+    blocks: Blocks = "named",
 ) -> ExitCode:
     """Carry out a plan made before: the file that is named, or the one among the scenario's results."""
     task = read_task(scenario, gains)
     folder = ResultFolder.of(task.scenario.name, out)
     found = read_plan(task.question, plan_file or folder.plan, reporter, gains_given=gains is not None)
-    return _carry_out(task, found, folder, reporter, fresh_maps=fresh_maps, live=live)
+    return _carry_out(task, found, folder, reporter, fresh_maps=fresh_maps, live=live, blocks=blocks)
 
 
 def _carry_out(
-    task: Task, found: Plan, folder: ResultFolder, reporter: Reporter, *, fresh_maps: bool, live: bool
+    task: Task,
+    found: Plan,
+    folder: ResultFolder,
+    reporter: Reporter,
+    *,
+    fresh_maps: bool,
+    live: bool,
+    blocks: Blocks,
 ) -> ExitCode:
     """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run."""
     maps = map_cells(task, found, reporter, fresh=fresh_maps)
     onlooker = open_live_view(task.scenario, found, reporter) if live else None
-    log = _simulate(task, found, maps, folder, reporter, onlooker)
+    log = _simulate(task, found, maps, folder, reporter, blocks, onlooker)
     _draw(task, found, log, folder, reporter)
     reporter.table(task.scenario.name, summary_rows(reporter.facts))
     reporter.say(
@@ -84,11 +94,12 @@ def _simulate(
     maps: tuple[HarmonicMap, ...],
     folder: ResultFolder,
     reporter: Reporter,
+    blocks: Blocks,
     onlooker: LiveView | None,
 ) -> SimulationLog:
     """Run the closed loop, note how it went, and write the log and the maps' certificates."""
     with reporter.stage("simulating") as progress, reporter.stopwatch("simulation"):
-        log = simulate(task.scenario, found, maps, progress=progress, onlooker=onlooker)
+        log = simulate(task.scenario, found, maps, blocks=blocks, progress=progress, onlooker=onlooker)
     reporter.facts.update(simulation_measures(found, log), peak_memory_mb=peak_memory_mb())
     folder.make()
     folder.forget_simulation()

@@ -39,7 +39,9 @@ def warm_up(scenario: Path, reporter: Reporter) -> ExitCode:
         result = plan(question.problem, question.gain_sets[question.gains], gain_set_name=question.gains)
         if isinstance(result, Found):
             short = replace(task.scenario.simulator, max_time=_WARM_UP_SECONDS)
-            simulate(replace(task.scenario, simulator=short), result.plan, build_maps(result.plan))
+            brief, maps = replace(task.scenario, simulator=short), build_maps(result.plan)
+            simulate(brief, result.plan, maps)
+            simulate(brief, result.plan, maps, blocks="fused")
     return ExitCode.DONE
 
 

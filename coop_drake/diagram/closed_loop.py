@@ -17,7 +17,7 @@ from coop_drake.fields import HarmonicMap
 from coop_drake.planning.plan import Plan
 from coop_drake.plant import TeamPlant, set_configuration
 from coop_drake.scenario import Scenario
-from coop_drake.systems import CellPlanner
+from coop_drake.systems import Block, CellPlanner
 
 __all__ = ["Blocks", "ClosedLoop", "build_closed_loop"]
 
@@ -68,6 +68,18 @@ class ClosedLoop:
         for deployed in self.deployed:
             deployed.prepare(context)
         return context
+
+    def release(self) -> None:
+        """Let go of all memory when the last context has gone; nothing of the loop may be used any more."""
+        _release(self.diagram)
+
+
+def _release(diagram: Diagram) -> None:
+    for system in diagram.GetSystems():
+        if isinstance(system, Block):
+            system.release()
+        elif isinstance(system, Diagram):
+            _release(system)
 
 
 def build_closed_loop(

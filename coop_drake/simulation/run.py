@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
-from coop_drake.diagram import Blocks, build_closed_loop
+from coop_drake.diagram import Blocks, ClosedLoop, build_closed_loop
 from coop_drake.fields import HarmonicMap
 from coop_drake.planning.plan import Plan
 from coop_drake.plant import read_component_tree
@@ -53,6 +53,19 @@ def simulate(
         ScenarioError: The models do not make a team, or fused blocks do not know what the scenario wants.
     """
     loop = build_closed_loop(scenario, plan, maps, blocks=blocks)
+    try:
+        return _simulated(loop, scenario, progress, onlooker)
+    finally:
+        loop.release()
+
+
+def _simulated(
+    loop: ClosedLoop,
+    scenario: Scenario,
+    progress: Progress | None,
+    onlooker: Callable[[Sample], None] | None,
+) -> SimulationLog:
+    plan = loop.plan
     clearance = TeamClearance(scenario.workspace.polygon, read_component_tree(loop.team.as_tree))
     root = loop.create_context()
     watch = Watch(

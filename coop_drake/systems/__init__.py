@@ -1,6 +1,7 @@
 """Thin LeafSystems over the control laws, the velocity fields and the cell planner."""
 
 from coop_drake.systems.axis_laws import AxisLaw, axis_laws
+from coop_drake.systems.block import Block
 from coop_drake.systems.cell_planner import CellPlanner
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
 from coop_drake.systems.free_robot_sensor import FreeRobotSensor
@@ -21,6 +22,7 @@ __all__ = [
     "CURRENT_CELL_SIZE",
     "READY_SIZE",
     "AxisLaw",
+    "Block",
     "CellPlanner",
     "FreeRobotSensor",
     "FusedCell",

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
+from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
 
 __all__ = ["CellPlanner"]
 
 
-class CellPlanner(LeafSystem):
+class CellPlanner(Block):
     """Advances to the next cell of the plan when all robots are ready to leave the current one.
 
     A robot is ready when its report carries the current cell's index and a margin that is not negative.

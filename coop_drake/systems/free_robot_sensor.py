@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.plant import SeparateTeam
+from coop_drake.systems.block import Block
 
 __all__ = ["FreeRobotSensor"]
 
 
-class FreeRobotSensor(LeafSystem):
+class FreeRobotSensor(Block):
     """Reads one robot's own state from a plant in which it is a tree of its own.
 
     ======= ============================ =============== =============================================== =====

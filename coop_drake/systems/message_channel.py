@@ -5,8 +5,9 @@ from __future__ import annotations
 from random import Random
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 
+from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import READY_SIZE
 
 __all__ = ["MessageChannel", "whole_periods"]
@@ -15,7 +16,7 @@ __all__ = ["MessageChannel", "whole_periods"]
 _NOTHING = (-1.0, -1.0)
 
 
-class MessageChannel(LeafSystem):
+class MessageChannel(Block):
     """Carries ready reports from one robot to the cell planner, one each period.
 
     ======= ============ ==== ================================================================

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.control.planar_chain import object_state
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant import RobotPlant, robot_chain
+from coop_drake.systems.block import Block
 
 __all__ = ["ObjectEstimator"]
 
 
-class ObjectEstimator(LeafSystem):
+class ObjectEstimator(Block):
     """Joins the object's pose with its twist A_k^-1 J_k z_k', which own motion tells through the grasp: (27).
 
     ======= ================= ========== ===================================================== =====

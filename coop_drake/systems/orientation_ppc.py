@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.control.kernels import track_state, write_walls
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.axis_laws import AxisLaw
+from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 
 __all__ = ["OrientationPpc"]
 
 
-class OrientationPpc(LeafSystem):
+class OrientationPpc(Block):
     """Keeps the object's angle in its funnel: the angular acceleration of (17)-(20).
 
     ======= ======================== ==== ====================================================== =======

@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.control.ready import arrival_margin, ready_margin
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.axis_laws import AxisLaw
+from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.reference_governor import GovernedCell
 
 __all__ = ["ReadyMonitor"]
 
 
-class ReadyMonitor(LeafSystem):
+class ReadyMonitor(Block):
     """Judges whether object and own joints may enter the next cell; in the last cell, whether they arrived.
 
     ======= ====================== ========== ====================================================== =====

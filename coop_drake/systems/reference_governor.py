@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.control import kernels
 from coop_drake.control.gains import TransitionGains
@@ -15,6 +15,7 @@ from coop_drake.control.governor import energy_margin, tracking_energy
 from coop_drake.fields import VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 from coop_drake.systems.governor_kernels import VELOCITY_STEP, cell_margin, lead
 
@@ -67,7 +68,7 @@ class GovernedCell:
         kernels.governor_velocity(vx, vy, margin, stiffness, gain, smoothing, velocity)
 
 
-class ReferenceGovernor(LeafSystem):
+class ReferenceGovernor(Block):
     """Leads the object to the cell's target no faster than is safe: (13)-(16).
 
     ======= =========================== ==== ====================================================== =====

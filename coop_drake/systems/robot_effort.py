@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.control.planar_chain import chain_effort
 from coop_drake.plant import RobotPlant, robot_chain
+from coop_drake.systems.block import Block
 
 __all__ = ["RobotEffort"]
 
 
-class RobotEffort(LeafSystem):
+class RobotEffort(Block):
     """Actuation M z'' + C z' + G + J^T tau_e of one robot from its own model, state and commands: (22)-(34).
 
     ======= ======================== ========== ======================================================= =====

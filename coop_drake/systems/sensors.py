@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.control.planar_chain import read_robot
 from coop_drake.plant import TeamPlant, base_chain
+from coop_drake.systems.block import Block
 
 __all__ = ["ObjectPoseSensor", "RobotStateSensor"]
 
 
-class ObjectPoseSensor(LeafSystem):
+class ObjectPoseSensor(Block):
     """Reads the object's pose.
 
     ======= ================= ========== ==================================================== =====
@@ -34,7 +35,7 @@ class ObjectPoseSensor(LeafSystem):
         output.SetFromVector(self._team.Eval(context)[self._index])
 
 
-class RobotStateSensor(LeafSystem):
+class RobotStateSensor(Block):
     """Reads one robot's own state: where its base is and moves, and its joints.
 
     ======= ============================ ========== ==================================================== =====

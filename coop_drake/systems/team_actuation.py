@@ -6,14 +6,15 @@ import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.plant import RobotModel, TeamPlant
+from coop_drake.systems.block import Block
 
 __all__ = ["TeamActuation"]
 
 
-class TeamActuation(LeafSystem):
+class TeamActuation(Block):
     """Applies base wrenches as forces on the bases and joint torques at the joints.
 
     ======= ====================== ========= ========================================================= =====

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.team_kernels import (
     FusedCell,
@@ -42,7 +43,7 @@ class TeamReport(NamedTuple):
     energy_margin: float
 
 
-class TeamController(LeafSystem):
+class TeamController(Block):
     """Computes what the controllers of all robots compute, from the plant's state, in one call.
 
     It is for speed alone. That robots need no state of each other is shown by the named blocks of every

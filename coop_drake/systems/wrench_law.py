@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.control.kernels import hand_command
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.systems.block import Block
 
 __all__ = ["WrenchLaw"]
 
 
-class WrenchLaw(LeafSystem):
+class WrenchLaw(Block):
     """Turns the object's desired acceleration into one robot's share of the work: (21), (28) and (31).
 
     ======= ========================== ==== ====================================================== =====
