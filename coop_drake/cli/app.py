@@ -24,6 +24,7 @@ from coop_drake.cli.floor_plan import FLOOR_PLAN_EXAMPLES, floor_plan_command
 from coop_drake.cli.guard import run_guarded
 from coop_drake.cli.kernel_cache import keep_kernels_somewhere
 from coop_drake.cli.map_cache import maps_command
+from coop_drake.cli.new import NEW_EXAMPLES, new_command
 from coop_drake.cli.options import GainsName, ScenarioPath
 from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
@@ -197,6 +198,7 @@ for name, command in (
 ):
     app.command(name, epilog=epilog(name))(command)
 app.command("floor-plan", epilog=FLOOR_PLAN_EXAMPLES)(floor_plan_command)
+app.command("new", epilog=NEW_EXAMPLES)(new_command)
 app.command("robot", epilog=ROBOT_EXAMPLES)(robot_command)
 app.command(
     "bench",

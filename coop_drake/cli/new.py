@@ -1,0 +1,171 @@
+"""The command new: a scenario with its models, from a few flags or questions."""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.markup import escape
+
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.reporter import Reporter
+
+if TYPE_CHECKING:
+    from coop_drake.scenario.starter import Starter
+
+__all__ = ["NEW_EXAMPLES", "new_command"]
+
+NEW_EXAMPLES = """Examples:
+
+coop-drake new mine --robots 3 --arm 0.3,0.3,0.3 --door 1.6
+
+coop-drake new hall --floor-plan hall.svg --unit cm --start 1 2 0 --goal 7 2 1.57
+
+coop-drake run mine/mine.scenario.yaml
+"""
+
+_QUESTIONS: tuple[tuple[str, str, Any], ...] = (
+    ("robots", "How many robots", 2),
+    ("arm", "Lengths of an arm's links from base to hand [m], a joint between each two", "0.35,0.4"),
+    ("base_radius", "Radius of a base [m]", 0.25),
+    ("length", "Length of the object [m]", 0.8),
+    ("width", "Width of the object [m]", 0.5),
+)
+
+
+def new_command(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of scenario and folder.")],
+    robots: Annotated[int | None, typer.Option("--robots", metavar="N", help="Two to four; 2.")] = None,
+    arm: Annotated[
+        str | None,
+        typer.Option(
+            "--arm", metavar="L1,L2,…", help="Links from base to hand [m], joints between; 0.35,0.4."
+        ),
+    ] = None,
+    base_radius: Annotated[
+        float | None, typer.Option("--base-radius", metavar="M", help="Radius of a base [m]; 0.25.")
+    ] = None,
+    length: Annotated[
+        float | None, typer.Option("--length", metavar="M", help="Length of the object [m]; 0.8.")
+    ] = None,
+    width: Annotated[
+        float | None, typer.Option("--width", metavar="M", help="Width of the object [m]; 0.5.")
+    ] = None,
+    door: Annotated[
+        float | None,
+        typer.Option("--door", metavar="M", help="Width of the door between two rooms [m]; a roomy one."),
+    ] = None,
+    floor_plan: Annotated[
+        Path | None,
+        typer.Option("--floor-plan", metavar="FILE", help="A drawing or map in place of two rooms."),
+    ] = None,
+    unit: Annotated[str | None, typer.Option("--unit", metavar="UNIT", help="Unit of the drawing.")] = None,
+    start: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option("--start", metavar="X Y THETA", help="Where the object starts [m, rad]."),
+    ] = None,
+    goal: Annotated[
+        tuple[float, float, float] | None,
+        typer.Option("--goal", metavar="X Y THETA", help="Where it shall go [m, rad]."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", file_okay=False, help="The folder; NAME by default."),
+    ] = None,
+    force: Annotated[bool, typer.Option("--force", help="Replace files that are there already.")] = False,
+    machine: Annotated[
+        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
+    ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+) -> None:
+    """Write a scenario and its models to start from; asks at a terminal for what no flag says."""
+    flags: dict[str, Any] = {
+        "robots": robots,
+        "arm": arm,
+        "base_radius": base_radius,
+        "length": length,
+        "width": width,
+    }
+    if sys.stdin.isatty() and sys.stdout.isatty() and not (machine or quiet):
+        flags = _asked(flags)
+    said: dict[str, Any] = {key: value for key, value in flags.items() if value is not None}
+    if "arm" in said:
+        said["links"] = _lengths(str(said.pop("arm")))
+    if not name.replace("-", "_").isidentifier():
+        raise typer.BadParameter(f"{name} is no name of letters, digits, - and _.")
+    if unit is not None and floor_plan is None:
+        raise typer.BadParameter("--unit is for a floor plan; name it with --floor-plan.")
+    folder = out if out is not None else Path(name)
+    reporter = Reporter(machine=machine, quiet=quiet)
+
+    def command() -> ExitCode:
+        from coop_drake.scenario.starter import Starter
+
+        workspace = None if floor_plan is None else _section(floor_plan, unit, folder)
+        starter = Starter(name, **said, door=door, workspace=workspace, start=start, goal=goal)
+        return _write(starter, folder, reporter, force=force)
+
+    run_guarded(reporter, command)
+
+
+def _asked(flags: dict[str, Any]) -> dict[str, Any]:
+    """Ask for every value that no flag gave."""
+    answers = dict(flags)
+    for key, question, default in _QUESTIONS:
+        if flags[key] is None:
+            answers[key] = typer.prompt(question, default=default, type=type(default))
+    return answers
+
+
+def _lengths(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise typer.BadParameter(f"--arm {text} is no list of lengths such as 0.35,0.4.") from None
+
+
+def _section(floor_plan: Path, unit: str | None, folder: Path) -> dict[str, object]:
+    """How the scenario names the floor plan: relative to the folder that it will stand in."""
+    section: dict[str, object] = {"file": Path(os.path.relpath(floor_plan, folder)).as_posix()}
+    return section if unit is None else {**section, "unit": unit}
+
+
+def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -> ExitCode:
+    """Write the files beside their place, read them as a user would, and only then move them there."""
+    # Here and not above: no other command should wait for Drake.
+    from coop_drake.cli.reading import read_task
+    from coop_drake.errors import ScenarioError
+    from coop_drake.plant.starter_models import object_model, robot_model
+    from coop_drake.scenario.starter import starter_text
+
+    files = {
+        f"{starter.name}.scenario.yaml": starter_text(starter),
+        "object.sdf": object_model(starter.length, starter.width),
+        "robot.sdf": robot_model("robot", starter.links, starter.base_radius),
+    }
+    for name in files:
+        if (folder / name).exists() and not force:
+            raise ScenarioError(str(folder / name), "--out", str(folder), "an empty folder, or --force")
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}.") as draft:
+        for name, text in files.items():
+            (Path(draft) / name).write_text(text, encoding="utf-8")
+        try:
+            with reporter.stage("checking"):
+                read_task(Path(draft) / f"{starter.name}.scenario.yaml", None)
+        except ScenarioError as error:  # The draft is gone when the message is read.
+            file = error.file.replace(str(Path(draft)), str(folder))
+            raise ScenarioError(file, error.key, error.value, error.allowed) from error
+        folder.mkdir(exist_ok=True)
+        for name in files:
+            (Path(draft) / name).replace(folder / name)
+    scenario = folder / f"{starter.name}.scenario.yaml"
+    reporter.facts.update(scenario=str(scenario), files=sorted(str(folder / name) for name in files))
+    reporter.say(f"Written: {', '.join(escape(str(folder / name)) for name in files)}")
+    reporter.say(f"Next: coop-drake run {escape(str(scenario))}")
+    return ExitCode.DONE
