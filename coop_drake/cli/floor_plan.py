@@ -106,7 +106,7 @@ def _tell(plan: FloorPlan, file: Path, reporter: Reporter) -> None:
         obstacles=len(plan.polygon.interiors),
         corners=sum(len(ring.coords) - 1 for ring in rings),
         corners_drawn=sum(len(ring.coords) - 1 for ring in (plan.drawn.exterior, *plan.drawn.interiors)),
-        other_places=len(plan.others),
+        other_rooms=len(plan.others),
         notes=list(plan.notes),
     )
     facts = reporter.facts
@@ -119,7 +119,7 @@ def _tell(plan: FloorPlan, file: Path, reporter: Reporter) -> None:
         ("corners", f"{facts['corners']} of {facts['corners_drawn']} drawn"),
     ]
     if plan.others:
-        rows.append(("other enclosed places", f"{len(plan.others)}, the largest {plan.others[0]:.2f} m²"))
+        rows.append(("other rooms", f"{len(plan.others)}, the largest {plan.others[0]:.2f} m²"))
     reporter.table(file.name, rows)
     for note in plan.notes:
         reporter.say(f"Note: {escape(note)}")

@@ -72,5 +72,5 @@ def _caption(plan: FloorPlan) -> str:
         f"{len(plan.polygon.interiors)} obstacles, {corners} corners of {drawn} drawn",
     ]
     if plan.others:
-        facts.append(f"{len(plan.others)} other enclosed places, the largest of {plan.others[0]:.1f} m²")
+        facts.append(f"{len(plan.others)} other rooms, the largest of {plan.others[0]:.1f} m²")
     return ". ".join([*facts, *plan.notes]) + "."

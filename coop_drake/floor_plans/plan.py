@@ -37,7 +37,10 @@ _MANY_DRAWN, _MANY_TRACED = 4_000, 300
 little off straight walls, too, which do not matter where walls are as rough as in maps."""
 
 _MOST_CORNERS = 20_000
-_SLOW = 1_000
+_SLOW = 500
+_SPECK = 0.1
+"""Other places smaller than this are not worth a word [m^2]."""
+
 _ROUNDING = 1e-9
 
 
@@ -48,7 +51,7 @@ class FloorPlan:
     Attributes:
         polygon: The floor, holes and all, in W [m]; inside ``drawn`` to a nanometre.
         drawn: The floor with every corner of the file.
-        others: Areas of the file's other enclosed places, largest first [m^2].
+        others: Areas of the file's other rooms, largest first [m^2].
         notes: What was left out, joined or taken for granted, in words.
     """
 
@@ -97,7 +100,8 @@ def read_floor_plan(
     notes = (*notes, *room.notes)
     if (corners := shapely.get_num_coordinates(floor)) > _SLOW:
         notes += (f"plans on {corners:,} corners take long; a larger tolerance saves corners",)
-    return FloorPlan(floor, room.floor, room.others, notes)
+    others = tuple(area for area in room.others if area >= _SPECK)
+    return FloorPlan(floor, room.floor, others, notes)
 
 
 def excess(floor: Polygon, drawn: Polygon) -> float:

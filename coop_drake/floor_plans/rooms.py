@@ -35,7 +35,7 @@ class Room:
 
     Attributes:
         floor: What its walls leave free, in W [m].
-        others: Areas of the plan's other enclosed places, largest first [m^2].
+        others: Areas of the plan's other rooms, largest first [m^2].
         notes: What was done to the lines, in words.
     """
 
@@ -82,7 +82,9 @@ def room_of(drawing: Drawing, file: str, gap: float, inside: Place | None) -> Ro
     if not free.is_empty and free.length > 0.0:
         parts = shapely.get_parts(room.difference(free.buffer(_THINNEST, join_style="mitre")))
         floor = chosen_room([part for part in parts if isinstance(part, Polygon)], file, inside, solid)
-    others = sorted((float(other.area) for other in rooms if other is not room), reverse=True)
+    outline = Polygon(room.exterior)  # What lies inside is an obstacle and no room.
+    places = [other for other in rooms if other is not room and not outline.covers(other)]
+    others = sorted((float(other.area) for other in places), reverse=True)
     notes = [f"{len(joined)} gaps of up to {gap:g} m were closed"] if joined else []
     if not free.is_empty and free.length > 0.0:
         notes.append(f"lines that enclose nothing stand as walls of {2e3 * _THINNEST:g} mm")
