@@ -19,6 +19,7 @@ from coop_drake.cli import simulating, verify
 from coop_drake.cli.question import Question
 from coop_drake.cli.reading import Task, read_task
 from coop_drake.errors import PlanError
+from coop_drake.floor_plans import read_floor_plan
 from coop_drake.planning import find_channel, load_plan, save_plan
 from coop_drake.planning.digest import problem_digest
 from coop_drake.planning.separation_file import save_separation
@@ -29,7 +30,17 @@ from coop_drake.simulation import SimulationLog
 from coop_drake.verification import verify_file
 from tests.support.cases import case
 from tests.support.certificates import GAINS, bent_corridor
-from tests.support.mutants import archives, directives, documents, models, rings, schema, text, values
+from tests.support.mutants import (
+    archives,
+    directives,
+    documents,
+    floor_plans,
+    models,
+    rings,
+    schema,
+    text,
+    values,
+)
 from tests.support.mutants.judging import REMEDY, faults
 from tests.support.mutants.mutant import Mutant, block, sampled
 from tests.support.robot_models import urdf_arm
@@ -73,8 +84,8 @@ def document_of(save: Callable[[Path], object], path: Path):
 
 SCENARIOS: dict[str, Callable[[], list[Mutant]]] = {
     "schema": lambda: [
-        *sampled(schema.schema_mutants(spelt_out()), 400, 1),
-        *sampled(schema.schema_mutants(shipped("elbow")), 80, 2),
+        *sampled(schema.schema_mutants(spelt_out()), 330, 1),
+        *sampled(schema.schema_mutants(shipped("elbow")), 60, 2),
     ],
     "values": lambda: sampled(values.value_mutants(spelt_out()), 70, 3),
     "rings": lambda: sampled(rings.ring_mutants(shipped("three")), 180, 4),
@@ -92,31 +103,51 @@ SCENARIOS: dict[str, Callable[[], list[Mutant]]] = {
 MODEL_FILES: dict[str, Callable[[], list[Mutant]]] = {
     "sdf": lambda: [
         *models.xml_mutants(LONG_BLUE, ROBOT, 9),
-        *sampled(models.number_mutants(LONG_BLUE, ROBOT), 70, 10),
+        *sampled(models.number_mutants(LONG_BLUE, ROBOT), 50, 10),
         *sampled(models.element_mutants(LONG_BLUE, ROBOT), 10, 11),
         *models.edited_mutants(LONG_BLUE, models.SDF_EDITS, ROBOT),
     ],
     "urdf": lambda: [
         *models.xml_mutants(FORKED, ROBOT, 12),
-        *sampled(models.number_mutants(FORKED, ROBOT), 55, 13),
+        *sampled(models.number_mutants(FORKED, ROBOT), 45, 13),
         *sampled(models.element_mutants(FORKED, ROBOT), 35, 14),
     ],
 }
 """Model files by their ending."""
+GEOJSON, MAP = json.dumps(floor_plans.GEOJSON).encode(), block(floor_plans.MAP).encode()
+DRAWINGS: dict[str, tuple[bytes, Callable[[], list[Mutant]]]] = {
+    "hall.svg": (floor_plans.SVG, lambda: list(floor_plans.svg_mutants(24))),
+    "hall.wkt": (
+        floor_plans.WKT,
+        lambda: [*floor_plans.wkt_mutants(25), *text.encoding_mutants(floor_plans.WKT, 10, 26)],
+    ),
+    "hall.geojson": (
+        GEOJSON,
+        lambda: [*floor_plans.geojson_mutants(27), *text.encoding_mutants(GEOJSON, 10, 28)],
+    ),
+    "map.yaml": (MAP, lambda: [*floor_plans.map_mutants(), *text.encoding_mutants(MAP, 10, 29)]),
+    "map.pgm": (floor_plans.PICTURE, lambda: list(floor_plans.picture_mutants(30))),
+}
+"""Floor plans, each with what it holds when it is sound."""
 COUNTS = {
-    "schema": 480,
+    "schema": 390,
     "values": 70,
     "rings": 180,
     "directives": 173,
     "text": 270,
     "team": 21,
-    "sdf": 142,
-    "urdf": 140,
+    "sdf": 122,
+    "urdf": 130,
+    "hall.svg": 46,
+    "hall.wkt": 62,
+    "hall.geojson": 162,
+    "map.yaml": 88,
+    "map.pgm": 16,
     "plan": 483,
     "proof 0": 138,
     "proof 1": 117,
     "proof 2": 73,
-    "log": 191,
+    "log": 197,
 }
 """At least so many different files in each group."""
 
@@ -166,6 +197,22 @@ def test_malformed_models_are_refused(ending, bench):
     (bench.folder / f"robot.{ending}").write_bytes(LONG_BLUE if ending == "sdf" else FORKED)
     read_task(scenario, None)
     bench.judge(MODEL_FILES[ending](), ending, f"robot.{ending}", "plan", str(scenario))
+
+
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_malformed_floor_plans_are_refused(name, tmp_path):
+    for other, (content, _) in DRAWINGS.items():
+        (tmp_path / other).write_bytes(content)
+    read_floor_plan(tmp_path / ("map.yaml" if name == "map.pgm" else name))
+    mutants, file = DRAWINGS[name][1](), tmp_path / name
+    check_count(mutants, name)
+    command = ["floor-plan", str(tmp_path / ("map.yaml" if name == "map.pgm" else name))]
+    wrong = [
+        (mutant, found)
+        for mutant in mutants
+        if (found := faults(mutant, file, command, tmp_path / "out", "; "))
+    ]
+    assert not wrong, wrong[:10]
 
 
 def plan_mutants(folder: Path) -> list[Mutant]:

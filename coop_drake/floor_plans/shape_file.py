@@ -86,6 +86,19 @@ def read_geojson(path: Path, settings: FloorPlanSettings) -> Drawing:
     return _drawing(file, chosen, settings)
 
 
+def _with_whole_rings(shape: BaseGeometry) -> BaseGeometry:
+    """The same shape.
+
+    Raises:
+        ValueError: A ring runs to a corner and back, which encloses nothing.
+    """
+    for polygon in shapely.get_parts(shape):
+        rings = (polygon.exterior, *polygon.interiors) if isinstance(polygon, Polygon) else ()
+        if any(0 < len(ring.coords) < 4 for ring in rings):
+            raise ValueError("a ring has fewer than three corners")
+    return shape
+
+
 def _text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8-sig")
@@ -116,7 +129,7 @@ def _geometries(
             yield from _geometries(geometry, file, f"{place}.geometries[{index}]", layer, depth + 1)
     elif kind in _KINDS:
         try:
-            yield place, layer, shapely.from_geojson(json.dumps(value))
+            yield place, layer, _with_whole_rings(shapely.from_geojson(json.dumps(value)))
         except (shapely.GEOSException, ValueError) as error:
             finding = f"no {kind} ({' '.join(str(error).split())})"
             raise FloorPlanError(file, place, finding, "give its coordinates as GeoJSON has them") from error

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
@@ -19,7 +19,7 @@ REMEDY = "; expected "
 
 
 def faults(
-    mutant: Mutant, file: Path, arguments: Sequence[str], out: Path, run: Callable[..., object] = COMMAND.main
+    mutant: Mutant, file: Path, arguments: Sequence[str], out: Path, remedy: str = REMEDY
 ) -> list[str]:
     """What is wrong with the answer to a mutant; nothing if it is as it should be.
 
@@ -28,7 +28,7 @@ def faults(
         file: Where the command finds it.
         arguments: The command; ``--json`` and ``--out`` are added.
         out: Where results would go; it must not come to be.
-        run: The command line's entry.
+        remedy: What stands before the words that help.
     """
     shutil.rmtree(out, ignore_errors=True)
     file.write_bytes(mutant.content)
@@ -36,7 +36,7 @@ def faults(
     said, complained = io.StringIO(), io.StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(complained):
-            code = run([*arguments, "--json"], standalone_mode=False)
+            code = COMMAND.main([*arguments, "--json"], standalone_mode=False)
     except BaseException as error:
         return [f"raised {type(error).__name__}: {str(error)[:200]}"]
     found = [] if code == 2 else [f"exit code {code}"]
@@ -51,7 +51,7 @@ def faults(
         found.append("the file is not named")
     if mutant.key not in message:
         found.append(f"the key {mutant.key} is not named")
-    if REMEDY not in message:
+    if remedy not in message:
         found.append("no remedy")
     if len(message) > 2000:
         found.append(f"the message has {len(message)} characters")
