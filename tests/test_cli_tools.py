@@ -79,6 +79,7 @@ def test_scenarios_are_completed_from_folders_on_the_way(tmp_path, monkeypatch):
     assert complete_scenario("models/b") == ["models/base.scenario.yaml"]
     assert "models/" in complete_scenario("mod")
     assert complete_scenario("nowhere/b") == []
+    assert complete_scenario("ba") == ["base"]
 
 
 def test_gain_sets_are_completed_from_the_scenario(tmp_path):

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import typer
 
+from coop_drake.shipped import scenario_file, shipped_scenarios
+
 __all__ = ["complete_gains", "complete_scenario"]
 
 _ENDING = ".scenario.yaml"
@@ -13,15 +15,16 @@ _SHIPPED_GAINS = ("scheduled", "table_2")
 
 
 def complete_scenario(incomplete: str) -> list[str]:
-    """Scenario files, and folders on the way to some, that begin as typed."""
+    """Shipped scenarios, scenario files, and folders on the way to some, that begin as typed."""
     typed = Path(incomplete)
     folder = typed if incomplete.endswith("/") else typed.parent
+    shipped = [name for name in shipped_scenarios() if name.startswith(incomplete)]
     if not folder.is_dir():
-        return []
+        return shipped
     entries = sorted(folder.iterdir())
     names = [f"{entry}/" if entry.is_dir() else str(entry) for entry in entries]
     found = [name for name in names if name.endswith(("/", _ENDING)) and name.startswith(incomplete)]
-    return [name for name in found if not name.rstrip("/").rpartition("/")[2].startswith(".")]
+    return shipped + [name for name in found if not name.rstrip("/").rpartition("/")[2].startswith(".")]
 
 
 def complete_gains(context: typer.Context, incomplete: str) -> list[str]:
@@ -29,7 +32,7 @@ def complete_gains(context: typer.Context, incomplete: str) -> list[str]:
     names = set(_SHIPPED_GAINS)
     scenario = context.params.get("scenario")
     if scenario is not None:
-        names |= _gain_sets(Path(scenario))
+        names |= _gain_sets(scenario_file(scenario))
     return sorted(name for name in names if name.startswith(incomplete))
 
 

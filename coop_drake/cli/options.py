@@ -14,7 +14,9 @@ __all__ = ["GainsName", "ScenarioPath"]
 ScenarioPath = Annotated[
     Path,
     typer.Argument(
-        metavar="SCENARIO", help="Scenario file (*.scenario.yaml).", autocompletion=complete_scenario
+        metavar="SCENARIO",
+        help="Scenario file (*.scenario.yaml), or the name of a shipped scenario.",
+        autocompletion=complete_scenario,
     ),
 ]
 GainsName = Annotated[
