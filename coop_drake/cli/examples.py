@@ -10,6 +10,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "run": (
         (f"run {_BASE}", "plan, simulate and record into out/base/"),
         (f"run {_BASE} --gains table_2 --out out/paper", "with the paper's gains, elsewhere"),
+        (f"run {_BASE} --live", "watch it in a browser while it is simulated"),
         (f"run {_BASE} --json --quiet", "one JSON object for machines"),
     ),
     "plan": (
