@@ -9,9 +9,9 @@ from pydrake.systems.framework import DiagramBuilder
 from coop_drake.diagram import build_closed_loop
 from coop_drake.plant import base_poses, build_separate_team, build_team_plant, set_configuration
 from coop_drake.scenario import PlantSettings
-from coop_drake.simulation import simulate
+from coop_drake.simulation import build_maps, simulate
 from tests.support.small_loop import small_maps, small_problem
-from tests.support.small_plan import ANGLE_TOLERANCE, POSITION_TOLERANCE
+from tests.support.small_plan import ANGLE_TOLERANCE, POSITION_TOLERANCE, plan_by_hand
 from tests.support.small_scenario import small_scenario
 from tests.support.system_checks import port_sizes
 
@@ -20,14 +20,13 @@ SEPARATE = PlantSettings(grasps="constraints")
 
 @pytest.fixture(scope="module")
 def logs():
-    """The last two cells of the small plan, and how the ideal plant and the other carry it out."""
+    """A short way through two cells, and how the ideal plant and the other carry the object there."""
     scenario, plan = small_problem("base")
-    first = plan.transitions[0]
-    start = np.array([*first.target, *(0.5 * (first.goal_lower + first.goal_upper))])
-    plan = replace(plan, cells=plan.cells[1:], transitions=plan.transitions[1:], start=start)
+    start, goal = np.array([4.25, 3.65, 0.42, 0.1, 0.2]), np.array([4.75, 3.6, 0.6])
+    plan = plan_by_hand(plan.cells[1:], start, goal, plan.joint_names)
+    maps = build_maps(plan)
     return plan, *(
-        simulate(replace(scenario, plant=plant), plan, small_maps()[1:])
-        for plant in (PlantSettings(), SEPARATE)
+        simulate(replace(scenario, plant=plant), plan, maps) for plant in (PlantSettings(), SEPARATE)
     )
 
 

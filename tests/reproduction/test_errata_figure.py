@@ -8,8 +8,13 @@ from coop_drake.reproduction.errata_figure import errata_figure, write_errata_fi
 
 
 @pytest.fixture(scope="module")
-def panels():
-    return {ax.get_title().split(":")[0]: ax for ax in errata_figure().axes}
+def figure():
+    return errata_figure()
+
+
+@pytest.fixture(scope="module")
+def panels(figure):
+    return {ax.get_title().split(":")[0]: ax for ax in figure.axes}
 
 
 def curves(ax, colour):
@@ -44,7 +49,8 @@ def test_the_funnel_has_room_in_blue_only(panels):
     assert blue[1][0] - blue[0][0] > 0.1
 
 
-def test_the_picture_is_written_where_it_is_said_to_be(tmp_path):
+def test_the_picture_is_written_where_it_is_said_to_be(figure, tmp_path, monkeypatch):
+    monkeypatch.setattr("coop_drake.reproduction.errata_figure.errata_figure", lambda: figure)
     path = write_errata_figure(tmp_path / "new")
     assert path.parent == tmp_path / "new"
     assert path.stat().st_size > 10_000
