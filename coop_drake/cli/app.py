@@ -20,16 +20,16 @@ from coop_drake.cli.diagram import diagram_command
 from coop_drake.cli.doctor import doctor_command
 from coop_drake.cli.examples import epilog
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.floor_plan import FLOOR_PLAN_EXAMPLES, floor_plan_command
+from coop_drake.cli.floor_plan import floor_plan_command
 from coop_drake.cli.guard import run_guarded
 from coop_drake.cli.kernel_cache import keep_kernels_somewhere
 from coop_drake.cli.map_cache import maps_command
-from coop_drake.cli.new import NEW_EXAMPLES, new_command
+from coop_drake.cli.new import new_command
 from coop_drake.cli.options import GainsName, ScenarioPath
 from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.reproduce import reproduce_command
-from coop_drake.cli.robot import ROBOT_EXAMPLES, robot_command
+from coop_drake.cli.robot import robot_command
 from coop_drake.cli.schema import schema_command
 from coop_drake.cli.show import show_command
 from coop_drake.cli.tune import tune_command
@@ -193,13 +193,13 @@ for name, command in (
     ("compare", compare_command),
     ("reproduce", reproduce_command),
     ("tune", tune_command),
+    ("floor-plan", floor_plan_command),
+    ("new", new_command),
+    ("robot", robot_command),
     ("schema", schema_command),
     ("doctor", doctor_command),
 ):
     app.command(name, epilog=epilog(name))(command)
-app.command("floor-plan", epilog=FLOOR_PLAN_EXAMPLES)(floor_plan_command)
-app.command("new", epilog=NEW_EXAMPLES)(new_command)
-app.command("robot", epilog=ROBOT_EXAMPLES)(robot_command)
 app.command(
     "bench",
     epilog=epilog("bench"),

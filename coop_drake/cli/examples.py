@@ -42,6 +42,24 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "compare": ((f"compare {_BASE}", "rigid grasps beside grasps as constraints"),),
     "tune": ((f"tune {_BASE}", "gains for this scenario, into a file that --gains takes"),),
     "doctor": (("doctor", "a table of what works"), ("doctor --json", "the same for machines")),
+    "floor-plan": (
+        ("floor-plan hall.dxf --unit mm --out hall.png", "look at a drawing"),
+        (
+            "floor-plan map.yaml --inside 2 3 --tolerance 0.05 --out workspace.yaml",
+            "an occupancy map as a scenario's workspace; a scenario may name the file itself, too",
+        ),
+    ),
+    "new": (
+        ("new mine --robots 3 --arm 0.3,0.3,0.3 --door 1.6", "a team and two rooms into mine/"),
+        ("new hall --floor-plan hall.svg --unit cm --start 1 2 0 --goal 7 2 1.57", "on a floor of your own"),
+    ),
+    "robot": (
+        ("robot stretch4.urdf --out models/stretch4", "model and meshes in one folder, joints judged"),
+        (
+            "robot pr2.urdf --package pr2_description=../pr2 --fix r_elbow_flex_joint=-0.3 --out models",
+            "with a package's folder, and the axes behind a joint that will be fixed",
+        ),
+    ),
     "bench": (("bench planner --only base --seeds 3", "a part of the benchmarks"),),
 }
 """For each command its examples, without the program's name, and what each does."""

@@ -15,18 +15,10 @@ from coop_drake.cli.reporter import Reporter
 if TYPE_CHECKING:
     from coop_drake.floor_plans import FloorPlan
 
-__all__ = ["FLOOR_PLAN_EXAMPLES", "floor_plan_command"]
+__all__ = ["floor_plan_command"]
 
 _PICTURES = (".png", ".svg")
 _SECTIONS = (".yaml", ".yml")
-FLOOR_PLAN_EXAMPLES = """Examples:
-
-coop-drake floor-plan hall.dxf --unit mm --out hall.png
-
-coop-drake floor-plan map.yaml --inside 2 3 --tolerance 0.05 --out workspace.yaml --out workspace.png
-
-A scenario may name the file itself: workspace: {file: hall.dxf, unit: mm}
-"""
 
 
 def floor_plan_command(

@@ -18,16 +18,7 @@ from coop_drake.cli.reporter import Reporter
 if TYPE_CHECKING:
     from coop_drake.scenario.starter import Starter
 
-__all__ = ["NEW_EXAMPLES", "new_command"]
-
-NEW_EXAMPLES = """Examples:
-
-coop-drake new mine --robots 3 --arm 0.3,0.3,0.3 --door 1.6
-
-coop-drake new hall --floor-plan hall.svg --unit cm --start 1 2 0 --goal 7 2 1.57
-
-coop-drake run mine/mine.scenario.yaml
-"""
+__all__ = ["new_command"]
 
 _QUESTIONS: tuple[tuple[str, str, Any], ...] = (
     ("robots", "How many robots", 2),

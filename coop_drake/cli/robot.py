@@ -15,16 +15,7 @@ from coop_drake.cli.reporter import Reporter
 if TYPE_CHECKING:
     from coop_drake.plant.joint_survey import SurveyedJoint
 
-__all__ = ["ROBOT_EXAMPLES", "robot_command"]
-
-ROBOT_EXAMPLES = """Examples:
-
-coop-drake robot stretch4.urdf --out models/stretch4
-
-coop-drake robot pr2.urdf --package pr2_description=../pr2 --fix r_upper_arm_roll_joint=-1.57 --out models
-
-A scenario then fixes what leaves the plane: fixed_joints: {robot_0: {"*": 0, wrist_yaw_joint: null}}
-"""
+__all__ = ["robot_command"]
 
 
 def robot_command(
