@@ -100,7 +100,7 @@ def _drake() -> Finding:
 
 def _scenarios() -> Finding:
     from coop_drake.scenario import load_scenario
-    from coop_drake.scenario.packages import SHIPPED
+    from coop_drake.shipped import SHIPPED
 
     scenarios = sorted(SHIPPED.glob("*.scenario.yaml"))
     names = [load_scenario(path).name for path in scenarios]

@@ -41,9 +41,11 @@ def scenario_schema() -> Schema:
 
 def _of_class(cls: type) -> Schema:
     hints = typing.get_type_hints(cls)
-    meanings = _meanings(cls)
-    properties = {f.name: {**_of_kind(hints[f.name]), **meanings.get(f.name, {})} for f in in_file(cls)}
+    meanings = field_meanings(cls)
+    properties = {f.name: _of_kind(hints[f.name]) for f in in_file(cls)}
     for f in in_file(cls):
+        if f.name in meanings:
+            properties[f.name]["description"] = meanings[f.name]
         if isinstance(f.default, bool | int | float | str):
             properties[f.name]["default"] = f.default
     required = required_fields(cls)
@@ -55,12 +57,12 @@ def _of_class(cls: type) -> Schema:
     }
 
 
-def _meanings(cls: type) -> dict[str, Schema]:
-    """What the docstring says of every field."""
+def field_meanings(cls: type) -> dict[str, str]:
+    """What the docstring of a class says of every field, with its unit in brackets."""
     text = inspect.getdoc(cls) or ""
     _, _, attributes = text.partition("Attributes:\n")
     found = _ATTRIBUTE.findall(attributes + "\n")
-    return {name: {"description": " ".join(meaning.split())} for name, meaning in found}
+    return {name: " ".join(meaning.split()) for name, meaning in found}
 
 
 def _of_kind(kind: Any) -> Schema:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from coop_drake.errors import ScenarioError
+from coop_drake.scenario.json_schema import field_meanings
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.schema import in_file
 from coop_drake.scenario.validation import validate
@@ -67,7 +68,7 @@ def sections(scenario: Scenario) -> Iterator[Section]:
 
 
 def _sections(cls: type, path: str, scenario: Scenario) -> Iterator[Section]:
-    hints, meanings = typing.get_type_hints(cls), _attributes(cls)
+    hints, meanings = typing.get_type_hints(cls), field_meanings(cls)
     keys = []
     for field in in_file(cls):
         place = f"{path}.{field.name}" if path else field.name
@@ -89,13 +90,6 @@ def _classes(kind: Any) -> list[type]:
     if dataclasses.is_dataclass(kind):
         return [kind] if isinstance(kind, type) else []
     return [cls for part in typing.get_args(kind) for cls in _classes(part)]
-
-
-def _attributes(cls: type) -> dict[str, str]:
-    """Meanings of the fields from the docstring of their class."""
-    listed = (inspect.getdoc(cls) or "").split("Attributes:\n")[1].split("\n\n")[0]
-    joined = re.sub(r"\n {8,}", " ", listed)  # where a meaning goes on in the next line
-    return dict(re.findall(r"^ {4}(\w+): (.*)$", joined, re.MULTILINE))
 
 
 def _unit_apart(meaning: str) -> tuple[str, str]:
