@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
+from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
-from coop_drake.cli.options import ScenarioPath
+from coop_drake.cli.options import GainsName, ScenarioPath
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 
@@ -47,13 +50,13 @@ def compare_command(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="DIR", file_okay=False, help="Where the plan goes; out/<scenario> by default."
+            "--out",
+            metavar="DIR",
+            file_okay=False,
+            help="Where plan and comparison go; out/<scenario>/compare by default.",
         ),
     ] = None,
-    gains: Annotated[
-        str | None,
-        typer.Option("--gains", metavar="NAME", help="Gain set; the scenario's choice by default."),
-    ] = None,
+    gains: GainsName = None,
     machine: Annotated[
         bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
     ] = False,
@@ -69,18 +72,22 @@ def _compare(scenario: Path, gains: str | None, out: Path | None, reporter: Repo
     from coop_drake.cli.mapping import map_cells
     from coop_drake.cli.planning import plan_question, without_plan
     from coop_drake.cli.reading import read_task
+    from coop_drake.files import write_atomically
     from coop_drake.planning import Found
 
     task = read_task(scenario, gains)
-    folder = ResultFolder.of(task.scenario.name, out)
+    folder = ResultFolder(out if out is not None else Path("out") / task.scenario.name / "compare")
     result = plan_question(task.question, folder, reporter)
     if not isinstance(result, Found):
         return without_plan(task.question, result, folder, reporter)
     maps = map_cells(task, result.plan, reporter, fresh=False)
     measures = [_measures(task, result.plan, maps, grasps, reporter) for grasps, _ in _PLANTS]
-    reporter.facts.update({grasps: facts for (grasps, _), facts in zip(_PLANTS, measures, strict=True)})
-    rows = [(label, *(form.format(facts[key]) for facts in measures)) for label, key, form in _ROWS]
+    compared: dict[str, Any] = {grasps: facts for (grasps, _), facts in zip(_PLANTS, measures, strict=True)}
+    write_atomically(folder.path / "compare.json", json.dumps(compared, indent=1).encode() + b"\n")
+    reporter.facts.update(compared)
+    rows = [(label, *(_text(facts[key], form) for facts in measures)) for label, key, form in _ROWS]
     reporter.table(task.scenario.name, rows, [heading for _, heading in _PLANTS])
+    reporter.say(f"The same as JSON is in {escape(str(folder.path / 'compare.json'))}")
     for (_, heading), facts in zip(_PLANTS, measures, strict=True):
         if facts["violation"]:
             reporter.complain(f"{heading}: {facts['violation']}")
@@ -100,4 +107,13 @@ def _measures(
     plant = replace(task.scenario.plant, grasps=grasps)
     with reporter.stage("simulating") as progress:
         log = simulate(replace(task.scenario, plant=plant), plan, maps, progress=progress)
-    return simulation_measures(plan, log)
+    measures = simulation_measures(plan, log)
+    # JSON has no infinities: where nothing can touch, there is no smallest clearance.
+    return {
+        key: None if isinstance(value, float) and not isfinite(value) else value
+        for key, value in measures.items()
+    }
+
+
+def _text(value: Any, form: str) -> str:
+    return "-" if value is None else form.format(value)
