@@ -76,10 +76,11 @@ def compare_gains(
     """
     hall = corridor_scenario(scenario)
     problem = planning_problem(hall, build_team_plant(hall, DiagramBuilder()))
+    plans = [corridor_plan(problem, hall.gain_sets[name], name) for name in names]
+    maps = build_maps(plans[0])  # Gains change neither cells nor targets.
     figures = []
-    for number, name in enumerate(names):
-        found = corridor_plan(problem, hall.gain_sets[name], name)
-        log = simulate(hall, found, build_maps(found), progress=part_of(progress, number, len(names)))
+    for number, (name, found) in enumerate(zip(names, plans, strict=True)):
+        log = simulate(hall, found, maps, progress=part_of(progress, number, len(names)))
         figures.append(_figures(name, log))
     return figures
 

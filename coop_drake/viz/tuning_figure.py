@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from coop_drake.drawing.canvas import house_style, new_figure, save_figure
 from coop_drake.drawing.colours import BLUE, GREY, INK, VERMILLION
@@ -68,6 +69,9 @@ def _draw_trials(ax: Axes, found: Search, across: Criterion, up: Criterion) -> N
     ax.set_ylabel(f"{up.label} [{up.unit}]")
     if _spread([outcome.values[up.name] for outcome in arrived]) > 5.0:
         ax.set_yscale("log")
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        ax.yaxis.set_minor_formatter(NullFormatter())
     ax.legend(loc="upper center", bbox_to_anchor=(0.5, 1.13), ncols=5, fontsize=8, columnspacing=1.0)
 
 
