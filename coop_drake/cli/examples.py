@@ -32,7 +32,9 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         (f"show {_BASE} --plan out/base/plan.json --out base.svg", "with the plan's channel"),
     ),
     "diagram": ((f"diagram {_BASE} --robot 1", "the blocks of the loop and of the second robot"),),
-    "reproduce": ((f"reproduce {_BASE}", "the paper's tables and figures beside ours"),),
+    "reproduce": (
+        ("reproduce", "the paper's tables and figures beside ours, into out/reproduction/index.html"),
+    ),
     "maps": (("maps", "where solved maps are kept"), ("maps --clear", "forget them")),
     "warm": ((f"warm {_BASE}", "compile all kernels ahead"),),
     "schema": (
@@ -40,7 +42,11 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("schema", "the same on standard output"),
     ),
     "compare": ((f"compare {_BASE}", "rigid grasps beside grasps as constraints"),),
-    "tune": ((f"tune {_BASE}", "gains for this scenario, into a file that --gains takes"),),
+    "tune": (
+        (f"tune {_BASE}", "less force in no more time, into out/base/tuned/gains.yaml"),
+        (f'tune {_BASE} --criterion time --limit "peak_force<=1x"', "less time with no more force"),
+        (f"run {_BASE} --gains out/base/tuned/gains.yaml", "use them"),
+    ),
     "doctor": (("doctor", "a table of what works"), ("doctor --json", "the same for machines")),
     "floor-plan": (
         ("floor-plan hall.dxf --unit mm --out hall.png", "look at a drawing"),

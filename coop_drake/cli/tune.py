@@ -9,7 +9,7 @@ import typer
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
-from coop_drake.cli.options import ScenarioPath
+from coop_drake.cli.options import GainsName, ScenarioPath
 from coop_drake.cli.reporter import Reporter
 
 __all__ = ["tune_command"]
@@ -37,12 +37,7 @@ def tune_command(
             "time<=1x by default.",
         ),
     ] = None,
-    gains: Annotated[
-        str | None,
-        typer.Option(
-            "--gains", metavar="NAME|FILE", help="Gain set to begin with; the scenario's by default."
-        ),
-    ] = None,
+    gains: GainsName = None,
     vary: Annotated[
         list[str] | None, typer.Option("--vary", metavar="GAIN", help="Gains to turn; all by default.")
     ] = None,
