@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
@@ -30,6 +31,9 @@ _DROPPED = (
     "mimic",
 )
 _GROUP = "own_links"
+_NEARLY_RIGHT = 1e-5
+"""Files round right angles; axes that hang askew by as little would spoil the equations of the plane [rad]."""
+
 _MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
@@ -106,6 +110,7 @@ class _Work:
     dropped: set[str] = field(default_factory=set)
     thickened: list[str] = field(default_factory=list)
     mended: list[str] = field(default_factory=list)
+    squared: int = 0
 
     def notes(self) -> Iterator[str]:
         """What was changed."""
@@ -115,6 +120,8 @@ class _Work:
             yield f"made solid by their pictures' hulls: {', '.join(self.thickened)}"
         if self.mended:
             yield f"impossible inertia made round: {', '.join(self.mended)}"
+        if self.squared:
+            yield f"{self.squared} angles within {_NEARLY_RIGHT:g} rad of a right angle made right"
         yield "links of the robot are filtered from colliding with one another"
 
     def drop(self, element: Element) -> None:
@@ -127,9 +134,21 @@ class _Work:
             else:
                 if child.tag == "dynamics" and float(child.attrib.pop("friction", "0")) != 0.0:
                     self.dropped.add("friction")
+                if child.tag == "origin" and "rpy" in child.attrib:
+                    child.set("rpy", self._squared(child.attrib["rpy"]))
                 if child.tag == "link":
                     child.attrib.pop("type", None)
                 self.drop(child)
+
+    def _squared(self, rpy: str) -> str:
+        """Angles with those made right that a file rounds; axes that should be upright then are."""
+        angles = []
+        for text in rpy.split():
+            quarters = round(float(text) / (0.5 * pi))
+            near = 0.0 < abs(float(text) - quarters * 0.5 * pi) <= _NEARLY_RIGHT
+            self.squared += near
+            angles.append(repr(quarters * 0.5 * pi) if near else text)
+        return " ".join(angles)
 
     def make_solid(self, link: Element) -> None:
         """Turn a link's meshes into hulls, and its pictures into what collides if nothing else does."""

@@ -32,7 +32,7 @@ ROBOT = """<robot name="maker">
   <origin xyz="0.3 0 0.5"/>
   <limit lower="-1" upper="1" effort="100" velocity="1"/><mimic joint="lift"/></joint>
 <joint name="grip" type="fixed"><parent link="arm"/><child link="tool"/>
-  <origin xyz="0.4 0 0" rpy="0 0 3.141592653589793"/></joint>
+  <origin xyz="0.4 0 0" rpy="0 0 3.14159"/></joint>
 <transmission name="drive"/><gazebo/>
 </robot>"""
 
@@ -91,6 +91,8 @@ def test_what_was_changed_is_said(maker):
     assert "left out: friction, gazebo, mimic, transmission" in notes
     assert "made solid by their pictures' hulls: wheel" in notes
     assert "impossible inertia made round: mast" in notes
+    assert "1 angles within 1e-05 rad of a right angle made right" in notes
+    assert b'rpy="0 0 3.141592653589793"' in import_robot(maker).files["maker.urdf"]
 
 
 def test_hulls_enclose_their_meshes(maker):
