@@ -32,7 +32,7 @@ _DROPPED = (
 )
 _GROUP = "own_links"
 _NEARLY_RIGHT = 1e-5
-"""Files round right angles; axes that hang askew by as little would spoil the equations of the plane [rad]."""
+"""Files round right angles; axes that hang askew by as little would spoil the plane's equations [rad]."""
 
 _MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
