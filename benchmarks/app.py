@@ -21,7 +21,7 @@ from benchmarks.planner.growth import growth_tasks
 from benchmarks.planner.head_to_head import Effort, head_to_head_tasks
 from benchmarks.planner.ompl_peer import has_ompl
 from benchmarks.planner.ours import compile_kernels
-from benchmarks.simulating import bench_simulation
+from benchmarks.simulating import simulating_tasks
 from benchmarks.table import show
 from benchmarks.tasks import Task, chosen, worked
 
@@ -87,7 +87,7 @@ def _tasks(effort: Effort) -> list[Task]:
         Task("command/help", lambda rows: bench_help(), alone=True),
         *(_command_task(scenario) for scenario in _COMMANDED),
         *mapping_tasks(),
-        Task("simulating/base", lambda rows: bench_simulation(), alone=True),
+        *simulating_tasks(),
     ]
 
 

@@ -1,53 +1,181 @@
-"""How fast the closed loop runs, against real time and against the bare plant."""
+"""How fast the closed loop runs, beside real time and the bare plant, and what it leaves in memory."""
 
 from __future__ import annotations
 
-from time import perf_counter
+import gc
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from resource import getpagesize
+from time import process_time
+from typing import NamedTuple
 
 from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from benchmarks.isolated import in_own_process
+from benchmarks.ring_teams import ring_transport
 from benchmarks.rows import Row
+from benchmarks.tasks import Task
 from benchmarks.transport import base_transport
+from coop_drake.diagram import Blocks, build_closed_loop
+from coop_drake.fields import HarmonicMap
 from coop_drake.planning import Plan
 from coop_drake.plant import build_team_plant, set_configuration
-from coop_drake.scenario import Scenario
-from coop_drake.simulation import simulate
+from coop_drake.scenario import Deployment, Scenario
+from coop_drake.simulation import configure_simulator, simulate
 
-__all__ = ["bench_simulation"]
+__all__ = ["loop_cost", "simulating_tasks"]
 
 _FIXED_STEP_SCHEMES = ("explicit_euler", "runge_kutta2")
+_TEAMS = (2, 3, 4, 8)
+_RATE = 200.0
+_HORIZON = 3.0
+_REPEATS = 3
+_RUNS = 100
+_SHORT = 0.05
+_LIMIT = 300.0
+
+Transport = tuple[Scenario, Plan, Sequence[HarmonicMap]]
 
 
-def bench_simulation() -> list[Row]:
-    """Run the closed loop, then the plant alone with as many steps over the same simulated time."""
-    scenario, plan, maps = base_transport()
-    start = perf_counter()
-    log = simulate(scenario, plan, maps)
-    wall, simulated = perf_counter() - start, float(log.times[-1])
-    steps = len(log.times) - 1
-    bare = _bare_plant_seconds(scenario, plan, simulated, simulated / steps)
-    bare_step = 1e3 * bare / steps
+class LoopCost(NamedTuple):
+    """What a loop alone costs, without the watch that checks and logs every step.
+
+    Attributes:
+        evaluations: How many times derivatives were evaluated.
+        seconds: CPU time of the loop [s].
+        bare_seconds: CPU time of the plant alone for as many evaluations [s].
+    """
+
+    evaluations: int
+    seconds: float
+    bare_seconds: float
+
+
+def simulating_tasks() -> list[Task]:
+    """Everything there is to measure about simulations."""
     return [
-        Row("simulating/base/wall_seconds", wall, "s", "simulated time", simulated),
-        Row("simulating/base/steps", steps, "steps"),
-        Row("simulating/base/one_step", 1e3 * wall / steps, "ms", "bare plant", bare_step),
+        Task("simulating/base", lambda rows: _rows("base", base_transport()), alone=True),
+        *(_ring_task(robots) for robots in _TEAMS),
+        Task("simulating/memory", lambda rows: _memory_rows(), alone=True),
+    ]
+
+
+def loop_cost(transport: Transport, blocks: Blocks, horizon: float) -> LoopCost:
+    """Run a loop without its watch, then the plant alone with as many evaluations over the same time.
+
+    Args:
+        transport: Scenario, plan and maps.
+        blocks: How the controllers are built.
+        horizon: Simulated time [s].
+    """
+    scenario, plan, _ = transport
+    loop = build_closed_loop(*transport, blocks=blocks)
+    try:
+        simulator = Simulator(loop.diagram, loop.create_context())
+        configure_simulator(simulator, scenario)
+        simulator.Initialize()
+        start = process_time()
+        simulator.AdvanceTo(horizon)
+        seconds = process_time() - start
+        integrator = simulator.get_integrator()
+        evaluations, steps = integrator.get_num_derivative_evaluations(), simulator.get_num_steps_taken()
+    finally:
+        loop.release()
+    return LoopCost(evaluations, seconds, _bare_plant_seconds(scenario, plan, horizon, horizon / steps))
+
+
+def _ring_task(robots: int) -> Task:
+    def measure(_: Sequence[Row]) -> list[Row]:
+        with ring_transport(robots) as transport:
+            return _rows(f"ring_of_{robots}", transport)
+
+    return Task(f"simulating/ring_of_{robots}", measure, alone=True)
+
+
+def _rows(team: str, transport: Transport) -> list[Row]:
+    rows: list[Row] = []
+    for blocks in ("named", "fused"):
+        for rate in (None, _RATE):
+            mode = blocks if rate is None else f"{blocks}_at_{rate:g}_Hz"
+            rows.extend(_mode_rows(f"simulating/{team}/{mode}", _at(transport, rate), blocks))
+    return rows
+
+
+def _at(transport: Transport, rate: float | None) -> Transport:
+    scenario, plan, maps = transport
+    return replace(scenario, deployment=Deployment(control_rate=rate)), plan, maps
+
+
+def _mode_rows(name: str, transport: Transport, blocks: Blocks) -> list[Row]:
+    """One evaluation beside the bare plant's; real time over CPU time of the loop alone and of whole runs."""
+    cost = min(
+        (loop_cost(transport, blocks, _HORIZON) for _ in range(_REPEATS)), key=lambda cost: cost.seconds
+    )
+    start = process_time()
+    log = simulate(*transport, blocks=blocks)
+    seconds, simulated = process_time() - start, float(log.times[-1])
+    per = 1e6 / cost.evaluations
+    return [
+        Row(f"{name}/evaluation", per * cost.seconds, "us", "bare plant", per * cost.bare_seconds),
+        Row(f"{name}/evaluations_a_second", cost.evaluations / _HORIZON, "1/s"),
+        Row(f"{name}/loop_times_real_time", _HORIZON / cost.seconds, ""),
+        Row(f"{name}/run_times_real_time", simulated / seconds, ""),
+        Row(f"{name}/run", seconds, "s", "simulated time", simulated),
     ]
 
 
 def _bare_plant_seconds(scenario: Scenario, plan: Plan, simulated: float, step: float) -> float:
-    """Wall time [s] of the drifting team without controllers, at the closed loop's mean step."""
+    """Shortest CPU time [s] of the drifting team without controllers, at a step's mean length."""
     builder = DiagramBuilder()
     team = build_team_plant(scenario, builder)
     diagram = builder.Build()
-    simulator = Simulator(diagram)
-    context = team.plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
-    set_configuration(team, context, plan.start)
-    team.plant.get_actuation_input_port().FixValue(context, [0.0] * len(team.joints))
-    ResetIntegratorFromFlags(simulator, scenario.simulator.integration_scheme, step)
-    if scenario.simulator.integration_scheme not in _FIXED_STEP_SCHEMES:
-        simulator.get_mutable_integrator().set_fixed_step_mode(True)
-    simulator.Initialize()
-    start = perf_counter()
-    simulator.AdvanceTo(simulated)
-    return perf_counter() - start
+
+    def once() -> float:
+        simulator = Simulator(diagram)
+        context = team.plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+        set_configuration(team, context, plan.start)
+        team.plant.get_actuation_input_port().FixValue(context, [0.0] * len(team.joints))
+        ResetIntegratorFromFlags(simulator, scenario.simulator.integration_scheme, step)
+        if scenario.simulator.integration_scheme not in _FIXED_STEP_SCHEMES:
+            simulator.get_mutable_integrator().set_fixed_step_mode(True)
+        simulator.Initialize()
+        start = process_time()
+        simulator.AdvanceTo(simulated)
+        return process_time() - start
+
+    return min(once() for _ in range(_REPEATS))
+
+
+def _memory_rows() -> list[Row]:
+    return [
+        Row(f"simulating/memory/{blocks}/growth_a_run", growth, "kB", "first run", first)
+        for blocks in ("named", "fused")
+        for first, growth in [in_own_process(memory_growth, blocks, limit=_LIMIT).value or (0.0, 0.0)]
+    ]
+
+
+def memory_growth(blocks: Blocks) -> tuple[float, float]:
+    """Resident memory after the first short runs, and by how much each of a hundred more adds to it [kB]."""
+    scenario, plan, maps = base_transport()
+    brief = replace(scenario, simulator=replace(scenario.simulator, max_time=_SHORT))
+    with _collected():
+        for _ in range(5):
+            simulate(brief, plan, maps, blocks=blocks)
+    first = _resident_kb()
+    with _collected():
+        for _ in range(_RUNS):
+            simulate(brief, plan, maps, blocks=blocks)
+    return first, (_resident_kb() - first) / _RUNS
+
+
+@contextmanager
+def _collected() -> Iterator[None]:
+    yield
+    gc.collect()
+
+
+def _resident_kb() -> float:
+    return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * getpagesize() / 1e3

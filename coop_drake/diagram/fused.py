@@ -149,24 +149,26 @@ def _report(
 def _hold(
     builder: DiagramBuilder, station: TransportStation, parts: Demultiplexer, period: float
 ) -> tuple[OutputPort, ...]:
-    """Hold all efforts between samples; base wrenches in W, so they go through the station's actuation."""
-    held = []
-    for i in range(parts.num_output_ports() - 1):
-        size = parts.get_output_port(i).size()
-        hold = builder.AddNamedSystem(f"effort_hold_{i}", ZeroOrderHold(period, size))
-        builder.Connect(parts.get_output_port(i), hold.get_input_port())
-        held.append(hold.get_output_port())
+    """Hold every robot's effort between samples; base wrenches are in W, for the station's actuation.
+
+    Nothing stands behind the holds, or Drake would compute it at every evaluation, time having passed.
+    """
     joints = [len(robot.joints) for robot in station.team.robots]
-    bases = _split(builder, "base_wrenches", held[0], [3] * len(joints))
-    torques = _split(builder, "joint_torques", held[-1], joints) if any(joints) else [None] * len(joints)
+    bases = _split(builder, "base_wrenches", parts.get_output_port(0), [3] * len(joints))
+    torques: list[OutputPort | None] = [None] * len(joints)
+    if any(joints):
+        torques = _split(builder, "joint_torques", parts.get_output_port(1), joints)
     efforts = []
     for k, (base, torque) in enumerate(zip(bases, torques, strict=True)):
         ports = [port for port in (base, torque) if port is not None]
-        effort = builder.AddNamedSystem(f"robot_{k}_effort", Multiplexer([port.size() for port in ports]))
+        sizes = [port.size() for port in ports]
+        effort = builder.AddNamedSystem(f"robot_{k}_effort", Multiplexer(sizes))
         for i, port in enumerate(ports):
             builder.Connect(port, effort.get_input_port(i))
-        builder.Connect(effort.get_output_port(), station.diagram.GetInputPort(f"robot_{k}_effort"))
-        efforts.append(effort.get_output_port())
+        hold = builder.AddNamedSystem(f"robot_{k}_hold", ZeroOrderHold(period, sum(sizes)))
+        builder.Connect(effort.get_output_port(), hold.get_input_port())
+        builder.Connect(hold.get_output_port(), station.diagram.GetInputPort(f"robot_{k}_effort"))
+        efforts.append(hold.get_output_port())
     return tuple(efforts)
 
 

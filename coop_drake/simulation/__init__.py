@@ -5,7 +5,7 @@ from coop_drake.simulation.invariants import ACCELERATION_TOLERANCE, WRENCH_TOLE
 from coop_drake.simulation.ledger import Ledger, communication
 from coop_drake.simulation.log import SimulationLog
 from coop_drake.simulation.maps import build_maps, certificate_rows
-from coop_drake.simulation.run import simulate
+from coop_drake.simulation.run import configure_simulator, simulate
 from coop_drake.simulation.telemetry import Sample
 
 __all__ = [
@@ -21,5 +21,6 @@ __all__ = [
     "build_maps",
     "certificate_rows",
     "communication",
+    "configure_simulator",
     "simulate",
 ]

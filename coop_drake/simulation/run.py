@@ -19,7 +19,7 @@ from coop_drake.simulation.log import SimulationLog
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.simulation.watch import Watch
 
-__all__ = ["simulate"]
+__all__ = ["configure_simulator", "simulate"]
 
 Progress = Callable[[str, float], None]
 
@@ -77,7 +77,7 @@ def _simulated(
         onlooker,
     )
     simulator = Simulator(loop.diagram, root)
-    _configure(simulator, scenario)
+    configure_simulator(simulator, scenario)
     simulator.set_monitor(watch)
     with joint_limits_kept_by_funnels():
         simulator.Initialize()
@@ -91,7 +91,13 @@ def _simulated(
     )
 
 
-def _configure(simulator: Simulator, scenario: Scenario) -> None:
+def configure_simulator(simulator: Simulator, scenario: Scenario) -> None:
+    """Let a simulator integrate as a scenario wants it.
+
+    Args:
+        simulator: Of a loop that was built for the scenario.
+        scenario: The scenario.
+    """
     if not scenario.plant.ideal:
         # Between two steps of the plant only governors move, at a rate that is constant but for themselves.
         step = scenario.plant.time_step

@@ -60,15 +60,23 @@ class MessageChannel(Block):
 
     def _transmit(self, context: Context, discrete_state: DiscreteValues) -> None:
         kept = context.get_discrete_state_vector().value().reshape(-1, READY_SIZE)
-        heard, arrivals = kept[0], np.vstack([kept[1:], _NOTHING])
-        dice = Random(self._seed << 32 | round(context.get_time() / self._period))
-        if dice.random() >= self._loss:
+        arrivals = np.empty_like(kept)
+        arrivals[:-1], arrivals[-1] = kept[1:], _NOTHING
+        arrives, again = self._thrown(context)
+        if arrives:
             arrivals[self._delay] = self._sent.Eval(context)
-            if dice.random() < self._repeat:
+            if again:
                 arrivals[self._again] = arrivals[self._delay]
-        if arrivals[0, 0] >= 0.0:
-            heard = arrivals[0]
-        discrete_state.get_mutable_vector().SetFromVector(np.concatenate([heard, arrivals[1:].ravel()]))
+        if arrivals[0, 0] < 0.0:
+            arrivals[0] = kept[0]
+        discrete_state.get_mutable_vector().SetFromVector(arrivals.ravel())
+
+    def _thrown(self, context: Context) -> tuple[bool, bool]:
+        """Whether a report arrives now, and whether it will again; no dice where chance has no part."""
+        if self._loss == 0.0 and self._repeat == 0.0:
+            return True, False
+        dice = Random(self._seed << 32 | round(context.get_time() / self._period))
+        return dice.random() >= self._loss, dice.random() < self._repeat
 
     def _write_heard(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_discrete_state_vector().value()[:READY_SIZE])

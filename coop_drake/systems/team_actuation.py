@@ -38,8 +38,10 @@ class TeamActuation(Block):
             for robot in team.robots
         ]
         self._wrench = np.zeros(6)
-        self.DeclareAbstractOutputPort("base_wrenches", self._allocate, self._write_wrenches)
-        self.DeclareVectorOutputPort("joint_torques", len(team.joints), self._write_torques)
+        # Efforts that are held between samples need no new wrenches although time goes on.
+        inputs = {self.all_input_ports_ticket()}
+        self.DeclareAbstractOutputPort("base_wrenches", self._allocate, self._write_wrenches, inputs)
+        self.DeclareVectorOutputPort("joint_torques", len(team.joints), self._write_torques, inputs)
 
     def _allocate(self) -> AbstractValue:
         return Value[list[ExternallyAppliedSpatialForce]]()
