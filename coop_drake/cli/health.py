@@ -13,6 +13,7 @@ from pathlib import Path
 
 import coop_drake
 from coop_drake.cli.map_cache import map_cache
+from coop_drake.shipped import shipped_scenarios
 
 __all__ = ["Finding", "examine"]
 
@@ -100,10 +101,8 @@ def _drake() -> Finding:
 
 def _scenarios() -> Finding:
     from coop_drake.scenario import load_scenario
-    from coop_drake.shipped import SHIPPED
 
-    scenarios = sorted(SHIPPED.glob("*.scenario.yaml"))
-    names = [load_scenario(path).name for path in scenarios]
+    names = [load_scenario(path).name for path in shipped_scenarios().values()]
     return Finding("shipped scenarios", ", ".join(names) or "none", bool(names), "install coop-drake anew")
 
 

@@ -47,7 +47,9 @@ class PlannerSettings:
 class PlanningProblem:
     """One question to the planner.
 
-    Joints that start or are to end at a limit, or that cannot move, get ``LIMIT_ROOM`` beyond their limits.
+    A joint that starts or is to end nearer to a limit than ``LIMIT_ROOM``, or that cannot move, may be
+    planned up to so much beyond that limit, everywhere on the way: plans and proofs are about these wider
+    limits. A question whose start or goal is itself beyond a limit keeps the limits as they are.
 
     Attributes:
         workspace: The floor W, outer ring and holes [m].
@@ -87,7 +89,9 @@ class PlanningProblem:
             return component
         room = LIMIT_ROOM if joint.kind == "revolute" else LIMIT_ROOM * object_radius(self.tree)
         ends = (float(self.start[3 + joint.index]), self.goal_joints[joint.index])
-        values = [value for value in ends if value is not None and joint.lower <= value <= joint.upper]
+        values = [value for value in ends if value is not None]
+        if not all(joint.lower <= value <= joint.upper for value in values):
+            return component
         lower = min([joint.lower, *[value - room for value in values]])
         upper = max([joint.upper, *[value + room for value in values]])
         if (lower, upper) == (joint.lower, joint.upper):

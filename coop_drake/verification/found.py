@@ -9,7 +9,7 @@ import numpy as np
 from coop_drake.control import GainSet
 from coop_drake.errors import RefusalError
 from coop_drake.planning.plan import Cell, Plan
-from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.problem import LIMIT_ROOM, PlanningProblem
 from coop_drake.verification.checks import Check, Progress, Verified
 from coop_drake.verification.claims import check_claims
 from coop_drake.verification.free_cells import check_apart, check_clear_of_walls
@@ -60,6 +60,7 @@ def verify_plan(
 
 
 def _check_limits(plan: Plan, problem: PlanningProblem) -> Check:
+    """Hold cells against the question's limits, with its room beyond those that joints start or end at."""
     lower, upper = problem.tree.joint_lower, problem.tree.joint_upper
     rooms = []
     for k, cell in enumerate(plan.cells):
@@ -72,7 +73,8 @@ def _check_limits(plan: Plan, problem: PlanningProblem) -> Check:
                 f"limits [{lower[axis]}, {upper[axis]}]",
             )
         rooms.append(float(room.min(initial=np.inf)))
-    return Check("joints within their limits", len(plan.cells) * len(lower), min(rooms), "rad or m of room")
+    name = f"joints within their limits, at most {LIMIT_ROOM:g} beyond one that they start or end at"
+    return Check(name, len(plan.cells) * len(lower), min(rooms), "rad or m of room")
 
 
 def _check_free(

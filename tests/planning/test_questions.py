@@ -31,6 +31,16 @@ def reaching(start: float, limits: tuple[float, float], kind: str = "revolute") 
     return PlanningProblem(box(0, 0, 4, 3), tree, pose, np.array([3.0, 2.0, 1.0]), (None,))
 
 
+def within_limits(tree: ComponentTree) -> ComponentTree:
+    """The same team with the arm's limits as its model has them."""
+    arm = tree.components[1]
+    assert arm.joint is not None
+    return replace(
+        tree,
+        components=(tree.components[0], replace(arm, joint=replace(arm.joint, lower=-0.5, upper=0.5))),
+    )
+
+
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 @pytest.mark.parametrize(
     ("start", "limits"), [(0.5, (-0.5, 0.5)), (-0.5, (-0.5, 0.5)), (0.3, (0.3, 0.3)), (0.3, (0.3, 0.3004))]
@@ -51,6 +61,16 @@ def test_a_joint_within_its_limits_gets_no_room() -> None:
     problem = reaching(0.3, (-0.5, 0.5))
     assert (problem.tree.joints[0].lower, problem.tree.joints[0].upper) == (-0.5, 0.5)
     assert replace(problem, start=problem.start).tree is problem.tree
+
+
+def test_a_goal_just_beyond_a_limit_does_not_profit_from_the_room_of_a_start_at_it() -> None:
+    problem = reaching(0.5, (-0.5, 0.5))
+    beyond = PlanningProblem(
+        problem.workspace, within_limits(problem.tree), problem.start, problem.goal_pose, (0.505,)
+    )
+    answer, _ = find_channel(beyond)
+    assert isinstance(answer, NoChannel)
+    assert answer.reason == "at the goal arm is 0.505, beyond its limits [-0.5, 0.5]"
 
 
 def test_a_goal_beyond_a_limit_is_infeasible_for_that_reason() -> None:
