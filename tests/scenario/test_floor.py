@@ -42,7 +42,7 @@ def test_a_map_is_read_round_the_start(tmp_path):
 
 REFUSED = {
     "rings too": ({"file": "hall.svg", "outer": [[0, 0], [1, 0], [1, 1]]}, "workspace.outer"),
-    "neither": ({"holes": []}, "workspace"),
+    "neither": ({"holes": []}, "workspace.outer"),
     "settings without a file": ({"outer": [[0, 0], [6, 0], [6, 4]], "unit": "mm"}, "workspace.unit"),
     "gone": ({"file": "gone.svg"}, "workspace.file"),
     "unit": ({"file": "hall.svg", "unit": "parsec"}, "workspace.unit"),

@@ -42,7 +42,7 @@ def test_a_name_selects_and_nothing_changes_without_one():
         ("selected: other\nsets: {mine: !ScheduledGains {}}", r"gains.yaml: selected: 'other'"),
         ("selected: mine\nset: {}", r"gains.yaml: set: "),
         ("[1, 2]", r"gains.yaml: the file"),
-        ("selected: {", r"gains.yaml: line 1"),
+        ("selected: {", r"gains.yaml: line 2, column 1"),
     ],
 )
 def test_a_file_that_is_wrong_is_refused_with_its_key(tmp_path, text, complaint):
