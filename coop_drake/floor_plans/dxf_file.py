@@ -31,7 +31,7 @@ def read_dxf(path: Path, settings: FloorPlanSettings) -> Drawing:
         FloorPlanError: The file is damaged, or does not say its unit.
     """
     file = str(path)
-    document, repairs = _document(path)
+    document = _document(path)
     metre = settings.metres(_UNITS.get(int(document.header.get("$INSUNITS", 0))), file)
     names = {layer.dxf.name: layer for layer in document.layers}
     hidden = {name for name, layer in names.items() if layer.is_off() or layer.is_frozen()}
@@ -58,31 +58,32 @@ def read_dxf(path: Path, settings: FloorPlanSettings) -> Drawing:
             known = ", ".join(sorted(used)) or "none"
             raise FloorPlanError(file, "layers", f"nothing is drawn on layer {layer!r}", f"known: {known}")
     notes = [f"{count} {kind} left out" for kind, count in sorted(ignored.items())]
-    if repairs:
-        notes.insert(0, f"{repairs} errors in the file were repaired")
     return Drawing(tuple(walls), tuple(notes))
 
 
-def _document(path: Path) -> tuple[Any, int]:
-    """The drawing, with what can be mended mended, and how much that was."""
-    from ezdxf import recover
+def _document(path: Path) -> Any:
+    """The drawing; nothing in it is guessed, for a number that is mended may be a wall that has moved."""
+    from ezdxf.filemanagement import readfile
     from ezdxf.lldxf.const import DXFError
 
     file, remedy = str(path), "save it anew as DXF (R2000 or later) from the CAD program"
-    content = path.read_bytes()
-    if b"EOF" not in content[-64:]:
+    if b"EOF" not in path.read_bytes()[-64:]:
         raise FloorPlanError(
             file, "the end", "the drawing does not end with EOF; it is cut short or no DXF", remedy
         )
     try:
-        with path.open("rb") as stream:
-            document, auditor = recover.read(stream)
-    except (DXFError, ValueError, TypeError, AttributeError, LookupError, OverflowError) as error:
+        return readfile(path)
+    except (
+        DXFError,
+        OSError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        LookupError,
+        OverflowError,
+        RecursionError,
+    ) as error:
         raise FloorPlanError(file, "the file", f"no readable DXF ({error})", remedy) from error
-    if auditor.has_errors:
-        worst = auditor.errors[0]
-        raise FloorPlanError(file, "the file", f"an error that cannot be repaired ({worst.message})", remedy)
-    return document, len(auditor.fixes)
 
 
 def _entities(document: Any, file: str) -> Iterator[Any]:
