@@ -40,7 +40,7 @@ def read_dxf(path: Path, settings: FloorPlanSettings) -> Drawing:
     used: set[str] = set()
     points = 0
     for entity in _entities(document, file):
-        layer = str(entity.dxf.get("layer", "0"))
+        layer = _layer_of(entity)
         used.add(layer)
         if layer in hidden or entity.dxf.get("invisible", 0):
             continue
@@ -101,6 +101,13 @@ def _entities(document: Any, file: str) -> Iterator[Any]:
         raise FloorPlanError(
             file, "a block", f"it cannot be dissolved ({error})", "explode the blocks in the CAD program"
         ) from error
+
+
+def _layer_of(entity: Any) -> str:
+    """The layer that an entity is shown on: what a block holds on layer 0 goes with the block."""
+    layer = str(entity.dxf.get("layer", "0"))
+    block = entity.source_block_reference
+    return layer if layer != "0" or block is None else _layer_of(block)
 
 
 def _walls_of(entity: Any, layer: str, metre: float, sagitta: float, file: str) -> list[Wall] | None:

@@ -25,6 +25,7 @@ _THINNEST = 1e-3
 """Half the width that a line gets that ends freely in a room [m]."""
 
 _LARGEST_COORDINATE = 1e6
+_MANY_ENDS = 1000
 
 Place = tuple[float, float]
 
@@ -157,12 +158,12 @@ def _thick(wall: Wall) -> Any:
 
 def _nothing_closed(noded: BaseGeometry, file: str, gap: float) -> FloorPlanError:
     """Say where the outline is open."""
-    ends = loose_ends(noded)
+    ends = loose_ends(noded)[:_MANY_ENDS]
     if len(ends) < 2:
         return FloorPlanError(
             file, "the drawing", "its lines enclose nothing", "draw an outline that ends where it begins"
         )
-    apart = np.hypot(*(ends[:, None] - ends[None]).transpose(2, 0, 1)) if len(ends) <= 2000 else np.eye(2)
+    apart = np.hypot(*(ends[:, None] - ends[None]).transpose(2, 0, 1))
     np.fill_diagonal(apart, np.inf)
     first, second = np.unravel_index(int(apart.argmin()), apart.shape)
     a, b = ends[first], ends[second]

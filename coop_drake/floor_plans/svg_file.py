@@ -73,6 +73,7 @@ class _Style:
     stroke: str = "none"
     stroke_width: str = "1"
     shown: bool = True
+    visibility: str = "visible"
     chosen: bool = False
     depth: int = 0
 
@@ -114,7 +115,8 @@ class _Walk:
         if not style.shown:
             return
         if tag in _SHAPES:
-            if style.chosen or not self.settings.layers:
+            visible = style.visibility not in ("hidden", "collapse")
+            if visible and (style.chosen or not self.settings.layers):
                 yield from self._shape(element, tag, style)
         elif tag == "use":
             self.clones += 1
@@ -146,7 +148,8 @@ class _Walk:
             transform=f"{outer.transform} {transform}",
             stroke=said.get("stroke", outer.stroke),
             stroke_width=said.get("stroke-width", outer.stroke_width),
-            shown=said.get("display") != "none" and said.get("visibility") not in ("hidden", "collapse"),
+            shown=said.get("display") != "none",
+            visibility=said.get("visibility", outer.visibility),
             chosen=outer.chosen or bool(names & set(self.settings.layers)),
             depth=outer.depth + 1,
         )

@@ -57,9 +57,14 @@ def test_blocks_are_put_in_scaled_turned_and_mirrored(tmp_path):
         hall(document, space)
         shelf = document.blocks.new("SHELF")
         shelf.add_lwpolyline([(0, 0), (2, 0), (2, 1)], close=True)
-        space.add_blockref("SHELF", (4_000, 2_000), {"xscale": -500, "yscale": 500, "rotation": 90})
+        space.add_blockref(
+            "SHELF", (4_000, 2_000), {"xscale": -500, "yscale": 500, "rotation": 90, "layer": "SHELVES"}
+        )
 
-    (hole,) = read_floor_plan(write_dxf(tmp_path, draw)).polygon.interiors
+    path = write_dxf(tmp_path, draw)
+    (hole,) = read_floor_plan(path).polygon.interiors
+    assert len(read_floor_plan(path, FloorPlanSettings(layers=("WALLS", "SHELVES"))).polygon.interiors) == 1
+    assert not read_floor_plan(path, FloorPlanSettings(layers=("WALLS",))).polygon.interiors
     assert set(hole.coords) == {(4.0, 2.0), (4.0, 1.0), (3.5, 1.0)}
 
 

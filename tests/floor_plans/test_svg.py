@@ -59,8 +59,11 @@ def test_layers_are_chosen_by_label_or_id_and_hidden_ones_left_out(tmp_path):
         f'<g inkscape:groupmode="layer" inkscape:label="Walls">{HALL}</g>'
         '<g id="desks"><rect x="1" y="1" width="1" height="1"/></g>'
         '<g style="display:none"><rect x="3" y="1" width="1" height="1"/></g>'
+        '<g visibility="hidden"><rect x="5" y="1" width="1" height="1"/></g>'
     )
     assert len(floor(tmp_path, body).interiors) == 1
+    seen = body.replace('<rect x="5"', '<rect visibility="visible" x="5"')
+    assert len(floor(tmp_path, seen).interiors) == 2
     assert not floor(tmp_path, body, FloorPlanSettings("m", layers=("Walls",))).interiors
     assert len(floor(tmp_path, body, FloorPlanSettings("m", layers=("Walls", "desks"))).interiors) == 1
     with pytest.raises(FloorPlanError, match=r"no group has the label or id 'walls'; known: Walls, desks"):
