@@ -7,12 +7,15 @@ from math import pi
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from shapely import union_all
+from shapely import get_coordinates, union_all
+from shapely.geometry.base import BaseGeometry
 
 from coop_drake.drawing.canvas import new_figure
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK
 from coop_drake.drawing.floor import draw_polygon, draw_team, team_legend
+from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Interval
 from coop_drake.geometry.tree import ComponentTree
 from coop_drake.reproduction.approximation import Approximation
@@ -20,6 +23,7 @@ from coop_drake.reproduction.approximation import Approximation
 __all__ = ["approximation_figure"]
 
 _ROOM = 0.12  # Around the widest over-approximation [m].
+_COARSE = 2e-3  # What drawn outlines may be off [m].
 
 
 def approximation_figure(tree: ComponentTree, made: Sequence[Approximation]) -> Figure:
@@ -49,13 +53,18 @@ def approximation_figure(tree: ComponentTree, made: Sequence[Approximation]) -> 
         over, under = upper[number], below[1 + number]
         draw_polygon(over, one.over, facecolor=BLUE, edgecolor=BLUE, alpha=0.25)
         draw_polygon(under, one.under, facecolor=GREEN, edgecolor=GREEN, alpha=0.7, zorder=4)
+        outlines = [line for shape in one.exact for line in _outlines(shape.simplify(_COARSE))]
         for ax in (over, under):
-            for shape in one.exact:
-                draw_polygon(ax, shape, facecolor="none", edgecolor=GREY, linewidth=0.4, alpha=0.35)
+            ax.add_collection(LineCollection(outlines, colors=GREY, linewidths=0.4, alpha=0.35))
             draw_polygon(ax, one.over, facecolor="none", edgecolor=BLUE, linewidth=1.2)
         _name(over, f"({'bcde'[number]}) over\n{slice_name}")
         _name(under, f"({'fghi'[number]}) under\n{slice_name}")
     return figure
+
+
+def _outlines(shape: BaseGeometry) -> list[FloatArray]:
+    """Outer rings of a shape of one part or several, each shape (n, 2)."""
+    return [get_coordinates(part.exterior) for part in getattr(shape, "geoms", [shape])]
 
 
 def _name(ax: Axes, title: str) -> None:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.control import GainSet
+from coop_drake.control import FixedGains
+from coop_drake.errors import ScenarioError
 from coop_drake.fields import MapStore
 from coop_drake.planning import PlanningProblem
 from coop_drake.plant import build_team_plant, planning_problem
@@ -35,7 +36,7 @@ class Material:
 
     problem: PlanningProblem
     inertia: ObjectInertia
-    table_2: GainSet
+    table_2: FixedGains
     made: tuple[Approximation, ...]
     runs: tuple[Run, ...]
     played: tuple[GainFigures, ...]
@@ -52,9 +53,12 @@ def gather(
         progress: Told the stage and the fraction done, if given.
 
     Raises:
-        ScenarioError: The team is another.
+        ScenarioError: The team is another, or Table 2's gains are no fixed ones.
         PlanError: There is no plan.
     """
+    table_2 = scenario.gain_sets["table_2"]
+    if not isinstance(table_2, FixedGains):
+        raise ScenarioError(str(scenario.path), "gains.sets.table_2", type(table_2).__name__, "!FixedGains")
     team = build_team_plant(scenario, DiagramBuilder())
     problem = planning_problem(scenario, team)
     played = compare_gains(scenario, progress=part_of(progress, 0, 2))  # First, for it refuses other teams.
@@ -62,7 +66,7 @@ def gather(
     return Material(
         problem=problem,
         inertia=team.object_inertia,
-        table_2=scenario.gain_sets["table_2"],
+        table_2=table_2,
         made=approximations(two_components(problem.tree), FIGURE_3_SLICES),
         runs=runs,
         played=tuple(played),

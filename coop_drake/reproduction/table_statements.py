@@ -7,7 +7,7 @@ from math import degrees
 
 import numpy as np
 
-from coop_drake.control import GainSet
+from coop_drake.control import FixedGains
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.planning import Plan
 from coop_drake.plant.team import ObjectInertia
@@ -127,7 +127,7 @@ def _figures(played: Sequence[GainFigures]) -> Iterator[Statement]:
         yield Statement(label, texts, None, ("R3", "R10") if name == "peak_force" else ("R10",))
 
 
-def parameter_statements(gain_set: GainSet, inertia: ObjectInertia) -> tuple[Statement, ...]:
+def parameter_statements(gain_set: FixedGains, inertia: ObjectInertia) -> tuple[Statement, ...]:
     """Compare our parameters with Table 2.
 
     Args:
@@ -137,7 +137,7 @@ def parameter_statements(gain_set: GainSet, inertia: ObjectInertia) -> tuple[Sta
     return tuple(_parameter(row, _value(row, gain_set, inertia)) for row in TABLE_2)
 
 
-def _value(row: Parameter, gain_set: GainSet, inertia: ObjectInertia) -> float:
+def _value(row: Parameter, gain_set: FixedGains, inertia: ObjectInertia) -> float:
     if row.gain:
         return float(getattr(gain_set, row.gain))
     return inertia.mass if row.symbol == "M_L" else inertia.inertia_about_com

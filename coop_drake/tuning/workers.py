@@ -6,6 +6,7 @@ import multiprocessing
 import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
 from coop_drake.control import GainSet
@@ -48,6 +49,7 @@ class Workers:
         return self
 
     def __exit__(self, *_: object) -> None:
+        # Shutting down alone would wait for trials that are under way; there is no public way to end them.
         processes = list((self._pool._processes or {}).values())
         self._pool.shutdown(wait=False, cancel_futures=True)
         for process in processes:
@@ -55,13 +57,23 @@ class Workers:
 
     def try_all(self, gain_sets: Sequence[GainSet]) -> Iterator[Trial]:
         """Try gain sets side by side; results come in their order, whichever is ready first."""
-        return self._pool.map(_try, gain_sets)
+        with _interrupts_held_back():
+            return self._pool.map(_try, gain_sets)
+
+
+@contextmanager
+def _interrupts_held_back() -> Iterator[None]:
+    """Ctrl-C waits until the processes have begun; they inherit that it is held back, and never see it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _prepare(scenario: Path, plan: Plan, maps: tuple[HarmonicMap, ...], longest: float) -> None:
     """Set a process up."""
     global _bench
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is answered by the process that waits for it.
     task = load_scenario(scenario)
     _bench = Workbench(task, plan, maps, longest=longest, blocks=quickest_blocks(task, plan, maps))
 
