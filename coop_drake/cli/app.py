@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Literal
@@ -131,7 +132,8 @@ def plan_command(
     reporter = Reporter(machine=machine, quiet=quiet)
 
     def command() -> ExitCode:
-        question = read_apart(scenario, gains)  # Drake is gone before the planner comes.
+        # Drake is never in this process; the planner is brought in while the other one reads.
+        question = read_apart(scenario, gains, lambda: import_module("coop_drake.cli.planning"))
         from coop_drake.cli.planning import plan_only
 
         return plan_only(question, out, reporter)

@@ -6,7 +6,8 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -37,7 +38,9 @@ class Question:
     gains: str
 
 
-def read_apart(path: Path, gains: str | None = None) -> Question:
+def read_apart(
+    path: Path, gains: str | None = None, meanwhile: Callable[[], object] | None = None
+) -> Question:
     """Read a scenario and its models in a process of their own.
 
     Only reading takes Drake. What planning does not need would stay in memory for as long as it lasts; where
@@ -46,6 +49,7 @@ def read_apart(path: Path, gains: str | None = None) -> Question:
     Args:
         path: The scenario file.
         gains: Name of the gain set to use, or a file that holds one; None for the one the scenario selects.
+        meanwhile: What this process can do while the other one reads.
 
     Raises:
         ScenarioError: The file, a model or the gain set is wrong.
@@ -62,7 +66,15 @@ def read_apart(path: Path, gains: str | None = None) -> Question:
         start_new_session=True,  # Ctrl-C is answered here.
     ) as process:
         try:
-            answer, _ = process.communicate(pickle.dumps((path, gains)))
+            stdin, stdout = process.stdin, process.stdout
+            assert stdin is not None
+            assert stdout is not None
+            with suppress(BrokenPipeError), stdin:  # Why it has ended its code says.
+                stdin.write(pickle.dumps((path, gains)))
+            if meanwhile is not None:
+                meanwhile()
+            answer = stdout.read()
+            process.wait()
         finally:
             process.kill()
     if process.returncode != 0:
