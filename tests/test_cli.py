@@ -230,7 +230,7 @@ def test_a_missing_file_and_an_unknown_gain_set_are_bad_input(room, tmp_path):
     assert gains.exit_code == 2
     facts = json.loads(gains.stdout)
     assert (facts["key"], facts["value"]) == ("--gains", "'tabel_2'")
-    assert facts["allowed"] == "one of scheduled, table_2"
+    assert facts["allowed"] == "one of scheduled, table_2, or a file with a gain set"
 
 
 def test_a_plan_of_another_scenario_and_a_file_that_is_no_plan_are_bad_input(finished, room, tmp_path):
@@ -247,7 +247,7 @@ def test_a_plan_of_another_scenario_and_a_file_that_is_no_plan_are_bad_input(fin
     )
     result = invoke("simulate", goal, "--plan", out / "plan.json", "--json")
     assert result.exit_code == 2
-    assert "the plan ends at" in json.loads(result.stdout)["error"]
+    assert "goal_pose: [3.2, " in json.loads(result.stdout)["error"]
     for content in ("{}", "not json", "[" * 100_000):
         (tmp_path / "plan.json").write_text(content)
         result = invoke("simulate", room, "--plan", tmp_path / "plan.json", "--json")
