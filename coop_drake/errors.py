@@ -15,6 +15,9 @@ __all__ = [
     "UnmappableError",
 ]
 
+_LONGEST_VALUE = 200
+"""Characters of a value that a message shows."""
+
 
 class CoopDrakeError(Exception):
     """Base of all exceptions raised on purpose by coop_drake."""
@@ -32,7 +35,13 @@ class ScenarioError(CoopDrakeError):
 
     def __init__(self, file: str, key: str, value: object, allowed: str) -> None:
         self.file, self.key, self.value, self.allowed = file, key, value, allowed
-        super().__init__(f"{file}: {key}: {value!r} is not allowed; expected {allowed}")
+        super().__init__(f"{file}: {key}: {self.shown} is not allowed; expected {allowed}")
+
+    @property
+    def shown(self) -> str:
+        """The offending value, cut where a whole section of a file would fill the screen."""
+        text = repr(self.value)
+        return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}…"
 
     def __reduce__(self) -> tuple[type[ScenarioError], tuple[str, str, object, str]]:
         """Pickle the data and not the message: files are read in a process of their own."""

@@ -226,11 +226,15 @@ def test_a_missing_file_and_an_unknown_gain_set_are_bad_input(room, tmp_path):
     missing = invoke("plan", tmp_path / "nowhere.yaml", "--json")
     assert missing.exit_code == 2
     assert "nowhere.yaml" in json.loads(missing.stdout)["error"]
+    assert "'no such file' is not allowed" in json.loads(missing.stdout)["error"]
     gains = invoke("plan", room, "--gains", "tabel_2", "--json")
     assert gains.exit_code == 2
     facts = json.loads(gains.stdout)
     assert (facts["key"], facts["value"]) == ("--gains", "'tabel_2'")
     assert facts["allowed"] == "one of scheduled, table_2, or a file with a gain set"
+    whole = invoke("plan", room, "--gains", room, "--json")
+    assert whole.exit_code == 2
+    assert "…" in json.loads(whole.stdout)["value"]
 
 
 def test_a_plan_of_another_scenario_and_a_file_that_is_no_plan_are_bad_input(finished, room, tmp_path):
@@ -260,6 +264,11 @@ def test_a_file_where_the_results_should_go_is_refused_before_planning(room, tmp
     result = invoke("plan", room, "--out", tmp_path / "taken", "--json")
     assert result.exit_code == 2
     assert (tmp_path / "taken").read_text() == ""
+    below = invoke("schema", "--out", tmp_path / "taken" / "schema.json")
+    assert below.exit_code == 2
+    assert f"{tmp_path / 'taken'}: a file stands where a folder is needed; expected" in below.output.replace(
+        "\n", ""
+    )
 
 
 def test_wrong_usage_is_bad_input_for_people_and_machines():

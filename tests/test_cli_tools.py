@@ -54,6 +54,13 @@ def test_every_command_has_examples_and_its_help_shows_them():
             assert what in text
 
 
+def test_help_keeps_what_stands_in_brackets():
+    """Words in brackets are markup to the table of options, which drops them: units are spelt out."""
+    for name, command in COMMAND.commands.items():
+        for parameter in command.params:
+            assert "[" not in (getattr(parameter, "help", None) or ""), (name, parameter.name)
+
+
 @pytest.mark.parametrize("line", [line for examples in EXAMPLES.values() for line, _ in examples])
 def test_examples_are_commands_as_they_are(line):
     name, *arguments = line.split()

@@ -117,6 +117,7 @@ MODEL_FILES: dict[str, Callable[[], list[Mutant]]] = {
 GEOJSON, MAP = json.dumps(floor_plans.GEOJSON).encode(), block(floor_plans.MAP).encode()
 DRAWINGS: dict[str, tuple[bytes, Callable[[], list[Mutant]]]] = {
     "hall.svg": (floor_plans.SVG, lambda: list(floor_plans.svg_mutants(24))),
+    "hall.dxf": (floor_plans.DXF, lambda: list(floor_plans.dxf_mutants(31))),
     "hall.wkt": (
         floor_plans.WKT,
         lambda: [*floor_plans.wkt_mutants(25), *text.encoding_mutants(floor_plans.WKT, 10, 26)],
@@ -139,6 +140,7 @@ COUNTS = {
     "sdf": 122,
     "urdf": 130,
     "hall.svg": 46,
+    "hall.dxf": 150,
     "hall.wkt": 62,
     "hall.geojson": 162,
     "map.yaml": 88,

@@ -37,15 +37,19 @@ def floor_plan_command(
     tolerance: Annotated[
         float | None,
         typer.Option(
-            "--tolerance", metavar="M", help="How far walls may grow to save corners [m]; 0.01 by default."
+            "--tolerance",
+            metavar="M",
+            help="How many metres walls may grow to save corners; 0.01 by default.",
         ),
     ] = None,
     gap: Annotated[
-        float, typer.Option("--gap", metavar="M", help="Gaps in outlines up to this are closed [m].")
+        float, typer.Option("--gap", metavar="M", help="Gaps in outlines of up to so many metres are closed.")
     ] = 0.01,
     inside: Annotated[
         tuple[float, float] | None,
-        typer.Option("--inside", metavar="X Y", help="A point of the room [m]; the largest by default."),
+        typer.Option(
+            "--inside", metavar="X Y", help="A point of the room in metres; the largest by default."
+        ),
     ] = None,
     unknown_is_free: Annotated[
         bool, typer.Option("--unknown-is-free", help="Take a map's unknown cells for floor.")

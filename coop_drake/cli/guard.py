@@ -37,7 +37,7 @@ def _attempt(reporter: Reporter, command: Callable[[], ExitCode]) -> ExitCode:
         reporter.complain("interrupted; files already written are whole")
         return ExitCode.INTERRUPTED
     except ScenarioError as error:
-        details = {"file": error.file, "key": error.key, "value": repr(error.value), "allowed": error.allowed}
+        details = {"file": error.file, "key": error.key, "value": error.shown, "allowed": error.allowed}
         reporter.complain(str(error), **details)
         return ExitCode.BAD_INPUT
     except FloorPlanError as error:
@@ -47,10 +47,22 @@ def _attempt(reporter: Reporter, command: Callable[[], ExitCode]) -> ExitCode:
     except (FieldError, StallError) as error:
         reporter.complain(str(error))
         return ExitCode.FAILED_RUN
-    except (CoopDrakeError, OSError) as error:
+    except CoopDrakeError as error:
         reporter.complain(str(error))
+        return ExitCode.BAD_INPUT
+    except OSError as error:
+        reporter.complain(_of_the_system(error))
         return ExitCode.BAD_INPUT
     except Exception as error:
         # A bug, not a mistake of the user's: machines get their object, people the traceback.
         reporter.complain(f"{type(error).__name__}: {error}")
         raise
+
+
+def _of_the_system(error: OSError) -> str:
+    """What the system would not do, as a sentence that names the file and what would help."""
+    if error.filename is None or error.strerror is None:
+        return str(error)
+    if isinstance(error, FileExistsError | NotADirectoryError):
+        return f"{error.filename}: a file stands where a folder is needed; expected another place, with --out"
+    return f"{error.filename}: {error.strerror.lower()}; expected a place that can be read and written"

@@ -35,21 +35,25 @@ def new_command(
     arm: Annotated[
         str | None,
         typer.Option(
-            "--arm", metavar="L1,L2,…", help="Links from base to hand [m], joints between; 0.35,0.4."
+            "--arm",
+            metavar="L1,L2,…",
+            help="Links from base to hand in metres, joints between them; 0.35,0.4.",
         ),
     ] = None,
     base_radius: Annotated[
-        float | None, typer.Option("--base-radius", metavar="M", help="Radius of a base [m]; 0.25.")
+        float | None, typer.Option("--base-radius", metavar="M", help="Radius of a base in metres; 0.25.")
     ] = None,
     length: Annotated[
-        float | None, typer.Option("--length", metavar="M", help="Length of the object [m]; 0.8.")
+        float | None, typer.Option("--length", metavar="M", help="Length of the object in metres; 0.8.")
     ] = None,
     width: Annotated[
-        float | None, typer.Option("--width", metavar="M", help="Width of the object [m]; 0.5.")
+        float | None, typer.Option("--width", metavar="M", help="Width of the object in metres; 0.5.")
     ] = None,
     door: Annotated[
         float | None,
-        typer.Option("--door", metavar="M", help="Width of the door between two rooms [m]; a roomy one."),
+        typer.Option(
+            "--door", metavar="M", help="Width of the door between two rooms in metres; a roomy one."
+        ),
     ] = None,
     floor_plan: Annotated[
         Path | None,
@@ -58,11 +62,11 @@ def new_command(
     unit: Annotated[str | None, typer.Option("--unit", metavar="UNIT", help="Unit of the drawing.")] = None,
     start: Annotated[
         tuple[float, float, float] | None,
-        typer.Option("--start", metavar="X Y THETA", help="Where the object starts [m, rad]."),
+        typer.Option("--start", metavar="X Y THETA", help="Where the object starts, in metres and radians."),
     ] = None,
     goal: Annotated[
         tuple[float, float, float] | None,
-        typer.Option("--goal", metavar="X Y THETA", help="Where it shall go [m, rad]."),
+        typer.Option("--goal", metavar="X Y THETA", help="Where it shall go, in metres and radians."),
     ] = None,
     out: Annotated[
         Path | None,

@@ -59,7 +59,7 @@ def watch_command(
             metavar="M",
             min=0.0,
             callback=_checked_margin,
-            help="Clearance to keep from the walls [m]; cells: 0 by default, else 'no way' is no proof.",
+            help="Metres to keep from the walls; cells: 0 by default, else 'no way' is no proof.",
         ),
     ] = None,
     machine: Annotated[

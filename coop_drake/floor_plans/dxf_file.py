@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import groupby
 from math import isfinite
 from pathlib import Path
@@ -21,7 +23,17 @@ __all__ = ["read_dxf"]
 _UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 10: 0.9144, 14: 1e-1}
 """Codes of $INSUNITS that a floor plan may be in [m]."""
 
+_REQUIRED = {
+    "LINE": ("start", "end"),
+    "CIRCLE": ("center", "radius"),
+    "ARC": ("center", "radius", "start_angle", "end_angle"),
+    "ELLIPSE": ("center", "major_axis", "ratio"),
+}
+"""What the reader would put a number of its own for, were it missing."""
+
 _MOST_ENTITIES = 200_000
+_MOST_TOLD = 5
+"""Warnings of the reader that are passed on."""
 
 
 def read_dxf(path: Path, settings: FloorPlanSettings) -> Drawing:
@@ -31,7 +43,8 @@ def read_dxf(path: Path, settings: FloorPlanSettings) -> Drawing:
         FloorPlanError: The file is damaged, or does not say its unit.
     """
     file = str(path)
-    document = _document(path)
+    with _told() as told:
+        document = _document(path)
     metre = settings.metres(_UNITS.get(int(document.header.get("$INSUNITS", 0))), file)
     names = {layer.dxf.name: layer for layer in document.layers}
     hidden = {name for name, layer in names.items() if layer.is_off() or layer.is_frozen()}
@@ -58,7 +71,27 @@ def read_dxf(path: Path, settings: FloorPlanSettings) -> Drawing:
             known = ", ".join(sorted(used)) or "none"
             raise FloorPlanError(file, "layers", f"nothing is drawn on layer {layer!r}", f"known: {known}")
     notes = [f"{count} {kind} left out" for kind, count in sorted(ignored.items())]
+    notes += [f"while reading: {line}" for line in told[:_MOST_TOLD]]
     return Drawing(tuple(walls), tuple(notes))
+
+
+@contextmanager
+def _told() -> Iterator[list[str]]:
+    """What the reader warns of meanwhile, as notes of the plan and not as lines of its own on the screen."""
+    lines: list[str] = []
+    handler, logger = logging.Handler(logging.WARNING), logging.getLogger("ezdxf")
+    handler.emit = lambda record: lines.append(_one_line(record.getMessage()))  # type: ignore[method-assign]
+    passed_on, logger.propagate = logger.propagate, False
+    logger.addHandler(handler)
+    try:
+        yield lines
+    finally:
+        logger.removeHandler(handler)
+        logger.propagate = passed_on
+
+
+def _one_line(finding: object) -> str:
+    return " ".join(str(finding).split())
 
 
 def _document(path: Path) -> Any:
@@ -83,7 +116,7 @@ def _document(path: Path) -> Any:
         OverflowError,
         RecursionError,
     ) as error:
-        raise FloorPlanError(file, "the file", f"no readable DXF ({error})", remedy) from error
+        raise FloorPlanError(file, "the file", f"no readable DXF ({_one_line(error)})", remedy) from error
 
 
 def _entities(document: Any, file: str) -> Iterator[Any]:
@@ -99,7 +132,10 @@ def _entities(document: Any, file: str) -> Iterator[Any]:
             yield entity
     except (DXFError, RecursionError, ValueError, ZeroDivisionError) as error:
         raise FloorPlanError(
-            file, "a block", f"it cannot be dissolved ({error})", "explode the blocks in the CAD program"
+            file,
+            "a block",
+            f"it cannot be dissolved ({_one_line(error)})",
+            "explode the blocks in the CAD program",
         ) from error
 
 
@@ -116,6 +152,7 @@ def _walls_of(entity: Any, layer: str, metre: float, sagitta: float, file: str) 
     from ezdxf.path import make_path
 
     place = f"{entity.dxftype()} {entity.dxf.get('handle') or ''} on layer {layer!r}".replace("  ", " ")
+    _refuse_no_numbers(entity, file, place)
     try:
         outline = make_path(entity)
         pieces = [np.array(piece) * metre for subpath in outline.sub_paths() for piece in _pieces(subpath)]
@@ -123,7 +160,7 @@ def _walls_of(entity: Any, layer: str, metre: float, sagitta: float, file: str) 
         return None
     except (DXFError, ValueError, ZeroDivisionError, OverflowError, LookupError) as error:
         raise FloorPlanError(
-            file, place, f"its numbers make no line ({error})", "delete it or draw it anew"
+            file, place, f"its numbers make no line ({_one_line(error)})", "delete it or draw it anew"
         ) from error
     if not pieces:
         return []
@@ -134,6 +171,16 @@ def _walls_of(entity: Any, layer: str, metre: float, sagitta: float, file: str) 
         closed = len(points) > 3 and bool(np.hypot(*(points[0] - points[-1])) <= 1e-9)
         walls.append(Wall(points[:-1] if closed else points, width + strays, closed, place))
     return walls
+
+
+def _refuse_no_numbers(entity: Any, file: str, place: str) -> None:
+    """Refuse an entity whose numbers are missing or not finite: it would be drawn elsewhere, or not."""
+    numbers = entity.dxf.all_existing_dxf_attribs()
+    missing = [name for name in _REQUIRED.get(entity.dxftype(), ()) if name not in numbers]
+    wrong = [name for name, value in numbers.items() if isinstance(value, float) and not isfinite(value)]
+    for name in (*missing, *wrong):
+        finding = f"its {name.replace('_', ' ')} is no number" if name in wrong else f"it has no {name}"
+        raise FloorPlanError(file, place, finding, "delete it or draw it anew")
 
 
 def _runs(pieces: list[Any]) -> Iterator[list[Any]]:

@@ -30,7 +30,9 @@ def load_scenario(path: Path | str) -> Scenario:
     file = scenario_file(path)
     if not file.exists():
         known = ", ".join(shipped_scenarios())
-        raise ScenarioError(str(path), "the file", None, f"a readable file, or a shipped scenario: {known}")
+        raise ScenarioError(
+            str(path), "the file", "no such file", f"a readable file, or a shipped scenario: {known}"
+        )
     scenario = with_floor(dataclasses.replace(read_file(Scenario, file), path=file))
     validate(scenario)
     return scenario

@@ -83,7 +83,7 @@ def knobs_of(gain_set: GainSet, names: Sequence[str] = ()) -> tuple[Knob, ...]:
     known = {knob.name: knob for knob in (_FIXED if isinstance(gain_set, FixedGains) else _SCHEDULED)}
     for name in names:
         if name not in known:
-            raise TuningError(f"--gain {name}: expected one of {', '.join(known)}")
+            raise TuningError(f"--vary {name}: expected one of {', '.join(known)}")
     chosen = [known[name] for name in dict.fromkeys(names)] if names else list(known.values())
     return tuple(_reaching(knob, getattr(gain_set, knob.name)) for knob in chosen)
 

@@ -9,6 +9,7 @@ from shapely import box, contains_xy
 from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans import FloorPlanSettings, read_floor_plan
 from tests.support.floor_plan_files import write_dxf
+from tests.support.mutants.floor_plans import DXF
 
 HALL = [(0, 0), (10_000, 0), (10_000, 6_000), (0, 6_000)]
 
@@ -115,3 +116,13 @@ def test_a_drawing_of_no_sense_is_refused(tmp_path):
         path.write_bytes(content)
         with pytest.raises(FloorPlanError):
             read_floor_plan(path, FloorPlanSettings(unit="m"))
+
+
+def test_what_the_reader_warns_of_is_a_note_and_not_a_line_on_the_screen(tmp_path, capsys):
+    path = tmp_path / "hall.dxf"
+    tables = b"0\nSECTION\n2\nTABLES\n0\nTABLE\n2\nLTYPE\n70\n1\n0\nWIDE\n2\nx\n0\nENDTAB\n0\nENDSEC\n"
+    entities = DXF.index(b"0\nSECTION\n2\nENTITIES")
+    path.write_bytes(DXF[:entities] + tables + DXF[entities:])
+    notes = read_floor_plan(path).notes
+    assert any(note.startswith("while reading: ") and "WIDE" in note for note in notes), notes
+    assert capsys.readouterr().err == ""

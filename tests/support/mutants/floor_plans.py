@@ -43,6 +43,16 @@ MAP: dict[str, Any] = {
 }
 PICTURE = b"P5\n40 30\n255\n" + bytes(254 for _ in range(40 * 30))
 """A hall of 4 m by 3 m, all of it free."""
+DXF = (
+    b"0 SECTION 2 HEADER 9 $ACADVER 1 AC1009 9 $INSUNITS 70 4 0 ENDSEC 0 SECTION 2 ENTITIES "
+    b"0 LINE 8 walls 10 0 20 0 11 9000 21 0 0 LINE 8 walls 10 9000 20 0 11 9000 21 6000 "
+    b"0 LINE 8 walls 10 9000 20 6000 11 0 21 6000 0 LINE 8 walls 10 0 20 6000 11 0 21 0 "
+    b"0 CIRCLE 8 walls 10 3000 20 3000 40 500 "
+    b"0 ARC 8 walls 10 6000 20 0 40 700 50 0 51 180 0 ENDSEC 0 EOF "
+).replace(b" ", b"\n")
+"""The hall once more, in millimetres, with a column and an alcove: lines of codes and of values."""
+DXF_TAGS = DXF.decode().splitlines()
+_DXF_NUMBERS = frozenset(("10", "20", "11", "21", "40", "50", "51"))
 _JUNK = ("wide", None, True, [], {}, "1m")
 
 
@@ -123,6 +133,23 @@ def geojson_mutants(seed: int) -> Iterator[Mutant]:
         yield Mutant(kind, dotted(ring), because, json.dumps(put(GEOJSON, ring, value)).encode())
 
 
+def dxf_mutants(seed: int) -> Iterator[Mutant]:
+    """Drawings in DXF: cut off, and with every number of an entity of another kind or gone."""
+    rng = random.Random(seed)
+    for place in sorted(rng.sample(range(1, len(DXF) - 5), 20)):
+        yield Mutant("cut off", f"byte {place}", "the end is missing", DXF[:place])
+    first = DXF_TAGS.index("ENTITIES") + 1
+    for place in range(first, len(DXF_TAGS) - 1, 2):
+        if DXF_TAGS[place] in _DXF_NUMBERS:
+            for wrong in ("wide", "nan", "inf", "1e400"):
+                yield _tags(f"{wrong} for a number", place + 1, "it is a number", [DXF_TAGS[place], wrong])
+            yield _tags("missing", place, "nothing stands for it", [])
+            yield _tags("half", place, "a code and a value are a pair", [DXF_TAGS[place]])
+    for kind, value in (("cm of none", "99"), ("a word", "mm"), ("unsaid", "0")):
+        place = DXF_TAGS.index("70")
+        yield _tags(kind, place + 1, "it is the unit", ["70", value])
+
+
 def map_mutants() -> Iterator[Mutant]:
     """Keys of occupancy maps; the picture beside them is sound."""
     for key in ("image", "resolution", "origin", "occupied_thresh", "free_thresh"):
@@ -169,6 +196,13 @@ def picture_mutants(seed: int) -> Iterator[Mutant]:
 
 def _text(kind: str, place: int, because: str, text: str) -> Mutant:
     return Mutant(kind, f"byte {place}", because, text.encode())
+
+
+def _tags(kind: str, place: int, because: str, tag: list[str]) -> Mutant:
+    """The drawing with another tag, or none, in place of the one whose line that is."""
+    code = place - place % 2
+    lines = [*DXF_TAGS[:code], *tag, *DXF_TAGS[code + 2 :]]
+    return Mutant(kind, f"line {place + 1}", because, "\n".join(lines).encode() + b"\n")
 
 
 def _map(kind: str, key: str, because: str, document: dict[str, Any]) -> Mutant:
