@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
 
+from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import Propeller, PropellerInfo
-from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.primitives import ConstantValueSource, Demultiplexer, Multiplexer
 
 from coop_drake.plant import SeparateTeam, TeamPlant, build_separate_team, build_team_plant
 from coop_drake.scenario import Scenario
-from coop_drake.systems import FreeRobotSensor, ObjectPoseSensor, RobotStateSensor, TeamActuation
+from coop_drake.systems import FreeRobotSensor, ObjectPoseSensor, RobotStateSensor
 
 __all__ = ["TransportStation", "build_driven_station", "build_station"]
 
@@ -95,17 +98,47 @@ def build_driven_station(scenario: Scenario) -> TransportStation:
 
 
 def _drive_robots(builder: DiagramBuilder, team: TeamPlant) -> None:
-    actuation, plant = builder.AddNamedSystem("team_actuation", TeamActuation(team)), team.plant
-    builder.Connect(actuation.GetOutputPort("base_wrenches"), plant.get_applied_spatial_force_input_port())
-    builder.Connect(actuation.GetOutputPort("joint_torques"), plant.get_actuation_input_port())
+    """Let every robot's effort act: wrenches of W on the bases, torques on the joints."""
+    plant, bases, torques = team.plant, [], []
     for robot in team.robots:
-        effort = f"robot_{robot.index}_effort"
-        builder.ExportInput(actuation.GetInputPort(effort), effort)
+        name, joints = f"robot_{robot.index}_effort", len(robot.joints)
+        parts = builder.AddNamedSystem(name, Demultiplexer([3, joints] if joints else [3]))
+        builder.ExportInput(parts.get_input_port(), name)
+        bases.append(parts.get_output_port(0))
+        if joints:
+            torques.append(parts.get_output_port(1))
+    thrusters = _add_thrusters(builder, team)
+    # Thrusters push along the axes of the poses they are told: those of W, for all that the bases turn.
+    axes = AbstractValue.Make([RigidTransform()] * plant.num_bodies())
+    world = builder.AddNamedSystem("world_axes", ConstantValueSource(axes))
+    builder.Connect(world.get_output_port(), thrusters.get_body_poses_input_port())
+    builder.Connect(_joined(builder, "base_wrenches", bases), thrusters.get_command_input_port())
+    if torques:
+        builder.Connect(_joined(builder, "joint_torques", torques), plant.get_actuation_input_port())
+
+
+def _joined(builder: DiagramBuilder, name: str, ports: Sequence[OutputPort]) -> OutputPort:
+    joined = builder.AddNamedSystem(name, Multiplexer([port.size() for port in ports]))
+    for i, port in enumerate(ports):
+        builder.Connect(port, joined.get_input_port(i))
+    return joined.get_output_port()
 
 
 def _drive_bases(builder: DiagramBuilder, team: TeamPlant) -> None:
-    """Let Drake's own block put wrenches on bases: thrusts along x and y, a moment about z."""
-    plant = team.plant
+    """Let wrenches act that are told in the axes of the bases, and all joints' torques in one."""
+    plant, thrusters = team.plant, _add_thrusters(builder, team)
+    builder.Connect(plant.get_body_poses_output_port(), thrusters.get_body_poses_input_port())
+    builder.ExportInput(thrusters.get_command_input_port(), "base_forces")
+    if team.joints:
+        builder.ExportInput(plant.get_actuation_input_port(), "joint_torques")
+
+
+def _add_thrusters(builder: DiagramBuilder, team: TeamPlant) -> Propeller:
+    """Let Drake's own block put wrenches on bases: thrusts along x and y, a moment about z.
+
+    A base wrench given as a generalized force would move the team alike, but the grasp's reaction could not
+    be read from the plant.
+    """
     thrusters = [
         PropellerInfo(robot.base_body.index(), RigidTransform(R_BP), thrust, moment)
         for robot in team.robots
@@ -116,11 +149,8 @@ def _drive_bases(builder: DiagramBuilder, team: TeamPlant) -> None:
         )
     ]
     bases = builder.AddNamedSystem("base_thrusters", Propeller(thrusters))
-    builder.Connect(plant.get_body_poses_output_port(), bases.get_body_poses_input_port())
-    builder.Connect(bases.get_spatial_forces_output_port(), plant.get_applied_spatial_force_input_port())
-    builder.ExportInput(bases.get_command_input_port(), "base_forces")
-    if team.joints:
-        builder.ExportInput(plant.get_actuation_input_port(), "joint_torques")
+    builder.Connect(bases.get_spatial_forces_output_port(), team.plant.get_applied_spatial_force_input_port())
+    return bases
 
 
 def _sensor(team: TeamPlant, robot: int) -> RobotStateSensor | FreeRobotSensor:

@@ -13,7 +13,6 @@ from coop_drake.systems.ready_monitor import ReadyMonitor
 from coop_drake.systems.reference_governor import GovernedCell, ReferenceGovernor
 from coop_drake.systems.robot_effort import RobotEffort
 from coop_drake.systems.sensors import ObjectPoseSensor, RobotStateSensor
-from coop_drake.systems.team_actuation import TeamActuation
 from coop_drake.systems.team_controller import TeamController
 from coop_drake.systems.team_kernels import FusedCell, FusedTeam
 from coop_drake.systems.wrench_law import WrenchLaw
@@ -37,7 +36,6 @@ __all__ = [
     "ReferenceGovernor",
     "RobotEffort",
     "RobotStateSensor",
-    "TeamActuation",
     "TeamController",
     "WrenchLaw",
     "axis_laws",

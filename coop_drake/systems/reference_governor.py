@@ -50,6 +50,13 @@ class GovernedCell:
         gains = self.gains
         return np.array([gains.stiffness, gains.damping, gains.governor_gain, gains.smoothing])
 
+    @cached_property
+    def _leading(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+        """What the compiled governor reads of the cell, if its field is that of a harmonic map."""
+        if not isinstance(self.field, VelocityField):
+            return None
+        return self.gain_row, self.clearance.edges, *self.field.kernel_arguments
+
     def lead(self, state: FloatArray, governor_position: FloatArray, velocity: FloatArray) -> None:
         """Write p_G' of (14) in this cell.
 
@@ -58,12 +65,11 @@ class GovernedCell:
             governor_position: p_G, shape (2,) [m].
             velocity: Receives p_G', shape (2,) [m/s].
         """
-        edges = self.clearance.edges
-        if isinstance(self.field, VelocityField):
-            lead(self.gain_row, edges, *self.field.kernel_arguments, state, governor_position, velocity)
+        if self._leading is not None:
+            lead(*self._leading, state, governor_position, velocity)
             return
         stiffness, _, gain, smoothing = self.gain_row
-        margin = cell_margin(edges, stiffness, state, governor_position)
+        margin = cell_margin(self.clearance.edges, stiffness, state, governor_position)
         vx, vy = self.field(governor_position)
         kernels.governor_velocity(vx, vy, margin, stiffness, gain, smoothing, velocity)
 

@@ -4,12 +4,10 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.control import robot_acceleration, robot_torque
 from coop_drake.plant import base_poses, build_robot_plant, build_team_plant, set_configuration
-from coop_drake.systems import ObjectEstimator, ObjectPoseSensor, RobotEffort, RobotStateSensor, TeamActuation
+from coop_drake.systems import ObjectEstimator, ObjectPoseSensor, RobotEffort, RobotStateSensor
 from tests.support.small_scenario import small_scenario
 from tests.support.system_checks import (
-    SIZE_OF_ABSTRACT,
     assert_every_input_is_required,
-    context_with,
     evaluate,
     port_sizes,
 )
@@ -115,35 +113,6 @@ def test_the_effort_is_the_law_with_the_robots_own_dynamics(rig):
         )
         np.testing.assert_allclose(evaluate(system, inputs, "robot_effort"), expected, rtol=1e-12, atol=1e-12)
         assert_every_input_is_required(system, inputs, {"robot_effort": set(inputs)})
-
-
-def test_actuation_puts_base_wrenches_on_bases_and_torques_on_joints(rig):
-    system, generator = TeamActuation(rig.team), np.random.default_rng(7)
-    efforts = {
-        f"robot_{robot.index}_effort": generator.normal(size=3 + len(robot.joints))
-        for robot in rig.team.robots
-    }
-    assert port_sizes(system) == (
-        {name: len(value) for name, value in efforts.items()},
-        {"base_wrenches": SIZE_OF_ABSTRACT, "joint_torques": len(rig.team.joints)},
-    )
-    np.testing.assert_array_equal(
-        evaluate(system, efforts, "joint_torques"), np.concatenate([e[3:] for e in efforts.values()])
-    )
-    wrenches = evaluate(system, efforts, "base_wrenches")
-    for robot, wrench, effort in zip(rig.team.robots, wrenches, efforts.values(), strict=True):
-        assert wrench.body_index == robot.base_body.index()
-        np.testing.assert_array_equal(wrench.p_BoBq_B, np.zeros(3))
-        np.testing.assert_array_equal(wrench.F_Bq_W.translational(), [*effort[:2], 0.0])
-        np.testing.assert_array_equal(wrench.F_Bq_W.rotational(), [0.0, 0.0, effort[2]])
-
-
-def test_actuation_needs_every_robots_effort(rig):
-    system = TeamActuation(rig.team)
-    context = context_with(system, {"robot_0_effort": np.zeros(3 + len(rig.team.robots[0].joints))})
-    for output in ("base_wrenches", "joint_torques"):
-        with pytest.raises(RuntimeError, match="robot_1_effort"):
-            system.GetOutputPort(output).Eval(context)
 
 
 @pytest.mark.parametrize("k", [-1, 7])
