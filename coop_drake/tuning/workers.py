@@ -50,15 +50,16 @@ class Workers:
 
     def __exit__(self, *_: object) -> None:
         # Shutting down alone would wait for trials that are under way; there is no public way to end them.
-        processes = list((self._pool._processes or {}).values())
-        self._pool.shutdown(wait=False, cancel_futures=True)
-        for process in processes:
+        # They end first, and nothing is cancelled: the pool trips over cancelled trials of dead processes.
+        for process in list((self._pool._processes or {}).values()):
             process.terminate()
+        self._pool.shutdown()
 
     def try_all(self, gain_sets: Sequence[GainSet]) -> Iterator[Trial]:
         """Try gain sets side by side; results come in their order, whichever is ready first."""
         with _interrupts_held_back():
-            return self._pool.map(_try, gain_sets)
+            trials = [self._pool.submit(_try, gains) for gains in gain_sets]
+        return (trial.result() for trial in trials)
 
 
 @contextmanager

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
+import threading
+from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
 from coop_drake.cli import app
 from coop_drake.cli.advice import Workers
+from coop_drake.control import ScheduledGains
 from coop_drake.scenario import load_scenario, with_gains
 from tests.support.scenarios import write_scenario
+from tests.support.small_plan import small_plan
 
 
 @pytest.fixture(scope="module")
@@ -62,3 +67,13 @@ def test_what_makes_no_sense_is_refused_before_any_work(room, tmp_path, argument
     assert result.exit_code == 2
     assert complaint in " ".join(result.output.split())
     assert not (tmp_path / "out").exists()
+
+
+def test_processes_end_amid_their_trials_without_a_word(monkeypatch):
+    said = []
+    monkeypatch.setattr(threading, "excepthook", said.append)
+    with Workers(Path("none.scenario.yaml"), small_plan(()), (), longest=1.0, count=1) as workers:
+        trials = workers.try_all([ScheduledGains()] * 8)
+        del trials  # As where Ctrl-C leaves the loop over them.
+    assert not said
+    assert not multiprocessing.active_children()
