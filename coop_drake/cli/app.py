@@ -26,7 +26,7 @@ from coop_drake.cli.guard import run_guarded
 from coop_drake.cli.kernel_cache import keep_kernels_somewhere
 from coop_drake.cli.map_cache import maps_command
 from coop_drake.cli.new import new_command
-from coop_drake.cli.options import GainsName, ScenarioPath
+from coop_drake.cli.options import GainsName, Machine, Quiet, ResultsFolder, ScenarioPath
 from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.reproduce import reproduce_command
@@ -51,12 +51,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
-OutPath = Annotated[
-    Path | None,
-    typer.Option(
-        "--out", metavar="DIR", file_okay=False, help="Where results go; out/<scenario> by default."
-    ),
-]
 FreshMaps = Annotated[
     bool, typer.Option("--fresh-maps", help="Solve all maps anew; others come from the cache, see `maps`.")
 ]
@@ -68,10 +62,6 @@ BlocksName = Annotated[
     Literal["named", "fused"],
     typer.Option("--blocks", help="Blocks of every robot, or, for speed, one for the team: equal results."),
 ]
-Machine = Annotated[
-    bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")]
 
 
 def main() -> None:
@@ -101,7 +91,7 @@ def show_version(
 @app.command("run", epilog=epilog("run"))
 def run_command(
     scenario: ScenarioPath,
-    out: OutPath = None,
+    out: ResultsFolder = None,
     gains: GainsName = None,
     fresh_maps: FreshMaps = False,
     live: Live = False,
@@ -123,7 +113,7 @@ def run_command(
 @app.command("plan", epilog=epilog("plan"))
 def plan_command(
     scenario: ScenarioPath,
-    out: OutPath = None,
+    out: ResultsFolder = None,
     gains: GainsName = None,
     machine: Machine = False,
     quiet: Quiet = False,
@@ -148,7 +138,7 @@ def simulate_command(
         Path | None,
         typer.Option("--plan", metavar="FILE", help="Plan to execute; plan.json in the results by default."),
     ] = None,
-    out: OutPath = None,
+    out: ResultsFolder = None,
     gains: Annotated[
         str | None,
         typer.Option("--gains", metavar="NAME|FILE", help="Gain set or its file; the plan's own by default."),

@@ -13,7 +13,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
-from coop_drake.cli.options import GainsName, ScenarioPath
+from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 
@@ -57,10 +57,8 @@ def compare_command(
         ),
     ] = None,
     gains: GainsName = None,
-    machine: Annotated[
-        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+    machine: Machine = False,
+    quiet: Quiet = False,
 ) -> None:
     """Carry a plan out with exactly rigid grasps and with constraints as grasps; compare the margins."""
     reporter = Reporter(machine=machine, quiet=quiet)

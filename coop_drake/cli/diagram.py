@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
-from coop_drake.cli.options import ScenarioPath
+from coop_drake.cli.options import PictureFolder, Quiet, ScenarioPath
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 
@@ -22,13 +22,8 @@ def diagram_command(
     robot: Annotated[
         int, typer.Option("--robot", metavar="K", min=0, help="Whose controller is opened.")
     ] = 0,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", metavar="DIR", file_okay=False, help="Where the picture goes; out/<scenario> by default."
-        ),
-    ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+    out: PictureFolder = None,
+    quiet: Quiet = False,
 ) -> None:
     """Draw the blocks of the closed loop and of one robot's controller, as they are wired in Drake."""
     reporter = Reporter(machine=False, quiet=quiet)

@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.options import Machine
 from coop_drake.cli.reporter import Reporter
 
 __all__ = ["doctor_command"]
@@ -18,9 +19,7 @@ _MARKS = {True: "[green]ok[/]", False: "[red]wrong[/]", None: "[yellow]note[/]"}
 
 
 def doctor_command(
-    machine: Annotated[
-        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-    ] = False,
+    machine: Machine = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show what is wrong only.")] = False,
 ) -> None:
     """Check the installation: versions, Drake, Meshcat, fonts, compiled parts, memory, caches."""

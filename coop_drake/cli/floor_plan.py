@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.options import Machine, Quiet
 from coop_drake.cli.reporter import Reporter
 
 if TYPE_CHECKING:
@@ -60,10 +61,8 @@ def floor_plan_command(
             "--out", metavar="FILE", dir_okay=False, help="*.yaml: workspace; *.png or *.svg: picture."
         ),
     ] = None,
-    machine: Annotated[
-        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+    machine: Machine = False,
+    quiet: Quiet = False,
 ) -> None:
     """Read a floor plan from elsewhere: preview it, or turn it into a scenario's workspace."""
     targets = out or []

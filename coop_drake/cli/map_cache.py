@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.options import Machine
 from coop_drake.cli.reporter import Reporter
 
 if TYPE_CHECKING:
@@ -33,9 +34,7 @@ def map_cache() -> MapStore:
 
 def maps_command(
     clear: Annotated[bool, typer.Option("--clear", help="Forget them all.")] = False,
-    machine: Annotated[
-        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-    ] = False,
+    machine: Machine = False,
 ) -> None:
     """Show where solved maps are kept for later runs, or forget them."""
     reporter = Reporter(machine=machine, quiet=False)

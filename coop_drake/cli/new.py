@@ -13,6 +13,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.options import Machine, Quiet
 from coop_drake.cli.reporter import Reporter
 
 if TYPE_CHECKING:
@@ -73,10 +74,8 @@ def new_command(
         typer.Option("--out", metavar="DIR", file_okay=False, help="The folder; NAME by default."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there already.")] = False,
-    machine: Annotated[
-        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+    machine: Machine = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write a scenario and its models to start from; asks at a terminal for what no flag says."""
     flags: dict[str, Any] = {

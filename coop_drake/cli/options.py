@@ -9,7 +9,7 @@ import typer
 
 from coop_drake.cli.completion import complete_gains, complete_scenario
 
-__all__ = ["GainsName", "ScenarioPath"]
+__all__ = ["GainsName", "Machine", "PictureFolder", "Quiet", "ResultsFolder", "ScenarioPath"]
 
 ScenarioPath = Annotated[
     Path,
@@ -28,3 +28,19 @@ GainsName = Annotated[
         autocompletion=complete_gains,
     ),
 ]
+ResultsFolder = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="DIR", file_okay=False, help="Where results go; out/<scenario> by default."
+    ),
+]
+PictureFolder = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="DIR", file_okay=False, help="Where the picture goes; out/<scenario> by default."
+    ),
+]
+Machine = Annotated[
+    bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")]

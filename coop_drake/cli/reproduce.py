@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.options import Machine, Quiet
 from coop_drake.cli.reporter import Reporter
 
 __all__ = ["reproduce_command"]
@@ -25,10 +26,8 @@ def reproduce_command(
     out: Annotated[
         Path, typer.Option("--out", metavar="DIR", file_okay=False, help="Where the report goes.")
     ] = Path("out/reproduction"),
-    machine: Annotated[
-        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+    machine: Machine = False,
+    quiet: Quiet = False,
 ) -> None:
     """Make the paper's Tables 1-2 and Figures 3-13 from our runs, beside what the paper states."""
     reporter = Reporter(machine=machine, quiet=quiet)

@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.options import Machine, Quiet
 from coop_drake.cli.reporter import Reporter
 
 if TYPE_CHECKING:
@@ -32,10 +33,8 @@ def robot_command(
         typer.Option("--fix", metavar="JOINT=VALUE", help="Show the others' axes with this joint there."),
     ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a model that is there already.")] = False,
-    machine: Annotated[
-        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+    machine: Machine = False,
+    quiet: Quiet = False,
 ) -> None:
     """Make a robot model from elsewhere ready: meshes as hulls, all in one folder, joints judged."""
     packages = {name: Path(folder) for name, folder in _pairs(package, "--package")}

@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.options import Quiet
 from coop_drake.cli.reporter import Reporter
 
 __all__ = ["schema_command"]
@@ -23,7 +24,7 @@ def schema_command(
             "--out", metavar="FILE", dir_okay=False, help="Where to write; standard output by default."
         ),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Write the JSON Schema of scenario files, so that editors complete and check them."""
     reporter = Reporter(machine=False, quiet=quiet)

@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
-from coop_drake.cli.options import ScenarioPath
+from coop_drake.cli.options import Quiet, ScenarioPath
 from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
@@ -34,7 +34,7 @@ def show_command(
             help="*.png or *.svg; show.png in the results by default.",
         ),
     ] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Draw the floor, the team at start and goal, and the channel of a plan."""
     if out is not None and out.suffix.lower() not in _PICTURES:

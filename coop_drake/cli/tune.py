@@ -9,7 +9,7 @@ import typer
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
-from coop_drake.cli.options import GainsName, ScenarioPath
+from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath
 from coop_drake.cli.reporter import Reporter
 
 __all__ = ["tune_command"]
@@ -52,10 +52,8 @@ def tune_command(
             "--out", metavar="DIR", file_okay=False, help="Where results go; out/<scenario>/tuned by default."
         ),
     ] = None,
-    machine: Annotated[
-        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+    machine: Machine = False,
+    quiet: Quiet = False,
 ) -> None:
     """Choose gains: less force, less time or more room, judged by simulating the whole transport.
 

@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
-from coop_drake.cli.options import ScenarioPath
+from coop_drake.cli.options import Machine, Quiet, ScenarioPath
 from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.errors import RefusalError
@@ -27,10 +27,8 @@ def verify_command(
         Path, typer.Argument(metavar="FILE", help="plan.json or certificate.json, as `plan` wrote it.")
     ],
     scenario: ScenarioPath,
-    machine: Annotated[
-        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+    machine: Machine = False,
+    quiet: Quiet = False,
 ) -> None:
     """Check a plan, or a proof that there is none, without anything of the search."""
     reporter = Reporter(machine=machine, quiet=quiet)

@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
-from coop_drake.cli.options import ScenarioPath
+from coop_drake.cli.options import Machine, Quiet, ScenarioPath
 from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 
@@ -62,10 +62,8 @@ def watch_command(
             help="Metres to keep from the walls; cells: 0 by default, else 'no way' is no proof.",
         ),
     ] = None,
-    machine: Annotated[
-        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+    machine: Machine = False,
+    quiet: Quiet = False,
 ) -> None:
     """Watch the planner think: pictures, a moving picture and a page to turn in space."""
     reporter = Reporter(machine=machine, quiet=quiet)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from time import process_time
-from typing import Annotated
 
-import typer
 from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
-from coop_drake.cli.options import ScenarioPath
+from coop_drake.cli.options import Machine, PictureFolder, Quiet, ScenarioPath
 from coop_drake.cli.question import Question, read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
@@ -27,16 +24,9 @@ _EXIT_CODES = {
 
 def why_command(
     scenario: ScenarioPath,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", metavar="DIR", file_okay=False, help="Where the picture goes; out/<scenario> by default."
-        ),
-    ] = None,
-    machine: Annotated[
-        bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
-    ] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")] = False,
+    out: PictureFolder = None,
+    machine: Machine = False,
+    quiet: Quiet = False,
 ) -> None:
     """Say why there is no plan: what blocks, where, how much is missing, and what would help."""
     reporter = Reporter(machine=machine, quiet=quiet)
