@@ -70,6 +70,11 @@ class TreeJoint:
     lower: float
     upper: float
 
+    @property
+    def unit(self) -> str:
+        """Unit of its value: rad, or m if it slides."""
+        return "rad" if self.kind == "revolute" else "m"
+
     def X_JC(self, q: float) -> PlanarPose:
         """Pose of the child in J at joint value q [rad or m]."""
         if self.kind == "revolute":

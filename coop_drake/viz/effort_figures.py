@@ -8,24 +8,26 @@ from matplotlib.figure import Figure
 from coop_drake.drawing.canvas import legend_above
 from coop_drake.drawing.colours import BLUE, GREEN, INK, OBJECT, ORANGE, robot_colour
 from coop_drake.simulation import SimulationLog
-from coop_drake.viz.time_axes import mark_switches, switch_times, time_axes
+from coop_drake.viz.time_axes import SWITCHES, mark_switches, switch_times, time_axes
 
 __all__ = ["force_figure", "summary_figure", "torque_figure"]
 
 
 def force_figure(log: SimulationLog) -> Figure:
     """Draw the total force that the robots apply to the object over time."""
-    caption = "Figure 12. Total force that the robots apply to the object."
-    figure, axes = time_axes(caption, ["F_x [N]", "F_y [N]"])
+    caption = f"Figure 12. Total force that the robots apply to the object. {SWITCHES}"
+    figure, axes = time_axes(caption, ["$F_x$ [N]", "$F_y$ [N]"])
     for axis, ax in enumerate(axes):
-        ax.plot(log.times, log.object_wrench[:, axis], color=BLUE)
+        ax.plot(log.times, log.object_wrench[:, axis], color=OBJECT)
     mark_switches(axes, switch_times(log.times, log.cell_index))
     return figure
 
 
 def torque_figure(log: SimulationLog) -> Figure:
     """Draw the total torque that the robots apply to the object over time."""
-    caption = "Figure 13. Total torque that the robots apply to the object, about its centre of mass."
+    caption = (
+        f"Figure 13. Total torque that the robots apply to the object, about its centre of mass. {SWITCHES}"
+    )
     figure, axes = time_axes(caption, ["torque [N m]"], height=3.0)
     axes[0].plot(log.times, log.object_wrench[:, 2], color=OBJECT)
     mark_switches(axes, switch_times(log.times, log.cell_index))
@@ -36,11 +38,16 @@ def summary_figure(log: SimulationLog) -> Figure:
     """Draw the invariants' margins, which must stay above zero, and the bases' forces over time."""
     caption = (
         "Summary. Distance of the team to the walls, between bodies, and of the object to its cell's "
-        "boundary; energy margin of the governor; force of every base. Margins must stay above zero."
+        "boundary; energy margin of the governor; force of every base. Margins must stay above zero. "
+        f"{SWITCHES}"
     )
-    figure, axes = time_axes(caption, ["clearance [m]", "Delta E [m^2/s^2]", "base force [N]"])
-    for name, colour in (("workspace", BLUE), ("body", GREEN), ("cell", ORANGE)):
-        axes[0].plot(log.times, getattr(log, f"{name}_clearance"), color=colour, linewidth=1.0, label=name)
+    figure, axes = time_axes(caption, ["clearance [m]", "energy margin ΔE [m²/s²]", "base force [N]"])
+    for clearance, colour, label in (
+        (log.workspace_clearance, BLUE, "team to walls"),
+        (log.body_clearance, GREEN, "between bodies"),
+        (log.cell_clearance, ORANGE, "object to its cell's boundary"),
+    ):
+        axes[0].plot(log.times, clearance, color=colour, linewidth=1.0, label=label)
     legend_above(axes[0])
     axes[1].plot(log.times, log.energy_margin, color=OBJECT, linewidth=1.0)
     axes[0].axhline(0.0, color=INK, linewidth=0.8)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from shapely import Polygon
 
 from coop_drake.drawing.canvas import legend_above, new_figure
-from coop_drake.drawing.colours import BLUE, INK
+from coop_drake.drawing.colours import INK, VERMILLION
 from coop_drake.drawing.floor import draw_team, draw_workspace, team_legend
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import ComponentTree
@@ -55,7 +55,7 @@ def start_and_goal_figure(workspace: Polygon, tree: ComponentTree, plan: Plan) -
 
 def path_figure(workspace: Polygon, tree: ComponentTree, log: SimulationLog) -> Figure:
     """Draw the object's path, and the team's footprint at instants spread evenly along it."""
-    caption = "Figure 5. Path of the object (blue) and footprints of the team along it, coloured by time."
+    caption = "Figure 5. Path of the object (red) and footprints of the team along it, coloured by time."
     figure = _floor_figure(workspace, caption)
     ax = figure.subplots()
     draw_workspace(ax, workspace)
@@ -64,7 +64,7 @@ def path_figure(workspace: Polygon, tree: ComponentTree, log: SimulationLog) -> 
     for row in _instants(log):
         z = np.concatenate([log.object_pose[row], log.joints[row]])
         draw_team(ax, tree, z, colour=colours(scale(log.times[row])), alpha=0.35)
-    ax.plot(log.object_pose[:, 0], log.object_pose[:, 1], color=BLUE, linewidth=1.8, zorder=5)
+    ax.plot(log.object_pose[:, 0], log.object_pose[:, 1], color=VERMILLION, linewidth=1.8, zorder=5)
     figure.colorbar(ScalarMappable(scale, colours), ax=ax, label="time [s]", shrink=0.6)
     return figure
 

@@ -7,24 +7,22 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from coop_drake.drawing.canvas import legend_above
-from coop_drake.drawing.colours import BLUE, GREY, INK, OBJECT, SKY, robot_colour
+from coop_drake.drawing.colours import GREY, INK, OBJECT, SKY, robot_colour
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import ComponentTree
 from coop_drake.simulation import SimulationLog
-from coop_drake.viz.time_axes import break_at, mark_switches, switch_times, time_axes
+from coop_drake.viz.time_axes import SWITCHES, break_at, mark_switches, switch_times, time_axes
 
 __all__ = ["angle_figure", "angular_velocity_figure", "joints_figure", "position_figure", "velocity_figure"]
-
-_SWITCHES = "Dashed lines mark the switches from cell to cell."
 
 
 def position_figure(log: SimulationLog) -> Figure:
     """Draw the object's position and the governor's over time."""
-    caption = f"Figure 6. Position of the object, and of the reference governor that leads it. {_SWITCHES}"
+    caption = f"Figure 6. Position of the object, and of the reference governor that leads it. {SWITCHES}"
     figure, axes = time_axes(caption, ["x [m]", "y [m]"])
     for axis, ax in enumerate(axes):
         ax.plot(log.times, log.governor_position[:, axis], color=GREY, linewidth=0.9, label="governor")
-        ax.plot(log.times, log.object_pose[:, axis], color=BLUE, label="object")
+        ax.plot(log.times, log.object_pose[:, axis], color=OBJECT, label="object")
     legend_above(axes[0])
     mark_switches(axes, switch_times(log.times, log.cell_index))
     return figure
@@ -34,14 +32,14 @@ def angle_figure(log: SimulationLog) -> Figure:
     """Draw the object's angle inside its funnel over time, and both again seen from the funnel's middle."""
     caption = (
         "Figure 7. Angle of the object between the walls of its funnel; below, both measured from the "
-        f"funnel's middle. {_SWITCHES}"
+        f"funnel's middle. {SWITCHES}"
     )
-    figure, axes = time_axes(caption, ["theta [rad]", "theta less middle [rad]"], height=2.6)
+    figure, axes = time_axes(caption, ["θ [rad]", "θ, from the middle [rad]"], height=2.6)
     middle = 0.5 * (log.funnel_lower[:, 0] + log.funnel_upper[:, 0])
     for ax, origin in zip(axes, (np.zeros_like(middle), middle), strict=True):
         _draw_funnel(ax, log, 0, origin)
         times, theta = break_at(log.times, log.object_pose[:, 2] - origin, log.cell_index)
-        ax.plot(times, theta, color=OBJECT, label="theta")
+        ax.plot(times, theta, color=OBJECT, label="θ")
     legend_above(axes[0])
     mark_switches(axes, switch_times(log.times, log.cell_index))
     return figure
@@ -50,18 +48,18 @@ def angle_figure(log: SimulationLog) -> Figure:
 def velocity_figure(log: SimulationLog) -> Figure:
     """Draw the object's linear velocity over time."""
     figure, axes = time_axes(
-        f"Figure 8. Linear velocity of the object. {_SWITCHES}", ["v_x [m/s]", "v_y [m/s]"]
+        f"Figure 8. Linear velocity of the object. {SWITCHES}", ["$v_x$ [m/s]", "$v_y$ [m/s]"]
     )
     for axis, ax in enumerate(axes):
-        ax.plot(log.times, log.object_twist[:, axis], color=BLUE)
+        ax.plot(log.times, log.object_twist[:, axis], color=OBJECT)
     mark_switches(axes, switch_times(log.times, log.cell_index))
     return figure
 
 
 def angular_velocity_figure(log: SimulationLog) -> Figure:
     """Draw the object's angular velocity over time."""
-    caption = f"Figure 9. Angular velocity of the object. {_SWITCHES}"
-    figure, axes = time_axes(caption, ["w [rad/s]"], height=3.0)
+    caption = f"Figure 9. Angular velocity of the object. {SWITCHES}"
+    figure, axes = time_axes(caption, ["ω [rad/s]"], height=3.0)
     axes[0].plot(log.times, log.object_twist[:, 2], color=OBJECT)
     mark_switches(axes, switch_times(log.times, log.cell_index))
     return figure
@@ -73,12 +71,8 @@ def joints_figure(tree: ComponentTree, log: SimulationLog, robot: int) -> Figure
     if not joints:
         return None
     name = log.robot_names[robot]
-    caption = (
-        f"Figure {min(10 + robot, 11)}. Joints of {name} between the walls of their funnels. {_SWITCHES}"
-    )
-    labels = [
-        f"{joint.name.split('::')[-1]} [{'rad' if joint.kind == 'revolute' else 'm'}]" for joint in joints
-    ]
+    caption = f"Figure {min(10 + robot, 11)}. Joints of {name} between the walls of their funnels. {SWITCHES}"
+    labels = [f"{joint.name.split('::')[-1]} [{joint.unit}]" for joint in joints]
     figure, axes = time_axes(caption, labels, height=3.0 if len(joints) == 1 else 2.1)
     for joint, ax in zip(joints, axes, strict=True):
         _draw_funnel(ax, log, 1 + joint.index, np.zeros_like(log.times))

@@ -11,7 +11,10 @@ from coop_drake.drawing.colours import GREY
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.simulation.log import IntArray
 
-__all__ = ["break_at", "mark_switches", "switch_times", "time_axes"]
+__all__ = ["SWITCHES", "break_at", "mark_switches", "switch_times", "time_axes"]
+
+SWITCHES = "Dashed lines mark the switches from cell to cell."
+"""What a caption says of `mark_switches`."""
 
 
 def time_axes(caption: str, labels: list[str], *, height: float = 2.1) -> tuple[Figure, list[Axes]]:

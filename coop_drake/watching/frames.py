@@ -143,12 +143,13 @@ def _draw_panel(ax: Axes, film: Film, shot: Shot, own: int, *, last: bool) -> No
     ax.set_xticks([value for value, _ in _TICKS], [label if last else "" for _, label in _TICKS])
     ax.tick_params(labelsize=8)
     if last:
-        ax.set_xlabel("theta [rad]", labelpad=0)
+        ax.set_xlabel("θ [rad]", labelpad=0)
     limits = _SINGLE
     if axis:
         joint = film.problem.tree.joints[axis - 1]
         limits = (joint.lower, joint.upper)
-        ax.set_ylabel(film.axis_names[axis].replace(" ", "\n", 1), fontsize=9)
+        name = film.axis_names[axis].replace(" ", "\n", 1)
+        ax.set_ylabel(f"{name} [{joint.unit}]", fontsize=9)
     else:
         ax.set_yticks([])
     ax.set_ylim(*limits)

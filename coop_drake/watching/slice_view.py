@@ -59,7 +59,7 @@ def _draw_footprints(ax: Axes, problem: PlanningProblem, swept: SweptTree, inter
     ax.autoscale_view()
     ax.set_aspect("equal")
     ax.set_xlabel("x from the object [m]")
-    ax.set_ylabel("y [m]")
+    ax.set_ylabel("y from the object [m]")
     ax.set_title(_named(problem, intervals), fontsize=9, loc="left")
 
 
@@ -90,6 +90,10 @@ def _area(regions: Sequence[Region]) -> float:
 
 
 def _named(problem: PlanningProblem, intervals: Intervals) -> str:
-    names = ["θ", *(joint.name.replace("::", " ") for joint in problem.tree.joints)]
-    bounds = [f"{np.degrees(lower):.0f}° to {np.degrees(upper):.0f}°" for lower, upper in intervals]
-    return ",  ".join(f"{name} {span}" for name, span in zip(names, bounds, strict=True))
+    axes = [("θ", "rad"), *((joint.name.replace("::", " "), joint.unit) for joint in problem.tree.joints)]
+    return ",  ".join(
+        f"{name} {np.degrees(lower):.0f}° to {np.degrees(upper):.0f}°"
+        if unit == "rad"
+        else f"{name} {lower:.2f} m to {upper:.2f} m"
+        for (name, unit), (lower, upper) in zip(axes, intervals, strict=True)
+    )

@@ -12,6 +12,7 @@ from coop_drake.viz.state_figures import angle_figure, joints_figure
 from coop_drake.viz.time_axes import break_at, switch_times
 from tests.support.cases import case
 from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
+from tests.support.sliding import with_sliding_joint
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 
 
@@ -84,6 +85,13 @@ def test_every_joint_of_a_robot_has_its_own_axes():
     figure = joints_figure(problem.tree, synthetic_log(problem), 1)
     assert figure is not None
     assert [axes.get_ylabel() for axes in figure.axes] == ["joint_1 [rad]", "joint_2 [rad]"]
+
+
+def test_a_sliding_joint_is_labelled_in_metres():
+    problem = case("elbow")
+    figure = joints_figure(with_sliding_joint(problem.tree), synthetic_log(problem), 1)
+    assert figure is not None
+    assert [axes.get_ylabel() for axes in figure.axes] == ["joint_1 [rad]", "joint_2 [m]"]
 
 
 def test_a_jump_at_a_switch_is_broken_not_sloped():

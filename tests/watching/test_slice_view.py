@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
 from coop_drake.watching import slice_figure
 from tests.support.cases import case
+from tests.support.sliding import with_sliding_joint
 
 
 @pytest.fixture(scope="module")
@@ -33,3 +35,10 @@ def test_what_is_proved_free_and_what_may_be_free_come_closer_in_a_narrow_slice(
 
 def test_footprints_are_drawn_to_one_scale(figure):
     assert figure.axes[0].get_xlim() == figure.axes[2].get_xlim()
+
+
+def test_a_sliding_joint_is_told_in_metres():
+    problem = case("base")
+    problem = replace(problem, tree=with_sliding_joint(problem.tree))
+    left = slice_figure(problem, [((1.5, 1.6), (-0.1, 0.1), (-0.05, 0.05))]).axes[0]
+    assert left.get_title(loc="left").endswith(",  robot_1 joint_1 -0.05 m to 0.05 m")
