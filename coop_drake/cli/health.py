@@ -107,17 +107,11 @@ def _scenarios() -> Finding:
 
 
 def _meshcat() -> Finding:
-    import logging
+    from pydrake.geometry import MeshcatParams
 
-    from pydrake.geometry import Meshcat, MeshcatParams
+    from coop_drake.viz.server import silent_meshcat
 
-    logger = logging.getLogger("drake")
-    level = logger.level
-    logger.setLevel(logging.WARNING)  # It would announce its address.
-    try:
-        return Finding("Meshcat", f"opens port {Meshcat(MeshcatParams(host='localhost')).port()}")
-    finally:
-        logger.setLevel(level)
+    return Finding("Meshcat", f"opens port {silent_meshcat(MeshcatParams(host='localhost')).port()}")
 
 
 def _fonts() -> Finding:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from pydrake.geometry import Meshcat
 
 from coop_drake.files import write_atomically
 from coop_drake.planning.plan import Plan
@@ -15,6 +14,7 @@ from coop_drake.simulation import SimulationLog
 from coop_drake.viz.overlay import story_of, with_overlay
 from coop_drake.viz.replay import animation_of
 from coop_drake.viz.scene import TransportScene
+from coop_drake.viz.server import silent_meshcat
 
 __all__ = ["inline_frame", "recording_html", "write_recording"]
 
@@ -49,7 +49,7 @@ def recording_html(
         log: What happened.
         progress: Called with a text and the fraction done.
     """
-    meshcat = Meshcat()
+    meshcat = silent_meshcat()
     scene = TransportScene(scenario, plan, meshcat)
     duration = float(log.times[-1])
     rate = min(scenario.visualization.frames_per_second, _MOST_FRAMES / max(duration, 1e-9))
