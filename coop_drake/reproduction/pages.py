@@ -8,8 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
-
 from coop_drake.drawing.canvas import house_style, save_figure
 from coop_drake.files import write_atomically
 from coop_drake.planning import Plan, table_1
@@ -23,6 +21,7 @@ from coop_drake.reproduction.material import Material
 from coop_drake.reproduction.report import exhibits
 from coop_drake.reproduction.runs import GAIN_SETS
 from coop_drake.reproduction.table_1 import CORRECTED, PRINTED
+from coop_drake.templates import rendered
 from coop_drake.viz import write_figures
 
 __all__ = ["write_report"]
@@ -46,23 +45,16 @@ def write_report(material: Material, folder: Path, progress: Progress | None = N
     found = exhibits(material)
     _write_tables(material, found, folder)
     tell("page", 0.9)
-    environment = Environment(
-        loader=PackageLoader("coop_drake.reproduction"),
-        autoescape=select_autoescape(("html.j2",)),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.globals.update(explanation=explanation, embedded=lambda file: _embedded(folder / file))
     content = {
+        "explanation": explanation,
+        "embedded": lambda file: _embedded(folder / file),
         "exhibits": found,
         "counts": _counts(found),
         "headings": tuple(GAIN_SETS.values()),
         "background": tuple(dict.fromkeys(key for exhibit in found for key in exhibit.because)),
     }
     for name in ("report.md", "index.html"):
-        text = environment.get_template(f"{name}.j2").render(content)
-        write_atomically(folder / name, text.encode())
+        write_atomically(folder / name, rendered("coop_drake.reproduction", name, **content).encode())
     return found
 
 

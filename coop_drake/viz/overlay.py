@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import re
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,13 +13,13 @@ from coop_drake.errors import CoopDrakeError
 from coop_drake.planning.plan import Plan
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import SimulationLog
+from coop_drake.templates import rendered
 from coop_drake.viz.arrows import LONGEST
 from coop_drake.viz.cells import CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR
 from coop_drake.viz.trail import TRAIL_COLOUR
 
 __all__ = ["story_of", "with_overlay"]
 
-_PAGE = Path(__file__).with_name("overlay.html")
 _RATE = 10.0  # Clearances told a second.
 
 
@@ -79,8 +77,7 @@ def with_overlay(page: str, story: dict[str, Any]) -> str:
     Raises:
         CoopDrakeError: The page is not built as Drake builds it.
     """
-    told = json.dumps(story).replace("</", "<\\/")
-    overlay = _PAGE.read_text(encoding="utf-8").replace("/*story*/", told)
+    overlay = rendered("coop_drake.viz", "overlay.html", story=story)
     body, end, rest = page.rpartition("</body>")
     if not end or not re.search(r"\bvar viewer = new MeshCat\.Viewer\b", body):
         raise CoopDrakeError("this version of Drake writes recordings in a way that coop_drake does not know")

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import base64
 import gzip
-import json
-import re
 from collections.abc import Mapping
-from html import escape
 from pathlib import Path
 from typing import Any
 
 import meshcat
 from meshcat.visualizer import ViewerWindow, Visualizer
 
+from coop_drake.templates import rendered
+
 __all__ = ["OfflineWindow", "offline_visualizer"]
 
-_PAGE = Path(__file__).with_name("page.html")
-_MARKS = re.compile(r"<!--title-->|/\*(viewer|lengths|commands|story)\*/")
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
 
 
@@ -52,15 +49,15 @@ class OfflineWindow(ViewerWindow):
         """The page: viewer, scene and player in one file that needs no network."""
         messages = self.zmq_socket.messages
         packed = gzip.compress(b"".join(messages), mtime=0)
-        parts = {
-            "<!--title-->": escape(self._title),
-            "/*viewer*/": _VIEWER.read_text(encoding="utf-8"),
-            "/*lengths*/": json.dumps([len(message) for message in messages]),
-            "/*commands*/": base64.b64encode(packed).decode(),
-            "/*story*/": json.dumps(self._story).replace("</", "<\\/"),
-        }
-        page = _PAGE.read_text(encoding="utf-8")
-        return _MARKS.sub(lambda mark: parts[mark[0]], page)
+        return rendered(
+            "coop_drake.watching",
+            "page.html",
+            title=self._title,
+            viewer=_VIEWER.read_text(encoding="utf-8"),
+            lengths=[len(message) for message in messages],
+            commands=base64.b64encode(packed).decode(),
+            story=self._story,
+        )
 
 
 def offline_visualizer(title: str, story: Mapping[str, Any]) -> Any:
