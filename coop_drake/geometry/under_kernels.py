@@ -76,6 +76,7 @@ def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> Fl
     Returns:
         Vertices of an enclosed convex polygon, shape (m, 2); no rows where none was found.
     """
+    half_width = min(half_width, pi)  # A joint of many turns covers no more; its chords would leap over arcs.
     edges = edge_directions(vertices)
     offsets = support(vertices, edges)
     parts = arc_parts(half_width)

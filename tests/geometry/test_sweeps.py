@@ -40,6 +40,14 @@ def test_the_under_sweep_lies_in_every_turned_copy(
         assert turned(ring, centre + share * half).covers(Polygon(sweep))
 
 
+def test_many_turns_leave_no_more_than_one() -> None:
+    """Chords of arcs that are longer than a turn would leap over what they stand for."""
+    for turns in np.arange(1.0, 30.0, 0.5):
+        sweep = under_revolute(ROUND_PIVOT, 0.3, turns * np.pi)
+        assert sweep is not None
+        assert np.hypot(*sweep.T).max() < 0.2
+
+
 @COMPILING
 @given(st.integers(3, 24), st.integers(1, 12), st.floats(-0.2, 0.2), st.sampled_from((0.0, 0.1, 0.25)))
 def test_lines_that_coincide_but_for_rounding_are_taken_at_the_innermost(
