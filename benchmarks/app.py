@@ -1,4 +1,4 @@
-"""``python -m benchmarks``: measures, writes out/bench.json as it goes, and shows tables."""
+"""``python -m benchmarks``: measures, writes out/bench.json as it goes, and shows tables; or lists itself."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from benchmarks.commands import bench_commands, bench_help
+from benchmarks.contents import TOPICS, WHOLE, show_contents
 from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.ledger import Ledger, LedgerError
 from benchmarks.mapping import mapping_tasks
@@ -41,7 +42,7 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 def main(
     topics: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[TOPIC]...", help="planner, command, mapping, simulating; all by default."),
+        typer.Argument(metavar="[TOPIC]...", help=f"{', '.join(TOPICS)}; all by default."),
     ] = None,
     only: Annotated[
         list[str] | None,
@@ -56,14 +57,19 @@ def main(
         int, typer.Option(min=1, help="Processes at the same time, where figures stand that.")
     ] = 2,
     out: Annotated[Path, typer.Option(help="Where the rows go.")] = _RESULTS,
+    listing: Annotated[bool, typer.Option("--list", help="Say what there is; measure nothing.")] = False,
 ) -> None:
     """Measure what exists on this machine, each figure beside a peer of the same run."""
     console = Console(stderr=True, highlight=False)
-    tasks = chosen(_tasks(Effort(seeds, budget, limit)), topics or [], only or [])
+    topics = [] if topics == ["all"] else topics or []
+    tasks = chosen(_tasks(Effort(seeds, budget, limit)), topics, only or [])
     if not tasks:
-        asked = escape(" ".join([*(topics or []), *(only or [])]))
+        asked = escape(" ".join([*topics, *(only or [])]))
         console.print(f"[bold red]Error:[/] nothing is called {asked}")
         raise typer.Exit(_BAD_USE)
+    if listing:
+        show_contents(tasks)
+        raise typer.Exit
     try:
         ledger = Ledger(out, fresh=not topics and not only)
     except LedgerError as error:
@@ -71,6 +77,9 @@ def main(
         raise typer.Exit(_BAD_USE) from error
     if not has_ompl():
         console.print("OMPL is not installed: its rows are left out (pip install 'coop-drake\\[bench]').")
+    console.print(
+        f"Tasks: {len(tasks)}{'' if topics or only else f', {WHOLE}'}; Ctrl-C keeps what was measured."
+    )
     code = _measure(tasks, ledger, jobs, console)
     show(ledger.rows)
     console.print(f"{len(ledger.rows)} rows are in {escape(str(out))}")

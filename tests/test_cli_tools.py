@@ -196,6 +196,19 @@ def test_benchmarks_that_are_not_there_are_an_error_that_says_so(tmp_path, monke
     assert "a clone of the repository" in result.stderr
 
 
+@pytest.mark.parametrize(("asked", "passed_on"), [([], ["--list"]), (["all"], ["all"])])
+def test_benchmarks_alone_are_listed(monkeypatch, asked, passed_on):
+    commands = []
+
+    def run(command, **_):
+        commands.append(command)
+        return subprocess.CompletedProcess(command, 0)
+
+    monkeypatch.setattr(subprocess, "run", run)
+    assert invoke("bench", *asked).exit_code == 0
+    assert commands == [[sys.executable, "-m", "benchmarks", *passed_on]]
+
+
 SHOWS = """
 import sys, time
 from coop_drake.cli.reporter import Reporter

@@ -18,7 +18,10 @@ __all__ = ["bench_command"]
 
 
 def bench_command(context: typer.Context) -> None:
-    """Measure speed and accuracy; arguments go to the benchmarks, `coop-drake bench -- --help` lists them."""
+    """Measure speed and accuracy: alone it lists what there is, `bench all` measures everything.
+
+    Arguments go to the benchmarks; `coop-drake bench -- --help` lists them.
+    """
     reporter = Reporter(machine=False, quiet=False)
     run_guarded(reporter, lambda: _bench(context.args))
 
@@ -30,6 +33,6 @@ def _bench(arguments: list[str]) -> ExitCode:
             f"{home}: benchmarks: are not here: an installed package comes without them; expected a clone of "
             "the repository, in which `make bench` measures everything"
         )
-    command = [sys.executable, "-m", "benchmarks", *arguments]
+    command = [sys.executable, "-m", "benchmarks", *(arguments or ["--list"])]
     code = subprocess.run(command, cwd=home, check=False).returncode
     return ExitCode.DONE if code == 0 else ExitCode.FAILED_RUN

@@ -66,7 +66,11 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "with a package's folder, and the axes behind a joint that will be fixed",
         ),
     ),
-    "bench": (("bench planner --only base --seeds 3", "a part of the benchmarks"),),
+    "bench": (
+        ("bench", "what there is to measure"),
+        ("bench planner --only base --seeds 3", "a part of it"),
+        ("bench all", "everything, in about twelve minutes"),
+    ),
 }
 """For each command its examples, without the program's name, and what each does."""
 

@@ -105,6 +105,28 @@ def test_a_name_that_nothing_has_is_bad_use(monkeypatch, tmp_path):
     assert not out.exists()
 
 
+def test_a_list_measures_nothing_and_names_every_part(monkeypatch, tmp_path):
+    def measured(rows):
+        raise AssertionError
+
+    names = ("planner/base", "planner/growth/width/1", "mapping/domains/maze")
+    out = tmp_path / "bench.json"
+    result = run(monkeypatch, [Task(name, measured) for name in names], "--list", "--out", str(out))
+    assert result.exit_code == 0
+    assert not out.exists()
+    rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in result.output.splitlines()]
+    told = {row[0]: (row[1], row[3]) for row in rows if len(row) == 4 and row[0]}
+    assert told == {"planner": ("2", "base, growth"), "mapping": ("1", "domains")}
+
+
+def test_all_is_everything_and_says_so_before_it_begins(monkeypatch, tmp_path):
+    out = tmp_path / "bench.json"
+    result = run(monkeypatch, [Task("topic/item", lambda rows: [ROW])], "all", "--out", str(out))
+    assert result.exit_code == 0
+    assert "Tasks: 1, about" in result.output
+    assert json.loads(out.read_text()) == [ROW.as_dict()]
+
+
 def test_ctrl_c_keeps_what_was_measured(monkeypatch, tmp_path):
     def interrupted(rows):
         raise KeyboardInterrupt

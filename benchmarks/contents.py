@@ -1,0 +1,38 @@
+"""What there is to measure, as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.tasks import Task
+
+__all__ = ["TOPICS", "WHOLE", "show_contents"]
+
+TOPICS = {
+    "planner": "plans and proofs beside OMPL and beside the planner without its parts; how work grows",
+    "command": "whole commands in processes of their own",
+    "mapping": "harmonic maps: accuracy, speed, how both grow",
+    "simulating": "the closed loop beside the bare plant; memory of repeated runs",
+}
+"""What every topic is about."""
+
+WHOLE = "about twelve minutes on two cores, most of it for the planner"
+"""How long everything takes."""
+
+
+def show_contents(tasks: Sequence[Task]) -> None:
+    """Show topics on standard output, with the names that ``--only`` takes, and how to measure them."""
+    table = Table("topic", "tasks", "what", "parts, for --only", show_lines=True)
+    for topic, about in TOPICS.items():
+        names = [task.name.split("/")[1:] for task in tasks if task.name.split("/")[0] == topic]
+        if names:
+            parts = dict.fromkeys(parts[0] for parts in names)
+            table.add_row(topic, str(len(names)), about, ", ".join(parts))
+    console = Console(highlight=False)
+    console.print(table)
+    console.print("A part: coop-drake bench TOPIC --only PART")
+    console.print(f"Everything: coop-drake bench all, {WHOLE}", soft_wrap=True)
+    console.print("Rows go to out/bench.json as they come; Ctrl-C keeps them.", soft_wrap=True)
