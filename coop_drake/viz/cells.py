@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from pydrake.geometry import Meshcat, Rgba
+from pydrake.geometry import Meshcat
 from shapely import Point
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.drawing.colours import BLUE, GREEN, VERMILLION
 from coop_drake.drawing.solids import flat_mesh, parts_of
 from coop_drake.planning.plan import Plan
-from coop_drake.viz.stage import set_mesh
+from coop_drake.viz.paint import rgba, set_mesh
 
-__all__ = ["CELL_COLOUR", "GOAL_COLOUR", "GOAL_POSE_COLOUR", "cell_paths", "rgba", "set_cells", "set_goal"]
+__all__ = ["CELL_COLOUR", "GOAL_COLOUR", "GOAL_POSE_COLOUR", "cell_paths", "set_cells", "set_goal"]
 
 CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR = BLUE, GREEN, VERMILLION
 
@@ -57,9 +57,3 @@ def _set_flat(
     parts = parts_of(shape)
     if parts:
         set_mesh(meshcat, path, flat_mesh(parts, height), rgba(colour, opacity))
-
-
-def rgba(colour: str, opacity: float = 1.0) -> Rgba:
-    """Return a colour ``#rrggbb`` as Drake takes it."""
-    red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
-    return Rgba(red, green, blue, opacity)

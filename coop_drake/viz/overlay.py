@@ -16,6 +16,7 @@ from coop_drake.simulation import SimulationLog
 from coop_drake.templates import rendered
 from coop_drake.viz.arrows import LONGEST
 from coop_drake.viz.cells import CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR
+from coop_drake.viz.paint import hex_colour
 from coop_drake.viz.trail import TRAIL_COLOUR
 
 __all__ = ["story_of", "with_overlay"]
@@ -63,7 +64,7 @@ def story_of(
             ("area", GOAL_POSE_COLOUR, "where the object is to stand"),
             ("line", TRAIL_COLOUR, "trail of the object's centre"),
             *(
-                ("arrow", _hex(colour), f"force of {robot} on the object, {of_a_metre:g} N a metre")
+                ("arrow", hex_colour(colour), f"force of {robot} on the object, {of_a_metre:g} N a metre")
                 for robot, colour in zip(log.robot_names, colours, strict=True)
             ),
             ("dot", "#888888", f"grasps, in their robots' colours; arrows end at {LONGEST:g} m"),
@@ -93,7 +94,3 @@ def _emptier_side(floor: Polygon) -> str:
         "right": floor.intersection(box(x_max - across, y_min, x_max, up)).area,
     }
     return min(hidden, key=lambda side: hidden[side])
-
-
-def _hex(colour: Rgba) -> str:
-    return "#" + "".join(f"{round(255 * part):02x}" for part in (colour.r(), colour.g(), colour.b()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +11,11 @@ from coop_drake.planning.plan import Plan
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import SimulationLog
 from coop_drake.viz.overlay import story_of, with_overlay
-from coop_drake.viz.replay import animation_of
+from coop_drake.viz.replay import Progress, animation_of
 from coop_drake.viz.scene import TransportScene
 from coop_drake.viz.server import silent_meshcat
 
 __all__ = ["inline_frame", "recording_html", "write_recording"]
-
-Progress = Callable[[str, float], None]
 
 _MOST_FRAMES = 4000  # Longer runs get fewer frames per second, so that the file stays small.
 

@@ -17,7 +17,7 @@ from coop_drake.viz.key_frames import Tracks
 from coop_drake.viz.scene import TransportScene
 from coop_drake.viz.trail import INDICES, set_trail, trail_points
 
-__all__ = ["animation_of", "at_times"]
+__all__ = ["Progress", "animation_of"]
 
 Progress = Callable[[str, float], None]
 
@@ -38,9 +38,9 @@ def animation_of(
     """
     tracks = Tracks(1.0 / (times[1] - times[0]) if len(times) > 1 else 1.0)
     states = np.hstack([log.object_pose, log.joints])
-    grasps = _add_bodies(tracks, scene, at_times(log, states, times), progress)
+    grasps = _add_bodies(tracks, scene, _at_times(log, states, times), progress)
     _add_arrows(tracks, scene, log, times, grasps)
-    _add_trail(tracks, scene, at_times(log, log.object_pose[:, :2], times))
+    _add_trail(tracks, scene, _at_times(log, log.object_pose[:, :2], times))
     rows = np.searchsorted(log.times, times, side="right") - 1
     for index in np.unique(log.cell_index):
         for path in cell_paths(int(index)):
@@ -48,7 +48,7 @@ def animation_of(
     return tracks.animation
 
 
-def at_times(log: SimulationLog, values: FloatArray, times: FloatArray) -> FloatArray:
+def _at_times(log: SimulationLog, values: FloatArray, times: FloatArray) -> FloatArray:
     """Return logged values, shape (T, k), between steps on straight lines, at times of shape (F,): (F, k)."""
     return np.column_stack([np.interp(times, log.times, column) for column in values.T])
 
@@ -84,7 +84,7 @@ def _add_arrows(
     tracks: Tracks, scene: TransportScene, log: SimulationLog, times: FloatArray, grasps: FloatArray
 ) -> None:
     for index in range(len(log.robot_names)):
-        forces = at_times(log, log.measured_wrenches[:, index, :2], times)
+        forces = _at_times(log, log.measured_wrenches[:, index, :2], times)
         directions, scales = arrow_sizes(forces, scene.of_a_metre)
         path = arrow_path(index)
         tracks.move(path, grasps[:, index] + ABOVE, directions, angle_tolerance=_ARROW_ANGLE)

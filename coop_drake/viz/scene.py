@@ -15,7 +15,8 @@ from coop_drake.planning.plan import Plan
 from coop_drake.plant import read_component_tree
 from coop_drake.scenario import Scenario
 from coop_drake.viz.arrows import force_of_a_metre, set_arrows
-from coop_drake.viz.cells import rgba, set_cells, set_goal
+from coop_drake.viz.cells import set_cells, set_goal
+from coop_drake.viz.paint import rgba
 from coop_drake.viz.stage import place_camera, set_stage
 from coop_drake.viz.team_view import TeamView
 

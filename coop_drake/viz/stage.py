@@ -21,8 +21,9 @@ from coop_drake.drawing.solids import (
     wall_polygons,
 )
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.viz.paint import set_mesh
 
-__all__ = ["place_camera", "set_mesh", "set_stage"]
+__all__ = ["place_camera", "set_stage"]
 
 _FLOOR = Rgba(0.97, 0.96, 0.94, 1.0)
 _GRID = Rgba(0.72, 0.72, 0.72, 1.0)
@@ -35,10 +36,8 @@ _SHELF_LENGTH = 0.8  # From this length on an obstacle on the floor is drawn as 
 _BOARDS = (0.12, 0.55, 1.0)  # Tops of a shelf's boards, as parts of the walls' height.
 _BOARD, _POST = 0.02, 0.025  # Thickness of boards, half the width of posts [m].
 _LENS = 30.0  # Field of view from bottom to top [degrees].
-_ELEVATION, _FILL = (
-    radians(56.0),
-    0.86,
-)  # How steeply the camera looks down, and the part of the picture filled.
+_ELEVATION = radians(56.0)  # How steeply the camera looks down.
+_FILL = 0.86  # Part of the picture filled.
 _BACKGROUND = {"top_color": (1.0, 1.0, 1.0), "bottom_color": (0.90, 0.92, 0.95)}
 _LIGHTS = {
     "AmbientLight": 2.7,
@@ -79,11 +78,6 @@ def set_stage(meshcat: Meshcat, workspace: Polygon, wall_height: float) -> None:
             set_mesh(meshcat, f"/stage/shelves/{index:02d}", _shelf(hole, wall_height), _SHELF)
     for name, height in (("foot", 0.005), ("top", wall_height)):
         meshcat.SetLineSegments(f"/stage/edges/{name}", *ring_lines([workspace], height), 2.0, _EDGE)
-
-
-def set_mesh(meshcat: Meshcat, path: str, mesh: TriangleMesh, colour: Rgba) -> None:
-    """Put a triangle mesh at a path."""
-    meshcat.SetTriangleMesh(path, mesh.vertices, mesh.faces, colour)
 
 
 def _set_light(meshcat: Meshcat) -> None:

@@ -21,8 +21,7 @@ from coop_drake.drawing.solids import TriangleMesh
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant import TeamPlant, build_team_plant, set_configuration
 from coop_drake.scenario import Scenario
-from coop_drake.viz.cells import rgba
-from coop_drake.viz.stage import set_mesh
+from coop_drake.viz.paint import rgba, set_mesh
 
 __all__ = ["TeamView"]
 
