@@ -22,7 +22,7 @@ from coop_drake.viz.team_view import TeamView
 
 __all__ = ["TransportScene"]
 
-_SHADOW_HEIGHT = 0.023  # Above cells, below the trail [m].
+_SHADOW_HEIGHT = 0.003  # Above the grid, below the cells, which it would else darken [m].
 
 
 class TransportScene:
