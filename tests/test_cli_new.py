@@ -59,9 +59,11 @@ def test_the_models_have_the_sizes_that_were_asked_for(tmp_path):
 
 
 def test_a_floor_plan_takes_the_place_of_the_rooms(tmp_path):
-    write_svg(tmp_path, '<rect width="10" height="6"/>')
+    layers = (("walls", '<rect width="10" height="6"/>'), ("desks", '<rect x="4" width="1" height="6"/>'))
+    groups = [f'<g inkscape:groupmode="layer" inkscape:label="{name}">{body}</g>' for name, body in layers]
+    write_svg(tmp_path, "".join(groups))
     poses = ["--start", 2, 2, 0, "--goal", 8, 4, 1.57]
-    drawing = ["--floor-plan", tmp_path / "hall.svg", "--unit", "m"]
+    drawing = ["--floor-plan", tmp_path / "hall.svg", "--unit", "m", "--layer", "walls"]
     done = call("mine", *drawing, *poses, "--out", tmp_path / "deep" / "mine")
     assert done.exit_code == 0, done.output
     path = tmp_path / "deep" / "mine" / "mine.scenario.yaml"
@@ -75,6 +77,7 @@ REFUSED = {
     "flat": (["--width", 0], "--width: 0.0 is not allowed"),
     "no start": (["--floor-plan", "hall.svg"], "--start: None is not allowed; expected X Y THETA"),
     "unit alone": (["--unit", "m"], "--unit is for a floor plan"),
+    "layer alone": (["--layer", "walls"], "--layer is for a floor plan"),
     "in a wall": (["--start", 0, 0, 0], "mine/mine.scenario.yaml: start: "),
 }
 

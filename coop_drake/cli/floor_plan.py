@@ -74,11 +74,11 @@ def floor_plan_command(
     reporter = Reporter(machine=machine, quiet=quiet)
 
     def command() -> ExitCode:
-        from coop_drake.floor_plans import FloorPlanSettings, read_floor_plan
+        from coop_drake.floor_plans import FloorPlanSettings, Inside, read_floor_plan
 
         settings = FloorPlanSettings(unit, scale, tuple(layer or ()), tolerance, gap, unknown_is_free)
         with reporter.stage("reading"):
-            plan = read_floor_plan(file, settings, inside)
+            plan = read_floor_plan(file, settings, Inside(*inside, "--inside") if inside else None)
         _tell(plan, file, reporter)
         for target in targets:
             _write(plan, file, target, inside)

@@ -61,6 +61,10 @@ def new_command(
         typer.Option("--floor-plan", metavar="FILE", help="A drawing or map in place of two rooms."),
     ] = None,
     unit: Annotated[str | None, typer.Option("--unit", metavar="UNIT", help="Unit of the drawing.")] = None,
+    layer: Annotated[
+        list[str] | None,
+        typer.Option("--layer", metavar="NAME", help="A layer of the drawing to read; may be repeated."),
+    ] = None,
     start: Annotated[
         tuple[float, float, float] | None,
         typer.Option("--start", metavar="X Y THETA", help="Where the object starts, in metres and radians."),
@@ -92,15 +96,16 @@ def new_command(
         said["links"] = _lengths(str(said.pop("arm")))
     if not name.replace("-", "_").isidentifier():
         raise typer.BadParameter(f"{name} is no name of letters, digits, - and _.")
-    if unit is not None and floor_plan is None:
-        raise typer.BadParameter("--unit is for a floor plan; name it with --floor-plan.")
+    for flag, given in (("--unit", unit), ("--layer", layer)):
+        if given and floor_plan is None:
+            raise typer.BadParameter(f"{flag} is for a floor plan; name it with --floor-plan.")
     folder = out if out is not None else Path(name)
     reporter = Reporter(machine=machine, quiet=quiet)
 
     def command() -> ExitCode:
         from coop_drake.scenario.starter import Starter
 
-        workspace = None if floor_plan is None else _section(floor_plan, unit, folder)
+        workspace = None if floor_plan is None else _section(floor_plan, unit, layer, folder)
         starter = Starter(name, **said, door=door, workspace=workspace, start=start, goal=goal)
         return _write(starter, folder, reporter, force=force)
 
@@ -123,10 +128,10 @@ def _lengths(text: str) -> tuple[float, ...]:
         raise typer.BadParameter(f"--arm {text} is no list of lengths such as 0.35,0.4.") from None
 
 
-def _section(floor_plan: Path, unit: str | None, folder: Path) -> dict[str, object]:
+def _section(floor_plan: Path, unit: str | None, layers: list[str] | None, folder: Path) -> dict[str, object]:
     """How the scenario names the floor plan: relative to the folder that it will stand in."""
-    section: dict[str, object] = {"file": Path(os.path.relpath(floor_plan, folder)).as_posix()}
-    return section if unit is None else {**section, "unit": unit}
+    said = {"file": Path(os.path.relpath(floor_plan, folder)).as_posix(), "unit": unit, "layers": layers}
+    return {key: value for key, value in said.items() if value}
 
 
 def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -> ExitCode:

@@ -2,6 +2,7 @@
 
 from coop_drake.floor_plans.picture import save_picture
 from coop_drake.floor_plans.plan import ENDINGS, FloorPlan, excess, read_floor_plan
+from coop_drake.floor_plans.rooms import Inside
 from coop_drake.floor_plans.settings import UNITS, FloorPlanSettings
 
 __all__ = [
@@ -9,6 +10,7 @@ __all__ = [
     "UNITS",
     "FloorPlan",
     "FloorPlanSettings",
+    "Inside",
     "excess",
     "read_floor_plan",
     "save_picture",

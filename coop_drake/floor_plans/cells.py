@@ -9,7 +9,7 @@ from shapely import LineString, Polygon
 
 from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans.map_file import BoolGrid, OccupancyMap
-from coop_drake.floor_plans.rooms import Place, Room
+from coop_drake.floor_plans.rooms import Inside, Room
 from coop_drake.geometry.pose import FloatArray
 
 __all__ = ["room_of_map"]
@@ -18,7 +18,7 @@ __all__ = ["room_of_map"]
 def room_of_map(
     cells: OccupancyMap,
     file: str,
-    inside: Place | None,
+    inside: Inside | None,
     *,
     unknown_is_free: bool = False,
     closing: float = 0.0,
@@ -51,7 +51,7 @@ def room_of_map(
 
 
 def _component(
-    free: BoolGrid, cells: OccupancyMap, file: str, inside: Place | None
+    free: BoolGrid, cells: OccupancyMap, file: str, inside: Inside | None
 ) -> tuple[BoolGrid, list[int]]:
     """The connected cells round a point, or most of all, and the sizes of the others, largest first."""
     labels, count = ndimage.label(free)
@@ -63,7 +63,7 @@ def _component(
     sizes[0] = 0
     label = int(sizes.argmax())
     if inside is not None:
-        row, column = (index + 1 for index in cells.cell(inside))
+        row, column = (index + 1 for index in cells.cell((inside.x, inside.y)))
         within = 0 <= row < labels.shape[0] and 0 <= column < labels.shape[1]
         label = int(labels[row, column]) if within else 0
     if label == 0 and inside is not None:
@@ -72,9 +72,9 @@ def _component(
         (x, y), (right, top) = corners.min(axis=0), corners.max(axis=0)
         raise FloorPlanError(
             file,
-            f"({inside[0]:g}, {inside[1]:g})",
-            "the start stands on no free cell",
-            f"the map reaches from ({x:.4g}, {y:.4g}) to ({right:.4g}, {top:.4g}) m; move the start, or mend "
+            str(inside),
+            "it stands on no free cell",
+            f"the map reaches from ({x:.4g}, {y:.4g}) to ({right:.4g}, {top:.4g}) m; move the point, or mend "
             "origin and thresholds",
         )
     rest = np.delete(sizes, [0, label])

@@ -16,7 +16,6 @@ from coop_drake.drawing import (
     save_figure,
 )
 from coop_drake.floor_plans.plan import FloorPlan
-from coop_drake.floor_plans.rooms import Place
 
 __all__ = ["save_picture"]
 
@@ -26,7 +25,7 @@ _TAKEN = "#d55e00"
 _DRAWN = "#999999"
 
 
-def save_picture(plan: FloorPlan, path: Path, title: str, inside: Place | None = None) -> None:
+def save_picture(plan: FloorPlan, path: Path, title: str, inside: tuple[float, float] | None = None) -> None:
     """Write a preview as PNG or SVG.
 
     Args:

@@ -13,7 +13,7 @@ from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans.cells import room_of_map
 from coop_drake.floor_plans.dxf_file import read_dxf
 from coop_drake.floor_plans.map_file import read_map
-from coop_drake.floor_plans.rooms import Place, Room, chosen_room, room_of
+from coop_drake.floor_plans.rooms import Inside, Room, chosen_room, room_of
 from coop_drake.floor_plans.settings import FloorPlanSettings
 from coop_drake.floor_plans.shape_file import read_geojson, read_wkt
 from coop_drake.floor_plans.svg_file import read_svg
@@ -62,7 +62,9 @@ class FloorPlan:
 
 
 def read_floor_plan(
-    path: Path | str, settings: FloorPlanSettings | None = None, inside: Place | None = None
+    path: Path | str,
+    settings: FloorPlanSettings | None = None,
+    inside: Inside | tuple[float, float] | None = None,
 ) -> FloorPlan:
     """Read the room that holds a point from an SVG, DXF, GeoJSON or WKT file, or from an occupancy map.
 
@@ -78,6 +80,7 @@ def read_floor_plan(
         FloorPlanError: The file cannot be read or used; with place, finding and remedy.
     """
     path, settings = Path(path), settings or FloorPlanSettings()
+    inside = None if inside is None else Inside(*inside)
     file = str(path)
     settings.check(file)
     _check_file(path)
@@ -131,7 +134,7 @@ def _check_file(path: Path) -> None:
 
 
 def _room(
-    path: Path, settings: FloorPlanSettings, inside: Place | None
+    path: Path, settings: FloorPlanSettings, inside: Inside | None
 ) -> tuple[Room, tuple[str, ...], float]:
     """The room as drawn, notes, and how far its walls may grow [m]."""
     file, kind = str(path), path.suffix.lower()
@@ -147,7 +150,7 @@ def _room(
     return room_of_map(cells, file, inside, unknown_is_free=free, closing=growth), (), growth
 
 
-def _simplified(drawn: Polygon, tolerance: float, many: int, inside: Place | None, file: str) -> Polygon:
+def _simplified(drawn: Polygon, tolerance: float, many: int, inside: Inside | None, file: str) -> Polygon:
     """Fewer corners, inwards; the part that holds the point."""
     from coop_drake.geometry.simplify import simplify_inward
 

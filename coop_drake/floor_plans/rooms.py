@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -15,7 +15,7 @@ from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans.gaps import bridges, loose_ends
 from coop_drake.floor_plans.walls import Drawing, Wall
 
-__all__ = ["Room", "chosen_room", "room_of"]
+__all__ = ["Inside", "Room", "chosen_room", "room_of"]
 
 _LARGEST = 1000.0
 _SMALLEST = 0.1
@@ -27,7 +27,22 @@ _THINNEST = 1e-3
 _LARGEST_COORDINATE = 1e6
 _MANY_ENDS = 1000
 
-Place = tuple[float, float]
+
+class Inside(NamedTuple):
+    """A point that says which room is meant, in W.
+
+    Attributes:
+        x: [m].
+        y: [m].
+        called: What messages call it.
+    """
+
+    x: float
+    y: float
+    called: str = "the point"
+
+    def __str__(self) -> str:
+        return f"{self.called} ({self.x:g}, {self.y:g})"
 
 
 @dataclass(frozen=True)
@@ -45,7 +60,7 @@ class Room:
     notes: tuple[str, ...]
 
 
-def room_of(drawing: Drawing, file: str, gap: float, inside: Place | None) -> Room:
+def room_of(drawing: Drawing, file: str, gap: float, inside: Inside | None) -> Room:
     """Find the room that every line of a drawing bounds as a wall.
 
     Args:
@@ -92,7 +107,7 @@ def room_of(drawing: Drawing, file: str, gap: float, inside: Place | None) -> Ro
     return Room(shapely.orient_polygons(floor), tuple(others), tuple(notes))
 
 
-def chosen_room(rooms: list[Polygon], file: str, inside: Place | None, solid: BaseGeometry) -> Polygon:
+def chosen_room(rooms: list[Polygon], file: str, inside: Inside | None, solid: BaseGeometry) -> Polygon:
     """The room that holds a point, or the largest.
 
     Raises:
@@ -100,7 +115,7 @@ def chosen_room(rooms: list[Polygon], file: str, inside: Place | None, solid: Ba
     """
     if inside is None:
         return max(rooms, key=lambda room: (room.area, room.bounds))
-    point = Point(inside)
+    point = Point(inside.x, inside.y)
     for room in rooms:
         if room.contains(point):
             return room
@@ -109,9 +124,9 @@ def chosen_room(rooms: list[Polygon], file: str, inside: Place | None, solid: Ba
     x, y, right, top = largest.bounds
     raise FloorPlanError(
         file,
-        f"({inside[0]:g}, {inside[1]:g})",
-        f"the start stands {where}",
-        f"the largest place reaches from ({x:.3g}, {y:.3g}) to ({right:.3g}, {top:.3g}) m; move the start, "
+        str(inside),
+        f"it stands {where}",
+        f"the largest place reaches from ({x:.3g}, {y:.3g}) to ({right:.3g}, {top:.3g}) m; move the point, "
         "or mend unit, scale or outlines",
     )
 

@@ -26,6 +26,7 @@ def with_floor(scenario: Scenario) -> Scenario:
             raise ScenarioError(file, f"workspace.{key}", "rings", "nothing beside workspace.file")
     # Here and not above: most scenarios have rings, and should not wait for readers of drawings.
     from coop_drake.floor_plans.plan import read_floor_plan
+    from coop_drake.floor_plans.rooms import Inside
     from coop_drake.floor_plans.settings import FloorPlanSettings
 
     found = resolve(workspace.file, scenario.path, package_map(scenario.path), file, "workspace.file")
@@ -33,7 +34,7 @@ def with_floor(scenario: Scenario) -> Scenario:
     path = Path(found.removeprefix("file://"))
     names = [field.name for field in dataclasses.fields(FloorPlanSettings)]
     settings = FloorPlanSettings(**{name: getattr(workspace, name) for name in names})
-    floor = read_floor_plan(path, settings, (start.x, start.y)).polygon
+    floor = read_floor_plan(path, settings, Inside(start.x, start.y, "start.object")).polygon
     outer, *holes = (
         tuple((float(x), float(y)) for x, y in shapely.get_coordinates(ring)[:-1])
         for ring in (floor.exterior, *floor.interiors)

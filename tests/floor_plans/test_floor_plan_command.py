@@ -43,7 +43,7 @@ def test_it_writes_a_workspace_that_is_the_floor_and_pictures(tmp_path):
     ("arguments", "message"),
     [
         (["hall.svg", "--unit", "feet"], "'feet' is no unit"),
-        (["hall.svg", "--unit", "m", "--inside", "20", "20"], "the start stands in none"),
+        (["hall.svg", "--unit", "m", "--inside", "20", "20"], "--inside (20, 20): it stands in none"),
         (["gone.svg"], "cannot be read"),
         (["hall.svg", "--out", "hall.pdf"], "ends neither in .yaml nor in .png or .svg"),
         (["hall.svg", "--out", "hall.svg"], "is the floor plan itself"),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from shapely import Point, affinity, box, contains_xy, union_all
 
 from coop_drake.errors import FloorPlanError
-from coop_drake.floor_plans import FloorPlanSettings, excess, read_floor_plan
+from coop_drake.floor_plans import FloorPlanSettings, Inside, excess, read_floor_plan
 from coop_drake.floor_plans.cells import room_of_map
 from coop_drake.floor_plans.map_file import OccupancyMap
 from tests.support.floor_plan_files import room_shades, write_map
@@ -91,7 +91,7 @@ def test_the_room_of_the_start_is_meant_and_diagonal_cells_do_not_connect(tmp_pa
     assert other.polygon.area == pytest.approx(0.81)
     assert other.others == pytest.approx((1.0,))
     with pytest.raises(
-        FloorPlanError, match=r"\(0.5, 0.5\): the start stands on no free cell; the map reaches"
+        FloorPlanError, match=r"the point \(0.5, 0.5\): it stands on no free cell; the map reaches"
     ):
         read_floor_plan(path, EXACT, (0.5, 0.5))
 
@@ -108,7 +108,7 @@ def test_the_floor_lies_inside_the_free_cells_and_its_rings_never_touch(rows, ya
     cells = OccupancyMap(free, ~free, 0.1, (3.0, -1.0, yaw))
     centre = tuple(cells.place(np.array([[4.5, 4.5]]))[0])
     try:
-        floor = room_of_map(cells, "map", centre, closing=closing).floor
+        floor = room_of_map(cells, "map", Inside(*centre), closing=closing).floor
     except FloorPlanError:
         return  # Closing or cutting corners off took the start's cell.
     squares = [

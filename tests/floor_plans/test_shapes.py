@@ -64,7 +64,7 @@ def test_the_room_that_holds_the_start_is_meant(tmp_path):
     assert chosen.polygon.equals(box(0, 0, 4, 6))
     assert chosen.others == (36.0,)
     with pytest.raises(
-        FloorPlanError, match=r"\(20, 1\): the start stands in none .* the largest place reaches"
+        FloorPlanError, match=r"the point \(20, 1\): it stands in none .* the largest place reaches"
     ):
         read_floor_plan(path, EXACT, (20.0, 1.0))
 

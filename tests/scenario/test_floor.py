@@ -60,5 +60,5 @@ def test_what_does_not_fit_together_is_refused(tmp_path, workspace, key):
 
 
 def test_a_start_outside_the_drawing_is_refused_with_the_drawing(tmp_path):
-    with pytest.raises(FloorPlanError, match=r"hall.svg: \(2.5, 2\): the start stands in none"):
+    with pytest.raises(FloorPlanError, match=r"hall.svg: start.object \(2.5, 2\): it stands in none"):
         load_scenario(named(tmp_path, scale=0.1))
