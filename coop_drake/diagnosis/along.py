@@ -8,7 +8,7 @@ from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning import PlanningProblem
 from coop_drake.planning.certify import Certifier
-from coop_drake.planning.margins import marginal_workspace
+from coop_drake.planning.margins import exact_footprint, marginal_workspace
 from coop_drake.planning.refine import configuration_scale
 
 __all__ = ["is_free_along"]
@@ -24,6 +24,8 @@ def is_free_along(problem: PlanningProblem, way: FloatArray) -> tuple[bool, int]
     Returns:
         Whether the way is proved free (a failure proves nothing), and how many boxes were tried.
     """
+    if not problem.workspace.contains(exact_footprint(problem.tree, way[0])):
+        return False, 0  # Boxes tell only whether a way meets a wall, not on which side it begins.
     swept = SweptTree(problem.tree)
     try:
         workspace, scale = marginal_workspace(problem, 0.0), configuration_scale(problem.tree)

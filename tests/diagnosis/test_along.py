@@ -1,0 +1,19 @@
+"""Ways that are given are free, or not proved to be."""
+
+import numpy as np
+from shapely import Polygon, box
+
+from coop_drake.diagnosis.along import is_free_along
+from coop_drake.planning.problem import PlanningProblem
+from tests.support.cases import team_tree
+
+PILLAR = box(4.0, 4.0, 9.0, 9.0)
+FLOOR = Polygon(box(0.0, 0.0, 20.0, 20.0).exterior.coords, [PILLAR.exterior.coords])
+
+
+def test_a_way_is_free_on_the_floor_and_not_inside_a_pillar_that_it_never_leaves():
+    for x, free in ((12.0, True), (6.0, False)):
+        start = np.array([x, 6.5, 0.0, 0.0])
+        way = np.stack((start, start + np.array([0.5, 0.0, 0.1, 0.1])))
+        problem = PlanningProblem(FLOOR, team_tree(1, 1), start, way[-1, :3], (None,))
+        assert is_free_along(problem, way)[0] is free
