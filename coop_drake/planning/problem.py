@@ -17,6 +17,9 @@ LIMIT_ROOM = 0.01
 Prismatic joints have so much in units of the object's radius.
 """
 
+ROUNDING = 1e-9
+"""A start or goal that misses a limit by no more than this is within it [rad or m]."""
+
 
 @dataclass(frozen=True)
 class PlannerSettings:
@@ -90,7 +93,7 @@ class PlanningProblem:
         room = LIMIT_ROOM if joint.kind == "revolute" else LIMIT_ROOM * object_radius(self.tree)
         ends = (float(self.start[3 + joint.index]), self.goal_joints[joint.index])
         values = [value for value in ends if value is not None]
-        if not all(joint.lower <= value <= joint.upper for value in values):
+        if not all(joint.lower - ROUNDING <= value <= joint.upper + ROUNDING for value in values):
             return component
         lower = min([joint.lower, *[value - room for value in values]])
         upper = max([joint.upper, *[value + room for value in values]])

@@ -8,11 +8,9 @@ import shapely
 from coop_drake.errors import PlanError
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import TreeJoint
-from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.problem import ROUNDING, PlanningProblem
 
 __all__ = ["check_question", "goal_beyond_limits"]
-
-_ROUNDING = 1e-9
 
 
 def check_question(problem: PlanningProblem) -> None:
@@ -64,4 +62,4 @@ def _check_numbers(key: str, values: FloatArray, count: int, names: str) -> None
 
 
 def _within(value: float, joint: TreeJoint) -> bool:
-    return joint.lower - _ROUNDING <= value <= joint.upper + _ROUNDING
+    return joint.lower - ROUNDING <= value <= joint.upper + ROUNDING

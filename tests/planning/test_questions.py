@@ -63,6 +63,11 @@ def test_a_joint_within_its_limits_gets_no_room() -> None:
     assert replace(problem, start=problem.start).tree is problem.tree
 
 
+def test_a_joint_that_misses_its_limit_by_rounding_gets_room_too() -> None:
+    problem = reaching(float(np.nextafter(0.5, 1.0)), (-0.5, 0.5))
+    assert problem.tree.joints[0].upper > 0.505
+
+
 def test_a_goal_just_beyond_a_limit_does_not_profit_from_the_room_of_a_start_at_it() -> None:
     problem = reaching(0.5, (-0.5, 0.5))
     beyond = PlanningProblem(
