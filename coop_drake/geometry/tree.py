@@ -108,7 +108,8 @@ class ComponentTree:
 
     Attributes:
         components: Parents before children.
-        sharing_joint: Pairs of body names that a movable joint connects; they may overlap at it.
+        sharing_joint: Pairs of body names that are never held apart: a movable joint connects them, or their
+            models filter them, as those of imported robots do with all their own links.
     """
 
     components: tuple[Component, ...]
@@ -141,7 +142,7 @@ class ComponentTree:
     def collision_pairs(self) -> tuple[tuple[tuple[int, int], tuple[int, int]], ...]:
         """Pairs ``((component, body), (component, body))`` that must never overlap.
 
-        Bodies of one component never move against each other; bodies that share a joint may touch at it.
+        Bodies of one component never move against each other; those of ``sharing_joint`` may overlap.
         """
         entries = [
             (i, j, body.name) for i, c in enumerate(self.components) for j, body in enumerate(c.bodies)
