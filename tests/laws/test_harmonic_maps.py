@@ -52,27 +52,11 @@ def unit(velocity):
     return velocity / np.hypot(*velocity)
 
 
-def random_cell(rng, holes):
-    """A star-shaped room with up to so many random obstacles in it."""
-    cell = star(rng, rng.integers(5, 12), 0.6, 1.6)
-    for _ in range(holes):
-        obstacle = affinity.translate(star(rng, rng.integers(3, 7), 0.05, 0.25), *rng.uniform(-0.8, 0.8, 2))
-        if cell.buffer(-0.02).contains(obstacle):
-            cell = cell.difference(obstacle)
-    return cell
-
-
-def star(rng, count, shortest, longest):
-    angle = 2 * np.pi * (np.arange(count) + rng.uniform(-0.35, 0.35, count)) / count
-    radius = rng.uniform(shortest, longest, count)
-    return Polygon(np.column_stack((radius * np.cos(angle), radius * np.sin(angle))))
-
-
 def test_no_streamline_leaves_its_cell_and_all_but_a_null_set_arrive(record_property):
     rng = np.random.default_rng(4)
     count, lost, slow = 0, {True: 0, False: 0}, 0
     for k in range(30):
-        domain = random_cell(rng, holes=k % 3)
+        domain = domains.random_room(rng, holes=k % 3)
         goal = goal_of(domain)
         cell = cut_open(domain, goal) if k >= 15 else domain
         starts = domains.inside(cell, 2000, seed=k)[:340]

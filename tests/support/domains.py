@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from shapely import Point, Polygon, box
+from shapely import Point, Polygon, affinity, box
 
 
 def square() -> tuple[Polygon, Point]:
@@ -69,6 +69,24 @@ def rounded_room() -> tuple[Polygon, Point]:
     return shapely.box(0, 0, 3, 2).difference(shapely.box(1.4, 1, 1.6, 3)).buffer(-0.3, quad_segs=8), Point(
         0.6, 1.2
     )
+
+
+def random_room(rng: np.random.Generator, holes: int) -> Polygon:
+    """A star-shaped room with up to so many random obstacles in it."""
+    room = _star(rng, int(rng.integers(5, 12)), 0.6, 1.6)
+    for _ in range(holes):
+        obstacle = affinity.translate(
+            _star(rng, int(rng.integers(3, 7)), 0.05, 0.25), *rng.uniform(-0.8, 0.8, 2)
+        )
+        if room.buffer(-0.02).contains(obstacle):
+            room = room.difference(obstacle)
+    return room
+
+
+def _star(rng: np.random.Generator, count: int, shortest: float, longest: float) -> Polygon:
+    angle = 2 * np.pi * (np.arange(count) + rng.uniform(-0.35, 0.35, count)) / count
+    radius = rng.uniform(shortest, longest, count)
+    return Polygon(np.column_stack((radius * np.cos(angle), radius * np.sin(angle))))
 
 
 def off_wall(region: Polygon, distance: float, per_edge: int = 9) -> tuple[np.ndarray, np.ndarray]:
