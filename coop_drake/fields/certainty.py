@@ -14,23 +14,25 @@ from coop_drake.fields.quadrature import FloatArray
 
 __all__ = ["check_certainty", "direction_error"]
 
-_UNCERTAIN = 0.1  # a direction that may err by more does not count as known [rad]
+_UNCERTAIN = 0.1  # a direction that may err by more does not count as known, as a sine [-]
 _MOST = 0.01  # part of the region where the direction may be unknown
 _LEAST_ROOM = 0.1  # of a leaf's size: sampled directions are judged as if walls were no closer
 
 
 def direction_error(harmonic_map: HarmonicMap, points: FloatArray) -> FloatArray:
-    """Bound on the error of the direction of adj(J) (q_d - T), small angles.
+    """Bound on the error of the direction of adj(J) (q_d - T).
 
-    The error of T is harmonic and nowhere above the certificate's bound e, so that of J is at most
-    4 e / (pi r) in the spectral norm of each row at a distance r from the boundary.
+    The error of T is harmonic, and so is each of its components, along whatever axis; none is above the
+    certificate's bound e. So the error of J is at most 4 e / (pi r) in the spectral norm at a distance r from
+    the boundary, that of q_d - T at most 2 e, and in the plane adj(J) has the norm of J.
 
     Args:
         harmonic_map: The map.
         points: Points inside its region, shape (n, 2) [m].
 
     Returns:
-        Angles, shape (n,) [rad]; what is not small against one says that the direction is not known.
+        Sines of the largest angles between true and computed direction, shape (n,) [-]; 1 and more say
+        that the direction is not known at all.
     """
     p = as_points(points)
     room = np.asarray(shapely.distance(harmonic_map.region.boundary, shapely.points(p)))
@@ -38,10 +40,10 @@ def direction_error(harmonic_map: HarmonicMap, points: FloatArray) -> FloatArray
 
 
 def check_certainty(harmonic_map: HarmonicMap) -> None:
-    """Refuse a map whose field points anywhere in more than a hundredth of the region.
+    """Refuse a map that leaves the field's direction open in more than a hundredth of the region.
 
-    It does in aisles between holes, far longer than wide, whose images lie in line with the goal's: there the
-    direction depends on what is as small as exp(-pi length / width). Sampled at the leaves of the map's
+    It does so in aisles between holes, far longer than wide, whose images lie in line with the goal's: there
+    the direction depends on what is as small as exp(-pi length / width). Sampled at the leaves of the map's
     quadtree, which are as small as the walls around them are close.
 
     Raises:
@@ -70,6 +72,6 @@ def _bound(harmonic_map: HarmonicMap, points: FloatArray, room: FloatArray) -> F
     x = J[:, 1, 1] * line[:, 0] - J[:, 0, 1] * line[:, 1]
     y = J[:, 0, 0] * line[:, 1] - J[:, 1, 0] * line[:, 0]
     error = harmonic_map.certificate.error_bound
-    of_J = 4.0 * np.sqrt(2.0) * error / (pi * np.maximum(room, 1e-300))
-    lost = of_J * np.hypot(*line.T) + np.linalg.norm(J, axis=(1, 2)) * error
+    of_J, of_line = 4.0 * error / (pi * np.maximum(room, 1e-300)), 2.0 * error
+    lost = of_J * (np.hypot(*line.T) + of_line) + np.linalg.norm(J, axis=(1, 2)) * of_line
     return np.asarray(lost / np.maximum(np.hypot(x, y), 1e-300))
