@@ -94,7 +94,15 @@ def test_people_see_bars_and_a_table_and_quiet_shows_nothing(room, tmp_path):
     assert invoke("plan", room, "--out", tmp_path, "--quiet").output == ""
 
 
-def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_path):
+@pytest.fixture
+def drawn(monkeypatch):
+    """Runs of which figures were to be drawn; drawing itself is slow, and looked at after the first run."""
+    runs = []
+    monkeypatch.setattr(simulating, "write_figures", lambda *asked: runs.append(asked))
+    return runs
+
+
+def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_path, drawn):
     out, _ = finished
     result = invoke(
         "simulate", room, "--plan", out / "plan.json", "--out", tmp_path, "--gains", "table_2", "--json"
@@ -107,6 +115,7 @@ def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_
     assert (tmp_path / "maps.json").read_bytes() == (out / "maps.json").read_bytes()
     assert not (tmp_path / "plan.json").exists()
     assert (tmp_path / "transport.html").exists()
+    assert [directory for *_, directory in drawn] == [tmp_path]
 
 
 def test_a_gap_too_narrow_is_infeasible_and_an_older_plan_does_not_stay(tmp_path):
@@ -151,7 +160,7 @@ def test_a_budget_that_ends_is_undecided(tmp_path):
     assert json.loads(result.stdout)["answer"] == "undecided"
 
 
-def test_a_violation_ends_in_exit_code_1_and_says_which(finished, room, tmp_path, monkeypatch):
+def test_a_violation_ends_in_exit_code_1_and_says_which(finished, room, tmp_path, monkeypatch, drawn):
     out, _ = finished
     log = SimulationLog.load(out / "log.npz")
     broken = replace(log, reached=False, violation="robot_0::base left the workspace at t = 1.5 s by 2 mm")
@@ -163,6 +172,7 @@ def test_a_violation_ends_in_exit_code_1_and_says_which(finished, room, tmp_path
     assert facts["violation"] == facts["error"] == broken.violation
     assert broken.violation in result.stderr
     assert (tmp_path / "log.npz").exists()
+    assert [log for *_, log, _ in drawn] == [broken]
 
 
 def test_a_live_run_is_looked_at_and_says_where_without_waiting_for_anybody(
@@ -288,8 +298,10 @@ def test_machines_get_no_infinities_and_no_numpy(capsys):
 
 
 def test_a_diagram_is_drawn_as_svg_and_a_stranger_s_controller_refused(room, tmp_path):
+    (tmp_path / "plan.json").write_text("of an earlier run")
     result = invoke("diagram", room, "--robot", "1", "--out", tmp_path)
     assert result.exit_code == 0, result.stderr
+    assert (tmp_path / "plan.json").read_text() == "of an earlier run"
     drawing = (tmp_path / "diagram.svg").read_text()
     assert drawing.startswith("<?xml")
     assert "Controller of robot 1" in drawing

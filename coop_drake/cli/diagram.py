@@ -33,7 +33,7 @@ def diagram_command(
 def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> ExitCode:
     # Here and not above: no other command should wait for Drake or for the pictures' library.
     from coop_drake.cli.mapping import map_cells
-    from coop_drake.cli.planning import plan_question, without_plan
+    from coop_drake.cli.planning import search_plan, without_plan
     from coop_drake.cli.reading import read_task
     from coop_drake.diagram import build_closed_loop
     from coop_drake.drawing import save_figure
@@ -46,12 +46,13 @@ def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> E
     robots = assemble(task.scenario).robots
     if robot >= len(robots):
         raise ScenarioError(str(scenario), "--robot", robot, f"a number from 0 to {len(robots) - 1}")
-    folder = ResultFolder.of(task.scenario.name, out)
-    result = plan_question(task.question, folder, reporter)
+    # An earlier run's results stay as they are: only the picture is written.
+    result = search_plan(task.question, reporter)
     if not isinstance(result, Found):
-        return without_plan(task.question, result, folder, reporter)
+        return without_plan(task.question, result, None, reporter)
     loop = build_closed_loop(task.scenario, result.plan, map_cells(task, result.plan, reporter, fresh=False))
+    picture = ResultFolder.of(task.scenario.name, out).diagram
     with reporter.stage("drawing"):
-        save_figure(block_diagram_figure(loop, robot), folder.diagram)
-    reporter.say(f"The picture is {escape(str(folder.diagram))}")
+        save_figure(block_diagram_figure(loop, robot), picture)
+    reporter.say(f"The picture is {escape(str(picture))}")
     return ExitCode.DONE

@@ -34,7 +34,7 @@ from coop_drake.planning.planner import plan
 from coop_drake.planning.separation_file import save_separation
 from coop_drake.planning.warm_up import main as load_kernels
 
-__all__ = ["plan_only", "plan_question", "read_plan", "without_plan"]
+__all__ = ["plan_only", "plan_question", "read_plan", "search_plan", "without_plan"]
 
 _SAME_GOAL = 1e-9  # Rounding of whole turns of the goal's angle [m, rad].
 
@@ -51,20 +51,33 @@ def plan_only(question: Question, out: Path | None, reporter: Reporter) -> ExitC
 
 
 def without_plan(
-    question: Question, result: Infeasible | Undecided, folder: ResultFolder, reporter: Reporter
+    question: Question, result: Infeasible | Undecided, folder: ResultFolder | None, reporter: Reporter
 ) -> ExitCode:
-    """Say that there is no plan, or that none is known."""
+    """Say that there is no plan, or that none is known, and where the proof is if a folder was written."""
     answer = answer_of(result)
     reporter.table(question.name, summary_rows(reporter.facts))
     reporter.say(f"[bold]{answer}[/]: {escape(result.reason)}")
-    if folder.certificate.exists():
+    if folder is not None and folder.certificate.exists():
         reporter.say(f"The proof is in {escape(str(folder.certificate))}")
     reporter.say(f"What blocks, and what would help: coop-drake why {escape(str(question.path))}")
     return ExitCode.INFEASIBLE if isinstance(result, Infeasible) else ExitCode.UNDECIDED
 
 
 def plan_question(question: Question, folder: ResultFolder, reporter: Reporter) -> PlanningResult:
-    """Plan, note what it took, and write the plan, or the proof that there is none.
+    """Plan, note what it took, and write the plan, or the proof that there is none."""
+    result = search_plan(question, reporter)
+    folder.make()
+    folder.forget_plan()
+    if isinstance(result, Found):
+        save_plan(result.plan, folder.plan)
+        write_atomically(folder.table, table_1(result.plan).encode())
+    elif isinstance(result, Infeasible) and result.separation is not None:
+        save_separation(result.separation, question.problem, folder.certificate)
+    return result
+
+
+def search_plan(question: Question, reporter: Reporter) -> PlanningResult:
+    """Plan and note what it took; nothing is written.
 
     Compiled parts are loaded first, on a clock of their own: what planning took does not depend on the cache.
     """
@@ -74,13 +87,6 @@ def plan_question(question: Question, folder: ResultFolder, reporter: Reporter) 
         gain_set = question.gain_sets[question.gains]
         result = plan(question.problem, gain_set, gain_set_name=question.gains, progress=progress)
     reporter.facts.update(planning_measures(result), peak_memory_mb=peak_memory_mb())
-    folder.make()
-    folder.forget_plan()
-    if isinstance(result, Found):
-        save_plan(result.plan, folder.plan)
-        write_atomically(folder.table, table_1(result.plan).encode())
-    elif isinstance(result, Infeasible) and result.separation is not None:
-        save_separation(result.separation, question.problem, folder.certificate)
     return result
 
 

@@ -15,21 +15,28 @@ from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
 from tests.support.sliding import with_sliding_joint
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 
+ROBOTS = {"elbow": OF_TWO_ROBOTS, "three": (*OF_TWO_ROBOTS, "fig11_joints_robot_2")}
 
-@pytest.mark.parametrize(
-    ("name", "robots"),
-    [
-        ("elbow", OF_TWO_ROBOTS),
-        ("three", (*OF_TWO_ROBOTS, "fig11_joints_robot_2")),
-    ],
-)
-def test_a_run_gets_figures_4_to_13_and_a_summary_as_png(tmp_path, name, robots):
+
+def draw(name, folder):
     problem = case(name)
-    written = write_figures(
-        problem.workspace, problem.tree, synthetic_plan(problem), synthetic_log(problem), tmp_path
-    )
-    assert sorted(path.name for path in written) == sorted(f"{stem}.png" for stem in OF_EVERY_RUN + robots)
-    assert sorted(tmp_path.iterdir()) == sorted(written)
+    plan, log = synthetic_plan(problem), synthetic_log(problem)
+    return write_figures(problem.workspace, problem.tree, plan, log, folder)
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory):
+    """The figures of a run of every team, and their folder."""
+    folders = {name: tmp_path_factory.mktemp(name) for name in ROBOTS}
+    return {name: (folder, draw(name, folder)) for name, folder in folders.items()}
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_run_gets_figures_4_to_13_and_a_summary_as_png(drawn, name):
+    folder, written = drawn[name]
+    stems = OF_EVERY_RUN + ROBOTS[name]
+    assert sorted(path.name for path in written) == sorted(f"{stem}.png" for stem in stems)
+    assert sorted(folder.iterdir()) == sorted(written)
     for path in written:
         with Image.open(path) as image:
             grey = np.asarray(image.convert("L"))
@@ -37,14 +44,10 @@ def test_a_run_gets_figures_4_to_13_and_a_summary_as_png(tmp_path, name, robots)
         assert np.ptp(grey) > 100
 
 
-def test_the_same_run_gives_the_same_picture(tmp_path):
-    problem = case("base")
-    plan, log = synthetic_plan(problem), synthetic_log(problem)
-    for folder in (tmp_path / "a", tmp_path / "b"):
-        folder.mkdir()
-        write_figures(problem.workspace, problem.tree, plan, log, folder)
-    for path in (tmp_path / "a").iterdir():
-        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes()
+def test_the_same_run_gives_the_same_picture(drawn, tmp_path):
+    _, written = drawn["elbow"]
+    again = draw("elbow", tmp_path)
+    assert [path.read_bytes() for path in again] == [path.read_bytes() for path in written]
 
 
 def test_figure_4_labels_start_and_goal_on_equal_axes_in_metres():
