@@ -9,24 +9,18 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from shapely import Polygon
 
-from coop_drake.drawing.canvas import legend_above, new_figure
-from coop_drake.drawing.colours import INK, VERMILLION
-from coop_drake.drawing.floor import draw_team, draw_workspace, team_legend
+from coop_drake.drawing.canvas import legend_above
+from coop_drake.drawing.colours import VERMILLION
+from coop_drake.drawing.floor import draw_team, team_legend
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import ComponentTree
 from coop_drake.planning.plan import Plan
 from coop_drake.simulation import SimulationLog
+from coop_drake.viz.ends import at_goal, draw_ends, floor_figure, joints_at_end
 
 __all__ = ["path_figure", "start_and_goal_figure"]
 
 _FOOTPRINTS = 14  # Footprints drawn along the path, start and end included.
-
-
-def _floor_figure(workspace: Polygon, caption: str) -> Figure:
-    x_min, y_min, x_max, y_max = workspace.bounds
-    aspect = (y_max - y_min) / (x_max - x_min)
-    height = min(9.0, max(3.5, 6.0 * aspect))
-    return new_figure(min(9.0, max(5.0, height / aspect + 1.2)), height + 0.8, caption)
 
 
 def start_and_goal_figure(workspace: Polygon, tree: ComponentTree, plan: Plan) -> Figure:
@@ -35,30 +29,16 @@ def start_and_goal_figure(workspace: Polygon, tree: ComponentTree, plan: Plan) -
     Joints without a goal value are drawn in the middle of the last cell's goal interval.
     """
     caption = "Figure 4. Start and goal configuration of the robots and the object."
-    figure = _floor_figure(workspace, caption)
-    ax = figure.subplots()
-    draw_workspace(ax, workspace)
+    figure, ax = floor_figure(workspace, caption)
     legend_above(ax, team_legend(tree))
-    last = plan.transitions[-1]
-    middle = 0.5 * (last.goal_lower + last.goal_upper)[1:]
-    joints = [
-        value if value is not None else rest for value, rest in zip(plan.goal_joints, middle, strict=True)
-    ]
-    for label, z in (("start", plan.start), ("goal", np.concatenate([plan.goal_pose, joints]))):
-        draw_team(ax, tree, z)
-        ax.plot(z[0], z[1], "o", color=INK, markersize=3, zorder=5)
-        ax.annotate(
-            label, (z[0], z[1]), xytext=(5, 4), textcoords="offset points", zorder=6, fontweight="bold"
-        )
+    draw_ends(ax, tree, plan.start, at_goal(plan, joints_at_end(plan)))
     return figure
 
 
 def path_figure(workspace: Polygon, tree: ComponentTree, log: SimulationLog) -> Figure:
     """Draw the object's path, and the team's footprint at instants spread evenly along it."""
     caption = "Figure 5. Path of the object (red) and footprints of the team along it, coloured by time."
-    figure = _floor_figure(workspace, caption)
-    ax = figure.subplots()
-    draw_workspace(ax, workspace)
+    figure, ax = floor_figure(workspace, caption)
     colours = mpl.colormaps["cividis"]
     scale = Normalize(float(log.times[0]), float(log.times[-1]))
     for row in _instants(log):
