@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import pytest
 from pydrake.systems.framework import DiagramBuilder
@@ -13,9 +13,12 @@ from coop_drake.scenario import load_scenario
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.schema import in_file
 from coop_drake.systems import OrientationPpc
+from docs.generate.__main__ import SCENARIO_PAGE
 from docs.generate.api_pages import api_pages
+from docs.generate.links import for_site
 from docs.generate.port_tables import as_markdown
 from docs.generate.scenario_keys import sections
+from docs.generate.scenario_page import scenario_page
 
 ROOT = Path(__file__).parents[1]
 
@@ -103,6 +106,29 @@ def test_tables_of_ports_become_tables_of_markdown():
         "| input | ``a`` | 2 | the one and only |",
         "| output | ``b`` | 1 | the other |",
     ]
+
+
+def test_links_lead_somewhere_beside_the_sources():
+    pages = list((ROOT / "docs").rglob("*.md"))
+    links = {
+        page: re.findall(r"\]\((?!https?:|#)([^)#]+)", page.read_text(encoding="utf-8")) for page in pages
+    }
+    assert sum(map(len, links.values())) > 20
+    assert [f"{page}: {to}" for page in pages for to in links[page] if not (page.parent / to).exists()] == []
+
+
+def test_the_page_of_scenario_files_is_up_to_date():
+    assert SCENARIO_PAGE.read_text(encoding="utf-8") == scenario_page(), "`make docs` writes it anew"
+
+
+def test_in_the_site_a_room_is_its_page_of_the_api():
+    text = "[funnel](../../coop_drake/systems), [plan](../coop_drake/planning.md)"
+    assert for_site(text, PurePosixPath("how_to/page.md")) == (
+        "[funnel](../reference/api/systems.md), [plan](../coop_drake/planning.md)"
+    )
+    assert for_site("[one](../coop_drake/fields)", PurePosixPath("page.md")) == (
+        "[one](reference/api/fields.md)"
+    )
 
 
 def test_every_room_has_a_page():

@@ -1,32 +1,42 @@
-"""``python -m docs.generate out/docs``: the documentation as pages that any browser opens."""
+"""``python -m docs.generate out/docs``: the documentation as pages that any browser opens.
+
+The page of scenario files is kept beside the others, so that it can be read without a site, too.
+"""
 
 from __future__ import annotations
 
 import shutil
 import subprocess
 import sys
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import yaml
 
 from docs.generate.api_pages import api_pages
+from docs.generate.links import for_site
 from docs.generate.scenario_page import scenario_page
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
+SCENARIO_PAGE = ROOT / "docs" / "reference" / "scenario.md"
 
 
 def main(site: Path) -> int:
     """Lay out the sources beside the site and build it, warnings being errors; returns the exit code."""
+    if _mended(SCENARIO_PAGE, scenario_page()):
+        print(f"{SCENARIO_PAGE.relative_to(ROOT)} was out of date and is written anew", file=sys.stderr)
+        return 1
     sources = site.with_name(site.name + "_sources").absolute()
     shutil.rmtree(sources, ignore_errors=True)
     shutil.copytree(
         ROOT / "docs", sources / "pages", ignore=shutil.ignore_patterns("generate", "*.py", "__pycache__")
     )
-    pages = {"reference/scenario.md": scenario_page(), **{page.path: page.text for page in api_pages(ROOT)}}
-    for path, text in pages.items():
-        (sources / "pages" / path).parent.mkdir(parents=True, exist_ok=True)
-        (sources / "pages" / path).write_text(text, encoding="utf-8")
+    for path in (sources / "pages").rglob("*.md"):
+        place = PurePosixPath(path.relative_to(sources / "pages").as_posix())
+        path.write_text(for_site(path.read_text(encoding="utf-8"), place), encoding="utf-8")
+    for page in api_pages(ROOT):
+        (sources / "pages" / page.path).parent.mkdir(parents=True, exist_ok=True)
+        (sources / "pages" / page.path).write_text(page.text, encoding="utf-8")
     settings = yaml.safe_load((HERE / "mkdocs.yml").read_text(encoding="utf-8"))
     settings["site_dir"] = "site"
     settings["nav"].append({"API": [page.path for page in api_pages(ROOT)]})
@@ -51,6 +61,15 @@ def main(site: Path) -> int:
         (sources / "site").rename(site)
         print(f"{site / 'index.html'} is the first page")
     return code
+
+
+def _mended(file: Path, text: str) -> bool:
+    """Write a file that does not say what it should; returns whether it had to be written."""
+    if file.exists() and file.read_text(encoding="utf-8") == text:
+        return False
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(text, encoding="utf-8")
+    return True
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ and what may stand there; a key that is not listed is refused, with the nearest 
 angles radians, frames those of the [conventions](../conventions.md).
 [How to write one](../how_to/own_scenario.md) shows a small one.
 
-This page is made from the classes that hold the values and from the checks that refuse them.
+This page is made by `make docs` from the classes that hold the values and the checks that refuse them.
 """
 
 
