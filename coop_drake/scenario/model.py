@@ -169,7 +169,8 @@ class SimulatorSettings:
 
     Attributes:
         max_time: The run fails when the goal is not reached by then [s].
-        integration_scheme: Name of the integrator, as Drake spells it.
+        integration_scheme: Name of the integrator, as Drake spells it; where controllers are sampled,
+            ``bogacki_shampine3`` stands in for ``runge_kutta5``.
         max_step_size: Longest step [s].
         accuracy: Relative accuracy of the error-controlled step [-].
     """

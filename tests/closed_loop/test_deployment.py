@@ -5,10 +5,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from pydrake.systems.analysis import ExtractSimulatorConfig, Simulator
+from pydrake.systems.primitives import ConstantVectorSource
 
 from coop_drake.control import FixedGains
 from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
-from coop_drake.simulation import simulate
+from coop_drake.simulation import configure_simulator, simulate
 from tests.support.hand_over import assert_certified
 from tests.support.small_loop import small_maps, small_problem
 
@@ -72,6 +74,15 @@ def test_a_harsh_one_is_reported_as_what_it_is(name):
     log = run(deployment, max_time=2.5 if deployment.messages == Messages() else 1.0)
     assert not log.reached
     assert complaint in log.violation
+
+
+@pytest.mark.parametrize(("rate", "scheme"), [(None, "runge_kutta5"), (RATE, "bogacki_shampine3")])
+def test_held_efforts_are_integrated_in_few_stages(rate, scheme):
+    """Trial steps of a lost run stay finite: what is infinite after many stages would end the process."""
+    scenario, _ = small_problem("base")
+    simulator = Simulator(ConstantVectorSource([0.0]))
+    configure_simulator(simulator, replace(scenario, deployment=Deployment(control_rate=rate)))
+    assert ExtractSimulatorConfig(simulator).integration_scheme == scheme
 
 
 def test_the_paper_s_gains_do_not_survive_sampling_that_the_scheduled_ones_do():
