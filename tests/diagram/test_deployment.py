@@ -91,6 +91,19 @@ def test_every_robot_has_noise_of_its_own_and_a_seed_decides_it():
     assert first[0] != first[1]
 
 
+def test_positions_angles_and_rates_have_deviations_of_their_own():
+    controller = loop_of(control_rate=200.0, measurements=NOISE).controllers[0]
+    rates = [0.03] * 4
+    for name, expected in (
+        ("object_pose", [0.01, 0.01, 0.02]),
+        ("robot_state", [0.01, 0.01, 0.02, 0.02, *rates]),
+    ):
+        scale = controller.GetSubsystemByName(f"{name}_deviations")
+        context = scale.CreateDefaultContext()
+        scale.get_input_port().FixValue(context, np.ones(len(expected)))
+        np.testing.assert_array_equal(scale.get_output_port().Eval(context), expected)
+
+
 def test_actuators_give_no_more_than_their_limits():
     loop = loop_of(actuators=ActuatorLimits(base_force=0.5, base_torque=0.25, joint_effort=0.125))
     simulator = Simulator(loop.diagram, loop.create_context())

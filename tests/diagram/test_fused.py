@@ -14,7 +14,7 @@ from coop_drake.simulation.fused_telemetry import FusedTelemetry
 from coop_drake.simulation.telemetry import Telemetry
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 from tests.support.small_loop import joint_names, small_maps, small_problem
-from tests.support.small_plan import small_plan
+from tests.support.small_plan import small_plan, stiffer_and_stiffer
 
 RING = [[REVOLUTE, PRISMATIC], [PRISMATIC], [REVOLUTE, REVOLUTE, REVOLUTE], [REVOLUTE]]
 #: Telemetry that is allowed to differ by what rounding makes of it.
@@ -24,9 +24,11 @@ ROUNDED = ("acceleration_error",)
 @pytest.fixture(scope="module", params=["base", "three", "ring"])
 def problem(request, tmp_path_factory):
     if request.param != "ring":
-        return small_problem(request.param)
-    scenario = ring_team(tmp_path_factory.mktemp("ring"), RING)
-    return scenario, small_plan(joint_names(scenario))
+        scenario, plan = small_problem(request.param)
+    else:
+        scenario = ring_team(tmp_path_factory.mktemp("ring"), RING)
+        plan = small_plan(joint_names(scenario))
+    return scenario, stiffer_and_stiffer(plan)
 
 
 @pytest.fixture(scope="module")

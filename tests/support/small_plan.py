@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import sqrt
+
 import numpy as np
 from shapely import Point, Polygon, box
 
@@ -63,6 +66,21 @@ def plan_by_hand(
         margin=0.1,
         gain_set="by hand",
     )
+
+
+def stiffer_and_stiffer(plan: Plan) -> Plan:
+    """The plan with a K of its own in every cell, so that it matters whose K a law takes."""
+    transitions = []
+    for i, transition in enumerate(plan.transitions):
+        gains, factor = transition.gains, 1.0 + 0.5 * i
+        stiffer = replace(
+            gains,
+            stiffness=factor * gains.stiffness,
+            damping=sqrt(factor) * gains.damping,
+            governor_gain=sqrt(factor) * gains.governor_gain,
+        )
+        transitions.append(replace(transition, gains=stiffer))
+    return replace(plan, transitions=tuple(transitions))
 
 
 def _cell(polygon: Polygon, angle: tuple[float, float], joint: tuple[float, float], n: int) -> Cell:

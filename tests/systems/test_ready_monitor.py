@@ -4,10 +4,10 @@ import pytest
 from coop_drake.control import arrival_margin, ready_margin
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.systems import GovernedCell, ReadyMonitor, axis_laws
-from tests.support.small_plan import GOAL_POSE, POSITION_TOLERANCE, small_plan
+from tests.support.small_plan import GOAL_POSE, POSITION_TOLERANCE, small_plan, stiffer_and_stiffer
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
 
-PLAN = small_plan(("a", "b", "c"))
+PLAN = stiffer_and_stiffer(small_plan(("a", "b", "c")))
 AXES = [0, 2, 3]
 INPUTS = {
     "object_state": [3.8, 3.5, 0.3, 0.0, 0.0, 0.0],
