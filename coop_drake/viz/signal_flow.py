@@ -17,8 +17,8 @@ class Block:
     Attributes:
         name: As the Diagram calls it.
         kind: The class behind it; empty for the Diagram's own inputs and outputs.
-        inputs: Names of the connected input ports.
-        outputs: Names of the connected output ports.
+        inputs: Names of the connected input ports, in the ports' order.
+        outputs: Names of the connected output ports, in the ports' order.
         column: Place in the flow from left to right.
     """
 
@@ -53,7 +53,7 @@ class SignalFlow:
     Attributes:
         name: The Diagram's.
         blocks: Its blocks.
-        signals: Its connections.
+        signals: Its connections, in the order of the blocks and ports that they come from and go to.
     """
 
     name: str
@@ -66,7 +66,7 @@ INPUTS, OUTPUTS = "from outside", "to outside"
 
 
 def signal_flow(diagram: Diagram, name: str, *, telemetry: frozenset[str] = frozenset()) -> SignalFlow:
-    """Read the blocks and the connections of a Diagram.
+    """Read the blocks and the connections of a Diagram, in an order that only depends on how it was built.
 
     Args:
         diagram: The Diagram; what is inside its blocks is not looked at.
@@ -83,6 +83,8 @@ def signal_flow(diagram: Diagram, name: str, *, telemetry: frozenset[str] = froz
         for (sink, entry), (source, output) in diagram.connection_map().items()
     ]
     signals += _from_outside(diagram) + _to_outside(diagram, telemetry)
+    sources, sinks = _port_orders(diagram)
+    signals.sort(key=lambda s: (sources[s.source, s.output], sinks[s.sink, s.input]))
     kinds = {system.get_name(): _kind(system) for system in diagram.GetSystems()}
     held = {
         (system.get_name(), system.get_output_port(output).get_name())
@@ -95,13 +97,24 @@ def signal_flow(diagram: Diagram, name: str, *, telemetry: frozenset[str] = froz
         Block(
             block,
             kinds.get(block, ""),
-            tuple(dict.fromkeys(s.input for s in signals if s.sink == block)),
+            tuple(sorted({s.input for s in signals if s.sink == block}, key=lambda name: sinks[block, name])),
             tuple(dict.fromkeys(s.output for s in signals if s.source == block)),
             columns[block],
         )
         for block in sorted(columns, key=lambda block: (columns[block], block))
     )
     return SignalFlow(name, blocks, tuple(signals))
+
+
+def _port_orders(diagram: Diagram) -> tuple[dict[tuple[str, str], int], dict[tuple[str, str], int]]:
+    """Ranks of all (block, port) that signals come from, and go to; Drake lists signals by addresses."""
+    outputs = [(INPUTS, diagram.get_input_port(k).get_name()) for k in range(diagram.num_input_ports())]
+    inputs = [(OUTPUTS, diagram.get_output_port(k).get_name()) for k in range(diagram.num_output_ports())]
+    for system in diagram.GetSystems():
+        name = system.get_name()
+        outputs += [(name, system.get_output_port(k).get_name()) for k in range(system.num_output_ports())]
+        inputs += [(name, system.get_input_port(k).get_name()) for k in range(system.num_input_ports())]
+    return {port: k for k, port in enumerate(outputs)}, {port: k for k, port in enumerate(inputs)}
 
 
 def _from_outside(diagram: Diagram) -> list[Signal]:

@@ -36,6 +36,24 @@ def test_what_a_controller_hears_and_says_is_there_without_what_is_only_looked_a
     assert blocks["reference_governor"].kind == "ReferenceGovernor"
 
 
+def test_signals_come_in_the_order_of_their_ports(loop):
+    flow = signal_flow(loop.diagram, "loop")
+    systems = {system.get_name(): (k, system) for k, system in enumerate(loop.diagram.GetSystems())}
+    ranks = [
+        (
+            systems[s.source][0],
+            int(systems[s.source][1].GetOutputPort(s.output).get_index()),
+            systems[s.sink][0],
+            int(systems[s.sink][1].GetInputPort(s.input).get_index()),
+        )
+        for s in flow.signals
+    ]
+    assert ranks == sorted(ranks)
+    for block in flow.blocks:
+        ports = [systems[block.name][1].GetInputPort(name).get_index() for name in block.inputs]
+        assert ports == sorted(ports)
+
+
 def test_signals_go_from_left_to_right_but_those_that_are_held(controller):
     columns = {block.name: block.column for block in controller.blocks}
     back = {s.source for s in controller.signals if columns[s.source] >= columns[s.sink]}
