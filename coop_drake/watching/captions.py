@@ -24,7 +24,7 @@ def headline(film: Film, moment: Moment) -> str:
         return f"{len(moment.splits)} slices are halved, the last one ({leaf.slice}) along {along}"
     if moment.searched:
         return f"The cheapest channel has {len(moment.channel)} cells, {moment.undecided_links} undecided"
-    return f"{len(moment.leaves)} coarse slices of theta to begin with"
+    return f"{len(moment.leaves)} coarse slices of θ to begin with"
 
 
 def counters(moment: Moment) -> str:

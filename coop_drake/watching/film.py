@@ -86,8 +86,8 @@ class Film:
 
     @property
     def axis_names(self) -> tuple[str, ...]:
-        """Names of all axes: theta, then every joint."""
-        return ("theta", *(joint.name.replace("::", " ") for joint in self.problem.tree.joints))
+        """Names of all axes as people read them: θ, then every joint."""
+        return ("θ", *(joint.name.replace("::", " ") for joint in self.problem.tree.joints))
 
 
 def record(

@@ -37,7 +37,7 @@ __all__ = ["frame_figure"]
 _SIZE = (12.8, 7.2)  # Inches, a hundred points each.
 _SINGLE = (0.0, 1.0)  # Where strips are drawn if theta is the only axis.
 _FLOOR = "The floor: positions of the object, for some choice of the angles"
-_ANGLES = "The angles: slices of theta and of each joint, cut where it looks"
+_ANGLES = "The angles: slices of θ and of each joint, cut where it looks"
 _TICKS = ((0.0, "0"), (np.pi / 2, "π/2"), (np.pi, "π"), (3 * np.pi / 2, "3π/2"))
 
 

@@ -163,9 +163,9 @@ def test_captions_say_what_happens_and_what_a_margin_is_worth(found, apart):
     recorded, shots = found
     splitting = next(shot for shot in shots if shot.moment.splits and shot.moment.verdict is None)
     assert "halved" in splitting.headline
-    assert splitting.headline.endswith("along theta")
+    assert splitting.headline.endswith("along θ")
     assert f"{shots[-1].moment.slices} slices made" in shots[-1].counters
-    assert recorded.axis_names == ("theta",)
+    assert recorded.axis_names == ("θ",)
     assert apart[1][-1].headline.startswith("Infeasible, proved")
     shy = storyboard(rod_film(WIDE, margin=0.06), 3)[-1]
     assert shy.headline.startswith("No way keeps 0.06 m from the walls")
