@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from pydrake.multibody.parsing import GetScopedFrameByName
@@ -44,20 +44,19 @@ class WeldedGrasps:
     """
 
     def __init__(self, plant: MultibodyPlant, robots: Sequence[RobotAssembly]) -> None:
-        self._plant = plant
+        self._reactions = plant.get_reaction_forces_output_port()
         welds = [_weld(plant, robot) for robot in robots]
         self._places = [place for place, _ in welds]
         self._frames = [weld.frame_on_child() for _, weld in welds]
 
     def wrenches(self, context: Context, base_wrenches: FloatArray) -> FloatArray:
         """As in :class:`Grasps`; the reaction on a weld's child acts on the robot, in the joint's frame."""
-        reactions = self._plant.get_reaction_forces_output_port().Eval(context)
-        return np.array(
-            [
-                _on_object(frame.CalcRotationMatrixInWorld(context).matrix(), reactions[place])
-                for place, frame in zip(self._places, self._frames, strict=True)
-            ]
-        )
+        reactions = self._reactions.Eval(context)
+        rows = [
+            reactions[place].Rotate(frame.CalcRotationMatrixInWorld(context)).get_coeffs()
+            for place, frame in zip(self._places, self._frames, strict=True)
+        ]
+        return np.array([(-row[3], -row[4], -row[2]) for row in rows])
 
     def errors(self, context: Context) -> FloatArray:
         """As in :class:`Grasps`: the hand is a body of the tree that the object is the root of."""
@@ -76,8 +75,3 @@ def _weld(plant: MultibodyPlant, robot: RobotAssembly) -> tuple[int, WeldJoint]:
         if joint.type_name() == "weld"
         and {int(joint.parent_body().index()), int(joint.child_body().index())} == ends
     )
-
-
-def _on_object(R_WJc: FloatArray, reaction: Any) -> FloatArray:
-    force, torque = R_WJc @ reaction.translational(), R_WJc @ reaction.rotational()
-    return -np.array([force[0], force[1], torque[2]])

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from shapely import Polygon
 
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.boundary import edges_of
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ComponentTree
-from coop_drake.simulation.convex_distance import nearest_pair, nearest_to_walls, place_vertices
+from coop_drake.geometry.tree import Component, ComponentTree
+from coop_drake.simulation.convex_distance import IntArray
+from coop_drake.simulation.step_kernels import team_distances
 
 __all__ = ["Clearance", "TeamClearance"]
 
@@ -42,30 +42,22 @@ class TeamClearance:
     """
 
     def __init__(self, workspace: Polygon, tree: ComponentTree) -> None:
-        self._tree = tree
-        self._walls = np.ascontiguousarray(edges_of(workspace))
+        walls = np.ascontiguousarray(edges_of(workspace))
         self._names: list[str] = []
-        radii: list[float] = []
-        bounds: list[tuple[int, int]] = []
-        vertices: list[FloatArray] = []
-        component_of_vertex: list[int] = []
+        pieces: list[tuple[float, float, float]] = []
+        vertices: list[tuple[float, float, float]] = []
         pieces_of_body: dict[tuple[int, int], list[int]] = {}
         for c, component in enumerate(tree.components):
             for b, body in enumerate(component.bodies):
                 for shape in body.shapes:
-                    first = len(component_of_vertex)
-                    vertices.append(np.asarray(shape.vertices, dtype=float))
-                    component_of_vertex += [c] * len(shape.vertices)
+                    first = len(vertices)
+                    vertices += [(float(c), float(x), float(y)) for x, y in shape.vertices]
                     pieces_of_body.setdefault((c, b), []).append(len(self._names))
                     self._names.append(body.name)
-                    radii.append(float(shape.radius))
-                    bounds.append((first, len(component_of_vertex)))
+                    pieces.append((float(first), float(len(vertices)), float(shape.radius)))
         if not self._names:
             raise GeometryError("the component tree has no body with a shape, so no clearance is defined")
-        self._local = np.ascontiguousarray(np.vstack(vertices))
-        self._component: NDArray[np.int64] = np.array(component_of_vertex, dtype=np.int64)
-        self._radii, self._bounds = np.array(radii), np.array(bounds, dtype=np.int64)
-        self._pairs = np.array(
+        self._pairs: IntArray = np.array(
             [
                 (i, j)
                 for first_body, second_body in tree.collision_pairs
@@ -73,7 +65,14 @@ class TeamClearance:
                 for j in pieces_of_body.get(second_body, [])
             ],
             dtype=np.int64,
-        )
+        ).reshape(-1, 2)
+        links = np.array([_link(component) for component in tree.components])
+        self._arrays = links, np.array(vertices), np.array(pieces), self._pairs, walls
+
+    @property
+    def kernel_arguments(self) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray]:
+        """What the compiled distances read of team and floor, see ``team_distances``."""
+        return self._arrays
 
     def __call__(self, configuration: FloatArray) -> tuple[Clearance, Clearance]:
         """Smallest distance to the walls, and between bodies that must not touch (infinite if none are).
@@ -81,12 +80,26 @@ class TeamClearance:
         Args:
             configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
         """
-        poses = np.array([(X.x, X.y, X.angle) for X in self._tree.poses(configuration)])
-        placed = place_vertices(self._local, self._component, poses)
-        distance, piece = nearest_to_walls(placed, self._bounds, self._radii, self._walls)
-        walls = Clearance(distance, f"{self._names[piece]} and the walls")
+        wall, piece, between, pair = team_distances(*self._arrays, configuration)
+        return Clearance(wall, self.wall_place(piece)), Clearance(between, self.pair_place(pair))
+
+    def wall_place(self, piece: int) -> str:
+        """What a piece's distance to the walls lies between."""
+        return f"{self._names[piece]} and the walls"
+
+    def pair_place(self, pair: int) -> str:
+        """What the distance of a pair lies between."""
         if not len(self._pairs):
-            return walls, Clearance(float("inf"), "no two bodies")
-        distance, pair = nearest_pair(placed, self._bounds, self._radii, self._pairs)
+            return "no two bodies"
         first, second = (self._names[piece] for piece in self._pairs[pair])
-        return walls, Clearance(distance, f"{first} and {second}")
+        return f"{first} and {second}"
+
+
+def _link(component: Component) -> tuple[float, ...]:
+    """A component's row, see ``LINK_COLUMNS``."""
+    joint = component.joint
+    if component.parent is None or joint is None:
+        return -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    X_PJ, sliding = joint.X_PJ, joint.kind == "prismatic"
+    motion = (0.0, *joint.axis) if sliding else (joint.sign, 0.0, 0.0)
+    return float(component.parent), X_PJ.x, X_PJ.y, X_PJ.angle, float(3 + joint.index), *motion

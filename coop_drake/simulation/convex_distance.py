@@ -14,27 +14,12 @@ from numpy.typing import NDArray
 
 from coop_drake.geometry.pose import FloatArray
 
-__all__ = ["core_distance", "nearest_pair", "nearest_to_walls", "place_vertices", "wall_distance"]
+__all__ = ["core_distance", "nearest_pair", "nearest_to_walls", "wall_distance"]
 
 IntArray = NDArray[np.int64]
 
-
-@njit(cache=True)
-def place_vertices(local: FloatArray, component: FloatArray, poses: FloatArray) -> FloatArray:
-    """Vertices in W from vertices in their component's frame.
-
-    Args:
-        local: Vertices, shape (v, 2) [m].
-        component: Index of every vertex's component, shape (v,).
-        poses: X_WC of every component as (x, y, angle), shape (c, 3) [m, rad].
-    """
-    placed = np.empty_like(local)
-    cosines, sines = np.cos(poses[:, 2]), np.sin(poses[:, 2])
-    for i in range(local.shape[0]):
-        c = component[i]
-        placed[i, 0] = poses[c, 0] + cosines[c] * local[i, 0] - sines[c] * local[i, 1]
-        placed[i, 1] = poses[c, 1] + sines[c] * local[i, 0] + cosines[c] * local[i, 1]
-    return placed
+#: What is farther away than something else by more than this is so despite rounding [m].
+_ROUNDING = 1e-9
 
 
 @njit(cache=True)
@@ -49,14 +34,9 @@ def wall_distance(core: FloatArray, walls: FloatArray) -> float:
     depth = 0.0
     count = core.shape[0]
     for w in range(walls.shape[0]):
-        ax, ay, bx, by = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
-        for i in range(count):
-            j = (i + 1) % count
-            nearest = min(
-                nearest, _segment_distance(core[i, 0], core[i, 1], core[j, 0], core[j, 1], ax, ay, bx, by)
-            )
-        if _core_holds(core, ax, ay):
-            depth = max(depth, _ring_distance(core, ax, ay))
+        nearest = min(nearest, _ring_to_wall(core, walls[w]))
+        if _core_holds(core, walls[w, 0], walls[w, 1]):
+            depth = max(depth, _ring_distance(core, walls[w, 0], walls[w, 1]))
             nearest = 0.0
     for i in range(count):
         if not _floor_holds(walls, core[i, 0], core[i, 1]):
@@ -99,38 +79,82 @@ def core_distance(first: FloatArray, second: FloatArray) -> float:
 
 
 @njit(cache=True)
-def nearest_to_walls(
-    placed: FloatArray, bounds: IntArray, radii: FloatArray, walls: FloatArray
-) -> tuple[float, int]:
+def nearest_to_walls(placed: FloatArray, pieces: FloatArray, walls: FloatArray) -> tuple[float, int]:
     """Smallest signed distance of several footprints to the walls, and whose it is.
+
+    Walls are looked at only where a footprint's box leaves room for them to be the nearest.
 
     Args:
         placed: Vertices of all cores in W, shape (v, 2) [m].
-        bounds: First vertex of every core and the one after its last, shape (cores, 2).
-        radii: By how much each core is grown, shape (cores,) [m].
+        pieces: For each core its first vertex, the one after its last, and by how much it is grown [m],
+            shape (cores, 3).
         walls: As in `wall_distance`.
     """
     nearest, which = inf, 0
-    for i in range(bounds.shape[0]):
-        distance = wall_distance(placed[bounds[i, 0] : bounds[i, 1]], walls) - radii[i]
+    for i in range(pieces.shape[0]):
+        radius = pieces[i, 2]
+        distance = _wall_distance_within(_core(placed, pieces, i), walls, nearest + radius) - radius
         if distance < nearest:
             nearest, which = distance, i
     return nearest, which
 
 
 @njit(cache=True)
-def nearest_pair(
-    placed: FloatArray, bounds: IntArray, radii: FloatArray, pairs: IntArray
-) -> tuple[float, int]:
+def _wall_distance_within(core: FloatArray, walls: FloatArray, limit: float) -> float:
+    """`wall_distance` where it is below a limit, else anything from the limit on."""
+    low_x, low_y, high_x, high_y = _box(core)
+    first, least = 0, inf
+    for w in range(walls.shape[0]):
+        gap = _squared_gap(walls[w], low_x, low_y, high_x, high_y)
+        if gap < least:
+            first, least = w, gap
+    nearest = _ring_to_wall(core, walls[first])
+    for w in range(walls.shape[0]):
+        reach = max(min(nearest, limit), 0.0) + _ROUNDING
+        if _squared_gap(walls[w], low_x, low_y, high_x, high_y) > reach * reach:
+            continue
+        nearest = min(nearest, _ring_to_wall(core, walls[w]))
+        if nearest <= _ROUNDING or _core_holds(core, walls[w, 0], walls[w, 1]):
+            return wall_distance(core, walls)
+    # A core that no wall meets is on one side of them all.
+    if not _floor_holds(walls, core[0, 0], core[0, 1]):
+        return wall_distance(core, walls)
+    return nearest
+
+
+@njit(cache=True)
+def _squared_gap(wall: FloatArray, low_x: float, low_y: float, high_x: float, high_y: float) -> float:
+    """Squared distance of a box from that about a wall."""
+    dx = max(0.0, max(min(wall[0], wall[2]) - high_x, low_x - max(wall[0], wall[2])))
+    dy = max(0.0, max(min(wall[1], wall[3]) - high_y, low_y - max(wall[1], wall[3])))
+    return dx * dx + dy * dy
+
+
+@njit(cache=True)
+def _ring_to_wall(core: FloatArray, wall: FloatArray) -> float:
+    """Distance of a core's edges to a wall, zero where they cross."""
+    nearest = inf
+    count = core.shape[0]
+    for i in range(count):
+        j = (i + 1) % count
+        distance = _segment_distance(
+            core[i, 0], core[i, 1], core[j, 0], core[j, 1], wall[0], wall[1], wall[2], wall[3]
+        )
+        nearest = min(nearest, distance)
+    return nearest
+
+
+@njit(cache=True)
+def nearest_pair(placed: FloatArray, pieces: FloatArray, pairs: IntArray) -> tuple[float, int]:
     """Smallest signed distance of some pairs of footprints, shape (pairs, 2), and which pair's it is.
 
     Other arguments as in `nearest_to_walls`. Pairs whose boxes are farther apart are not looked at.
     """
-    boxes = np.empty((bounds.shape[0], 4))
-    for i in range(bounds.shape[0]):
-        core = placed[bounds[i, 0] : bounds[i, 1]]
-        boxes[i, 0], boxes[i, 1] = core[:, 0].min() - radii[i], core[:, 1].min() - radii[i]
-        boxes[i, 2], boxes[i, 3] = core[:, 0].max() + radii[i], core[:, 1].max() + radii[i]
+    boxes = np.empty((pieces.shape[0], 4))
+    for i in range(pieces.shape[0]):
+        low_x, low_y, high_x, high_y = _box(_core(placed, pieces, i))
+        boxes[i, 0], boxes[i, 1] = low_x - pieces[i, 2], low_y - pieces[i, 2]
+        boxes[i, 2], boxes[i, 3] = high_x + pieces[i, 2], high_y + pieces[i, 2]
     nearest, which = inf, 0
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
@@ -138,11 +162,26 @@ def nearest_pair(
         apart_y = max(boxes[i, 1] - boxes[j, 3], boxes[j, 1] - boxes[i, 3])
         if max(apart_x, apart_y) > nearest:
             continue
-        first, second = placed[bounds[i, 0] : bounds[i, 1]], placed[bounds[j, 0] : bounds[j, 1]]
-        distance = core_distance(first, second) - radii[i] - radii[j]
+        between = core_distance(_core(placed, pieces, i), _core(placed, pieces, j))
+        distance = between - pieces[i, 2] - pieces[j, 2]
         if distance < nearest:
             nearest, which = distance, k
     return nearest, which
+
+
+@njit(cache=True)
+def _core(placed: FloatArray, pieces: FloatArray, index: int) -> FloatArray:
+    core: FloatArray = placed[int(pieces[index, 0]) : int(pieces[index, 1])]
+    return core
+
+
+@njit(cache=True)
+def _box(core: FloatArray) -> tuple[float, float, float, float]:
+    low_x, low_y, high_x, high_y = inf, inf, -inf, -inf
+    for i in range(core.shape[0]):
+        low_x, low_y = min(low_x, core[i, 0]), min(low_y, core[i, 1])
+        high_x, high_y = max(high_x, core[i, 0]), max(high_y, core[i, 1])
+    return low_x, low_y, high_x, high_y
 
 
 @njit(cache=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import Context
 
-from coop_drake.control.load_sharing import rotate, total_wrench
 from coop_drake.diagram import ClosedLoop
+from coop_drake.simulation.step_kernels import largest_difference, object_wrench
 from coop_drake.simulation.telemetry import Sample, port_reader
 
 __all__ = ["FusedTelemetry"]
@@ -51,7 +51,7 @@ class FusedTelemetry:
             held = [read() for read in self._held]
             bases = np.array([effort[:3] for effort in held])
             torques = np.concatenate([effort[3:] for effort in held])
-        wrenches = report.hands[:, 3:]
+        commanded = np.ascontiguousarray(report.hands[:, 3:])
         realised = self._accelerations()[team.velocity_index[:3]]
         return Sample(
             time=self._root.get_time(),
@@ -65,17 +65,13 @@ class FusedTelemetry:
             funnel_lower=report.walls[: self._axes],
             funnel_upper=report.walls[self._axes :],
             energy_margin=report.energy_margin,
-            object_wrench=total_wrench(
-                wrenches,
-                rotate(z[2], self._grasps.T).T,
-                com_offset=rotate(z[2], team.object_inertia.p_LLcm),
-            ),
-            commanded_wrenches=wrenches,
+            object_wrench=object_wrench(commanded, self._grasps, team.object_inertia.p_LLcm, z[2]),
+            commanded_wrenches=commanded,
             measured_wrenches=team.grasps.wrenches(self._plant_context, bases),
             grasp_error=float(team.grasps.errors(self._plant_context).max()),
             base_wrenches=bases,
             joint_torques=torques,
-            acceleration_error=float(np.abs(report.acceleration - realised).max()),
+            acceleration_error=largest_difference(report.acceleration[None], realised[None]),
             ready_margins=self._ready()[1::2],
             arrived=bool(self._arrived()[0]),
         )

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.planning.plan import Plan
 from coop_drake.simulation.clearance import TeamClearance
+from coop_drake.simulation.step_kernels import margins
 from coop_drake.simulation.telemetry import Sample
 
 __all__ = ["ACCELERATION_TOLERANCE", "GRASP_TOLERANCE", "WRENCH_TOLERANCE", "Invariants", "Margins"]
@@ -51,6 +53,21 @@ class Margins:
     violation: str
 
 
+class _Measured(NamedTuple):
+    """What the compiled ``margins`` returns."""
+
+    wall: float
+    piece: int
+    between: float
+    pair: int
+    in_cell: float
+    funnel: float
+    funnel_axis: int
+    slice: float
+    slice_axis: int
+    wrench_error: float
+
+
 class Invariants:
     """Checks samples of a run against the floor, the team and the plan.
 
@@ -61,49 +78,58 @@ class Invariants:
     """
 
     def __init__(self, clearance: TeamClearance, plan: Plan, *, exact: bool = True) -> None:
-        self._clearance, self._plan, self._exact = clearance, plan, exact
-        self._cells = [BoundaryDistance(cell.safe) for cell in plan.cells]
+        self._clearance, self._exact = clearance, exact
+        self._cells = [
+            (BoundaryDistance(cell.safe).edges, np.array(cell.lower), np.array(cell.upper))
+            for cell in plan.cells
+        ]
         self._axes = ("object angle", *plan.joint_names)
 
     def check(self, sample: Sample) -> Margins:
         """Measure every margin, and say which invariant is broken if one is."""
-        walls, bodies = self._clearance(sample.z)
-        cell, axes = self._plan.cells[sample.cell], sample.z[2:]
-        in_funnel = np.minimum(axes - sample.funnel_lower, sample.funnel_upper - axes)
-        in_slice = np.minimum(axes - cell.lower, cell.upper - axes)
-        wrench_error = float(np.abs(sample.measured_wrenches - sample.commanded_wrenches).max())
-        in_cell = self._cells[sample.cell](sample.z[:2])
-        funnel_axis, slice_axis = int(in_funnel.argmin()), int(in_slice.argmin())
-        funnel_margin, slice_margin = float(in_funnel[funnel_axis]), float(in_slice[slice_axis])
-        broken = []
-        if not walls.distance > 0.0:
-            broken.append(f"clearance between {walls.place} is {walls.distance:.3g} m")
-        if not bodies.distance > 0.0:
-            broken.append(f"clearance between {bodies.place} is {bodies.distance:.3g} m")
-        if not in_cell > 0.0:
-            where = f"the boundary of cell {sample.cell}"
-            broken.append(f"distance of the object to {where} is {in_cell:.3g} m")
-        if not funnel_margin > 0.0:
-            axis = self._axes[funnel_axis]
-            broken.append(f"distance of {axis} to its funnel is {funnel_margin:.3g} rad or m")
-        if not slice_margin > 0.0:
-            axis = self._axes[slice_axis]
-            broken.append(f"distance of {axis} to its slice is {slice_margin:.3g} rad or m")
-        if not sample.grasp_error <= GRASP_TOLERANCE:
-            broken.append(f"distance of a hand to its grasp is {sample.grasp_error:.3g} m")
+        measured = _Measured(
+            *margins(
+                *self._clearance.kernel_arguments,
+                sample.z,
+                *self._cells[sample.cell],
+                sample.funnel_lower,
+                sample.funnel_upper,
+                sample.commanded_wrenches,
+                sample.measured_wrenches,
+            )
+        )
+        broken = [*self._broken(sample, measured)]
         if self._exact:
-            broken.extend(_inexact(sample, wrench_error))
+            broken.extend(_inexact(sample, measured.wrench_error))
         return Margins(
-            workspace_clearance=walls.distance,
-            body_clearance=bodies.distance,
-            cell_clearance=in_cell,
-            funnel_margin=funnel_margin,
-            slice_margin=slice_margin,
+            workspace_clearance=measured.wall,
+            body_clearance=measured.between,
+            cell_clearance=measured.in_cell,
+            funnel_margin=measured.funnel,
+            slice_margin=measured.slice,
             energy_margin=sample.energy_margin,
             acceleration_error=sample.acceleration_error,
-            wrench_error=wrench_error,
+            wrench_error=measured.wrench_error,
             violation=_told(sample, broken) if broken else "",
         )
+
+    def _broken(self, sample: Sample, measured: _Measured) -> Iterator[str]:
+        if not measured.wall > 0.0:
+            yield f"clearance between {self._clearance.wall_place(measured.piece)} is {measured.wall:.3g} m"
+        if not measured.between > 0.0:
+            place = self._clearance.pair_place(measured.pair)
+            yield f"clearance between {place} is {measured.between:.3g} m"
+        if not measured.in_cell > 0.0:
+            where = f"the boundary of cell {sample.cell}"
+            yield f"distance of the object to {where} is {measured.in_cell:.3g} m"
+        if not measured.funnel > 0.0:
+            axis = self._axes[measured.funnel_axis]
+            yield f"distance of {axis} to its funnel is {measured.funnel:.3g} rad or m"
+        if not measured.slice > 0.0:
+            axis = self._axes[measured.slice_axis]
+            yield f"distance of {axis} to its slice is {measured.slice:.3g} rad or m"
+        if not sample.grasp_error <= GRASP_TOLERANCE:
+            yield f"distance of a hand to its grasp is {sample.grasp_error:.3g} m"
 
 
 def _told(sample: Sample, broken: list[str]) -> str:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydrake.systems.framework import Context, System
 
-from coop_drake.control.load_sharing import rotate, total_wrench
 from coop_drake.diagram import TELEMETRY, ClosedLoop
 from coop_drake.geometry.pose import FloatArray
+from coop_drake.simulation.step_kernels import largest_difference, object_wrench
 
 __all__ = ["Sample", "Telemetry", "port_reader"]
 
@@ -77,72 +78,106 @@ class Telemetry:
         self._team, self._root = loop.team, root
         self._plant_context = self._team.plant.GetMyContextFromRoot(root)
         self._grasps = np.array([[robot.X_LE.x, robot.X_LE.y] for robot in self._team.robots])
-        self._states = [
-            port_reader(loop.station.diagram, f"robot_{robot.index}_state", root)
-            for robot in self._team.robots
-        ]
-        self._lower, self._upper = _funnel_places([len(robot.joints) for robot in self._team.robots])
-        self._of_robots = {
-            name: [port_reader(law, name, root) for law in loop.laws] for name in ("ready", *TELEMETRY)
-        }
-        self._of_robots["robot_effort"] = [port_reader(c, "robot_effort", root) for c in loop.controllers]
-        self._current_cell = port_reader(loop.cell_planner, "current_cell", root)
-        self._arrived = port_reader(loop.cell_planner, "arrived", root)
-        self._accelerations = port_reader(loop.station.diagram, "generalized_acceleration", root)
+        self._rates = self._team.plant.num_positions() + self._team.velocity_index
+        self._ports = _PortRow(root)
+        self._places = _places(loop, self._ports)
 
     def read(self) -> Sample:
         """Read the present instant."""
-        team, state = self._team, self._team.plant.GetPositionsAndVelocities(self._plant_context)
-        z = state[team.position_index]
-        cell, entry = self._current_cell()
-        efforts, hands = self._from_robots("robot_effort"), np.array(self._from_robots("hand_command"))
-        base_wrenches = np.array([effort[:3] for effort in efforts])
-        funnels = np.concatenate([self._of_robots["angle_funnel"][0](), *self._from_robots("joint_funnels")])
-        governors = np.array(self._from_robots("governor_position"))
-        offsets = rotate(z[2], self._grasps.T).T
-        com_offset = rotate(z[2], team.object_inertia.p_LLcm)
+        team, at, values = self._team, self._places, self._ports.read()
+        state = team.plant.GetPositionsAndVelocities(self._plant_context)
+        z, governors = state[team.position_index], values[at.governors]
+        base_wrenches, commanded = values[at.base_wrenches], values[at.commanded_wrenches]
+        cell, entry, arrived = values[at.instant]
         return Sample(
             time=self._root.get_time(),
             cell=int(cell),
             entry=float(entry),
             z=z,
-            rates=state[team.plant.num_positions() + team.velocity_index],
-            base_poses=np.array([read()[:3] for read in self._states]),
+            rates=state[self._rates],
+            base_poses=values[at.base_poses],
             governor_position=governors[0],
-            governor_spread=float(np.abs(governors - governors[0]).max()),
-            funnel_lower=funnels[self._lower],
-            funnel_upper=funnels[self._upper],
-            energy_margin=float(min(self._from_robots("energy_margin"))[0]),
-            object_wrench=total_wrench(hands[:, 3:], offsets, com_offset=com_offset),
-            commanded_wrenches=hands[:, 3:],
+            governor_spread=largest_difference(governors, governors[:1]),
+            funnel_lower=values[at.funnel_lower],
+            funnel_upper=values[at.funnel_upper],
+            energy_margin=float(values[at.energy_margins].min()),
+            object_wrench=object_wrench(commanded, self._grasps, team.object_inertia.p_LLcm, z[2]),
+            commanded_wrenches=commanded,
             measured_wrenches=team.grasps.wrenches(self._plant_context, base_wrenches),
             grasp_error=float(team.grasps.errors(self._plant_context).max()),
             base_wrenches=base_wrenches,
-            joint_torques=np.concatenate([effort[3:] for effort in efforts]),
-            acceleration_error=self._acceleration_error(),
-            ready_margins=np.array([margin for _, margin in self._from_robots("ready")]),
-            arrived=bool(self._arrived()[0]),
+            joint_torques=values[at.joint_torques],
+            acceleration_error=largest_difference(values[at.accelerations], values[at.realised]),
+            ready_margins=values[at.ready_margins],
+            arrived=bool(arrived),
         )
 
-    def _from_robots(self, output: str) -> list[FloatArray]:
-        return [read() for read in self._of_robots[output]]
 
-    def _acceleration_error(self) -> float:
-        realised = self._accelerations()[self._team.velocity_index[:3]]
-        return float(np.abs(np.array(self._from_robots("object_acceleration")) - realised).max())
+class _PortRow:
+    """The values of many ports in one row.
+
+    Args:
+        root: Context of the whole diagram.
+    """
+
+    def __init__(self, root: Context) -> None:
+        self._root = root
+        self._readers: list[Callable[[], FloatArray]] = []
+        self._size = 0
+
+    def add(self, system: System, output: str) -> Any:
+        """Append an output; returns where in the row it stands, integers."""
+        first = self._size
+        self._readers.append(port_reader(system, output, self._root))
+        self._size += system.GetOutputPort(output).size()
+        return np.arange(first, self._size)
+
+    def read(self) -> FloatArray:
+        """The present values of all ports."""
+        return np.concatenate([read() for read in self._readers])
 
 
-def _funnel_places(joints: list[int]) -> tuple[list[int], list[int]]:
-    """Where lower and upper walls stand when the angle's and every robot's funnels are put in one row."""
-    lower, upper, first = [0], [1], 2
-    for n in joints:
-        lower.extend(range(first, first + n))
-        upper.extend(range(first + n, first + 2 * n))
-        first += 2 * n
-    return lower, upper
+class _Places(NamedTuple):
+    """Where in a row of ports the parts of a sample stand, as integers of the parts' shapes."""
+
+    instant: Any
+    base_poses: Any
+    governors: Any
+    funnel_lower: Any
+    funnel_upper: Any
+    energy_margins: Any
+    commanded_wrenches: Any
+    base_wrenches: Any
+    joint_torques: Any
+    accelerations: Any
+    realised: Any
+    ready_margins: Any
+
+
+def _places(loop: ClosedLoop, ports: _PortRow) -> _Places:
+    """Add everything that is read of a loop to a row."""
+    station, planner = loop.station.diagram, loop.cell_planner
+    states = [ports.add(station, f"robot_{robot.index}_state") for robot in loop.team.robots]
+    efforts = [ports.add(controller, "robot_effort") for controller in loop.controllers]
+    of = {name: [ports.add(law, name) for law in loop.laws] for name in ("ready", *TELEMETRY)}
+    realised = ports.add(station, "generalized_acceleration")[loop.team.velocity_index[:3]]
+    angle, joints = of["angle_funnel"][0], [np.split(funnels, 2) for funnels in of["joint_funnels"]]
+    return _Places(
+        instant=np.concatenate([ports.add(planner, "current_cell"), ports.add(planner, "arrived")]),
+        base_poses=np.array([state[:3] for state in states]),
+        governors=np.array(of["governor_position"]),
+        funnel_lower=np.concatenate([angle[:1], *(lower for lower, _ in joints)]),
+        funnel_upper=np.concatenate([angle[1:], *(upper for _, upper in joints)]),
+        energy_margins=np.concatenate(of["energy_margin"]),
+        commanded_wrenches=np.array(of["hand_command"])[:, 3:],
+        base_wrenches=np.array([effort[:3] for effort in efforts]),
+        joint_torques=np.concatenate([effort[3:] for effort in efforts]),
+        accelerations=np.array(of["object_acceleration"]),
+        realised=realised[None],
+        ready_margins=np.array([margin for _, margin in of["ready"]]),
+    )
 
 
 def port_reader(system: System, output: str, root: Context) -> Callable[[], Any]:
     """A function that evaluates one output; looking ports and contexts up takes longer than reading them."""
-    port, context = system.GetOutputPort(output), system.GetMyContextFromRoot(root)
-    return lambda: port.Eval(context)
+    return partial(system.GetOutputPort(output).Eval, system.GetMyContextFromRoot(root))
