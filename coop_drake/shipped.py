@@ -21,6 +21,12 @@ def shipped_scenarios() -> dict[str, Path]:
 
 
 def scenario_file(given: Path | str) -> Path:
-    """The file that is meant: the one given, or, where there is none, the shipped scenario of that name."""
+    """The file that is meant: the one given, the only one in a folder given, or the shipped one so named."""
     path = Path(given)
-    return path if path.exists() else shipped_scenarios().get(str(given), path)
+    if path.is_dir():
+        inside = list(path.glob("*" + _SUFFIX))
+        if len(inside) == 1:
+            return inside[0]
+    elif path.exists():
+        return path
+    return shipped_scenarios().get(str(given), path)

@@ -31,6 +31,18 @@ def test_a_file_of_that_name_comes_first(tmp_path, monkeypatch):
     assert scenario_file("base") == Path("base")
 
 
+def test_a_folder_stands_for_the_only_scenario_in_it(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "base").mkdir()
+    assert scenario_file("base") == SHIPPED / "base.scenario.yaml"
+    (tmp_path / "base" / "mine.scenario.yaml").write_text("one", encoding="utf-8")
+    assert scenario_file("base") == Path("base/mine.scenario.yaml")
+    (tmp_path / "base").rename("both")
+    (tmp_path / "both" / "other.scenario.yaml").write_text("two", encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"both: the file: 'a folder' .* just one \*.scenario.yaml"):
+        load_scenario("both")
+
+
 @pytest.mark.parametrize("name", ["bace", "models/none.scenario.yaml"])
 def test_what_is_neither_is_refused_with_the_names_there_are(name):
     with pytest.raises(ScenarioError, match=r"a readable file, or a shipped scenario: base, closed,"):

@@ -1,4 +1,4 @@
-"""The commands: run, plan, simulate.
+"""The commands, under the headings of the help; run, plan, simulate and warm are here themselves.
 
 Every command brings in what it needs when it is called: some need Drake, some the planner, some pictures,
 and none should wait for, or keep in memory, what only another one needs.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
@@ -42,10 +43,14 @@ __all__ = ["app", "main"]
 
 _UsageError = typer.BadParameter.__base__  # The same base in typer's own click and in the package click.
 
+_CARRYING, _MACHINE = "Carrying objects", "This machine"
+"""Headings of the help."""
+
 app = typer.Typer(
     name="coop-drake",
     help="Plan, map, control and simulate several mobile manipulators that carry one object.",
-    epilog="Exit codes: 0 done, 1 failed run, 2 bad input, 3 infeasible, 4 undecided, 130 interrupted.",
+    epilog="Begin with `coop-drake run base`, and for a case of your own with `coop-drake new NAME`.\n\n"
+    "Exit codes: 0 done, 1 failed run, 2 bad input, 3 infeasible, 4 undecided, 130 interrupted.",
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
@@ -88,7 +93,7 @@ def show_version(
         raise typer.Exit
 
 
-@app.command("run", epilog=epilog("run"))
+@app.command("run", epilog=epilog("run"), rich_help_panel=_CARRYING)
 def run_command(
     scenario: ScenarioPath,
     out: ResultsFolder = None,
@@ -110,7 +115,7 @@ def run_command(
     run_guarded(reporter, command)
 
 
-@app.command("plan", epilog=epilog("plan"))
+@app.command("plan", epilog=epilog("plan"), rich_help_panel=_CARRYING)
 def plan_command(
     scenario: ScenarioPath,
     out: ResultsFolder = None,
@@ -131,7 +136,7 @@ def plan_command(
     run_guarded(reporter, command)
 
 
-@app.command("simulate", epilog=epilog("simulate"))
+@app.command("simulate", epilog=epilog("simulate"), rich_help_panel=_CARRYING)
 def simulate_command(
     scenario: ScenarioPath,
     plan: Annotated[
@@ -162,7 +167,6 @@ def simulate_command(
     run_guarded(reporter, command)
 
 
-@app.command("warm", epilog=epilog("warm"))
 def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
     """Compile all kernels, so that the next command starts at once; `make` does it when it sets up."""
     reporter = Reporter(machine=False, quiet=quiet)
@@ -175,25 +179,32 @@ def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
     run_guarded(reporter, command)
 
 
-for name, command in (
-    ("watch", watch_command),
-    ("why", why_command),
-    ("verify", verify_command),
-    ("show", show_command),
-    ("maps", maps_command),
-    ("diagram", diagram_command),
-    ("compare", compare_command),
-    ("reproduce", reproduce_command),
-    ("tune", tune_command),
-    ("floor-plan", floor_plan_command),
-    ("new", new_command),
-    ("robot", robot_command),
-    ("schema", schema_command),
-    ("doctor", doctor_command),
-):
-    app.command(name, epilog=epilog(name))(command)
+_PANELS: dict[str, dict[str, Callable[..., None]]] = {
+    _CARRYING: {"tune": tune_command, "compare": compare_command},
+    "A case of your own": {
+        "new": new_command,
+        "floor-plan": floor_plan_command,
+        "robot": robot_command,
+        "show": show_command,
+        "schema": schema_command,
+    },
+    "Understanding answers": {
+        "why": why_command,
+        "verify": verify_command,
+        "watch": watch_command,
+        "diagram": diagram_command,
+        "reproduce": reproduce_command,
+    },
+    _MACHINE: {"doctor": doctor_command, "warm": warm_command, "maps": maps_command},
+}
+"""Commands that need no more than their name, in the order of the help."""
+
+for panel, commands in _PANELS.items():
+    for name, command in commands.items():
+        app.command(name, epilog=epilog(name), rich_help_panel=panel)(command)
 app.command(
     "bench",
     epilog=epilog("bench"),
+    rich_help_panel=_MACHINE,
     context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
 )(bench_command)

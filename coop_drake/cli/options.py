@@ -15,7 +15,7 @@ ScenarioPath = Annotated[
     Path,
     typer.Argument(
         metavar="SCENARIO",
-        help="Scenario file (*.scenario.yaml), or the name of a shipped scenario.",
+        help="Scenario file (*.scenario.yaml), a folder with one, or the name of a shipped scenario.",
         autocompletion=complete_scenario,
     ),
 ]

@@ -21,13 +21,17 @@ def load_scenario(path: Path | str) -> Scenario:
     limits) is checked by :func:`coop_drake.plant.planning_problem`.
 
     Args:
-        path: The file, ``NAME.scenario.yaml`` by custom; or the name of a shipped scenario, like ``base``.
+        path: The file, ``NAME.scenario.yaml`` by custom; a folder with just one; or the name of a shipped
+            scenario, like ``base``.
 
     Raises:
         ScenarioError: With file, key, value and what is allowed there.
         FloorPlanError: The workspace names a floor plan that cannot be read.
     """
     file = scenario_file(path)
+    if file.is_dir():
+        files = "a file, or a folder with just one *.scenario.yaml"
+        raise ScenarioError(str(path), "the file", "a folder", files)
     if not file.exists():
         known = ", ".join(shipped_scenarios())
         raise ScenarioError(
