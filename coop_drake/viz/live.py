@@ -66,6 +66,8 @@ class LiveView:
             sleep(ahead)
 
     def _show_cell(self, cell: int) -> None:
+        if cell == self._cell:  # Hiding it for a moment would let it flicker.
+            return
         for index, visible in ((self._cell, False), (cell, True)):
             for path in cell_paths(index):
                 self._scene.meshcat.SetProperty(path, "visible", visible)

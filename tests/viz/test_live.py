@@ -54,6 +54,16 @@ def test_team_cell_forces_and_trail_follow_the_run(shown):
     assert meshcat.HasPath("/motion/trail/00000")
 
 
+def test_a_cell_is_touched_when_it_changes_only(shown):
+    view, meshcat = shown
+    view(sample(0.0, 0.9, 1, 0.0))
+    meshcat.SetProperty("/plan/cells/001", "visible", False)  # as who watches may do
+    view(sample(0.1, 0.9, 1, 0.0))
+    assert not visible(meshcat, "/plan/cells/001")
+    view(sample(0.2, 0.9, 2, 0.0))
+    assert visible(meshcat, "/plan/cells/002")
+
+
 def test_steps_just_after_a_frame_are_left_out_but_the_last_one_is_shown(shown):
     view, meshcat = shown
     view(sample(0.0, 0.9, 0, 0.0))
