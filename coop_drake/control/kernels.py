@@ -1,4 +1,4 @@
-"""Compiled inner loops of the laws; what they compute is explained in funnels.py, ppc.py and robot_effort.py.
+"""Compiled inner loops of the laws; what they compute is explained in funnels.py, ppc.py and load_sharing.py.
 
 Laws that run in the loop read what they need of one cell from one table, one row for each axis: every array
 that is handed over takes longer than the law itself.
@@ -271,30 +271,3 @@ def write_walls(rows: FloatArray, time: float, walls: FloatArray) -> None:
         value = decay(time, rows[i, 4], rows[i, 5] != 0.0)[0]
         walls[i] = rows[i, 2] + (rows[i, 0] - rows[i, 2]) * value
         walls[m + i] = rows[i, 3] + (rows[i, 1] - rows[i, 3]) * value
-
-
-@compiled
-def robot_acceleration(
-    end_effector: FloatArray, joints: FloatArray, jacobian: FloatArray, rate_term: FloatArray
-) -> FloatArray:
-    """Return z'' of one robot; see ``robot_effort``. The base's three unknowns follow from Cramer's rule."""
-    n = joints.size
-    a, b, c = end_effector[0] - rate_term[0], end_effector[1] - rate_term[1], end_effector[2] - rate_term[2]
-    for i in range(n):
-        a -= jacobian[0, 3 + i] * joints[i]
-        b -= jacobian[1, 3 + i] * joints[i]
-        c -= jacobian[2, 3 + i] * joints[i]
-    # Rows of the adjugate of J_b are cross products of its columns.
-    x0, x1, x2 = jacobian[0, 0], jacobian[1, 0], jacobian[2, 0]
-    y0, y1, y2 = jacobian[0, 1], jacobian[1, 1], jacobian[2, 1]
-    t0, t1, t2 = jacobian[0, 2], jacobian[1, 2], jacobian[2, 2]
-    u0, u1, u2 = y1 * t2 - y2 * t1, y2 * t0 - y0 * t2, y0 * t1 - y1 * t0
-    v0, v1, v2 = t1 * x2 - t2 * x1, t2 * x0 - t0 * x2, t0 * x1 - t1 * x0
-    w0, w1, w2 = x1 * y2 - x2 * y1, x2 * y0 - x0 * y2, x0 * y1 - x1 * y0
-    determinant = x0 * u0 + x1 * u1 + x2 * u2
-    result = np.empty(3 + n)
-    result[0] = (u0 * a + u1 * b + u2 * c) / determinant
-    result[1] = (v0 * a + v1 * b + v2 * c) / determinant
-    result[2] = (w0 * a + w1 * b + w2 * c) / determinant
-    result[3:] = joints
-    return result

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.control import kernels
 from coop_drake.control.gains import FloatArray
 
 
@@ -32,9 +31,8 @@ def robot_acceleration(
     Returns:
         z'', shape (3 + n,).
     """
-    return kernels.robot_acceleration(
-        end_effector_acceleration, joint_acceleration, jacobian, jacobian_rate_term
-    )
+    wanted = end_effector_acceleration - jacobian_rate_term - jacobian[:, 3:] @ joint_acceleration
+    return np.concatenate([np.linalg.solve(jacobian[:, :3], wanted), joint_acceleration])
 
 
 def robot_torque(
