@@ -40,9 +40,8 @@ def tuning_figure(found: Search) -> Figure:
     figure = new_figure(9.5, 4.6, caption)
     plane, fall = figure.subplots(1, 2, width_ratios=(3, 2))
     _draw_trials(plane, found, other, sought)
-    scores = np.array(found.scores)
-    best = np.minimum.accumulate(scores)
-    shown = best < 1e3
+    best = np.minimum.accumulate(found.scores)
+    shown = np.logical_or.accumulate([found.objective.kept(trial.outcome) for trial in found.trials])
     fall.step(np.arange(len(best))[shown], best[shown], where="post", color=VERMILLION)
     fall.set_xlabel("run")
     fall.set_ylabel("best score so far [-]")
