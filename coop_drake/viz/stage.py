@@ -7,7 +7,7 @@ from math import radians
 import numpy as np
 import shapely
 from pydrake.geometry import Meshcat, Rgba
-from shapely import MultiLineString, Polygon, minimum_rotated_rectangle
+from shapely import MultiLineString, Polygon, box, minimum_rotated_rectangle
 
 from coop_drake.drawing.camera import camera_pose
 from coop_drake.drawing.solids import (
@@ -111,12 +111,7 @@ def _length(shape: Polygon) -> float:
 def _shelf(shape: Polygon, height: float) -> TriangleMesh:
     """Boards of the obstacle's own outline, held by a post at every corner."""
     corners = np.asarray(shape.exterior.coords)[:-1, :2]
-    posts = [
-        Polygon(
-            [(x - _POST, y - _POST), (x + _POST, y - _POST), (x + _POST, y + _POST), (x - _POST, y + _POST)]
-        )
-        for x, y in corners
-    ]
+    posts = [box(x - _POST, y - _POST, x + _POST, y + _POST) for x, y in corners]
     inside = [part for post in posts for part in parts_of(post & shape)]
     boards = [slab_mesh([shape], part * height - _BOARD, part * height) for part in _BOARDS]
     return joined([wall_mesh(inside, height), *boards])
