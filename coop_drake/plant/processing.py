@@ -6,9 +6,16 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from pydrake.geometry import SceneGraph
-from pydrake.multibody.parsing import ModelDirectives, PackageMap, Parser, ProcessModelDirectives
+from pydrake.multibody.parsing import (
+    ModelDirective,
+    ModelDirectives,
+    PackageMap,
+    Parser,
+    ProcessModelDirectives,
+)
 from pydrake.multibody.plant import MultibodyPlant
 
+from coop_drake.plant.read_together import read_together
 from coop_drake.scenario import Assembly
 
 _REPLACED = re.compile(r"invalid inertia|inertia matrix|central inertia|Using default value")
@@ -22,20 +29,41 @@ def process(
 
     Warnings that are no complaints are passed on to Drake's logger.
     """
+    directives = [assembly.directives[index] for index in indices]
+    complaint, done = _process(assembly, directives, plant, scene_graph, together=True)
+    if complaint and done:
+        # Drake's words about the files themselves, not about the document that they were read in.
+        scratch, geometry = MultibodyPlant(0.0), SceneGraph() if scene_graph else None
+        if geometry:
+            scratch.RegisterAsSourceForSceneGraph(geometry)
+        complaint = _process(assembly, directives, scratch, geometry, together=False)[0] or complaint
+    return complaint
+
+
+def _process(
+    assembly: Assembly,
+    directives: Sequence[ModelDirective],
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph | None,
+    *,
+    together: bool,
+) -> tuple[str, bool]:
+    """The complaint, and whether it is about models that were read together."""
     parser = Parser(plant, scene_graph) if scene_graph else Parser(plant)
     parser.package_map().AddMap(_missing(assembly, parser))
+    done = together
     try:
         with _warnings() as records:
-            ProcessModelDirectives(
-                ModelDirectives(directives=[assembly.directives[index] for index in indices]), parser
-            )
+            done = together and read_together(directives, parser)
+            if not done:
+                ProcessModelDirectives(ModelDirectives(directives=list(directives)), parser)
     except (RuntimeError, ValueError, SystemExit) as error:  # pydrake exits where Drake's C++ would abort
-        return " ".join(str(error).split())
+        return " ".join(str(error).split()), done
     messages = [" ".join(record.getMessage().split()) for record in records]
     replaced = [message for message in messages if _REPLACED.search(message)]
     if not replaced:
         _pass_on(records)
-    return "; ".join(dict.fromkeys(replaced))
+    return "; ".join(dict.fromkeys(replaced)), done
 
 
 def _missing(assembly: Assembly, parser: Parser) -> PackageMap:
