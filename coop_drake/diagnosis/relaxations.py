@@ -8,7 +8,13 @@ from math import pi
 
 from coop_drake.diagnosis.bracket import Bracket, Steps, bracketed
 from coop_drake.diagnosis.squeeze import squeezed
-from coop_drake.diagnosis.team_changes import base_bodies, object_bodies, shrunk_bodies, widened_joints
+from coop_drake.diagnosis.team_changes import (
+    base_bodies,
+    object_bodies,
+    shrink_into_themselves,
+    shrunk_bodies,
+    widened_joints,
+)
 from coop_drake.diagnosis.trials import Trial, Trials
 from coop_drake.geometry.tree import ComponentTree
 from coop_drake.planning import PlanningProblem
@@ -32,6 +38,7 @@ class Change:
         tree: The team with an amount of the change.
         most: Largest amount tried.
         resolution: How closely the least amount is looked for.
+        monotone: Whether what is free for an amount is free for every larger one.
     """
 
     name: str
@@ -39,6 +46,7 @@ class Change:
     tree: Callable[[float], ComponentTree]
     most: float
     resolution: float
+    monotone: bool = True
 
 
 @dataclass(frozen=True)
@@ -53,6 +61,11 @@ class Relaxation:
     change: Change
     bracket: Bracket
 
+    @property
+    def never_enough(self) -> bool:
+        """Whether no amount up to the largest tried is enough, proved."""
+        return self.change.monotone and self.bracket.is_refuted
+
 
 def changes(tree: ComponentTree) -> list[Change]:
     """The changes that make sense for a team."""
@@ -65,6 +78,7 @@ def changes(tree: ComponentTree) -> list[Change]:
             lambda a: shrunk_bodies(tree, bodies, 1.0 - a),
             _MOST_SHRINKAGE,
             _SHRINKAGE_RESOLUTION,
+            shrink_into_themselves(tree, bodies),
         )
 
     listed = [shrinking("smaller bases", bases)] if bases else []

@@ -142,7 +142,7 @@ def _relaxation(relaxation: Relaxation) -> str:
             "" if not bracket.refuted else f" ({_amount(relaxation, bracket.refuted)} proved too little)"
         )
         return f"enough by {_amount(relaxation, bracket.found)}{too_little}"
-    known = "proved" if bracket.is_refuted else "not found"
+    known = "proved" if relaxation.never_enough else "not found"
     return f"not by this alone ({known} up to {_amount(relaxation, bracket.most)})"
 
 
@@ -175,7 +175,12 @@ def facts_of(diagnosis: Diagnosis) -> dict[str, Any]:
     if diagnosis.mixed:
         facts["mixed"] = [mixed_facts(cell) for cell in diagnosis.mixed]
     facts["relaxations"] = [
-        {"name": r.change.name, "unit": r.change.unit, **_bracket_facts(r.bracket)}
+        {
+            "name": r.change.name,
+            "unit": r.change.unit,
+            **_bracket_facts(r.bracket),
+            "proved_never_enough": r.never_enough,
+        }
         for r in diagnosis.relaxations
     ]
     return facts

@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from itertools import pairwise
 from math import pi
 
 import numpy as np
 import shapely
+from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import Body, ComponentTree, ConvexShape, TreeJoint
 
-__all__ = ["base_bodies", "body_size", "object_bodies", "shrunk_bodies", "widened_joints"]
+__all__ = [
+    "base_bodies",
+    "body_size",
+    "object_bodies",
+    "shrink_into_themselves",
+    "shrunk_bodies",
+    "widened_joints",
+]
 
 _SLIDE_PER_RADIAN = 0.25
 """A prismatic joint is widened by so much for every radian of a revolute one [m/rad]."""
@@ -50,7 +59,9 @@ def body_size(body: Body) -> tuple[float, float]:
 
 
 def shrunk_bodies(tree: ComponentTree, names: Collection[str], factor: float) -> ComponentTree:
-    """Scale some bodies about the middle of their footprint; joints and grasps stay where they are.
+    """Scale some bodies about a point of their footprint; joints and grasps stay where they are.
+
+    It is the middle, or where all of the footprint is not seen from there, a point from which it is.
 
     Args:
         tree: The team.
@@ -65,6 +76,12 @@ def shrunk_bodies(tree: ComponentTree, names: Collection[str], factor: float) ->
         for component in tree.components
     )
     return ComponentTree(components, tree.sharing_joint)
+
+
+def shrink_into_themselves(tree: ComponentTree, names: Collection[str]) -> bool:
+    """Whether some bodies, the smaller they are, need less of the same room: those like a U do not."""
+    bodies = [body for component in tree.components for body in component.bodies if body.name in names]
+    return not any(_kernel(_outline(body)).is_empty for body in bodies)
 
 
 def widened_joints(tree: ComponentTree, amount: float) -> ComponentTree:
@@ -95,8 +112,30 @@ def _outline(body: Body) -> BaseGeometry:
     )
 
 
+def _kernel(outline: BaseGeometry) -> BaseGeometry:
+    """Points from which all of an outline is seen: those to the left of all its edges."""
+    if not isinstance(outline, Polygon) or outline.interiors:
+        return Polygon()
+    kernel: BaseGeometry = outline.convex_hull
+    corners = shapely.get_coordinates(shapely.orient_polygons(outline))
+    reach = 4.0 * float(np.hypot(*np.ptp(corners, axis=0)))
+    for first, last in pairwise(corners):
+        x, y = reach * (last - first) / np.hypot(*(last - first))
+        left = np.array([[-x, -y], [x, y], [x - y, y + x], [-x - y, -y + x]])
+        kernel = kernel.intersection(Polygon(first + left))
+    return kernel
+
+
+def _middle(outline: BaseGeometry) -> FloatArray:
+    """The point towards which an outline is shrunk, shape (2,) [m]."""
+    centre, kernel = outline.convex_hull.centroid, _kernel(outline)
+    place = centre if kernel.is_empty or kernel.covers(centre) else kernel.centroid
+    middle: FloatArray = shapely.get_coordinates(place)[0]
+    return middle
+
+
 def _scaled(body: Body, factor: float) -> Body:
-    middle: FloatArray = shapely.get_coordinates(_outline(body).convex_hull.centroid)[0]
+    middle = _middle(_outline(body))
     shapes = tuple(
         ConvexShape(middle + factor * (shape.vertices - middle), factor * shape.radius)
         for shape in body.shapes
