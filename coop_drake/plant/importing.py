@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from math import pi
+from math import isfinite, nan, pi
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
@@ -132,7 +132,7 @@ class _Work:
                 self.dropped.add(str(child.tag))
                 element.remove(child)
             else:
-                if child.tag == "dynamics" and float(child.attrib.pop("friction", "0")) != 0.0:
+                if child.tag == "dynamics" and self._number(child.attrib.pop("friction", "0"), child.tag):
                     self.dropped.add("friction")
                 if child.tag == "origin" and "rpy" in child.attrib:
                     child.set("rpy", self._squared(child.attrib["rpy"]))
@@ -144,11 +144,22 @@ class _Work:
         """Angles with those made right that a file rounds; axes that should be upright then are."""
         angles = []
         for text in rpy.split():
-            quarters = round(float(text) / (0.5 * pi))
-            near = 0.0 < abs(float(text) - quarters * 0.5 * pi) <= _NEARLY_RIGHT
+            angle = self._number(text, "rpy")
+            quarters = round(angle / (0.5 * pi))
+            near = 0.0 < abs(angle - quarters * 0.5 * pi) <= _NEARLY_RIGHT
             self.squared += near
             angles.append(repr(quarters * 0.5 * pi) if near else text)
         return " ".join(angles)
+
+    def _number(self, text: str, where: str) -> float:
+        """A number of the file."""
+        try:
+            number = float(text)
+        except ValueError:
+            number = nan
+        if not isfinite(number):
+            raise ScenarioError(str(self.path), where, text, "a finite number")
+        return number
 
     def make_solid(self, link: Element) -> None:
         """Turn a link's meshes into hulls, and its pictures into what collides if nothing else does."""
@@ -170,11 +181,12 @@ class _Work:
         if inertia is None:
             return
         said = {key: inertia.get(key) or inertia.findtext(key) or "0" for key in _MOMENTS}
-        xx, yy, zz, xy, xz, yz = (float(said[key]) for key in _MOMENTS)
+        name = str(link.get("name"))
+        xx, yy, zz, xy, xz, yz = (self._number(said[key], f"{key} of {name}") for key in _MOMENTS)
         moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         if moments[0] >= 0.0 and moments[0] + moments[1] >= moments[2] * (1.0 - 1e-9):
             return
-        self.mended.append(str(link.get("name")))
+        self.mended.append(name)
         for key in _MOMENTS:
             value = f"{max(moments[2], 0.0):.9g}" if key in _MOMENTS[:3] else "0"
             child = inertia.find(key)

@@ -126,11 +126,17 @@ def test_what_cannot_be_read_is_refused(maker, tmp_path):
         "gone.urdf": (exchanged(text, ("package://maker/meshes/base.stl", "gone.stl")), "a file that exists"),
         "empty.urdf": ("<robot name='a'/>", "a model with links"),
         "robot.xacro": (text, r"a .urdf or .sdf file"),
+        "rpy.urdf": (exchanged(text, ('rpy="0 0 3.14159"', 'rpy="0 0 ${pi}"')), "rpy: .*a finite number"),
+        "friction.urdf": (exchanged(text, ('friction="1"', 'friction="nan"')), "dynamics: .*a finite number"),
     }
     for name, (content, allowed) in cases.items():
         (tmp_path / name).write_text(content)
         with pytest.raises(ScenarioError, match=allowed):
             import_robot(tmp_path / name)
+    heavy = LINK.format(name="base", mass=1, ixx="1.0e", shapes="")
+    (tmp_path / "inertia.urdf").write_text(ROBOT.format(links=heavy))
+    with pytest.raises(ScenarioError, match=r"ixx of base: .*a finite number"):
+        import_robot(tmp_path / "inertia.urdf")
     broken = tmp_path / "broken.stl"
     broken.write_text("no mesh at all")
     (tmp_path / "mesh.urdf").write_text(exchanged(text, ("package://maker/meshes/base.stl", "broken.stl")))
