@@ -16,7 +16,7 @@ from coop_drake.verification.checks import Check
 from coop_drake.verification.covers import uncovered
 from coop_drake.verification.inner_sweeps import inscribed_circle
 from coop_drake.verification.labels import check_spread
-from coop_drake.verification.may_be_free import fitting_positions
+from coop_drake.verification.may_be_free import fitting_positions, without_slivers
 from coop_drake.verification.outer_sweeps import outer_sweep
 from coop_drake.verification.solids import Solid, component_stages
 from coop_drake.verification.walls import wall_edges
@@ -49,7 +49,8 @@ def check_disc(separation: DiscSeparation, problem: PlanningProblem) -> tuple[Ch
 
     def outside(tolerance: float) -> BaseGeometry:
         circle = inscribed_circle(radius - 2.0 * ROUNDING, tolerance)
-        return fitting_positions(walls, circle, problem.workspace.envelope).difference(cover)
+        fits = fitting_positions(walls, circle, problem.workspace.envelope)
+        return without_slivers(fits.difference(cover), cover, ROUNDING)
 
     rest, tolerance = uncovered(outside)
     if not rest.is_empty:

@@ -9,11 +9,11 @@ from shapely.geometry.base import BaseGeometry
 
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.tree import ComponentTree
-from coop_drake.verification.inner_sweeps import inner_sweep
+from coop_drake.verification.inner_sweeps import HAIR, inner_sweep
 from coop_drake.verification.solids import colliding_pairs, team_solids
 from coop_drake.verification.walls import Walls, wall_edges, wall_sums
 
-__all__ = ["FreePositions", "fitting_positions"]
+__all__ = ["FreePositions", "fitting_positions", "without_slivers"]
 
 
 class FreePositions:
@@ -51,7 +51,7 @@ class FreePositions:
             ring = self._ring(index, lower, upper, tolerance) if solid.component > 0 else None
             if ring is not None:
                 rest = fitting_positions(self._walls, ring, rest)
-        return rest
+        return without_slivers(rest, cover, HAIR)
 
     def fits_nowhere(self, lower: FloatArray, upper: FloatArray, place: FloatArray, tolerance: float) -> bool:
         """Whether the team collides at a position and all angles of a slice.
@@ -116,6 +116,23 @@ def fitting_positions(walls: Walls, ring: FloatArray, among: BaseGeometry) -> Mu
     sums = wall_sums(walls.starts[near], walls.ends[near], ring)
     shapely.prepare(fits)
     return _areas(fits.difference(shapely.union_all(sums[shapely.intersects(fits, sums)])))
+
+
+def without_slivers(rest: BaseGeometry, cover: BaseGeometry, hair: float) -> MultiPolygon:
+    """What is left without parts that are rounding: they hold no disc of a quarter of the hair.
+
+    A footprint that is smaller than it need be by a hair fits all over the disc of that radius about every
+    free position. Only beside the cover, which may cut such discs, every part counts.
+
+    Args:
+        rest: Positions outside a cover at which a footprint fits that is a hair smaller than it need be.
+        cover: The cover.
+        hair: The hair [m].
+    """
+    parts = np.asarray(shapely.get_parts(_areas(rest)))
+    thick = ~shapely.is_empty(shapely.buffer(parts, -0.25 * hair))
+    beside = shapely.distance(parts, cover) <= 2.0 * hair
+    return MultiPolygon(list(parts[thick | beside]))
 
 
 def _areas(shape: BaseGeometry) -> MultiPolygon:
