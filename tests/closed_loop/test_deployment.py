@@ -17,6 +17,7 @@ from tests.support.small_loop import small_maps, small_problem
 RATE = 100.0
 MILD = {
     "sampling": Deployment(control_rate=RATE),
+    "sampling, quicker": Deployment(control_rate=200.0),
     "saturation": Deployment(actuators=ActuatorLimits(base_force=50.0)),
     "noise": Deployment(control_rate=RATE, measurements=Measurements(1e-3, 5e-4, 1e-3)),
     "delay": Deployment(control_rate=200.0, measurements=Measurements(delay=0.005)),
@@ -66,6 +67,15 @@ def test_a_mild_departure_is_survived(name):
     assert log.acceleration_error.max() > 1e-3  # it does depart
     assert log.energy_margin.min() >= 0.0
     assert_certified(small_problem("base")[1], log)
+
+
+def test_a_thousand_samples_a_second_are_survived_too():
+    scenario, plan = small_problem("base")
+    fast = replace(scenario, deployment=Deployment(control_rate=1000.0))
+    log = simulate(fast, plan, small_maps(), blocks="fused")
+    assert log.reached
+    assert log.violation == ""
+    assert min(log.funnel_margin.min(), log.slice_margin.min(), log.cell_clearance.min()) > 0.0
 
 
 @pytest.mark.parametrize("name", HARSH)
