@@ -8,6 +8,12 @@ import subprocess
 import sys
 import time
 
+import pytest
+import typer
+
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.reporter import Reporter
 from coop_drake.planning import load_plan
 from tests.support.scenarios import MODELS
 
@@ -33,3 +39,23 @@ def test_ctrl_c_after_planning_leaves_the_plan_whole_and_nothing_half_written(tm
     assert "Traceback" not in stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["plan.json", "table_1.md"]
     assert load_plan(tmp_path / "plan.json").cells
+
+
+def _ended(error: BaseException) -> int:
+    """Exit code of a command that raises an error."""
+
+    def command() -> ExitCode:
+        raise error
+
+    with pytest.raises(typer.Exit) as left:
+        run_guarded(Reporter(machine=False, quiet=True), command)
+    return left.value.exit_code
+
+
+def test_ctrl_c_inside_compiled_code_and_imports_is_no_bug(capsys):
+    for error in (SystemError("a result with an exception set"), ImportError("initialization failed")):
+        error.__cause__ = KeyboardInterrupt()
+        assert _ended(error) == 130
+        assert "interrupted" in capsys.readouterr().err
+    with pytest.raises(SystemError, match="of another kind"):
+        _ended(SystemError("of another kind"))

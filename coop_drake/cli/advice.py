@@ -138,6 +138,10 @@ def _verified(
     )
     _write(found, wishes, folder, reporter, state)
     _show(reporter, f"{task.scenario.name}, gains tuned", found, after, anew)
+    if found.best is found.trials[0]:
+        reporter.say(
+            f"None of {len(found.trials) - 1} runs was better: these are the gains there were before."
+        )
     if not kept:
         reporter.complain(f"no gains were found that keep every limit: {after.violation or wishes.limits}")
     return ExitCode.DONE if kept else ExitCode.FAILED_RUN

@@ -109,7 +109,7 @@ def _tell(plan: FloorPlan, file: Path, reporter: Reporter) -> None:
         ("from", f"({x:.3f}, {y:.3f}) m"),
         ("to", f"({right:.3f}, {top:.3f}) m"),
         ("floor", f"{plan.polygon.area:.2f} m²"),
-        ("taken by walls", f"{taken:.3g} m²"),
+        ("taken by walls", f"{taken:.2f} m²"),
         ("obstacles", f"{facts['obstacles']}"),
         ("corners", f"{facts['corners']} of {facts['corners_drawn']} drawn"),
     ]

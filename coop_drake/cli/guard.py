@@ -34,8 +34,7 @@ def _attempt(reporter: Reporter, command: Callable[[], ExitCode]) -> ExitCode:
     try:
         return command()
     except KeyboardInterrupt:
-        reporter.complain("interrupted; files already written are whole")
-        return ExitCode.INTERRUPTED
+        return _interrupted(reporter)
     except ScenarioError as error:
         details = {"file": error.file, "key": error.key, "value": error.shown, "allowed": error.allowed}
         reporter.complain(str(error), **details)
@@ -54,9 +53,25 @@ def _attempt(reporter: Reporter, command: Callable[[], ExitCode]) -> ExitCode:
         reporter.complain(_of_the_system(error))
         return ExitCode.BAD_INPUT
     except Exception as error:
+        if _came_of_ctrl_c(error):
+            return _interrupted(reporter)
         # A bug, not a mistake of the user's: machines get their object, people the traceback.
         reporter.complain(f"{type(error).__name__}: {error}")
         raise
+
+
+def _interrupted(reporter: Reporter) -> ExitCode:
+    reporter.complain("interrupted; files already written are whole")
+    return ExitCode.INTERRUPTED
+
+
+def _came_of_ctrl_c(error: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an error: compiled code and imports that it ends raise errors of their own."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def _of_the_system(error: OSError) -> str:
