@@ -51,7 +51,7 @@ class Trial:
 def quickest_blocks(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> Blocks:
     """Fused blocks where they know all that the scenario wants, else named ones."""
     try:
-        build_closed_loop(scenario, plan, maps, blocks="fused")
+        build_closed_loop(scenario, plan, maps, blocks="fused").release()
     except ScenarioError:
         return "named"
     return "fused"
