@@ -75,26 +75,23 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int) -> DeployedC
     builder.ExportInput(controller.GetInputPort("current_cell"), "current_cell")
     effort = wrapping.actuate(controller.GetOutputPort("robot_effort"), joints)
     builder.ExportOutput(effort, "robot_effort")
-    seed = _seed(deployment, robot)
-    builder.ExportOutput(wrapping.send(controller.GetOutputPort("ready"), seed), "ready")
+    builder.ExportOutput(wrapping.send(controller.GetOutputPort("ready"), robot), "ready")
     for name in TELEMETRY:
         builder.ExportOutput(controller.GetOutputPort(name), name)
-    return DeployedController(builder.Build(), controller, tuple(wrapping.noises), wrapping.delays, seed)
+    return DeployedController(
+        builder.Build(), controller, tuple(wrapping.noises), wrapping.delays, _seed(deployment, robot)
+    )
 
 
 def build_radio(deployment: Deployment, robot: int) -> MessageChannel:
     """The channel of a robot's reports in a team that is sampled."""
-    return _radio(deployment, _seed(deployment, robot))
-
-
-def _radio(deployment: Deployment, seed: int) -> MessageChannel:
     messages = deployment.messages
     return MessageChannel(
         deployment.period or 0.0,
         delay=messages.delay,
         loss=messages.loss,
         repeat=messages.repeat,
-        seed=seed,
+        seed=_seed(deployment, robot),
     )
 
 
@@ -150,11 +147,11 @@ class _Wrapping:
         self._builder.Connect(effort, saturation.get_input_port())
         return saturation.get_output_port()
 
-    def send(self, ready: OutputPort, seed: int) -> OutputPort:
-        """The reports as the cell planner hears them."""
+    def send(self, ready: OutputPort, robot: int) -> OutputPort:
+        """The reports of a robot as the cell planner hears them."""
         if self._deployment.period is None:
             return ready
-        channel = self._builder.AddNamedSystem("radio", _radio(self._deployment, seed))
+        channel = self._builder.AddNamedSystem("radio", build_radio(self._deployment, robot))
         self._builder.Connect(ready, channel.get_input_port())
         return channel.get_output_port()
 
