@@ -14,6 +14,7 @@ from coop_drake.reproduction.corridor import corridor_plan, corridor_scenario
 from coop_drake.reproduction.runs import GAIN_SETS, part_of
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import SimulationLog, build_maps, simulate
+from coop_drake.tuning import CRITERIA
 
 __all__ = ["GainFigures", "compare_gains"]
 
@@ -86,18 +87,16 @@ def compare_gains(
 
 
 def _figures(name: str, log: SimulationLog) -> GainFigures:
-    forces = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1])
-    turning = np.diff(log.object_twist[:, 2]) / np.diff(log.times)
     return GainFigures(
         name=name,
         seconds=float(log.times[-1]),
-        peak_force=float(forces.max()),
-        peak_angular_acceleration=float(np.abs(turning).max()),
+        peak_force=CRITERIA["peak_force"].measure(log),
+        peak_angular_acceleration=CRITERIA["peak_turning"].measure(log),
         peak_joint_rate=float(np.abs(log.joint_rates).max()),
         funnel_margin=float(log.funnel_margin.min()),
         energy_margin=float(log.energy_margin.min()),
         acceleration_error=float(log.acceleration_error.max()),
         wrench_error=float(log.wrench_error.max()),
         governor_spread=float(log.governor_spread.max()),
-        violation=log.violation if not log.reached else "",
+        violation=log.violation,
     )

@@ -84,7 +84,7 @@ def run_governor(
         position: p at the beginning, shape (2,) [m].
         velocity: p' there, shape (2,) [m/s].
         governor: p_G there, shape (2,) [m].
-        gains: (K, zeta, K_G, c).
+        gains: K [1/s^2], zeta [1/s], K_G [-] and c [m].
         seconds: Duration [s].
         margin: Delta E; (15) corrected unless given.
         tolerance: Relative and absolute, of the integration.
