@@ -12,7 +12,7 @@ from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.scenario import load_scenario
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.schema import in_file
-from coop_drake.systems import OrientationPpc
+from coop_drake.systems import AxisPpc
 from docs.generate.__main__ import SCENARIO_PAGE
 from docs.generate.api_pages import api_pages
 from docs.generate.links import for_site
@@ -82,12 +82,15 @@ def test_the_robot_that_is_shown_makes_a_team(tmp_path):
 def test_the_block_that_is_shown_stands_in_for_the_funnel():
     names = {}
     exec(shown("controller_block.md", "python"), names)  # the page's own code
-    block = names["SpringAngle"](0.5, stiffness=4.0, damping=2.0)
+    block = names["SpringAxes"]([0.5, 0.1], stiffness=4.0, damping=2.0)
     outputs = {block.get_output_port(i).get_name() for i in range(block.num_output_ports())}
-    assert outputs == set(re.findall(r"output  ``(\w+)``", OrientationPpc.__doc__))
+    assert outputs == set(re.findall(r"output  ``(\w+)``", AxisPpc.__doc__))
     context = block.CreateDefaultContext()
     block.GetInputPort("object_state").FixValue(context, [0, 0, 0.7, 0, 0, 0.1])
-    assert block.GetOutputPort("angle_acceleration").Eval(context) == pytest.approx([-4 * 0.2 - 2 * 0.1])
+    block.GetInputPort("robot_state").FixValue(context, [1, 2, 3, 0.4, 5, 6, 7, -0.3])
+    expected = [-4 * 0.2 - 2 * 0.1, -4 * 0.3 + 2 * 0.3]
+    assert block.GetOutputPort("axis_acceleration").Eval(context) == pytest.approx(expected)
+    assert block.GetOutputPort("funnels").Eval(context) == pytest.approx([0.4, 0.0, 0.6, 0.2])
 
 
 def test_tables_of_ports_become_tables_of_markdown():

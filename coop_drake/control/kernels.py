@@ -173,31 +173,50 @@ def track_row(row: FloatArray, time: float, position: float, rate: float) -> tup
 
 
 @compiled
-def track_state(
-    table: FloatArray, time: float, state: FloatArray, first: int, first_rate: int, acceleration: FloatArray
-) -> None:
-    """Write the acceleration of every axis whose positions and rates stand in a state, shape (m,)."""
-    for i in range(table.shape[0]):
-        acceleration[i] = track_row(table[i], time, state[first + i], state[first_rate + i])[0]
+def track_cell(
+    tables: FloatArray, current_cell: FloatArray, now: float, thing: FloatArray, robot: FloatArray,
+    acceleration: FloatArray,
+) -> bool:  # fmt: skip
+    """Write the accelerations of the object's angle and one robot's joints in the current cell.
+
+    Args:
+        tables: The tables of the axes (theta, q_k) in all cells, shape (cells, 1 + n, ``LAW_COLUMNS``).
+        current_cell: Index of the current cell, time of its entry [-, s].
+        now: Time [s].
+        thing: Pose and twist of the object, shape (6,).
+        robot: (z_k, z_k'), shape (2 (3 + n),).
+        acceleration: Receives the accelerations, shape (1 + n,).
+
+    Returns:
+        Whether there is such a cell; nothing is written otherwise.
+    """
+    index, n = int(current_cell[0]), tables.shape[1] - 1
+    if not 0 <= index < tables.shape[0]:
+        return False
+    table, time = tables[index], now - current_cell[1]
+    acceleration[0] = track_row(table[0], time, thing[2], thing[5])[0]
+    for i in range(n):
+        acceleration[1 + i] = track_row(table[1 + i], time, robot[3 + i], robot[6 + n + i])[0]
+    return True
 
 
 @compiled
 def hand_command(
-    share: FloatArray, state: FloatArray, linear: FloatArray, angular: FloatArray, command: FloatArray
+    share: FloatArray, state: FloatArray, ax: float, ay: float, alpha: float, command: FloatArray
 ) -> None:
     """Write the acceleration of a grasp, then its wrench on the object; see ``load_sharing``.
 
     Args:
         share: (p_LE, p_LLcm, mass, inertia, the robot's part of the work), shape (7,).
         state: Pose and twist of the object, shape (6,).
-        linear: Desired acceleration of the object's origin, shape (2,).
-        angular: Desired angular acceleration, shape (1,).
+        ax: Desired acceleration of the object's origin along x ...
+        ay: ... and along y [m/s^2].
+        alpha: Desired angular acceleration [rad/s^2].
         command: Receives both, shape (6,).
     """
     c, s, turning = np.cos(state[2]), np.sin(state[2]), state[5] * state[5]
     rx, ry = c * share[0] - s * share[1], s * share[0] + c * share[1]
     mx, my = c * share[2] - s * share[3], s * share[2] + c * share[3]
-    ax, ay, alpha = linear[0], linear[1], angular[0]
     command[0] = ax - alpha * ry - turning * rx
     command[1] = ay + alpha * rx - turning * ry
     command[2] = alpha
@@ -205,6 +224,14 @@ def hand_command(
     fy = share[6] * share[4] * (ay + alpha * mx - turning * my)
     command[3], command[4] = fx, fy
     command[5] = share[6] * share[5] * alpha - (my - ry) * fx + (mx - rx) * fy
+
+
+@compiled
+def command_hand(
+    share: FloatArray, state: FloatArray, governor: FloatArray, axes: FloatArray, command: FloatArray
+) -> None:
+    """Write what ``hand_command`` does from a governor's command, shape (4,), and accelerations of axes."""
+    hand_command(share, state, governor[2], governor[3], axes[0], command)
 
 
 @compiled

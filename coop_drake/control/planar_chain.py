@@ -132,6 +132,33 @@ def read_robot(chain: FloatArray, yaw: float, joints: IntArray, state: FloatArra
 
 
 @compiled
+def read_team(
+    pose: IntArray, first: IntArray, ways: FloatArray, yaws: FloatArray, first_joint: IntArray,
+    joints: IntArray, state: FloatArray, measured: FloatArray,
+) -> None:  # fmt: skip
+    """Write the object's pose, then of every robot what ``read_robot`` writes.
+
+    Args:
+        pose: Where the object's pose stands in the state, shape (3,).
+        first: Row of ``ways`` with which each robot's begin, and the number of rows, shape (N + 1,).
+        ways: From the object to every robot's base.
+        yaws: Angles of the bases in the object where all joints are at zero, shape (N,) [rad].
+        first_joint: As ``first``, of ``joints``.
+        joints: Where all joints stand in the state, then where their rates do, shape (2, n).
+        state: Of the team.
+        measured: Receives all, shape (3 + 6 N + 2 n,).
+    """
+    for i in range(3):
+        measured[i] = state[pose[i]]
+    at = 3
+    for k in range(yaws.size):
+        own = joints[:, first_joint[k] : first_joint[k + 1]]
+        end = at + 2 * (3 + own.shape[1])
+        read_robot(ways[first[k] : first[k + 1]], yaws[k], own, state, measured[at:end])
+        at = end
+
+
+@compiled
 def chain_effort(
     chain: FloatArray, state: FloatArray, hand: FloatArray, joints: FloatArray, effort: FloatArray
 ) -> None:
@@ -172,6 +199,14 @@ def chain_effort(
         along = chain[i, TURN] * forces[i, 2] + ux * forces[i, 0] + uy * forces[i, 1]
         own = chain[i, DAMPING] * state[int(chain[i, RATE])] + chain[i, ROTOR] * joints[i - 1]
         effort[2 + i] = along + own
+
+
+@compiled
+def axes_effort(
+    chain: FloatArray, state: FloatArray, hand: FloatArray, axes: FloatArray, effort: FloatArray
+) -> None:
+    """Write what ``chain_effort`` does from accelerations of the axes (theta, q_k), shape (1 + n,)."""
+    chain_effort(chain, state, hand, axes[1:], effort)
 
 
 @compiled

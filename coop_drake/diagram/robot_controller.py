@@ -6,17 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem
-from pydrake.systems.primitives import DiscreteTimeIntegrator, Integrator
+from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem, OutputPort
+from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator, Integrator
 
 from coop_drake.geometry.pose import PlanarPose
 from coop_drake.planning.plan import Plan
 from coop_drake.plant import ObjectInertia, RobotPlant
 from coop_drake.systems import (
+    AxisPpc,
     GovernedCell,
-    JointPpc,
     ObjectEstimator,
-    OrientationPpc,
     ReadyMonitor,
     ReferenceGovernor,
     RobotEffort,
@@ -26,16 +25,15 @@ from coop_drake.systems import (
 
 __all__ = ["TELEMETRY", "RobotKnowledge", "build_robot_controller"]
 
-TELEMETRY = {
-    "object_state": "object_estimator",
-    "governor_position": "governor_state",
-    "energy_margin": "reference_governor",
-    "angle_funnel": "orientation_ppc",
-    "joint_funnels": "joint_ppc",
-    "object_acceleration": "wrench_law",
-    "hand_command": "wrench_law",
-}
-"""Outputs that are exported to be looked at, by the log or a user, and the blocks that make them."""
+TELEMETRY = (
+    "object_state",
+    "governor_position",
+    "energy_margin",
+    "funnels",
+    "object_acceleration",
+    "hand_command",
+)
+"""Outputs of blocks that are exported to be looked at, by the log or a user."""
 
 
 @dataclass(frozen=True)
@@ -82,45 +80,56 @@ def build_robot_controller(knowledge: RobotKnowledge) -> Diagram:
     """
     builder = DiagramBuilder()
     blocks = {name: builder.AddNamedSystem(name, block) for name, block in _blocks(knowledge).items()}
-    _connect_by_name(builder, blocks)
-    builder.ExportOutput(blocks["robot_effort"].GetOutputPort("robot_effort"), "robot_effort")
-    builder.ExportOutput(blocks["ready_monitor"].GetOutputPort("ready"), "ready")
-    for output, block in TELEMETRY.items():
-        port = (
-            blocks[block].get_output_port()
-            if block == "governor_state"
-            else blocks[block].GetOutputPort(output)
-        )
-        builder.ExportOutput(port, output)
+    outputs = {
+        port.get_name(): port
+        for block in blocks.values()
+        for port in (block.get_output_port(i) for i in range(block.num_output_ports()))
+    }
+    command = outputs["governor_command"]
+    outputs["governor_position"] = _add_governor_state(builder, knowledge, command)
+    _connect_by_name(builder, blocks, outputs)
+    for name in ("robot_effort", "ready", *TELEMETRY):
+        builder.ExportOutput(outputs[name], name)
     return builder.Build()
 
 
 def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
     plan, cells, inertia = knowledge.plan, knowledge.cells, knowledge.object_inertia
     p_LE = np.array([knowledge.X_LE.x, knowledge.X_LE.y])
-    joint_axes = [1 + i for i in range(knowledge.joints.start, knowledge.joints.stop)]
+    joints = range(knowledge.joints.start, knowledge.joints.stop)
+    laws = axis_laws(plan, [0, *(1 + i for i in joints)])
     return {
         "object_estimator": ObjectEstimator(knowledge.robot, p_LE),
         "reference_governor": ReferenceGovernor(cells),
-        "governor_state": _governor_state(knowledge),
-        "orientation_ppc": OrientationPpc(axis_laws(plan, [0])),
-        "joint_ppc": JointPpc(axis_laws(plan, joint_axes)),
+        "axis_ppc": AxisPpc(laws),
         "wrench_law": WrenchLaw(
             p_LE,
             p_LLcm=inertia.p_LLcm,
             mass=inertia.mass,
             inertia=inertia.inertia_about_com,
             share=knowledge.load_share,
+            joints=len(joints),
         ),
         "robot_effort": RobotEffort(knowledge.robot),
         "ready_monitor": ReadyMonitor(
             cells,
-            axis_laws(plan, [0, *joint_axes]),
+            laws,
             [transition.inradius for transition in plan.transitions],
             plan.goal_pose[:2],
             knowledge.position_tolerance,
         ),
     }
+
+
+def _add_governor_state(
+    builder: DiagramBuilder, knowledge: RobotKnowledge, command: OutputPort
+) -> OutputPort:
+    """Keep p_G, whose rate is the first half of the governor's command."""
+    halves = builder.AddNamedSystem("governor_rate", Demultiplexer([2, 2]))
+    builder.Connect(command, halves.get_input_port())
+    state = builder.AddNamedSystem("governor_state", _governor_state(knowledge))
+    builder.Connect(halves.get_output_port(0), state.get_input_port())
+    return state.get_output_port()
 
 
 def _governor_state(knowledge: RobotKnowledge) -> Integrator | DiscreteTimeIntegrator:
@@ -130,24 +139,18 @@ def _governor_state(knowledge: RobotKnowledge) -> Integrator | DiscreteTimeInteg
     return DiscreteTimeIntegrator(2, knowledge.period)
 
 
-def _connect_by_name(builder: DiagramBuilder, blocks: Mapping[str, LeafSystem]) -> None:
+def _connect_by_name(
+    builder: DiagramBuilder, blocks: Mapping[str, LeafSystem], outputs: Mapping[str, OutputPort]
+) -> None:
     """Join every input to the output of its name; inputs that no block makes come from outside."""
-    governor = blocks["governor_state"]
-    sources = {"governor_position": governor.get_output_port()}
-    for name, block in blocks.items():
-        if name != "governor_state":
-            for i in range(block.num_output_ports()):
-                sources[block.get_output_port(i).get_name()] = block.get_output_port(i)
-    builder.Connect(sources["governor_velocity"], governor.get_input_port())
     outside: set[str] = set()
-    for name, block in blocks.items():
+    for block in blocks.values():
         for port in (block.get_input_port(i) for i in range(block.num_input_ports())):
-            if name == "governor_state":
-                continue
-            if port.get_name() in sources:
-                builder.Connect(sources[port.get_name()], port)
-            elif port.get_name() in outside:
-                builder.ConnectInput(port.get_name(), port)
+            name = port.get_name()
+            if name in outputs:
+                builder.Connect(outputs[name], port)
+            elif name in outside:
+                builder.ConnectInput(name, port)
             else:
-                builder.ExportInput(port, port.get_name())
-                outside.add(port.get_name())
+                builder.ExportInput(port, name)
+                outside.add(name)

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
 
 from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import Propeller, PropellerInfo
-from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
-from pydrake.systems.primitives import ConstantValueSource, Demultiplexer, Multiplexer
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantValueSource, Demultiplexer, Selector
 
 from coop_drake.plant import SeparateTeam, TeamPlant, build_separate_team, build_team_plant
 from coop_drake.scenario import Scenario
-from coop_drake.systems import FreeRobotSensor, ObjectPoseSensor, RobotStateSensor
+from coop_drake.systems import TeamSensor, build_selector, build_separate_sensor
 
 __all__ = ["TransportStation", "build_driven_station", "build_station"]
 
@@ -53,14 +52,8 @@ def build_station(scenario: Scenario) -> TransportStation:
     builder = DiagramBuilder()
     team = (build_team_plant if scenario.plant.ideal else build_separate_team)(scenario, builder)
     plant = team.plant
-    pose = builder.AddNamedSystem("object_pose_sensor", ObjectPoseSensor(team))
-    builder.Connect(plant.get_state_output_port(), pose.GetInputPort("team_state"))
-    builder.ExportOutput(pose.GetOutputPort("object_pose"), "object_pose")
+    _measure(builder, team)
     _drive_robots(builder, team)
-    for robot in team.robots:
-        sensor = builder.AddNamedSystem(f"robot_{robot.index}_sensor", _sensor(team, robot.index))
-        builder.Connect(plant.get_state_output_port(), sensor.GetInputPort("team_state"))
-        builder.ExportOutput(sensor.GetOutputPort("robot_state"), f"robot_{robot.index}_state")
     builder.ExportOutput(plant.get_generalized_acceleration_output_port(), "generalized_acceleration")
     builder.ExportOutput(team.scene_graph.get_query_output_port(), "query_object")
     return TransportStation(builder.Build(), team)
@@ -97,31 +90,45 @@ def build_driven_station(scenario: Scenario) -> TransportStation:
     return TransportStation(builder.Build(), team)
 
 
+def _measure(builder: DiagramBuilder, team: TeamPlant) -> None:
+    """Measure the object's pose and every robot's own state."""
+    names = ["object_pose", *(f"robot_{robot.index}_state" for robot in team.robots)]
+    if isinstance(team, SeparateTeam):
+        sensor = parts = builder.AddNamedSystem("team_sensor", build_separate_sensor(team))
+    else:
+        sensor = builder.AddNamedSystem("team_sensor", TeamSensor(team))
+        parts = builder.AddNamedSystem("measurements", Demultiplexer(sensor.sizes))
+        builder.Connect(sensor.get_output_port(), parts.get_input_port())
+    builder.Connect(team.plant.get_state_output_port(), sensor.GetInputPort("team_state"))
+    for i, name in enumerate(names):
+        builder.ExportOutput(parts.get_output_port(i), name)
+
+
 def _drive_robots(builder: DiagramBuilder, team: TeamPlant) -> None:
     """Let every robot's effort act: wrenches of W on the bases, torques on the joints."""
-    plant, bases, torques = team.plant, [], []
-    for robot in team.robots:
-        name, joints = f"robot_{robot.index}_effort", len(robot.joints)
-        parts = builder.AddNamedSystem(name, Demultiplexer([3, joints] if joints else [3]))
-        builder.ExportInput(parts.get_input_port(), name)
-        bases.append(parts.get_output_port(0))
-        if joints:
-            torques.append(parts.get_output_port(1))
+    plant, efforts = team.plant, builder.AddNamedSystem("efforts", _efforts(team))
+    for i in range(efforts.num_input_ports()):
+        builder.ExportInput(efforts.get_input_port(i), efforts.get_input_port(i).get_name())
     thrusters = _add_thrusters(builder, team)
     # Thrusters push along the axes of the poses they are told: those of W, for all that the bases turn.
     axes = AbstractValue.Make([RigidTransform()] * plant.num_bodies())
     world = builder.AddNamedSystem("world_axes", ConstantValueSource(axes))
     builder.Connect(world.get_output_port(), thrusters.get_body_poses_input_port())
-    builder.Connect(_joined(builder, "base_wrenches", bases), thrusters.get_command_input_port())
-    if torques:
-        builder.Connect(_joined(builder, "joint_torques", torques), plant.get_actuation_input_port())
+    builder.Connect(efforts.GetOutputPort("base_wrenches"), thrusters.get_command_input_port())
+    if team.joints:
+        builder.Connect(efforts.GetOutputPort("joint_torques"), plant.get_actuation_input_port())
 
 
-def _joined(builder: DiagramBuilder, name: str, ports: Sequence[OutputPort]) -> OutputPort:
-    joined = builder.AddNamedSystem(name, Multiplexer([port.size() for port in ports]))
-    for i, port in enumerate(ports):
-        builder.Connect(port, joined.get_input_port(i))
-    return joined.get_output_port()
+def _efforts(team: TeamPlant) -> Selector:
+    """Sorts the efforts of all robots into wrenches on bases and torques of joints."""
+    sizes = [3 + len(robot.joints) for robot in team.robots]
+    return build_selector(
+        {f"robot_{robot.index}_effort": size for robot, size in zip(team.robots, sizes, strict=True)},
+        {
+            "base_wrenches": [(k, i) for k in range(len(sizes)) for i in range(3)],
+            "joint_torques": [(k, i) for k, size in enumerate(sizes) for i in range(3, size)],
+        },
+    )
 
 
 def _drive_bases(builder: DiagramBuilder, team: TeamPlant) -> None:
@@ -151,7 +158,3 @@ def _add_thrusters(builder: DiagramBuilder, team: TeamPlant) -> Propeller:
     bases = builder.AddNamedSystem("base_thrusters", Propeller(thrusters))
     builder.Connect(bases.get_spatial_forces_output_port(), team.plant.get_applied_spatial_force_input_port())
     return bases
-
-
-def _sensor(team: TeamPlant, robot: int) -> RobotStateSensor | FreeRobotSensor:
-    return FreeRobotSensor(team, robot) if isinstance(team, SeparateTeam) else RobotStateSensor(team, robot)

@@ -161,13 +161,14 @@ def _places(loop: ClosedLoop, ports: _PortRow) -> _Places:
     efforts = [ports.add(controller, "robot_effort") for controller in loop.controllers]
     of = {name: [ports.add(law, name) for law in loop.laws] for name in ("ready", *TELEMETRY)}
     realised = ports.add(station, "generalized_acceleration")[loop.team.velocity_index[:3]]
-    angle, joints = of["angle_funnel"][0], [np.split(funnels, 2) for funnels in of["joint_funnels"]]
+    # Every robot has walls for the angle; they are alike, and the first robot's are taken.
+    walls = [np.split(funnels, 2) for funnels in of["funnels"]]
     return _Places(
         instant=np.concatenate([ports.add(planner, "current_cell"), ports.add(planner, "arrived")]),
         base_poses=np.array([state[:3] for state in states]),
         governors=np.array(of["governor_position"]),
-        funnel_lower=np.concatenate([angle[:1], *(lower for lower, _ in joints)]),
-        funnel_upper=np.concatenate([angle[1:], *(upper for _, upper in joints)]),
+        funnel_lower=np.concatenate([walls[0][0][:1], *(lower[1:] for lower, _ in walls)]),
+        funnel_upper=np.concatenate([walls[0][1][:1], *(upper[1:] for _, upper in walls)]),
         energy_margins=np.concatenate(of["energy_margin"]),
         commanded_wrenches=np.array(of["hand_command"])[:, 3:],
         base_wrenches=np.array([effort[:3] for effort in efforts]),

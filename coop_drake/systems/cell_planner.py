@@ -55,8 +55,11 @@ class CellPlanner(Block):
             self.DeclarePeriodicDiscreteUpdateEvent(period_sec=period, offset_sec=0.0, update=self._advance)
 
     def _all_ready(self, context: Context, cell: float) -> bool:
-        reports = (port.Eval(context) for port in self._ready)
-        return all(index == cell and margin >= 0.0 for index, margin in reports)
+        for port in self._ready:
+            index, margin = port.Eval(context)
+            if not (margin >= 0.0 and index == cell):
+                return False
+        return True
 
     def _advance(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         cell = context.get_discrete_state_vector().value()[0]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.control.kernels import compiled, governor_velocity
+from coop_drake.control.kernels import compiled, governed_acceleration, governor_velocity
 from coop_drake.fields.flat_field import velocity_in_field
 from coop_drake.geometry.boundary import signed_distance_compiled
 from coop_drake.geometry.pose import FloatArray
 
-__all__ = ["VELOCITY_STEP", "cell_margin", "lead"]
+__all__ = ["VELOCITY_STEP", "cell_margin", "govern", "lead"]
 
 #: The energy is computed from a velocity in steps of this size [m/s]. Every robot knows the velocity through
 #: its own arm, with its own rounding; in steps they have the same number, and so the same p_G, bit by bit.
@@ -61,3 +61,18 @@ def lead(
         return
     vx, vy = velocity_in_field(flat, field, governor[0], governor[1])
     governor_velocity(vx, vy, margin, gains[0], gains[2], gains[3], velocity)
+
+
+@compiled
+def govern(
+    gains: FloatArray,
+    edges: FloatArray,
+    flat: FloatArray,
+    field: FloatArray,
+    state: FloatArray,
+    governor: FloatArray,
+    command: FloatArray,
+) -> None:
+    """Write p_G', then the desired acceleration of L's origin, both of (14), shape (4,); see ``lead``."""
+    lead(gains, edges, flat, field, state, governor, command[:2])
+    governed_acceleration(state, governor, gains[0], gains[1], command[2:])

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.control.ready import arrival_margin, ready_margin
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
+from coop_drake.systems.ready_kernels import robot_arrival, robot_ready
 from coop_drake.systems.reference_governor import GovernedCell
 
 __all__ = ["ReadyMonitor"]
@@ -57,9 +57,10 @@ class ReadyMonitor(Block):
             )
         if not position_tolerance > 0.0:
             raise ValueError(f"ReadyMonitor's position tolerance must be positive, not {position_tolerance}")
-        self._cells, self._laws, self._inradii = tuple(cells), tuple(laws), tuple(inradii)
+        self._cells, self._inradii = tuple(cells), tuple(inradii)
+        self._tables = [law.table for law in laws]
         self._goal, self._tolerance = np.array(goal_position, dtype=float), position_tolerance
-        self._joints = n = laws[0].axes - 1
+        n = laws[0].axes - 1
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + n))
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
@@ -68,54 +69,18 @@ class ReadyMonitor(Block):
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
         index = index_of(self._current.Eval(context), len(self._cells))
-        thing, state, n = self._object.Eval(context), self._state.Eval(context), self._joints
-        axes = np.concatenate([thing[2:3], state[3 : 3 + n]])
-        rates = np.concatenate([thing[5:], state[6 + n :]])
-        judge = self._arrival if index == len(self._cells) - 1 else self._readiness
-        margin = judge(index, thing[:2], thing[3:5], axes, rates, self._governor.Eval(context))
+        thing, state, following = self._object.Eval(context), self._state.Eval(context), index + 1
+        if following == len(self._cells):
+            margin = robot_arrival(self._tables[index], self._goal, self._tolerance, thing, state)
+        else:
+            margin = robot_ready(
+                self._tables[index],
+                self._tables[following],
+                self._cells[following].clearance.edges,
+                self._cells[following].gains.stiffness,
+                self._inradii[index],
+                thing,
+                state,
+                self._governor.Eval(context),
+            )
         output.SetFromVector([float(index), margin])
-
-    def _readiness(
-        self,
-        index: int,
-        position: FloatArray,
-        velocity: FloatArray,
-        axes: FloatArray,
-        rates: FloatArray,
-        governor_position: FloatArray,
-    ) -> float:
-        law, next_law = self._laws[index], self._laws[index + 1]
-        return ready_margin(
-            position=position,
-            velocity=velocity,
-            governor_position=governor_position,
-            next_clearance=self._cells[index + 1].clearance(governor_position),
-            inradius=self._inradii[index],
-            axis_position=axes,
-            axis_rate=rates,
-            goal_lower=law.funnel.goal_lower,
-            goal_upper=law.funnel.goal_upper,
-            next_funnel=next_law.funnel,
-            next_gains=next_law.gains,
-        )
-
-    def _arrival(
-        self,
-        index: int,
-        position: FloatArray,
-        velocity: FloatArray,
-        axes: FloatArray,
-        rates: FloatArray,
-        _: FloatArray,
-    ) -> float:
-        funnel = self._laws[index].funnel
-        return arrival_margin(
-            position=position,
-            velocity=velocity,
-            target=self._goal,
-            axis_position=axes,
-            axis_rate=rates,
-            goal_lower=funnel.goal_lower,
-            goal_upper=funnel.goal_upper,
-            position_tolerance=self._tolerance,
-        )

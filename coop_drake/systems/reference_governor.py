@@ -17,7 +17,7 @@ from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
-from coop_drake.systems.governor_kernels import VELOCITY_STEP, cell_margin, lead
+from coop_drake.systems.governor_kernels import VELOCITY_STEP, cell_margin, govern
 
 __all__ = ["VELOCITY_STEP", "GovernedCell", "ReferenceGovernor"]
 
@@ -51,27 +51,25 @@ class GovernedCell:
         return np.array([gains.stiffness, gains.damping, gains.governor_gain, gains.smoothing])
 
     @cached_property
-    def _leading(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
-        """What the compiled governor reads of the cell, if its field is that of a harmonic map."""
+    def kernel_arguments(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+        """What the compiled governor reads of the cell; None if its field is not that of a harmonic map."""
         if not isinstance(self.field, VelocityField):
             return None
         return self.gain_row, self.clearance.edges, *self.field.kernel_arguments
 
-    def lead(self, state: FloatArray, governor_position: FloatArray, velocity: FloatArray) -> None:
-        """Write p_G' of (14) in this cell.
+    def govern(self, state: FloatArray, governor_position: FloatArray, command: FloatArray) -> None:
+        """Write p_G' and -K (p - p_G) - zeta p' of (14) in this cell, whatever its field is.
 
         Args:
             state: Pose and twist of the object, shape (6,).
             governor_position: p_G, shape (2,) [m].
-            velocity: Receives p_G', shape (2,) [m/s].
+            command: Receives both, shape (4,) [m/s, m/s^2].
         """
-        if self._leading is not None:
-            lead(*self._leading, state, governor_position, velocity)
-            return
-        stiffness, _, gain, smoothing = self.gain_row
+        stiffness, damping, gain, smoothing = self.gain_row
         margin = cell_margin(self.clearance.edges, stiffness, state, governor_position)
         vx, vy = self.field(governor_position)
-        kernels.governor_velocity(vx, vy, margin, stiffness, gain, smoothing, velocity)
+        kernels.governor_velocity(vx, vy, margin, stiffness, gain, smoothing, command[:2])
+        kernels.governed_acceleration(state, governor_position, stiffness, damping, command[2:])
 
 
 class ReferenceGovernor(Block):
@@ -81,12 +79,13 @@ class ReferenceGovernor(Block):
     input   ``object_state``            6    pose and twist of L                                    W
     input   ``governor_position``       2    p_G, kept by an integrator outside [m]                 W
     input   ``current_cell``            2    index of the current cell, time of its entry [-, s]
-    output  ``governor_velocity``       2    rate of p_G [m/s]                                      W
-    output  ``position_acceleration``   2    desired acceleration of L's origin [m/s^2]             W
+    output  ``governor_command``        4    rate of p_G [m/s], desired acceleration of L's origin  W
+                                             [m/s^2]
     output  ``energy_margin``           1    Delta E [m^2/s^2]
     ======= =========================== ==== ====================================================== =====
 
-    No state of its own: p_G lives in the integrator that ``governor_velocity`` feeds.
+    No state of its own: p_G lives in the integrator that the rate feeds. One output holds both halves of
+    (14), because asking a block for two takes twice as long.
 
     Args:
         cells: One entry for each cell of the plan.
@@ -100,27 +99,25 @@ class ReferenceGovernor(Block):
         if not cells:
             raise ValueError("ReferenceGovernor needs at least one cell")
         self._cells = tuple(cells)
+        self._compiled = [cell.kernel_arguments for cell in cells]
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
-        self.DeclareVectorOutputPort("governor_velocity", 2, self._write_velocity)
-        self.DeclareVectorOutputPort("position_acceleration", 2, self._write_acceleration)
+        self.DeclareVectorOutputPort("governor_command", 4, self._write_command)
         self.DeclareVectorOutputPort("energy_margin", 1, self._write_margin)
 
-    def _cell(self, context: Context) -> GovernedCell:
-        return self._cells[index_of(self._current.Eval(context), len(self._cells))]
-
-    def _write_velocity(self, context: Context, output: BasicVector) -> None:
-        cell, state = self._cell(context), self._object.Eval(context)
-        cell.lead(state, self._governor.Eval(context), output.get_mutable_value())
-
-    def _write_acceleration(self, context: Context, output: BasicVector) -> None:
-        gains, state = self._cell(context).gains, self._object.Eval(context)
-        governor, acceleration = self._governor.Eval(context), output.get_mutable_value()
-        kernels.governed_acceleration(state, governor, gains.stiffness, gains.damping, acceleration)
+    def _write_command(self, context: Context, output: BasicVector) -> None:
+        index = index_of(self._current.Eval(context), len(self._cells))
+        state, governor = self._object.Eval(context), self._governor.Eval(context)
+        arguments, command = self._compiled[index], output.get_mutable_value()
+        if arguments is None:
+            self._cells[index].govern(state, governor, command)
+        else:
+            govern(*arguments, state, governor, command)
 
     def _write_margin(self, context: Context, output: BasicVector) -> None:
-        cell, state = self._cell(context), self._object.Eval(context)
+        cell = self._cells[index_of(self._current.Eval(context), len(self._cells))]
+        state = self._object.Eval(context)
         output[0] = cell_margin(
             cell.clearance.edges, cell.gains.stiffness, state, self._governor.Eval(context)
         )

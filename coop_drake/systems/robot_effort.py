@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.control.planar_chain import chain_effort
+from coop_drake.control.planar_chain import axes_effort
 from coop_drake.plant import RobotPlant, robot_chain
 from coop_drake.systems.block import Block
 
@@ -18,7 +18,8 @@ class RobotEffort(Block):
     input   ``robot_state``          2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)          W
     input   ``hand_command``         6          acceleration of Ek wanted [m/s^2, rad/s^2],
                                                 then the wrench on the object at Ek [N, N m]            W
-    input   ``joint_acceleration``   n          accelerations of the joints wanted [rad/s^2 or m/s^2]
+    input   ``axis_acceleration``    1 + n      acceleration of the object's angle, not used here; those
+                                                of the joints wanted [rad/s^2 or m/s^2]
     output  ``robot_effort``         3 + n      base wrench at Bk, joint torques [N, N m]               W
     ======= ======================== ========== ======================================================= =====
 
@@ -30,16 +31,16 @@ class RobotEffort(Block):
 
     def __init__(self, robot: RobotPlant) -> None:
         super().__init__()
-        self._robot, self._chain = robot, robot_chain(robot)
+        self._robot, self._chain, self._springs = robot, robot_chain(robot), robot.has_springs
         self._size = size = 3 + len(robot.joints)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * size)
         self._hand = self.DeclareVectorInputPort("hand_command", 6)
-        self._joints = self.DeclareVectorInputPort("joint_acceleration", size - 3)
+        self._axes = self.DeclareVectorInputPort("axis_acceleration", size - 2)
         self.DeclareVectorOutputPort("robot_effort", size, self._write_effort)
 
     def _write_effort(self, context: Context, output: BasicVector) -> None:
         state, effort = self._state.Eval(context), output.get_mutable_value()
-        chain_effort(self._chain, state, self._hand.Eval(context), self._joints.Eval(context), effort)
-        if self._robot.has_springs:
+        axes_effort(self._chain, state, self._hand.Eval(context), self._axes.Eval(context), effort)
+        if self._springs:
             self._robot.set_state(state[: self._size], state[self._size :])
             effort += self._robot.spring_effort()

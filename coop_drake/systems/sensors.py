@@ -1,25 +1,30 @@
-"""What is measured: the object's pose, and every robot's own state."""
+"""What the robots measure in the simulated team."""
 
 from __future__ import annotations
 
+import numpy as np
 from pydrake.systems.framework import BasicVector, Context
+from pydrake.systems.primitives import Selector
 
-from coop_drake.control.planar_chain import read_robot
-from coop_drake.plant import TeamPlant, base_chain
+from coop_drake.control.planar_chain import read_team
+from coop_drake.plant import SeparateTeam, TeamPlant, base_chain
 from coop_drake.systems.block import Block
+from coop_drake.systems.selector import build_selector
 
-__all__ = ["ObjectPoseSensor", "RobotStateSensor"]
+__all__ = ["TeamSensor", "build_separate_sensor"]
 
 
-class ObjectPoseSensor(Block):
-    """Reads the object's pose.
+class TeamSensor(Block):
+    """Reads the object's pose and every robot's own state from a plant whose one tree begins at the object.
 
-    ======= ================= ========== ==================================================== =====
-    input   ``team_state``    2 (3 + n)  the plant's positions and velocities, its own order
-    output  ``object_pose``   3          pose of L in W, angle unwrapped [m, rad]             W
-    ======= ================= ========== ==================================================== =====
+    ======= ================ =================== =================================================== =====
+    input   ``team_state``   2 (3 + n)           the plant's positions and velocities, its own order
+    output  ``measurements`` 3 + sum 2 (3 + n_k) pose of L, then of each robot z_k and its rate,     W
+                                                 z_k = (x, y, yaw of Bk, q_k) [m, rad]
+    ======= ================ =================== =================================================== =====
 
-    No state.
+    No state. The object's angle is unwrapped; yaws are in (-pi, pi]. All sensors are one block because one
+    call is cheap; who gets which part is for the wires behind it.
 
     Args:
         team: The team whose plant gives the state.
@@ -27,40 +32,47 @@ class ObjectPoseSensor(Block):
 
     def __init__(self, team: TeamPlant) -> None:
         super().__init__()
-        self._index = team.position_index[:3]
-        self._team = self.DeclareVectorInputPort("team_state", team.plant.num_multibody_states())
-        self.DeclareVectorOutputPort("object_pose", 3, self._write_pose)
+        ways = [base_chain(team, robot) for robot in team.robots]
+        self._team = (
+            team.position_index[:3].astype(np.int64),
+            np.array([0, *np.cumsum([len(way.chain) for way in ways])]),
+            np.vstack([way.chain for way in ways]),
+            np.array([way.yaw for way in ways]),
+            np.array([0, *np.cumsum([way.joints.shape[1] for way in ways])]),
+            np.hstack([way.joints for way in ways]),
+        )
+        #: Sizes of the measurements' parts: the object's, then each robot's.
+        self.sizes = [3, *(2 * (3 + way.joints.shape[1]) for way in ways)]
+        self._state = self.DeclareVectorInputPort("team_state", team.plant.num_multibody_states())
+        self.DeclareVectorOutputPort("measurements", sum(self.sizes), self._write_measurements)
 
-    def _write_pose(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector(self._team.Eval(context)[self._index])
+    def _write_measurements(self, context: Context, output: BasicVector) -> None:
+        read_team(*self._team, self._state.Eval(context), output.get_mutable_value())
 
 
-class RobotStateSensor(Block):
-    """Reads one robot's own state: where its base is and moves, and its joints.
+def build_separate_sensor(team: SeparateTeam) -> Selector:
+    """Measures the same in a plant in which every robot is a tree of its own: its state holds all of it.
 
-    ======= ============================ ========== ==================================================== =====
-    input   ``team_state``               2 (3 + n)  the plant's positions and velocities, its own order
-    output  ``robot_state``              2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)       W
-    ======= ============================ ========== ==================================================== =====
-
-    No state. The yaw is in (-pi, pi].
+    ======= ===================== ============== ====================================================== =====
+    input   ``team_state``        plant's states the plant's positions and velocities
+    output  ``object_pose``       3              pose of L, angle unwrapped [m, rad]                    W
+    output  ``robot_<k>_state``   2 (3 + n_k)    z_k and its rate, z_k = (x, y, yaw of Bk, q_k), yaw    W
+                                                 unwrapped [m, rad]
+    ======= ===================== ============== ====================================================== =====
 
     Args:
         team: The team whose plant gives the state.
-        robot: Index k of the robot.
-
-    Raises:
-        IndexError: The team has no such robot.
     """
-
-    def __init__(self, team: TeamPlant, robot: int) -> None:
-        super().__init__()
-        if not 0 <= robot < len(team.robots):
-            raise IndexError(f"robot {robot} is not in the team of {len(team.robots)}")
-        way = base_chain(team, team.robots[robot])
-        self._way = way.chain, way.yaw, way.joints
-        self._team = self.DeclareVectorInputPort("team_state", team.plant.num_multibody_states())
-        self.DeclareVectorOutputPort("robot_state", 2 * (3 + way.joints.shape[1]), self._write_state)
-
-    def _write_state(self, context: Context, output: BasicVector) -> None:
-        read_robot(*self._way, self._team.Eval(context), output.get_mutable_value())
+    rates = team.plant.num_positions()
+    places = {"object_pose": [int(place) for place in team.position_index[:3]]}
+    for robot, base in zip(team.robots, team.base_joints, strict=True):
+        places[f"robot_{robot.index}_state"] = [
+            *(base.position_start() + i for i in range(3)),
+            *(joint.position_start() for joint in robot.joints),
+            *(rates + base.velocity_start() + i for i in range(3)),
+            *(rates + joint.velocity_start() for joint in robot.joints),
+        ]
+    return build_selector(
+        {"team_state": team.plant.num_multibody_states()},
+        {name: [(0, place) for place in chosen] for name, chosen in places.items()},
+    )

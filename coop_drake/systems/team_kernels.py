@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from coop_drake.control.kernels import compiled, governed_acceleration, hand_command, track_row, write_walls
 from coop_drake.control.planar_chain import chain_effort, read_robot
-from coop_drake.control.ready import CLEARANCE_FRACTION, EROSION, RATE_TOLERANCE, SPEED_TOLERANCE
-from coop_drake.geometry.boundary import signed_distance_compiled
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.governor_kernels import cell_margin, lead
+from coop_drake.systems.ready_kernels import axis_ready, axis_rests, position_arrived, position_ready
 
 __all__ = ["FusedCell", "FusedTeam", "team_arrival", "team_command", "team_ready", "team_telemetry"]
 
@@ -93,7 +92,7 @@ def team_law(
         start, stop = first[2, k], first[2, k + 1]
         way, chain = ways[first[1, k] : first[1, k + 1]], chains[first[0, k] : first[0, k + 1]]
         read_robot(way, yaws[k], places[:, 3 + start : 3 + stop], state, robot)
-        hand_command(shares[k], thing, acceleration[:2], acceleration[2:], hands[k])
+        hand_command(shares[k], thing, acceleration[0], acceleration[1], acceleration[2], hands[k])
         chain_effort(chain, robot, hands[k], joints[start:stop], effort)
         for i in range(3):
             bases[k, i], efforts[3 * k + i] = robot[i], effort[i]
@@ -197,18 +196,16 @@ def team_ready(
         governor: p_G, shape (2,) [m].
         margins: Receives them.
     """
-    stiffness = next_gains[0]
-    x, y = state[places[0, 0]] - governor[0], state[places[0, 1]] - governor[1]
-    vx, vy = state[places[1, 0]], state[places[1, 1]]
-    energy = 0.5 * (vx**2 + vy**2 + stiffness * (x * x + y * y))
-    clearance = signed_distance_compiled(next_edges, governor[0], governor[1])
-    margin = 0.5 * stiffness * clearance * abs(clearance) - energy
-    floor = 0.5 * stiffness * CLEARANCE_FRACTION * inradius * abs(CLEARANCE_FRACTION * inradius)
-    common = min((margin - floor) / max(abs(margin), floor), _axis_ready(table, next_table, 0, places, state))
+    thing = _object_state(places, state)
+    common = min(
+        position_ready(next_edges, next_gains[0], inradius, thing, governor),
+        axis_ready(table[0], next_table[0], thing[2], thing[5]),
+    )
     for k in range(margins.size):
         margins[k] = common
         for i in range(1 + first[2, k], 1 + first[2, k + 1]):
-            margins[k] = min(margins[k], _axis_ready(table, next_table, i, places, state))
+            position, rate = state[places[0, 2 + i]], state[places[1, 2 + i]]
+            margins[k] = min(margins[k], axis_ready(table[i], next_table[i], position, rate))
 
 
 @compiled
@@ -227,14 +224,14 @@ def team_arrival(
         state: Of the plant.
         margins: Receives them.
     """
-    distance = np.hypot(state[places[0, 0]] - goal[0], state[places[0, 1]] - goal[1])
-    speed = np.hypot(state[places[1, 0]], state[places[1, 1]])
-    common = min(1.0 - distance / ((1.0 - EROSION) * tolerance), 1.0 - speed / SPEED_TOLERANCE)
-    common = min(common, _axis_rests(table, 0, places, state))
+    thing = _object_state(places, state)
+    common = min(position_arrived(goal, tolerance, thing), axis_rests(table[0], thing[2], thing[5]))
     for k in range(margins.size):
         margins[k] = common
         for i in range(1 + first[2, k], 1 + first[2, k + 1]):
-            margins[k] = min(margins[k], _axis_rests(table, i, places, state))
+            margins[k] = min(
+                margins[k], axis_rests(table[i], state[places[0, 2 + i]], state[places[1, 2 + i]])
+            )
 
 
 @compiled
@@ -243,24 +240,3 @@ def _object_state(places: IntArray, state: FloatArray) -> FloatArray:
     for i in range(3):
         thing[i], thing[3 + i] = state[places[0, i]], state[places[1, i]]
     return thing
-
-
-@compiled
-def _axis_inside(row: FloatArray, position: float) -> float:
-    half = 0.5 * (row[3] - row[2]) * (1.0 - 2.0 * EROSION)
-    return 1.0 - abs(position - 0.5 * (row[2] + row[3])) / half
-
-
-@compiled
-def _axis_ready(
-    table: FloatArray, next_table: FloatArray, axis: int, places: IntArray, state: FloatArray
-) -> float:
-    position, rate = state[places[0, 2 + axis]], state[places[1, 2 + axis]]
-    energy, bound = track_row(next_table[axis], 0.0, position, rate)[1], next_table[axis, 9]
-    return min(_axis_inside(table[axis], position), (bound - energy) / max(energy, bound))
-
-
-@compiled
-def _axis_rests(table: FloatArray, axis: int, places: IntArray, state: FloatArray) -> float:
-    inside = _axis_inside(table[axis], state[places[0, 2 + axis]])
-    return min(inside, 1.0 - abs(state[places[1, 2 + axis]]) / RATE_TOLERANCE)

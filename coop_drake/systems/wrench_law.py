@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.control.kernels import hand_command
+from coop_drake.control.kernels import command_hand
 from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.block import Block
 
@@ -15,14 +15,16 @@ __all__ = ["WrenchLaw"]
 class WrenchLaw(Block):
     """Turns the object's desired acceleration into one robot's share of the work: (21), (28) and (31).
 
-    ======= ========================== ==== ====================================================== =====
-    input   ``object_state``           6    pose and twist of L                                    W
-    input   ``position_acceleration``  2    desired acceleration of L's origin [m/s^2]             W
-    input   ``angle_acceleration``     1    desired angular acceleration [rad/s^2]                 W
-    output  ``object_acceleration``    3    both in one [m/s^2, rad/s^2]                           W
-    output  ``hand_command``           6    acceleration of Ek that goes with it [m/s^2, rad/s^2],
-                                            then the wrench on the object at Ek [N, N m]           W
-    ======= ========================== ==== ====================================================== =====
+    ======= ======================= ===== ====================================================== =====
+    input   ``object_state``        6     pose and twist of L                                    W
+    input   ``governor_command``    4     rate of p_G, not used here; desired acceleration of    W
+                                          L's origin [m/s^2]
+    input   ``axis_acceleration``   1 + n desired angular acceleration [rad/s^2]; those of the   W
+                                          joints, not used here
+    output  ``object_acceleration`` 3     both that are used, in one [m/s^2, rad/s^2]            W
+    output  ``hand_command``        6     acceleration of Ek that goes with it [m/s^2, rad/s^2], W
+                                          then the wrench on the object at Ek [N, N m]
+    ======= ======================= ===== ====================================================== =====
 
     No state.
 
@@ -32,13 +34,14 @@ class WrenchLaw(Block):
         mass: M_L [kg].
         inertia: I_L about the centre of mass [kg m^2].
         share: The robot's part of the work, in [0, 1]; the team's sum to one.
+        joints: Number of the robot's joints n.
 
     Raises:
         ValueError: Mass or inertia is not positive, or the share is not in [0, 1].
     """
 
     def __init__(
-        self, p_LE: FloatArray, *, p_LLcm: FloatArray, mass: float, inertia: float, share: float
+        self, p_LE: FloatArray, *, p_LLcm: FloatArray, mass: float, inertia: float, share: float, joints: int
     ) -> None:
         super().__init__()
         if not (mass > 0.0 and inertia > 0.0):
@@ -47,19 +50,18 @@ class WrenchLaw(Block):
             raise ValueError(f"WrenchLaw's share must lie in [0, 1], not {share}")
         self._parameters = np.array([*p_LE, *p_LLcm, mass, inertia, share], dtype=float)
         self._object = self.DeclareVectorInputPort("object_state", 6)
-        self._linear = self.DeclareVectorInputPort("position_acceleration", 2)
-        self._angular = self.DeclareVectorInputPort("angle_acceleration", 1)
+        self._governor = self.DeclareVectorInputPort("governor_command", 4)
+        self._axes = self.DeclareVectorInputPort("axis_acceleration", 1 + joints)
         self.DeclareVectorOutputPort("object_acceleration", 3, self._write_object)
         self.DeclareVectorOutputPort("hand_command", 6, self._write_hand)
 
     def _write_object(self, context: Context, output: BasicVector) -> None:
-        output.SetFromVector([*self._linear.Eval(context), *self._angular.Eval(context)])
+        output.SetFromVector([*self._governor.Eval(context)[2:], self._axes.Eval(context)[0]])
 
     def _write_hand(self, context: Context, output: BasicVector) -> None:
-        hand_command(
-            self._parameters,
+        state, governor, axes = (
             self._object.Eval(context),
-            self._linear.Eval(context),
-            self._angular.Eval(context),
-            output.get_mutable_value(),
+            self._governor.Eval(context),
+            self._axes.Eval(context),
         )
+        command_hand(self._parameters, state, governor, axes, output.get_mutable_value())

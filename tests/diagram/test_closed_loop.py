@@ -115,8 +115,7 @@ def test_a_controller_hears_three_things_and_no_more(loop):
             "object_state": 6,
             "governor_position": 2,
             "energy_margin": 1,
-            "angle_funnel": 2,
-            "joint_funnels": 2 * n,
+            "funnels": 2 * (1 + n),
             "object_acceleration": 3,
             "hand_command": 6,
         }
@@ -128,9 +127,9 @@ def test_every_robot_runs_every_block_of_the_law(loop):
         assert {system.get_name() for system in controller.GetSystems()} == {
             "object_estimator",
             "reference_governor",
+            "governor_rate",
             "governor_state",
-            "orientation_ppc",
-            "joint_ppc",
+            "axis_ppc",
             "wrench_law",
             "robot_effort",
             "ready_monitor",

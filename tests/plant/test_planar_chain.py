@@ -71,7 +71,7 @@ def test_springs_of_a_model_are_held(tmp_path):
     robot = build_robot_plant(ring_team(tmp_path, [[("revolute", "0 0 1", more)], [REVOLUTE]]), 0)
     assert robot.has_springs
     state, hand, joints = np.linspace(0.1, 0.8, 8), np.linspace(-1.0, 1.0, 6), np.array([0.5])
-    inputs = {"robot_state": state, "hand_command": hand, "joint_acceleration": joints}
+    inputs = {"robot_state": state, "hand_command": hand, "axis_acceleration": [9.0, *joints]}
     effort = evaluate(RobotEffort(robot), inputs, "robot_effort")
     robot.set_state(*np.split(state, 2))
     jacobian = robot.grasp_jacobian()

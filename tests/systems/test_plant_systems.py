@@ -4,7 +4,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.control import robot_acceleration, robot_torque
 from coop_drake.plant import base_poses, build_robot_plant, build_team_plant, set_configuration
-from coop_drake.systems import ObjectEstimator, ObjectPoseSensor, RobotEffort, RobotStateSensor
+from coop_drake.systems import ObjectEstimator, RobotEffort, TeamSensor
 from tests.support.small_scenario import small_scenario
 from tests.support.system_checks import (
     assert_every_input_is_required,
@@ -29,8 +29,14 @@ class Rig:
         set_configuration(self.team, self.context, self.z, self.rates)
         self.team_state = self.team.plant.GetPositionsAndVelocities(self.context)
 
+    def measured(self):
+        """The object's pose, then every robot's state."""
+        sensor = TeamSensor(self.team)
+        values = evaluate(sensor, {"team_state": self.team_state}, "measurements")
+        return np.split(values, np.cumsum(sensor.sizes)[:-1])
+
     def robot_state(self, k):
-        return evaluate(RobotStateSensor(self.team, k), {"team_state": self.team_state}, "robot_state")
+        return self.measured()[1 + k]
 
     def grasp(self, k):
         X_LE = self.team.robots[k].X_LE
@@ -42,32 +48,25 @@ def rig(request):
     return Rig(request.param)
 
 
-def test_the_object_pose_sensor_reads_the_pose(rig):
-    sensor = ObjectPoseSensor(rig.team)
-    states = rig.team.plant.num_multibody_states()
-    assert port_sizes(sensor) == ({"team_state": states}, {"object_pose": 3})
-    np.testing.assert_array_equal(evaluate(sensor, {"team_state": rig.team_state}, "object_pose"), rig.z[:3])
-    assert_every_input_is_required(sensor, {"team_state": rig.team_state}, {"object_pose": {"team_state"}})
-
-
-def test_the_robot_state_sensor_reads_base_and_joints(rig):
-    states = rig.team.plant.num_multibody_states()
+def test_the_team_sensor_reads_the_object_and_every_robots_base_and_joints(rig):
+    sensor, states = TeamSensor(rig.team), rig.team.plant.num_multibody_states()
+    sizes = [3, *(2 * (3 + len(robot.joints)) for robot in rig.team.robots)]
+    assert sensor.sizes == sizes
+    assert port_sizes(sensor) == ({"team_state": states}, {"measurements": sum(sizes)})
+    assert_every_input_is_required(sensor, {"team_state": rig.team_state}, {"measurements": {"team_state"}})
+    pose, *robots = rig.measured()
+    np.testing.assert_array_equal(pose, rig.z[:3])
     ahead, step = rig.team.plant.CreateDefaultContext(), 1e-6
     set_configuration(rig.team, ahead, rig.z + step * rig.rates)
     behind = rig.team.plant.CreateDefaultContext()
     set_configuration(rig.team, behind, rig.z - step * rig.rates)
     base_rates = (base_poses(rig.team, ahead) - base_poses(rig.team, behind)) / (2.0 * step)
-    for robot in rig.team.robots:
-        sensor, n = RobotStateSensor(rig.team, robot.index), len(robot.joints)
-        assert port_sizes(sensor) == ({"team_state": states}, {"robot_state": 2 * (3 + n)})
-        state = rig.robot_state(robot.index)
+    for robot, state in zip(rig.team.robots, robots, strict=True):
+        n = len(robot.joints)
         np.testing.assert_allclose(state[:3], base_poses(rig.team, rig.context)[robot.index], atol=1e-14)
         np.testing.assert_array_equal(state[3 : 3 + n], rig.z[3:][robot.q_slice])
         np.testing.assert_allclose(state[3 + n : 6 + n], base_rates[robot.index], atol=1e-8)
         np.testing.assert_array_equal(state[6 + n :], rig.rates[3:][robot.q_slice])
-        assert_every_input_is_required(
-            sensor, {"team_state": rig.team_state}, {"robot_state": {"team_state"}}
-        )
 
 
 def test_every_robot_finds_the_objects_state_from_its_own_motion(rig):
@@ -91,7 +90,7 @@ def test_the_effort_is_the_law_with_the_robots_own_dynamics(rig):
         inputs = {
             "robot_state": rig.robot_state(k),
             "hand_command": generator.normal(size=6),
-            "joint_acceleration": generator.normal(size=n),
+            "axis_acceleration": generator.normal(size=1 + n),
         }
         assert port_sizes(system) == (
             {name: len(value) for name, value in inputs.items()},
@@ -100,7 +99,7 @@ def test_the_effort_is_the_law_with_the_robots_own_dynamics(rig):
         model.set_state(*np.split(inputs["robot_state"], 2))
         acceleration = robot_acceleration(
             inputs["hand_command"][:3],
-            inputs["joint_acceleration"],
+            inputs["axis_acceleration"][1:],
             jacobian=model.grasp_jacobian(),
             jacobian_rate_term=model.grasp_bias(),
         )
@@ -113,9 +112,3 @@ def test_the_effort_is_the_law_with_the_robots_own_dynamics(rig):
         )
         np.testing.assert_allclose(evaluate(system, inputs, "robot_effort"), expected, rtol=1e-12, atol=1e-12)
         assert_every_input_is_required(system, inputs, {"robot_effort": set(inputs)})
-
-
-@pytest.mark.parametrize("k", [-1, 7])
-def test_a_sensor_for_a_robot_outside_the_team_is_refused(rig, k):
-    with pytest.raises(IndexError, match=f"robot {k} is not in the team of {len(rig.team.robots)}"):
-        RobotStateSensor(rig.team, k)

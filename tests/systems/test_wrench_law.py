@@ -8,23 +8,23 @@ from tests.support.system_checks import assert_every_input_is_required, evaluate
 P_LE, P_LLCM = np.array([0.4, 0.1]), np.array([0.05, -0.02])
 INPUTS = {
     "object_state": [3.8, 3.5, 0.7, 0.3, 0.1, 0.9],
-    "position_acceleration": [1.2, -0.4],
-    "angle_acceleration": [2.0],
+    "governor_command": [7.0, 8.0, 1.2, -0.4],
+    "axis_acceleration": [2.0, 9.0, 10.0],
 }
 DESIRED = np.array([1.2, -0.4, 2.0])
 
 
 @pytest.fixture
 def law():
-    return WrenchLaw(P_LE, p_LLcm=P_LLCM, mass=3.0, inertia=0.7, share=0.25)
+    return WrenchLaw(P_LE, p_LLcm=P_LLCM, mass=3.0, inertia=0.7, share=0.25, joints=2)
 
 
 def test_ports(law):
     inputs, outputs = port_sizes(law)
     assert inputs == {
         "object_state": 6,
-        "position_acceleration": 2,
-        "angle_acceleration": 1,
+        "governor_command": 4,
+        "axis_acceleration": 3,
     }
     assert outputs == {"object_acceleration": 3, "hand_command": 6}
 
@@ -48,7 +48,7 @@ def test_outputs_are_the_laws(law):
 
 
 def test_inputs_are_required(law):
-    command = {"position_acceleration", "angle_acceleration"}
+    command = {"governor_command", "axis_acceleration"}
     assert_every_input_is_required(
         law,
         INPUTS,
@@ -72,4 +72,4 @@ def test_inputs_are_required(law):
 )
 def test_bad_parameters_are_refused(mass, inertia, share, complaint):
     with pytest.raises(ValueError, match=complaint):
-        WrenchLaw(P_LE, p_LLcm=P_LLCM, mass=mass, inertia=inertia, share=share)
+        WrenchLaw(P_LE, p_LLcm=P_LLCM, mass=mass, inertia=inertia, share=share, joints=0)

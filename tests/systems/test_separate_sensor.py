@@ -3,7 +3,7 @@ import pytest
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.plant import build_separate_team, build_team_plant, set_configuration
-from coop_drake.systems import FreeRobotSensor, RobotStateSensor
+from coop_drake.systems import TeamSensor, build_separate_sensor
 from tests.support.small_scenario import small_scenario
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
 
@@ -23,24 +23,21 @@ def teams(request):
     return list(zip(built, states, strict=True))
 
 
-def test_a_robot_measures_the_same_in_both_plants(teams):
+def test_the_same_is_measured_in_both_plants(teams):
     (separate, state), (tree, tree_state) = teams
-    for robot in separate.robots:
-        sensor, n = FreeRobotSensor(separate, robot.index), len(robot.joints)
-        states = separate.plant.num_multibody_states()
-        assert port_sizes(sensor) == ({"team_state": states}, {"robot_state": 2 * (3 + n)})
-        measured = evaluate(sensor, {"team_state": state}, "robot_state")
-        expected = evaluate(RobotStateSensor(tree, robot.index), {"team_state": tree_state}, "robot_state")
-        np.testing.assert_allclose(measured, expected, atol=1e-12)
+    sensor, of_tree = build_separate_sensor(separate), TeamSensor(tree)
+    values = evaluate(of_tree, {"team_state": tree_state}, "measurements")
+    expected = np.split(values, np.cumsum(of_tree.sizes)[:-1])
+    names = ["object_pose", *(f"robot_{robot.index}_state" for robot in separate.robots)]
+    assert port_sizes(sensor) == (
+        {"team_state": separate.plant.num_multibody_states()},
+        dict(zip(names, of_tree.sizes, strict=True)),
+    )
+    for name, value in zip(names, expected, strict=True):
+        np.testing.assert_allclose(evaluate(sensor, {"team_state": state}, name), value, atol=1e-12)
 
 
 def test_the_state_is_required(teams):
     (separate, state), _ = teams
-    sensor = FreeRobotSensor(separate, 0)
-    assert_every_input_is_required(sensor, {"team_state": state}, {"robot_state": {"team_state"}})
-
-
-def test_a_robot_that_is_not_there_is_refused(teams):
-    (separate, _), _ = teams
-    with pytest.raises(IndexError, match="robot 2 is not in the team of 2"):
-        FreeRobotSensor(separate, 2)
+    sensor = build_separate_sensor(separate)
+    assert_every_input_is_required(sensor, {"team_state": state}, {"robot_0_state": {"team_state"}})

@@ -1,0 +1,33 @@
+"""Drake's block that sorts elements of vectors, from names and places."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from pydrake.systems.primitives import Selector, SelectorParams
+
+__all__ = ["build_selector"]
+
+
+def build_selector(inputs: Mapping[str, int], outputs: Mapping[str, Sequence[tuple[int, int]]]) -> Selector:
+    """Build a Selector.
+
+    Args:
+        inputs: Names and sizes of the inputs.
+        outputs: Names of the outputs, and for each of its elements the input's number and the place in it.
+    """
+    return Selector(
+        SelectorParams(
+            inputs=[SelectorParams.InputPortParams(name=name, size=size) for name, size in inputs.items()],
+            outputs=[
+                SelectorParams.OutputPortParams(
+                    name=name,
+                    selections=[
+                        SelectorParams.OutputSelection(input_port_index=port, input_offset=place)
+                        for port, place in places
+                    ],
+                )
+                for name, places in outputs.items()
+            ],
+        )
+    )
