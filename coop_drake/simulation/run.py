@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -57,6 +58,10 @@ def simulate(
         return _simulated(loop, scenario, progress, onlooker)
     finally:
         loop.release()
+        del loop
+        # Diagrams and their systems hold each other, and Python does not see how large they are: it would
+        # let many runs' plants pile up. They are young; to look through all that is old would take longer.
+        gc.collect(1)
 
 
 def _simulated(
