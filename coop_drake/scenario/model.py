@@ -172,15 +172,16 @@ class SimulatorSettings:
         integration_scheme: Name of the integrator, as Drake spells it; where controllers are sampled,
             ``bogacki_shampine3`` stands in for ``runge_kutta5``.
         max_step_size: Longest step [s].
-        accuracy: Relative accuracy of the error-controlled step [-].
+        accuracy: Relative accuracy of the error-controlled step [-]. What ``runge_kutta3`` does with 1e-3 is
+            nearer to the truth, at its worst, than ``runge_kutta5`` with 1e-4: the laws have corners.
     """
 
     max_time: float = 300.0
     integration_scheme: Literal[
-        "runge_kutta5", "runge_kutta3", "runge_kutta2", "bogacki_shampine3", "explicit_euler"
-    ] = "runge_kutta5"
+        "runge_kutta3", "runge_kutta5", "runge_kutta2", "bogacki_shampine3", "explicit_euler"
+    ] = "runge_kutta3"
     max_step_size: float = 0.02
-    accuracy: float = 1e-4
+    accuracy: float = 1e-3
 
 
 @dataclass(frozen=True)

@@ -148,7 +148,7 @@ CASES = {
         ("gains:", "simulator: {integration_scheme: euler}\ngains:"),
         "simulator.integration_scheme",
         "euler",
-        "one of runge_kutta5, runge_kutta3",
+        "one of runge_kutta3, runge_kutta5",
     ),
     "slow control": (
         ("object: object\n", "deployment: {control_rate: 0.5}\n"),
