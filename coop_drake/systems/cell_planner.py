@@ -41,7 +41,7 @@ class CellPlanner(Block):
             raise ValueError(f"CellPlanner needs at least one robot and one cell, not {robots} and {cells}")
         if period is not None and not period > 0.0:
             raise ValueError(f"CellPlanner's period must be positive, not {period}")
-        self._cells = cells
+        self._cells, self._nothing = cells, EventStatus.DidNothing()
         self._ready = tuple(
             self.DeclareVectorInputPort(f"robot_{k}_ready", READY_SIZE) for k in range(robots)
         )
@@ -54,25 +54,29 @@ class CellPlanner(Block):
         else:
             self.DeclarePeriodicDiscreteUpdateEvent(period_sec=period, offset_sec=0.0, update=self._advance)
 
-    def _all_ready(self, context: Context, cell: float) -> bool:
-        for port in self._ready:
+    def _left_by_all(self, context: Context) -> float:
+        """Index of the cell that all robots are ready to leave, -1 if they are not."""
+        cell = -1.0
+        for k, port in enumerate(self._ready):
             index, margin = port.Eval(context)
-            if not (margin >= 0.0 and index == cell):
-                return False
-        return True
+            # Most steps end here, at the first robot: the state is not read before it must be.
+            if not margin >= 0.0 or (k > 0 and index != cell):
+                return -1.0
+            cell = index
+        return cell
 
     def _advance(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
-        cell = context.get_discrete_state_vector().value()[0]
-        if cell < self._cells - 1 and self._all_ready(context, cell):
+        cell = self._left_by_all(context)
+        if 0.0 <= cell < self._cells - 1 and cell == context.get_discrete_state_vector().value()[0]:
             discrete_state.get_mutable_vector().SetFromVector([cell + 1.0, context.get_time()])
             return EventStatus.Succeeded()
         # What follows from the state stays valid: nobody computes it again.
-        return EventStatus.DidNothing()
+        return self._nothing
 
     def _write_cell(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_discrete_state_vector().value())
 
     def _write_arrived(self, context: Context, output: BasicVector) -> None:
         cell = context.get_discrete_state_vector().value()[0]
-        last = cell == self._cells - 1
-        output.SetFromVector([1.0 if last and self._all_ready(context, cell) else 0.0])
+        arrived = cell == self._cells - 1 and cell == self._left_by_all(context)
+        output.SetFromVector([1.0 if arrived else 0.0])

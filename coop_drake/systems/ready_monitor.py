@@ -57,8 +57,11 @@ class ReadyMonitor(Block):
             )
         if not position_tolerance > 0.0:
             raise ValueError(f"ReadyMonitor's position tolerance must be positive, not {position_tolerance}")
-        self._cells, self._inradii = tuple(cells), tuple(inradii)
-        self._tables = [law.table for law in laws]
+        self._cells, self._tables = len(cells), [law.table for law in laws]
+        self._leaving = [
+            (law.table, next_law.table, next_cell.clearance.edges, next_cell.gains.stiffness, inradius)
+            for law, next_law, next_cell, inradius in zip(laws, laws[1:], cells[1:], inradii, strict=False)
+        ]
         self._goal, self._tolerance = np.array(goal_position, dtype=float), position_tolerance
         n = laws[0].axes - 1
         self._object = self.DeclareVectorInputPort("object_state", 6)
@@ -68,19 +71,14 @@ class ReadyMonitor(Block):
         self.DeclareVectorOutputPort("ready", READY_SIZE, self._write_ready)
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
-        index = index_of(self._current.Eval(context), len(self._cells))
-        thing, state, following = self._object.Eval(context), self._state.Eval(context), index + 1
-        if following == len(self._cells):
-            margin = robot_arrival(self._tables[index], self._goal, self._tolerance, thing, state)
+        index = index_of(self._current.Eval(context), self._cells)
+        thing, state, report = (
+            self._object.Eval(context),
+            self._state.Eval(context),
+            output.get_mutable_value(),
+        )
+        report[0] = index
+        if index == self._cells - 1:
+            report[1] = robot_arrival(self._tables[index], self._goal, self._tolerance, thing, state)
         else:
-            margin = robot_ready(
-                self._tables[index],
-                self._tables[following],
-                self._cells[following].clearance.edges,
-                self._cells[following].gains.stiffness,
-                self._inradii[index],
-                thing,
-                state,
-                self._governor.Eval(context),
-            )
-        output.SetFromVector([float(index), margin])
+            report[1] = robot_ready(*self._leaving[index], thing, state, self._governor.Eval(context))

@@ -87,10 +87,14 @@ class TeamController(Block):
             raise ValueError(
                 f"TeamController needs one inradius for each cell, not {len(inradii)} for {len(cells)}"
             )
-        self._cells, self._inradii, self._on_bases = tuple(cells), tuple(inradii), on_bases
+        self._cells, self._on_bases = tuple(cells), on_bases
         self._laws = [(*cell, *team) for cell in cells]
         self._team, self._places = team, (team.places, team.first)
-        self._goal, self._tolerance = np.array(goal_position, dtype=float), position_tolerance
+        self._leaving = [
+            (cell.table, following.table, following.edges, following.gains, inradius)
+            for cell, following, inradius in zip(cells, cells[1:], inradii, strict=False)
+        ]
+        self._arriving = cells[-1].table, np.array(goal_position, dtype=float), position_tolerance
         robots, axes = len(team.yaws), team.places.shape[1]
         self._state = self.DeclareVectorInputPort("team_state", 2 * axes)
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
@@ -137,20 +141,9 @@ class TeamController(Block):
     def _write_ready(self, context: Context, output: BasicVector) -> None:
         index = index_of(self._cell.Eval(context), len(self._cells))
         state, reports = self._state.Eval(context), output.get_mutable_value()
-        table, margins = self._cells[index].table, reports[1::READY_SIZE]
-        reports[::READY_SIZE] = index
         if index == len(self._cells) - 1:
-            team_arrival(table, self._goal, self._tolerance, *self._places, state, margins)
-            return
-        following = self._cells[index + 1]
-        team_ready(
-            table,
-            following.table,
-            following.edges,
-            following.gains,
-            self._inradii[index],
-            *self._places,
-            state,
-            self._governor.Eval(context),
-            margins,
-        )
+            team_arrival(*self._arriving, *self._places, index, state, reports)
+        else:
+            team_ready(
+                *self._leaving[index], *self._places, index, state, self._governor.Eval(context), reports
+            )

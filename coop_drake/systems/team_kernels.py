@@ -179,10 +179,10 @@ def team_telemetry(
 @compiled
 def team_ready(
     table: FloatArray, next_table: FloatArray, next_edges: FloatArray, next_gains: FloatArray,
-    inradius: float, places: IntArray, first: IntArray, state: FloatArray, governor: FloatArray,
-    margins: FloatArray,
+    inradius: float, places: IntArray, first: IntArray, index: int, state: FloatArray, governor: FloatArray,
+    reports: FloatArray,
 ) -> None:  # fmt: skip
-    """Write every robot's margin of ``ready_margin``, shape (N,).
+    """Write of every robot the cell that it speaks of and its ``ready_margin``, shape (2 N,).
 
     Args:
         table: Laws of all axes in the current cell.
@@ -192,28 +192,30 @@ def team_ready(
         inradius: R of the present transition [m].
         places: Where z and its rates stand in the plant's state.
         first: First rows of a ``FusedTeam``.
+        index: Of the current cell.
         state: Of the plant.
         governor: p_G, shape (2,) [m].
-        margins: Receives them.
+        reports: Receives them.
     """
     thing = _object_state(places, state)
     common = min(
         position_ready(next_edges, next_gains[0], inradius, thing, governor),
         axis_ready(table[0], next_table[0], thing[2], thing[5]),
     )
-    for k in range(margins.size):
-        margins[k] = common
+    for k in range(reports.size // 2):
+        margin = common
         for i in range(1 + first[2, k], 1 + first[2, k + 1]):
             position, rate = state[places[0, 2 + i]], state[places[1, 2 + i]]
-            margins[k] = min(margins[k], axis_ready(table[i], next_table[i], position, rate))
+            margin = min(margin, axis_ready(table[i], next_table[i], position, rate))
+        reports[2 * k], reports[2 * k + 1] = index, margin
 
 
 @compiled
 def team_arrival(
-    table: FloatArray, goal: FloatArray, tolerance: float, places: IntArray, first: IntArray,
-    state: FloatArray, margins: FloatArray,
+    table: FloatArray, goal: FloatArray, tolerance: float, places: IntArray, first: IntArray, index: int,
+    state: FloatArray, reports: FloatArray,
 ) -> None:  # fmt: skip
-    """Write every robot's margin of ``arrival_margin``, shape (N,).
+    """Write of every robot the cell that it speaks of and its ``arrival_margin``, shape (2 N,).
 
     Args:
         table: Laws of all axes in the last cell.
@@ -221,17 +223,17 @@ def team_arrival(
         tolerance: How close to it counts as arrived [m].
         places: Where z and its rates stand in the plant's state.
         first: First rows of a ``FusedTeam``.
+        index: Of the last cell.
         state: Of the plant.
-        margins: Receives them.
+        reports: Receives them.
     """
     thing = _object_state(places, state)
     common = min(position_arrived(goal, tolerance, thing), axis_rests(table[0], thing[2], thing[5]))
-    for k in range(margins.size):
-        margins[k] = common
+    for k in range(reports.size // 2):
+        margin = common
         for i in range(1 + first[2, k], 1 + first[2, k + 1]):
-            margins[k] = min(
-                margins[k], axis_rests(table[i], state[places[0, 2 + i]], state[places[1, 2 + i]])
-            )
+            margin = min(margin, axis_rests(table[i], state[places[0, 2 + i]], state[places[1, 2 + i]]))
+        reports[2 * k], reports[2 * k + 1] = index, margin
 
 
 @compiled
