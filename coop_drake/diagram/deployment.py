@@ -7,12 +7,20 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.common import RandomDistribution, RandomGenerator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
-from pydrake.systems.primitives import Adder, DiscreteTimeDelay, Gain, RandomSource, Saturation, ZeroOrderHold
+from pydrake.systems.primitives import (
+    Adder,
+    DiscreteTimeDelay,
+    Gain,
+    LinearSystem,
+    RandomSource,
+    Saturation,
+    ZeroOrderHold,
+)
 
 from coop_drake.diagram.robot_controller import TELEMETRY
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.scenario import Deployment
-from coop_drake.systems import MessageChannel, whole_periods
+from coop_drake.scenario import Deployment, Messages
+from coop_drake.systems import MessageChannel, clear_channel, whole_periods
 
 __all__ = ["DeployedController", "build_radio", "deploy"]
 
@@ -58,8 +66,9 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int) -> DeployedC
     """Put a limit round a robot's controller, and noise, delays, a hold and a radio as far as switched on.
 
     In the order of the signals: ``robot_state`` and ``object_pose`` get noise, then a delay; ``robot_effort``
-    is held for a period, then limited; ``ready`` goes through a :class:`MessageChannel`. The limit is always
-    there: that of the actuators, or where none is given one so high that only a run that is lost meets it.
+    is held for a period, then limited; ``ready`` goes through a :class:`MessageChannel`, or a hold where
+    nothing is lost or late. The limit is always there: that of the actuators, or where none is given one so
+    high that only a run that is lost meets it.
 
     Args:
         controller: From :func:`build_robot_controller`, with the same period.
@@ -83,11 +92,13 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int) -> DeployedC
     )
 
 
-def build_radio(deployment: Deployment, robot: int) -> MessageChannel:
+def build_radio(deployment: Deployment, robot: int) -> MessageChannel | LinearSystem:
     """The channel of a robot's reports in a team that is sampled."""
-    messages = deployment.messages
+    messages, period = deployment.messages, deployment.period or 0.0
+    if messages == Messages():
+        return clear_channel(period)
     return MessageChannel(
-        deployment.period or 0.0,
+        period,
         delay=messages.delay,
         loss=messages.loss,
         repeat=messages.repeat,

@@ -5,7 +5,7 @@ from coop_drake.systems.axis_ppc import AxisPpc
 from coop_drake.systems.block import Block
 from coop_drake.systems.cell_planner import CellPlanner
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
-from coop_drake.systems.message_channel import MessageChannel, whole_periods
+from coop_drake.systems.message_channel import MessageChannel, clear_channel, whole_periods
 from coop_drake.systems.object_estimator import ObjectEstimator
 from coop_drake.systems.ready_monitor import ReadyMonitor
 from coop_drake.systems.reference_governor import GovernedCell, ReferenceGovernor
@@ -37,5 +37,6 @@ __all__ = [
     "axis_laws",
     "build_selector",
     "build_separate_sensor",
+    "clear_channel",
     "whole_periods",
 ]

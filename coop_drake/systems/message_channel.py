@@ -6,11 +6,12 @@ from random import Random
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
+from pydrake.systems.primitives import LinearSystem
 
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import READY_SIZE
 
-__all__ = ["MessageChannel", "whole_periods"]
+__all__ = ["MessageChannel", "clear_channel", "whole_periods"]
 
 #: Stands for no report, as before the first arrives: it is about no cell, so it never counts.
 _NOTHING = (-1.0, -1.0)
@@ -80,6 +81,18 @@ class MessageChannel(Block):
 
     def _write_heard(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_discrete_state_vector().value()[:READY_SIZE])
+
+
+def clear_channel(period: float) -> LinearSystem:
+    """A channel that neither loses nor delays anything: Drake's own hold, with nothing heard at first.
+
+    Args:
+        period: Time between two reports [s].
+    """
+    passed, no = np.eye(READY_SIZE), np.zeros((READY_SIZE, READY_SIZE))
+    hold = LinearSystem(A=no, B=passed, C=passed, D=no, time_period=period)
+    hold.configure_default_state(_NOTHING)
+    return hold
 
 
 def whole_periods(time: float, period: float) -> int:

@@ -3,7 +3,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-from coop_drake.systems import MessageChannel, whole_periods
+from coop_drake.systems import MessageChannel, clear_channel, whole_periods
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
 
 PERIOD = 0.1
@@ -50,6 +50,13 @@ def test_no_input_is_needed_to_hear():
 
 def test_a_good_channel_passes_every_report_on():
     assert heard(MessageChannel(PERIOD)) == list(range(12))
+
+
+def test_a_clear_channel_is_one_that_neither_loses_nor_delays():
+    clear = clear_channel(PERIOD)
+    assert not clear.HasAnyDirectFeedthrough()
+    np.testing.assert_array_equal(clear.get_output_port().Eval(clear.CreateDefaultContext()), NEVER)
+    assert heard(clear) == heard(MessageChannel(PERIOD)) == list(range(12))
 
 
 @pytest.mark.parametrize(("delay", "periods"), [(0.1, 1), (0.3, 3), (0.25, 3), (0.30000000000000004, 3)])

@@ -9,7 +9,7 @@ from pydrake.systems.framework import Diagram, LeafSystem
 
 from coop_drake import systems
 from coop_drake.diagram import build_closed_loop
-from coop_drake.scenario import Deployment, PlantSettings
+from coop_drake.scenario import Deployment, Messages, PlantSettings
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.system_checks import SIZE_OF_ABSTRACT, port_sizes, state_of
 
@@ -33,7 +33,7 @@ def blocks():
     scenario, plan = small_problem("base")
     found = {}
     for blocks, changes in (
-        ("named", {"deployment": Deployment(control_rate=100.0)}),
+        ("named", {"deployment": Deployment(control_rate=100.0, messages=Messages(loss=0.1))}),
         ("named", {"plant": PlantSettings(grasps="constraints")}),
         ("fused", {}),
     ):
