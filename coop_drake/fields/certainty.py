@@ -16,6 +16,7 @@ __all__ = ["check_certainty", "direction_error"]
 
 _UNCERTAIN = 0.1  # a direction that may err by more does not count as known, as a sine [-]
 _MOST = 0.01  # part of the region where the direction may be unknown
+_ASIDE = 0.25  # of a leaf's size
 _LEAST_ROOM = 0.1  # of a leaf's size: sampled directions are judged as if walls were no closer
 
 
@@ -53,6 +54,9 @@ def check_certainty(harmonic_map: HarmonicMap) -> None:
     centres, sizes = leaves[:, :2] + harmonic_map.solution.centre, leaves[:, 2]
     inside = shapely.contains_xy(harmonic_map.region, *centres.T)
     centres, sizes = centres[inside], sizes[inside]
+    # No way leads on from the goal: a leaf about it is judged beside it.
+    at_goal = shapely.distance(harmonic_map.goal, shapely.points(centres)) < _LEAST_ROOM * sizes
+    centres[at_goal] += _ASIDE * sizes[at_goal, None]
     room = shapely.distance(harmonic_map.region.boundary, shapely.points(centres))
     unknown = _bound(harmonic_map, centres, np.maximum(room, _LEAST_ROOM * sizes)) > _UNCERTAIN
     part = float((sizes * sizes)[unknown].sum() / (sizes * sizes).sum())

@@ -40,6 +40,14 @@ def test_cut_open_it_is_not():
     assert VelocityField(HarmonicMap(cell, goal, tolerance=1e-6))(goal.coords[0]).tolist() == [0.0, 0.0]
 
 
+def test_a_goal_in_the_middle_of_a_leaf_is_no_place_where_the_direction_is_unknown():
+    goal = Point(3.4, 3.6)
+    harmonic_map = HarmonicMap(box(2.7, 2.7, 4.3, 4.3), goal)
+    leaves = harmonic_map.solution.arrays.leaf_square[:, :2] + harmonic_map.solution.centre
+    assert shapely.distance(goal, shapely.points(leaves)).min() < 1e-9
+    assert VelocityField(harmonic_map)(goal.coords[0]).tolist() == [0.0, 0.0]
+
+
 @pytest.mark.parametrize(
     ("domain", "goal"),
     [

@@ -1,9 +1,9 @@
-"""A transport across an open room with a plan written by hand: three cells, no search, no Drake."""
+"""Transports in an open room with plans written by hand: no search, no Drake."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from math import sqrt
+from math import cos, pi, sin, sqrt
 
 import numpy as np
 from shapely import Point, Polygon, box
@@ -31,6 +31,19 @@ def small_plan(joint_names: tuple[str, ...], gain_set: GainSet | None = None) ->
     cells = tuple(_cell(polygon, angle, joint, n) for polygon, angle, joint in CELLS)
     start = np.array([*START_POSE, *[0.0] * n])
     return plan_by_hand(cells, start, np.array(GOAL_POSE), joint_names, gain_set)
+
+
+def round_trip(joint_names: tuple[str, ...], cells: int = 30) -> Plan:
+    """A plan once round the middle of the room, all axes to and fro, through many cells."""
+    n = len(joint_names)
+    walked = []
+    for turn in np.linspace(0.0, 2.0 * pi, cells):
+        x, y = 5.0 - 1.5 * cos(turn), 3.5 - 1.5 * sin(turn)
+        angle, joint = 0.3 * sin(3.0 * turn), 0.15 * sin(2.0 * turn)
+        polygon = box(x - 0.8, y - 0.8, x + 0.8, y + 0.8)
+        walked.append(_cell(polygon, (angle - 0.25, angle + 0.25), (joint - 0.25, joint + 0.25), n))
+    start = np.array([3.5, 3.5, 0.0, *[0.0] * n])
+    return plan_by_hand(tuple(walked), start, np.array([3.4, 3.6, 0.1]), joint_names)
 
 
 def plan_by_hand(
