@@ -9,7 +9,7 @@ from coop_drake.fields.flat_field import velocity_in_field
 from coop_drake.geometry.boundary import signed_distance_compiled
 from coop_drake.geometry.pose import FloatArray
 
-__all__ = ["VELOCITY_STEP", "cell_margin", "govern", "lead"]
+__all__ = ["VELOCITY_STEP", "cell_margin", "govern"]
 
 #: The energy is computed from a velocity in steps of this size [m/s]. Every robot knows the velocity through
 #: its own arm, with its own rounding; in steps they have the same number, and so the same p_G, bit by bit.
@@ -35,35 +35,6 @@ def cell_margin(edges: FloatArray, stiffness: float, state: FloatArray, governor
 
 
 @compiled
-def lead(
-    gains: FloatArray,
-    edges: FloatArray,
-    flat: FloatArray,
-    field: FloatArray,
-    state: FloatArray,
-    governor: FloatArray,
-    velocity: FloatArray,
-) -> None:
-    """Write p_G' of (14), shape (2,).
-
-    Args:
-        gains: (K, zeta, K_G, c).
-        edges: Of the governed set, shape (edges, 4) [m].
-        flat: The cell's map, as ``VelocityField.kernel_arguments`` has it.
-        field: What the velocity field adds to the map.
-        state: Pose and twist of the object, shape (6,).
-        governor: p_G, shape (2,) [m].
-        velocity: Receives p_G'.
-    """
-    margin = cell_margin(edges, gains[0], state, governor)
-    if margin <= 0.0:
-        velocity[0], velocity[1] = 0.0, 0.0
-        return
-    vx, vy = velocity_in_field(flat, field, governor[0], governor[1])
-    governor_velocity(vx, vy, margin, gains[0], gains[2], gains[3], velocity)
-
-
-@compiled
 def govern(
     gains: FloatArray,
     edges: FloatArray,
@@ -73,6 +44,21 @@ def govern(
     governor: FloatArray,
     command: FloatArray,
 ) -> None:
-    """Write p_G', then the desired acceleration of L's origin, both of (14), shape (4,); see ``lead``."""
-    lead(gains, edges, flat, field, state, governor, command[:2])
+    """Write p_G', then the desired acceleration of L's origin, both of (14), shape (4,) [m/s, m/s^2].
+
+    Args:
+        gains: (K, zeta, K_G, c).
+        edges: Of the governed set, shape (edges, 4) [m].
+        flat: The cell's map, as ``VelocityField.kernel_arguments`` has it.
+        field: What the velocity field adds to the map.
+        state: Pose and twist of the object, shape (6,).
+        governor: p_G, shape (2,) [m].
+        command: Receives both.
+    """
     governed_acceleration(state, governor, gains[0], gains[1], command[2:])
+    margin = cell_margin(edges, gains[0], state, governor)
+    if margin <= 0.0:
+        command[0], command[1] = 0.0, 0.0
+        return
+    vx, vy = velocity_in_field(flat, field, governor[0], governor[1])
+    governor_velocity(vx, vy, margin, gains[0], gains[2], gains[3], command[:2])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from coop_drake.control.kernels import compiled, governed_acceleration, hand_command, track_row, write_walls
 from coop_drake.control.planar_chain import chain_effort, read_robot
 from coop_drake.geometry.pose import FloatArray
-from coop_drake.systems.governor_kernels import cell_margin, lead
+from coop_drake.systems.governor_kernels import cell_margin, govern
 from coop_drake.systems.ready_kernels import axis_ready, axis_rests, position_arrived, position_ready
 
 __all__ = ["FusedCell", "FusedTeam", "team_arrival", "team_command", "team_ready", "team_telemetry"]
@@ -137,7 +137,9 @@ def team_command(
         for k in range(robots):
             c, s, fx, fy = np.cos(bases[k, 2]), np.sin(bases[k, 2]), command[3 * k], command[3 * k + 1]
             command[3 * k], command[3 * k + 1] = c * fx + s * fy, c * fy - s * fx
-    lead(gains, edges, flat, field, _object_state(places, state), governor, command[last:])
+    governed = np.empty(4)
+    govern(gains, edges, flat, field, _object_state(places, state), governor, governed)
+    command[last:] = governed[:2]
 
 
 @compiled
