@@ -159,7 +159,8 @@ def _places(loop: ClosedLoop, ports: _PortRow) -> _Places:
     station, planner = loop.station.diagram, loop.cell_planner
     states = [ports.add(station, f"robot_{robot.index}_state") for robot in loop.team.robots]
     efforts = [ports.add(controller, "robot_effort") for controller in loop.controllers]
-    of = {name: [ports.add(law, name) for law in loop.laws] for name in ("ready", *TELEMETRY)}
+    logged = [name for name in TELEMETRY if name != "object_state"]
+    of = {name: [ports.add(law, name) for law in loop.laws] for name in ("ready", *logged)}
     realised = ports.add(station, "generalized_acceleration")[loop.team.velocity_index[:3]]
     # Every robot has walls for the angle; they are alike, and the first robot's are taken.
     walls = [np.split(funnels, 2) for funnels in of["funnels"]]

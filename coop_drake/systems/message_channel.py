@@ -86,6 +86,8 @@ class MessageChannel(Block):
 def clear_channel(period: float) -> LinearSystem:
     """A channel that neither loses nor delays anything: Drake's own hold, with nothing heard at first.
 
+    Its input and output are those of :class:`MessageChannel`, reports of shape (2,), under Drake's names.
+
     Args:
         period: Time between two reports [s].
     """
