@@ -19,9 +19,9 @@ from benchmarks.ring_teams import ring_transport
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from benchmarks.transport import base_transport
+from coop_drake.answers import Plan
 from coop_drake.diagram import Blocks, build_closed_loop
 from coop_drake.fields import HarmonicMap
-from coop_drake.planning import Plan
 from coop_drake.plant import build_team_plant, set_configuration
 from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation import configure_simulator, simulate

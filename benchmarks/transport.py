@@ -7,9 +7,9 @@ from pathlib import Path
 
 from pydrake.systems.framework import DiagramBuilder
 
+from coop_drake.answers import Found, Plan
 from coop_drake.errors import PlanError
 from coop_drake.fields import HarmonicMap
-from coop_drake.planning import Found, Plan
 from coop_drake.planning.planner import plan
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.scenario import Scenario, load_scenario

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from coop_drake.answers import load_plan
 from coop_drake.cli import app, simulating
 from coop_drake.cli.reporter import Reporter
 from coop_drake.errors import PlanError
-from coop_drake.planning import load_plan
 from coop_drake.simulation import SimulationLog
 from coop_drake.viz import LiveView
 from tests.support.scenarios import MODELS, ROOM, write_scenario

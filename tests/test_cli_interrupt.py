@@ -11,10 +11,10 @@ import time
 import pytest
 import typer
 
+from coop_drake.answers import load_plan
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
 from coop_drake.cli.reporter import Reporter
-from coop_drake.planning import load_plan
 from tests.support.scenarios import MODELS
 
 # A shell that starts tests in the background has its children ignore Ctrl-C.

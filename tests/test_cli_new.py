@@ -7,12 +7,12 @@ import json
 import pytest
 from typer.testing import CliRunner
 
+from coop_drake.answers import Found
 from coop_drake.cli import app, new
 from coop_drake.cli.reading import read_task
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.planning import Found
 from coop_drake.planning.planner import plan
 from coop_drake.scenario import load_scenario
+from coop_drake.tree.pose import PlanarPose
 from tests.support.floor_plan_files import write_svg
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from coop_drake.answers import load_plan, save_plan
 from coop_drake.cli import app, simulating
-from coop_drake.planning import load_plan, save_plan
 from coop_drake.simulation import SimulationLog, stall
 from tests.support.scenarios import write_scenario
 

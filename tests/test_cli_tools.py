@@ -18,12 +18,12 @@ from PIL import Image
 from typer.testing import CliRunner
 
 import coop_drake
+from coop_drake.answers import save_plan
+from coop_drake.answers.digest import problem_digest
 from coop_drake.cli import app, health, show
 from coop_drake.cli.completion import complete_gains, complete_scenario
 from coop_drake.cli.examples import EXAMPLES
 from coop_drake.cli.question import Question
-from coop_drake.planning import save_plan
-from coop_drake.planning.digest import problem_digest
 from coop_drake.scenario import dump_scenario, load_scenario
 from coop_drake.scenario.document import parse
 from coop_drake.scenario.json_schema import scenario_schema

@@ -15,14 +15,15 @@ from pathlib import Path
 import pytest
 from pydrake.systems.framework import DiagramBuilder
 
+from coop_drake.answers import load_plan, save_plan
+from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.proof_file import save_separation
 from coop_drake.cli import simulating, verify
 from coop_drake.cli.question import Question
 from coop_drake.cli.reading import Task, read_task
 from coop_drake.errors import PlanError
 from coop_drake.floor_plans import read_floor_plan
-from coop_drake.planning import find_channel, load_plan, save_plan
-from coop_drake.planning.digest import problem_digest
-from coop_drake.planning.separation_file import save_separation
+from coop_drake.planning import find_channel
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.scenario import dump_scenario, load_scenario
 from coop_drake.scenario.document import parse

@@ -17,11 +17,12 @@ from benchmarks.isolated import in_own_process
 from benchmarks.planner.family import corridor_problem, first_question
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
-from coop_drake.planning import PlanningProblem, find_channel
-from coop_drake.planning.channel import Channel
-from coop_drake.planning.exploration import Verdict
-from coop_drake.planning.proofs import Proofs, explorer
-from coop_drake.planning.split_rules import SplitRule
+from coop_drake.answers import PlanningProblem
+from coop_drake.planning import find_channel
+from coop_drake.planning.boxes.channel import Channel
+from coop_drake.planning.cells.exploration import Verdict
+from coop_drake.planning.cells.split_rules import SplitRule
+from coop_drake.planning.proofs.proofs import Proofs, explorer
 
 __all__ = ["VARIANTS", "Answered", "ablation_rows", "ablation_tasks", "answer"]
 

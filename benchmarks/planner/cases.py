@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.planning import PlanningProblem
+from coop_drake.answers import PlanningProblem
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.scenario import load_scenario
 

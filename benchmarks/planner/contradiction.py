@@ -18,7 +18,7 @@ from benchmarks.planner.peer import PeerRun
 from benchmarks.planner.trees_peer import run_trees
 from benchmarks.rows import Row
 from benchmarks.tasks import Rows, Task
-from coop_drake.planning import PlanningProblem
+from coop_drake.answers import PlanningProblem
 
 __all__ = ["QUESTIONS", "Patience", "contradiction_rows", "contradiction_tasks"]
 

@@ -9,9 +9,9 @@ import numpy as np
 from shapely import Polygon, affinity, box, normalize, union_all
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.pose import FloatArray, PlanarPose
-from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.planning import PlanningProblem
+from coop_drake.answers import PlanningProblem
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.pose import FloatArray, PlanarPose
 
 __all__ = [
     "corridor_floor",

@@ -7,11 +7,11 @@ from collections.abc import Callable
 import numba
 import numpy as np
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import PlanningProblem
-from coop_drake.planning.collision_kernels import is_free
-from coop_drake.planning.team_arrays import team_arrays
-from coop_drake.planning.walls import walls_for
+from coop_drake.answers import PlanningProblem
+from coop_drake.planning.sampling.collision_kernels import is_free
+from coop_drake.planning.sampling.obstacle_grid import walls_for
+from coop_drake.planning.sampling.team_arrays import team_arrays
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["compiled_check", "free_goals"]
 

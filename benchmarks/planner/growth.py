@@ -7,7 +7,7 @@ from benchmarks.planner.family import corridor_problem, crowd_problem, shelf_pro
 from benchmarks.planner.ours import plan_once_warm
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
-from coop_drake.planning import PlanningProblem
+from coop_drake.answers import PlanningProblem
 
 __all__ = ["growth_rows", "growth_tasks"]
 

@@ -22,9 +22,9 @@ import numpy as np
 
 from benchmarks.planner.footprint import compiled_check, free_goals
 from benchmarks.planner.peer import GOALS, MOTION_STEP, RANGE, PeerRun
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import PlanningProblem
-from coop_drake.planning.refine import configuration_scale
+from coop_drake.answers import PlanningProblem
+from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.pose import FloatArray
 
 if TYPE_CHECKING:
     from ompl import base as ob

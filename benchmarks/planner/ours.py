@@ -8,8 +8,9 @@ from time import process_time
 
 from benchmarks.planner.family import corridor_problem, first_question
 from benchmarks.planner.trees_peer import run_trees
-from coop_drake.control import ScheduledGains
-from coop_drake.planning import Found, PlanningProblem, PlanningResult, warm_up
+from coop_drake.answers import Found, PlanningProblem, PlanningResult
+from coop_drake.laws import ScheduledGains
+from coop_drake.planning import warm_up
 from coop_drake.planning.planner import plan
 
 __all__ = ["Planned", "compile_kernels", "plan_once_warm", "plan_repeatedly"]

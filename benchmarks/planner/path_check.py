@@ -8,13 +8,13 @@ from math import pi, remainder
 import numpy as np
 import shapely
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ConvexShape
-from coop_drake.planning import PlanningProblem
-from coop_drake.planning.collision_kernels import is_free
-from coop_drake.planning.refine import configuration_scale
-from coop_drake.planning.team_arrays import team_arrays
-from coop_drake.planning.walls import walls_for
+from coop_drake.answers import PlanningProblem
+from coop_drake.planning.sampling.collision_kernels import is_free
+from coop_drake.planning.sampling.obstacle_grid import walls_for
+from coop_drake.planning.sampling.team_arrays import team_arrays
+from coop_drake.tree.component_tree import ConvexShape
+from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["fault_of"]
 

@@ -7,11 +7,11 @@ from math import pi
 import numba
 import numpy as np
 
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.sweep_kernels import IntArray
-from coop_drake.planning.collision_kernels import is_free
-from coop_drake.planning.team_arrays import TeamArrays
-from coop_drake.planning.walls import Walls
+from coop_drake.planning.sampling.collision_kernels import is_free
+from coop_drake.planning.sampling.obstacle_grid import Walls
+from coop_drake.planning.sampling.team_arrays import TeamArrays
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["rrt_connect"]
 

@@ -14,10 +14,10 @@ import numpy as np
 from benchmarks.planner.footprint import compiled_check, free_goals
 from benchmarks.planner.peer import GOALS, MOTION_STEP, RANGE, PeerRun
 from benchmarks.planner.tree_kernels import rrt_connect
-from coop_drake.planning import PlanningProblem
-from coop_drake.planning.refine import configuration_scale
-from coop_drake.planning.team_arrays import team_arrays
-from coop_drake.planning.walls import walls_for
+from coop_drake.answers import PlanningProblem
+from coop_drake.planning.sampling.obstacle_grid import walls_for
+from coop_drake.planning.sampling.team_arrays import team_arrays
+from coop_drake.tree.levers import configuration_scale
 
 __all__ = ["CHECKS", "run_trees"]
 

@@ -8,13 +8,13 @@ from pathlib import Path
 
 from rich.markup import escape
 
+from coop_drake.answers import Found
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.mapping import map_cells
 from coop_drake.cli.planning import plan_question, without_plan
 from coop_drake.cli.reading import Task, read_task
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
-from coop_drake.planning import Found
 from coop_drake.tuning import (
     CRITERIA,
     TUNED,

@@ -18,9 +18,9 @@ from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 
 if TYPE_CHECKING:
+    from coop_drake.answers import Plan
     from coop_drake.cli.reading import Task
     from coop_drake.fields import HarmonicMap
-    from coop_drake.planning import Plan
 
 __all__ = ["compare_command"]
 
@@ -67,11 +67,11 @@ def compare_command(
 
 def _compare(scenario: Path, gains: str | None, out: Path | None, reporter: Reporter) -> ExitCode:
     # Here and not above: no other command should wait for Drake.
+    from coop_drake.answers import Found
     from coop_drake.cli.mapping import map_cells
     from coop_drake.cli.planning import plan_question, without_plan
     from coop_drake.cli.reading import read_task
     from coop_drake.files import write_atomically
-    from coop_drake.planning import Found
 
     task = read_task(scenario, gains)
     folder = ResultFolder(out if out is not None else Path("out") / task.scenario.name / "compare")

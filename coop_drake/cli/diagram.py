@@ -32,13 +32,13 @@ def diagram_command(
 
 def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> ExitCode:
     # Here and not above: no other command should wait for Drake or for the pictures' library.
+    from coop_drake.answers import Found
     from coop_drake.cli.mapping import map_cells
     from coop_drake.cli.planning import search_plan, without_plan
     from coop_drake.cli.reading import read_task
     from coop_drake.diagram import build_closed_loop
     from coop_drake.drawing import save_figure
     from coop_drake.errors import ScenarioError
-    from coop_drake.planning import Found
     from coop_drake.scenario import assemble
     from coop_drake.viz.block_diagram import block_diagram_figure
 

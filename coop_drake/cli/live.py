@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import sys
 
+from coop_drake.answers import Plan
 from coop_drake.cli.reporter import Reporter
-from coop_drake.planning import Plan
 from coop_drake.scenario import Scenario
 from coop_drake.viz import LiveView
 from coop_drake.viz.server import silent_meshcat

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+from coop_drake.answers import Plan
 from coop_drake.cli.map_cache import map_cache
 from coop_drake.cli.measures import map_measures
 from coop_drake.cli.reading import Task
@@ -12,7 +13,6 @@ from coop_drake.cli.results import ResultFolder
 from coop_drake.errors import FieldError
 from coop_drake.fields import HarmonicMap
 from coop_drake.files import write_atomically
-from coop_drake.planning import Plan
 from coop_drake.simulation import build_maps, certificate_rows
 
 __all__ = ["map_cells", "save_certificates"]

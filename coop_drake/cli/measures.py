@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from coop_drake.planning import Found, Infeasible, Plan, PlanningResult
+from coop_drake.answers import Found, Infeasible, Plan, PlanningResult
 
 if TYPE_CHECKING:
     from coop_drake.fields import HarmonicMap

@@ -8,6 +8,19 @@ from pathlib import Path
 import numpy as np
 from rich.markup import escape
 
+from coop_drake.answers import (
+    Found,
+    Infeasible,
+    Plan,
+    PlanningProblem,
+    PlanningResult,
+    Undecided,
+    load_plan,
+    save_plan,
+    table_1,
+)
+from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.proof_file import save_separation
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.measures import answer_of, plan_measures, planning_measures
 from coop_drake.cli.question import Question
@@ -17,21 +30,8 @@ from coop_drake.cli.summary import summary_rows
 from coop_drake.errors import PlanError
 from coop_drake.files import write_atomically
 from coop_drake.memory import peak_memory_mb
-from coop_drake.planning import (
-    Found,
-    Infeasible,
-    Plan,
-    PlanningProblem,
-    PlanningResult,
-    Undecided,
-    load_plan,
-    reschedule,
-    save_plan,
-    table_1,
-)
-from coop_drake.planning.digest import problem_digest
+from coop_drake.planning import reschedule
 from coop_drake.planning.planner import plan
-from coop_drake.planning.separation_file import save_separation
 from coop_drake.planning.warm_up import main as load_kernels
 
 __all__ = ["plan_only", "plan_question", "read_plan", "search_plan", "without_plan"]

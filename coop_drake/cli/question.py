@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from coop_drake.control import GainSet
-    from coop_drake.planning import PlanningProblem
+    from coop_drake.answers import PlanningProblem
+    from coop_drake.laws import GainSet
 
 __all__ = ["Question", "read_apart"]
 

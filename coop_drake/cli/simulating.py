@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
+from coop_drake.answers import Found, Plan
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.live import open_live_view
 from coop_drake.cli.mapping import map_cells, save_certificates
@@ -18,7 +19,6 @@ from coop_drake.cli.summary import summary_rows
 from coop_drake.diagram import Blocks
 from coop_drake.fields import HarmonicMap
 from coop_drake.memory import peak_memory_mb
-from coop_drake.planning import Found, Plan
 from coop_drake.simulation import SimulationLog, simulate
 from coop_drake.viz import LiveView, write_figures, write_recording
 

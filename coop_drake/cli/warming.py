@@ -10,10 +10,10 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from coop_drake.answers import Found
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.reading import read_task
 from coop_drake.cli.reporter import Reporter
-from coop_drake.planning import Found
 from coop_drake.planning.planner import plan
 from coop_drake.simulation import build_maps, simulate
 

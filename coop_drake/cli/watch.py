@@ -16,7 +16,7 @@ from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 
 if TYPE_CHECKING:
-    from coop_drake.planning import PlanningProblem
+    from coop_drake.answers import PlanningProblem
 
 __all__ = ["watch_command"]
 

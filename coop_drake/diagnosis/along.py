@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from coop_drake.answers import PlanningProblem
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning import PlanningProblem
-from coop_drake.planning.certify import Certifier
-from coop_drake.planning.margins import exact_footprint, marginal_workspace
-from coop_drake.planning.refine import configuration_scale
+from coop_drake.planning.boxes.certify import Certifier
+from coop_drake.planning.questions.margins import exact_footprint, marginal_workspace
+from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["is_free_along"]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.growth import Growth
 from coop_drake.diagnosis.passages import Stretch, stretches
 from coop_drake.diagnosis.trials import Answer, Trial, Trials
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import PlanningProblem
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Passage", "blocking_passages"]
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 from shapely import box
 
+from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.trials import Answer, Trials
-from coop_drake.planning import PlanningProblem
 
 __all__ = ["WithoutWalls", "without_walls"]
 

@@ -11,8 +11,8 @@ from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.drawing import BodyFootprint, team_footprints
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ComponentTree
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Contact", "Overlap", "contacts", "deepest", "overlaps"]
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.diagnosis.blocking import Passage
 from coop_drake.diagnosis.bodies import WithoutWalls
 from coop_drake.diagnosis.bracket import Bracket
 from coop_drake.diagnosis.contacts import Contact, Overlap
 from coop_drake.diagnosis.relaxations import Relaxation
 from coop_drake.diagnosis.trials import Answer
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.undecided import MixedCell
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["BlockedPose", "Diagnosis", "PassageFindings"]
 

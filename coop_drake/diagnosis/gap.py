@@ -10,7 +10,7 @@ from shapely import LineString, Polygon
 from shapely.geometry.polygon import orient
 
 from coop_drake.geometry.boundary import edges_of
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Gap", "narrowest_gap"]
 

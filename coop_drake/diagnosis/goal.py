@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import qmc
 
+from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.bracket import Steps, bracketed
 from coop_drake.diagnosis.contacts import Contact, Overlap, contacts, overlaps
 from coop_drake.diagnosis.diagnosis import BlockedPose
 from coop_drake.diagnosis.growth import Growth
 from coop_drake.diagnosis.trials import Answer, Trial, Trials
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import PlanningProblem
-from coop_drake.planning.goals import blocked_goal
+from coop_drake.planning.proofs.blocked_goals import blocked_goal
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["blocked_pose"]
 

@@ -10,7 +10,7 @@ from scipy.spatial import QhullError, Voronoi
 from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Growth"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from coop_drake.planning.undecided import MixedCell
+from coop_drake.answers.mixed_cell import MixedCell
 
 __all__ = ["mixed_facts", "mixed_sentences"]
 

@@ -10,12 +10,12 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.contacts import Contact, contacts
 from coop_drake.diagnosis.gap import Gap, narrowest_gap
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Interval
-from coop_drake.planning import PlanningProblem
-from coop_drake.planning.margins import exact_footprint
+from coop_drake.planning.questions.margins import exact_footprint
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["BodyAtFault", "Stretch", "stretches"]
 

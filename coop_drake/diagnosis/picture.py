@@ -10,12 +10,12 @@ from matplotlib.patches import Circle
 from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.blocking import Passage
 from coop_drake.diagnosis.diagnosis import Diagnosis
 from coop_drake.drawing import draw_polygon, draw_workspace, new_figure, team_footprints
 from coop_drake.drawing.colours import BLUE, GREY, INK, VERMILLION, WALL
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import PlanningProblem
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["diagnosis_figure"]
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import pi
 
+from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.bracket import Bracket, Steps, bracketed
 from coop_drake.diagnosis.squeeze import squeezed
 from coop_drake.diagnosis.team_changes import (
@@ -16,8 +17,7 @@ from coop_drake.diagnosis.team_changes import (
     widened_joints,
 )
 from coop_drake.diagnosis.trials import Trial, Trials
-from coop_drake.geometry.tree import ComponentTree
-from coop_drake.planning import PlanningProblem
+from coop_drake.tree.component_tree import ComponentTree
 
 __all__ = ["Change", "Relaxation", "changes", "try_changes"]
 

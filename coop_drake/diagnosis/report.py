@@ -13,7 +13,7 @@ from coop_drake.diagnosis.mixed import mixed_facts, mixed_sentences
 from coop_drake.diagnosis.passages import BodyAtFault
 from coop_drake.diagnosis.relaxations import Relaxation
 from coop_drake.diagnosis.trials import Answer
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["facts_of", "rows_of", "sentences_of"]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.trials import Answer, Trial, Trials
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import PlanningProblem
-from coop_drake.planning.tightening import Varied, amount_needed, are_free, drawn, drawn_closer
+from coop_drake.planning.sampling.narrow_passages import Varied, amount_needed, are_free, drawn, drawn_closer
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["relieved", "squeezed"]
 

@@ -12,8 +12,8 @@ import shapely
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import Body, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.component_tree import Body, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.pose import FloatArray
 
 __all__ = [
     "base_bodies",

@@ -6,16 +6,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 
+from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.along import is_free_along
 from coop_drake.diagnosis.way import way_through
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import Channel, PlanningProblem
-from coop_drake.planning.attempts import SampledAttempts
-from coop_drake.planning.exploration import Verdict
-from coop_drake.planning.proofs import Proofs
-from coop_drake.planning.refine import configuration_scale
-from coop_drake.planning.sampler import densified
+from coop_drake.planning import Channel
+from coop_drake.planning.cells.exploration import Verdict
+from coop_drake.planning.proofs.proofs import Proofs
+from coop_drake.planning.sampling.sampler import densified
+from coop_drake.planning.search.attempts import SampledAttempts
+from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Answer", "Trial", "Trials"]
 

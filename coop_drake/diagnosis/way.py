@@ -8,11 +8,12 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
+from coop_drake.answers import PlanningProblem
 from coop_drake.geometry.passage import PassageFinder, pole
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import Channel, PlanningProblem
-from coop_drake.planning.refine import configuration_scale
-from coop_drake.planning.sampler import densified
+from coop_drake.planning import Channel
+from coop_drake.planning.sampling.sampler import densified
+from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["way_through"]
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from coop_drake.answers import PlanningProblem
+from coop_drake.answers.proof import BlockedGoal
 from coop_drake.diagnosis.blocking import Growths, blocking_passages
 from coop_drake.diagnosis.bodies import without_walls
 from coop_drake.diagnosis.bracket import Steps, bracketed
@@ -14,8 +16,7 @@ from coop_drake.diagnosis.growth import Growth
 from coop_drake.diagnosis.relaxations import try_changes
 from coop_drake.diagnosis.squeeze import relieved, squeezed
 from coop_drake.diagnosis.trials import Answer, Progress, Trial, Trials
-from coop_drake.planning import Channel, PlanningProblem, find_channel
-from coop_drake.planning.separation import BlockedGoal
+from coop_drake.planning import Channel, find_channel
 
 __all__ = ["diagnose"]
 

@@ -8,13 +8,13 @@ from typing import Literal
 
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
+from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import DeployedController, deploy
 from coop_drake.diagram.fused import FusedControllers, add_fused_controllers
 from coop_drake.diagram.knowledge import robot_knowledge
 from coop_drake.diagram.robot_controller import build_robot_controller
 from coop_drake.diagram.station import TransportStation, build_driven_station, build_station
 from coop_drake.fields import HarmonicMap
-from coop_drake.planning.plan import Plan
 from coop_drake.plant import TeamPlant, set_configuration
 from coop_drake.scenario import Scenario
 from coop_drake.systems import Block, CellPlanner

@@ -18,9 +18,9 @@ from pydrake.systems.primitives import (
 )
 
 from coop_drake.diagram.robot_controller import TELEMETRY
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.scenario import Deployment, Messages
 from coop_drake.systems import MessageChannel, clear_channel, whole_periods
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["DeployedController", "build_radio", "deploy"]
 

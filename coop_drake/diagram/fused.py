@@ -20,10 +20,10 @@ from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.diagram.station import TransportStation
 from coop_drake.errors import ScenarioError
 from coop_drake.fields import VelocityField
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant import TeamPlant, base_chain, robot_chain
 from coop_drake.scenario import Deployment, Scenario
 from coop_drake.systems import READY_SIZE, CellPlanner, FusedCell, FusedTeam, TeamController, axis_laws
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["FusedControllers", "add_fused_controllers", "build_team_controller"]
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coop_drake.control import slowdown_radius
+from coop_drake.answers.plan import Plan
 from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import PlanError
 from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.planning.plan import Plan
+from coop_drake.laws import slowdown_radius
 from coop_drake.plant import RobotPlant, TeamPlant, build_robot_plant
 from coop_drake.scenario import Scenario
 from coop_drake.systems import GovernedCell

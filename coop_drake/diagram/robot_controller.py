@@ -9,8 +9,7 @@ import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem, OutputPort
 from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator, Integrator
 
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.planning.plan import Plan
+from coop_drake.answers.plan import Plan
 from coop_drake.plant import ObjectInertia, RobotPlant
 from coop_drake.systems import (
     AxisPpc,
@@ -22,6 +21,7 @@ from coop_drake.systems import (
     WrenchLaw,
     axis_laws,
 )
+from coop_drake.tree.pose import PlanarPose
 
 __all__ = ["TELEMETRY", "RobotKnowledge", "build_robot_controller"]
 

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["camera_pose"]
 

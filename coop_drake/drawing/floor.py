@@ -14,8 +14,8 @@ from shapely.geometry.polygon import orient
 
 from coop_drake.drawing.colours import FLOOR, INK, OBJECT, WALL, robot_colour
 from coop_drake.drawing.footprints import team_footprints
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ComponentTree
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["draw_polygon", "draw_team", "draw_workspace", "team_legend"]
 

@@ -8,8 +8,8 @@ import numpy as np
 from shapely import MultiPoint, union_all
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ComponentTree
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["BodyFootprint", "team_footprints"]
 

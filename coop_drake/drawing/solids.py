@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shapely import Polygon, constrained_delaunay_triangles
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = [
     "TriangleMesh",

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.fields.compiled import compiled
+from coop_drake.compiled import compiled
 from coop_drake.fields.nodes import Nodes
 from coop_drake.fields.outline import ComplexArray, IntArray
 from coop_drake.fields.quadrature import FloatArray, legendre_transform
@@ -73,7 +73,7 @@ def double_layer(grid: Nodes, segments: ComplexArray, panel_edge: IntArray, node
     )
 
 
-@compiled
+@compiled(reassociate=True)
 def block(k: DoubleLayer, rows: IntArray, columns: IntArray, row_of: IntArray) -> FloatArray:
     """Entries of 2 K at ``rows`` x ``columns``, in columns (transposed rows) in memory.
 
@@ -109,7 +109,7 @@ def block(k: DoubleLayer, rows: IntArray, columns: IntArray, row_of: IntArray) -
     return out.T
 
 
-@compiled
+@compiled(reassociate=True)
 def mark_near(
     k: DoubleLayer, own: IntArray, disc: tuple[float, float, float], row_of: IntArray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -151,7 +151,7 @@ def mark_near(
     return sources, targets
 
 
-@compiled
+@compiled(reassociate=True)
 def _near_pairs(
     target: ComplexArray, target_edge: IntArray, segments: ComplexArray, edge: IntArray
 ) -> tuple[IntArray, IntArray]:
@@ -165,7 +165,7 @@ def _near_pairs(
     return start, found[: start[-1]].copy()
 
 
-@compiled
+@compiled(reassociate=True)
 def _near_of(
     target: ComplexArray, target_edge: IntArray, segment: ComplexArray, edge: int, found: IntArray, end: int
 ) -> int:
@@ -182,7 +182,7 @@ def _near_of(
     return end
 
 
-@compiled
+@compiled(reassociate=True)
 def _near_weights(
     target: ComplexArray, segments: ComplexArray, start: IntArray, found: IntArray, transform: FloatArray
 ) -> FloatArray:
@@ -198,7 +198,7 @@ def _near_weights(
     return weights
 
 
-@compiled
+@compiled(reassociate=True)
 def legendre_moments(zeta: complex, out: FloatArray) -> None:
     """1/pi times the imaginary part of the integral of P_k(x) / (x - zeta) over [-1, 1], k from 0."""
     q0 = 0.5 * (np.log(zeta + 1.0) - np.log(zeta - 1.0))

@@ -6,7 +6,7 @@ from math import pi
 
 import numpy as np
 
-from coop_drake.fields.compiled import compiled
+from coop_drake.compiled import compiled
 from coop_drake.fields.far_field import far_field, leaf_at
 from coop_drake.fields.flat_map import FlatMap, centre_of, rounding_of, unflatten
 from coop_drake.fields.layers import INSIDE, MapArrays
@@ -17,7 +17,7 @@ from coop_drake.fields.walls import is_inside, nearest_on_edges
 __all__ = ["evaluate_at", "evaluate_many", "evaluate_one"]
 
 
-@compiled
+@compiled(reassociate=True)
 def _sums(m: MapArrays, leaf: int, x: float, y: float, tolerance: float) -> tuple[Sums, complex, int]:
     """Sum over the whole boundary; a step away from a junction of panels or 0; the vertex at hand or -1."""
     total, step, vertex = far_field(m, leaf, x, y), 0j, -1
@@ -36,7 +36,7 @@ def _sums(m: MapArrays, leaf: int, x: float, y: float, tolerance: float) -> tupl
     return total, step, vertex
 
 
-@compiled
+@compiled(reassociate=True)
 def evaluate_one(m: MapArrays, x: float, y: float, tolerance: float) -> Sums:
     """u, v, u_x, u_y, v_x, v_y at a point relative to the map's centre; outside: at the nearest wall.
 
@@ -57,7 +57,7 @@ def evaluate_one(m: MapArrays, x: float, y: float, tolerance: float) -> Sums:
     return c * tu, c * tv, c * xu, c * yu, c * xv, c * yv
 
 
-@compiled
+@compiled(reassociate=True)
 def evaluate_at(flat: FlatMap, x: float, y: float) -> tuple[FloatArray, FloatArray]:
     """Image (2,) and Jacobian (2, 2) of a point of W."""
     centre = centre_of(flat)
@@ -69,7 +69,7 @@ def evaluate_at(flat: FlatMap, x: float, y: float) -> tuple[FloatArray, FloatArr
     return image, jacobian
 
 
-@compiled
+@compiled(reassociate=True)
 def evaluate_many(flat: FlatMap, points: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Images (n, 2) and Jacobians (n, 2, 2) of points (n, 2) relative to the map's centre."""
     m, rounding = unflatten(flat), rounding_of(flat)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from coop_drake.fields.compiled import compiled
+from coop_drake.compiled import compiled
 from coop_drake.fields.layers import INSIDE, LEVELS, ON_BOUNDARY, OUTSIDE, REFINED_NODES, MapArrays
 from coop_drake.fields.outline import IntArray
 from coop_drake.fields.quadrature import FloatArray
@@ -112,7 +112,7 @@ def grown(m: MapArrays, opened: bool) -> MapArrays:
     )
 
 
-@compiled
+@compiled(reassociate=True)
 def _sort_out(
     m: MapArrays, opened: bool, square: FloatArray, state: IntArray, series: FloatArray,
     start: IntArray, near: IntArray,
@@ -158,7 +158,7 @@ def _sort_out(
     return first, kept[:end], worth
 
 
-@compiled
+@compiled(reassociate=True)
 def _most(m: MapArrays) -> tuple[int, int]:
     """Most nodes that a source has, most panels that a ring has on one leg."""
     nodes, rings = max(REFINED_NODES, m.sources.shape[1] - m.corner_index[-1, 0]), 1
@@ -168,7 +168,7 @@ def _most(m: MapArrays) -> tuple[int, int]:
     return nodes, rings
 
 
-@compiled
+@compiled(reassociate=True)
 def _open(m: MapArrays, k: int, level: int, todo: IntArray, waiting: int) -> int:
     """Put the panels of a corner's ring, and the corner within, on the list of candidates."""
     for place in range(2 * m.corner_index[k, 1]):
@@ -178,7 +178,7 @@ def _open(m: MapArrays, k: int, level: int, todo: IntArray, waiting: int) -> int
     return waiting + 1
 
 
-@compiled
+@compiled(reassociate=True)
 def _worth(m: MapArrays, near: IntArray, x: float, y: float, radius: float) -> int:
     """How much of what is near a box is worth a division: panels and corners that are shorter than it.
 
@@ -199,7 +199,7 @@ def _worth(m: MapArrays, near: IntArray, x: float, y: float, radius: float) -> i
     return worth
 
 
-@compiled
+@compiled(reassociate=True)
 def _is_far(place: int, opened: bool, seen: tuple[float, float, float], radius: float) -> bool:
     """Whether all of a box is far from what is ``seen`` from its centre."""
     distance, middle, size = seen
@@ -212,7 +212,7 @@ def _is_far(place: int, opened: bool, seen: tuple[float, float, float], radius: 
     return distance >= _REACH * radius and middle - radius >= factor * size
 
 
-@compiled
+@compiled(reassociate=True)
 def _expand(nodes: FloatArray, count: int, radius: float, series: FloatArray) -> None:
     """Add the power series of sources in units of the radius, rows (u, v) as real and imaginary parts."""
     for j in range(count):
@@ -239,7 +239,7 @@ def _expand(nodes: FloatArray, count: int, radius: float, series: FloatArray) ->
         series[degree, 3] += d
 
 
-@compiled
+@compiled(reassociate=True)
 def _shift(series: FloatArray, shifts: FloatArray) -> None:
     """Turn series, four a box, into those of its quarters, whose centres are ``shifts`` (4, 2) radii away."""
     n = series.shape[1]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from coop_drake.fields.compiled import compiled
+from coop_drake.compiled import compiled
 from coop_drake.fields.layers import MapArrays
 from coop_drake.fields.near_field import Sums
 
 __all__ = ["far_field", "leaf_at"]
 
 
-@compiled
+@compiled(reassociate=True)
 def leaf_at(m: MapArrays, x: float, y: float) -> int:
     """Leaf that holds a point."""
     cx, cy, half = m.root[0], m.root[1], m.root[2]
@@ -22,7 +22,7 @@ def leaf_at(m: MapArrays, x: float, y: float) -> int:
     return int(m.box_leaf[box])
 
 
-@compiled
+@compiled(reassociate=True)
 def far_field(m: MapArrays, leaf: int, x: float, y: float) -> Sums:
     """Both sums and their derivatives."""
     inverse = 1.0 / m.leaf_square[leaf, 2]

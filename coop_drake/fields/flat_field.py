@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.fields.compiled import compiled
+from coop_drake.compiled import compiled
 from coop_drake.fields.evaluation import evaluate_one
 from coop_drake.fields.flat_map import FlatMap, centre_of, rounding_of, unflatten
 from coop_drake.fields.quadrature import FloatArray
@@ -28,7 +28,7 @@ def flat_field(edges: FloatArray, image: FloatArray, radius: float, max_speed: f
     return np.concatenate(([radius, max_speed], image, edges.reshape(-1)))
 
 
-@compiled
+@compiled(reassociate=True)
 def velocity_in_field(flat: FlatMap, field: FloatArray, x: float, y: float) -> tuple[float, float]:
     """Velocity at a point of W [m/s].
 
@@ -58,7 +58,7 @@ def velocity_in_field(flat: FlatMap, field: FloatArray, x: float, y: float) -> t
     return speed * dx / norm, speed * dy / norm
 
 
-@compiled
+@compiled(reassociate=True)
 def velocities_in_field(flat: FlatMap, field: FloatArray, points: FloatArray) -> FloatArray:
     """The same at many points (n, 2)."""
     velocities = np.empty((len(points), 2))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.fields.compiled import compiled
+from coop_drake.compiled import compiled
 from coop_drake.fields.layers import MapArrays
 from coop_drake.fields.quadrature import FloatArray
 
@@ -36,53 +36,53 @@ def flatten(arrays: MapArrays, centre: FloatArray, rounding: float) -> FlatMap:
     return np.concatenate([np.ascontiguousarray(part).reshape(-1).view(np.int64) for part in parts])
 
 
-@compiled
+@compiled(reassociate=True)
 def centre_of(flat: FlatMap) -> FloatArray:
     """Origin of the map's coordinates in W [m], shape (2,)."""
     centre: FloatArray = flat[:2].view(np.float64)
     return centre
 
 
-@compiled
+@compiled(reassociate=True)
 def rounding_of(flat: FlatMap) -> float:
     """How far outside still counts as on the wall [m]."""
     return float(flat[2:3].view(np.float64)[0])
 
 
-@compiled
+@compiled(reassociate=True)
 def _words(flat: FlatMap, k: int) -> FlatMap:
     """Words of the array that stands at a place of `MapArrays`."""
     start = flat[_HEAD + k * _ENTRY]
     return flat[start : start + flat[_HEAD + k * _ENTRY + 1]]
 
 
-@compiled
+@compiled(reassociate=True)
 def _length(flat: FlatMap, k: int, axis: int) -> int:
     """Its length along an axis."""
     return int(flat[_HEAD + k * _ENTRY + 2 + axis])
 
 
-@compiled
+@compiled(reassociate=True)
 def _floats(flat: FlatMap, k: int) -> FloatArray:
     """One of floats, flat."""
     floats: FloatArray = _words(flat, k).view(np.float64)
     return floats
 
 
-@compiled
+@compiled(reassociate=True)
 def _rows(flat: FlatMap, k: int) -> FloatArray:
     """One of floats with two axes."""
     return _floats(flat, k).reshape((_length(flat, k, 0), _length(flat, k, 1)))
 
 
-@compiled
+@compiled(reassociate=True)
 def _blocks(flat: FlatMap, k: int) -> FloatArray:
     """One of floats with four axes."""
     n0, n1, n2, n3 = _length(flat, k, 0), _length(flat, k, 1), _length(flat, k, 2), _length(flat, k, 3)
     return _floats(flat, k).reshape((n0, n1, n2, n3))
 
 
-@compiled
+@compiled(reassociate=True)
 def unflatten(flat: FlatMap) -> MapArrays:
     """The map's arrays, as views; their places are those of `MapArrays`."""
     return MapArrays(

@@ -11,7 +11,7 @@ from math import pi
 
 import numpy as np
 
-from coop_drake.fields.compiled import compiled
+from coop_drake.compiled import compiled
 from coop_drake.fields.layers import LEVELS, REFINED_NODES, MapArrays
 from coop_drake.fields.quadrature import FloatArray, gauss_nodes
 
@@ -24,7 +24,7 @@ _GAUSS_X, _GAUSS_W = gauss_nodes(REFINED_NODES)
 Sums = tuple[float, float, float, float, float, float]
 
 
-@compiled
+@compiled(reassociate=True)
 def _panel(density: FloatArray, ax: float, ay: float, bx: float, by: float, tolerance: float) -> Sums:
     """One panel from a to b, both seen from the point, with density (2, REFINED, 2).
 
@@ -49,7 +49,7 @@ def _panel(density: FloatArray, ax: float, ay: float, bx: float, by: float, tole
     return _turned(_legendre(density[1], complex(0.5 * (px + mx), 0.5 * (py + my)), q0, d0), hx, hy)
 
 
-@compiled
+@compiled(reassociate=True)
 def _gauss(density: FloatArray, zx: float, zy: float) -> Sums:
     """Imaginary parts of the two integrals, real and imaginary parts of their derivatives, by quadrature."""
     tu, tv, ru, iu, rv, iv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -68,7 +68,7 @@ def _gauss(density: FloatArray, zx: float, zy: float) -> Sums:
     return tu, tv, ru, iu, rv, iv
 
 
-@compiled
+@compiled(reassociate=True)
 def _legendre(c: FloatArray, zeta: complex, q0: complex, d0: complex) -> Sums:
     """The same through Q_k and its derivative, from their values for k = 0."""
     q1, d1 = zeta * q0 - 1.0, q0 + zeta * d0
@@ -87,7 +87,7 @@ def _legendre(c: FloatArray, zeta: complex, q0: complex, d0: complex) -> Sums:
     return -2.0 * tu, -2.0 * tv, -2.0 * du.real, -2.0 * du.imag, -2.0 * dv.real, -2.0 * dv.imag
 
 
-@compiled
+@compiled(reassociate=True)
 def _turned(s: Sums, hx: float, hy: float) -> Sums:
     """Divide the derivatives with respect to zeta, given by real and imaginary part, by h."""
     tu, tv, ru, iu, rv, iv = s
@@ -96,7 +96,7 @@ def _turned(s: Sums, hx: float, hy: float) -> Sums:
     return tu, tv, iu * hx - ru * hy, ru * hx + iu * hy, iv * hx - rv * hy, rv * hx + iv * hy
 
 
-@compiled
+@compiled(reassociate=True)
 def _away(ax: float, ay: float, bx: float, by: float) -> complex:
     """A step off the wall if the point, seen from which the panel runs from a to b, is at one of its ends."""
     hx, hy = 0.5 * (bx - ax), 0.5 * (by - ay)
@@ -106,20 +106,20 @@ def _away(ax: float, ay: float, bx: float, by: float) -> complex:
     return 0j
 
 
-@compiled
+@compiled(reassociate=True)
 def add(a: Sums, b: Sums) -> Sums:
     """Sum of two contributions."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]
 
 
-@compiled
+@compiled(reassociate=True)
 def regular(m: MapArrays, k: int, x: float, y: float, tolerance: float) -> tuple[Sums, complex]:
     """A regular panel seen from a point; and a step away from a junction of panels, if one is at hand."""
     ax, ay, bx, by = m.panels[k, 0] - x, m.panels[k, 1] - y, m.panels[k, 2] - x, m.panels[k, 3] - y
     return _panel(m.panel_density[k], ax, ay, bx, by, tolerance), _away(ax, ay, bx, by)
 
 
-@compiled
+@compiled(reassociate=True)
 def ring_ends(
     m: MapArrays, k: int, level: int, place: int, x: float, y: float, rx: float, ry: float
 ) -> tuple[float, float, float, float]:
@@ -148,7 +148,7 @@ def ring_ends(
     return ax, ay, bx, by
 
 
-@compiled
+@compiled(reassociate=True)
 def ring(
     m: MapArrays, k: int, level: int, place: int, x: float, y: float, rx: float, ry: float, tolerance: float
 ) -> tuple[Sums, complex]:
@@ -158,7 +158,7 @@ def ring(
     return _panel(density, ax, ay, bx, by, tolerance), _away(ax, ay, bx, by)
 
 
-@compiled
+@compiled(reassociate=True)
 def _tail(m: MapArrays, k: int, level: int, rx: float, ry: float) -> Sums:
     """The corner's legs at one level, seen from afar, through their compressed density."""
     tu, tv, xu, yu, xv, yv = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -184,20 +184,20 @@ def _tail(m: MapArrays, k: int, level: int, rx: float, ry: float) -> Sums:
     return tu, tv, xu, yu, xv, yv
 
 
-@compiled
+@compiled(reassociate=True)
 def _floor(m: MapArrays, k: int, tolerance: float) -> float:
     """Distance from a vertex below which points are not told from it [m]."""
     return max(2.0 * float(m.corners[k, 8]) * 0.5**LEVELS, 4.0 * tolerance)
 
 
-@compiled
+@compiled(reassociate=True)
 def is_at_vertex(m: MapArrays, k: int, x: float, y: float, tolerance: float) -> bool:
     """Whether a point is the vertex of a corner, as far as can be told."""
     rx, ry, floor = x - m.corners[k, 0], y - m.corners[k, 1], _floor(m, k, tolerance)
     return bool(rx * rx + ry * ry < floor * floor)
 
 
-@compiled
+@compiled(reassociate=True)
 def corner(m: MapArrays, k: int, level: int, x: float, y: float, tolerance: float) -> tuple[Sums, complex]:
     """One corner from a level down, seen from a point not far from it; and a step away from a junction."""
     rx, ry = x - m.corners[k, 0], y - m.corners[k, 1]

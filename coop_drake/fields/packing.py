@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.fields.compiled import compiled
+from coop_drake.compiled import compiled
 from coop_drake.fields.corners import corner_operator, leg_panels, panel_nodes
 from coop_drake.fields.density import Density
 from coop_drake.fields.expansions import grown
@@ -164,7 +164,7 @@ def _descend(angle: float, closeness: float, incoming: FloatArray) -> tuple[Floa
     return ring.reshape(-1, REFINED_NODES, 2), tail.reshape(-1, 2)
 
 
-@compiled
+@compiled(reassociate=True)
 def _fields(inward: FloatArray, field: FloatArray) -> FloatArray:
     """The field that comes in at every level, shape (LEVELS + 1, 2, n, 2)."""
     n = inward.shape[1]

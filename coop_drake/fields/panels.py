@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.fields.compiled import compiled
+from coop_drake.compiled import compiled
 from coop_drake.fields.outline import Outline
 from coop_drake.fields.quadrature import FloatArray
 
@@ -55,7 +55,7 @@ def lay_panels(outline: Outline, closeness: float) -> Panels:
     return Panels(legs, pieces[:, 0].astype(np.int64), pieces[:, 1], pieces[:, 2], pieces[:, 3])
 
 
-@compiled
+@compiled(reassociate=True)
 def point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Distance of a point from a segment from a to b [m]."""
     dx, dy = bx - ax, by - ay
@@ -65,7 +65,7 @@ def point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: fl
     return float(np.sqrt(rx * rx + ry * ry))
 
 
-@compiled
+@compiled(reassociate=True)
 def segment_distance(p: FloatArray, q: FloatArray) -> float:
     """Distance of two segments (x0, y0, x1, y1) that do not cross [m]."""
     return min(
@@ -80,7 +80,7 @@ def segment_distance(p: FloatArray, q: FloatArray) -> float:
     )
 
 
-@compiled
+@compiled(reassociate=True)
 def _corner_legs(
     edges: FloatArray, preceding: np.ndarray, longest: FloatArray, closeness: float
 ) -> FloatArray:
@@ -112,7 +112,7 @@ def _corner_legs(
     return legs
 
 
-@compiled
+@compiled(reassociate=True)
 def _close_slivers(lengths: FloatArray, following: np.ndarray, legs: FloatArray) -> None:
     """Let two legs that almost fill an edge meet: a panel as short as rounding could not be evaluated.
 
@@ -128,7 +128,7 @@ def _close_slivers(lengths: FloatArray, following: np.ndarray, legs: FloatArray)
                 legs[after] *= 0.8
 
 
-@compiled
+@compiled(reassociate=True)
 def _edge_panels(
     edges: FloatArray, following: np.ndarray, legs: FloatArray, longest: FloatArray, closeness: float
 ) -> FloatArray:

@@ -6,7 +6,7 @@ from math import pi
 
 import numpy as np
 
-from coop_drake.fields.compiled import compiled
+from coop_drake.compiled import compiled
 from coop_drake.fields.density import Density
 from coop_drake.fields.double_layer import NEAR, legendre_moments
 from coop_drake.fields.far_field import far_field, leaf_at
@@ -50,7 +50,7 @@ def refine(
     return refined, incoming
 
 
-@compiled
+@compiled(reassociate=True)
 def _subtract(
     m: MapArrays, edge: IntArray, coefficients: FloatArray,
     target: ComplexArray, target_edge: IntArray, target_corner: IntArray, out: FloatArray,
@@ -100,7 +100,7 @@ def _subtract(
         out[i, 1] -= v / pi
 
 
-@compiled
+@compiled(reassociate=True)
 def _direct(
     s: FloatArray, edge: IntArray, first: int, last: int, x: float, y: float, own: int
 ) -> tuple[float, float]:

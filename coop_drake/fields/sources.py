@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.fields.compiled import compiled
+from coop_drake.compiled import compiled
 from coop_drake.fields.layers import REFINED_NODES, MapArrays
 from coop_drake.fields.near_field import ring_ends
 from coop_drake.fields.panels import point_distance
@@ -19,7 +19,7 @@ FAR = 2.2  # |zeta| from which the solved nodes of a panel do
 _GAUSS_X, _GAUSS_W = gauss_nodes(REFINED_NODES)
 
 
-@compiled
+@compiled(reassociate=True)
 def size(m: MapArrays, k: int, place: int, level: int) -> float:
     """Half length of a panel, length of a corner's legs [m]."""
     if k < 0:
@@ -32,7 +32,7 @@ def size(m: MapArrays, k: int, place: int, level: int) -> float:
     return 0.5 * leg * float(m.breaks[first + 1] - m.breaks[first])
 
 
-@compiled
+@compiled(reassociate=True)
 def seen_from(m: MapArrays, k: int, place: int, level: int, x: float, y: float) -> tuple[float, float, float]:
     """Distance of a panel or corner from a point, distance of its middle or vertex, half length or leg."""
     if k < 0:
@@ -51,7 +51,7 @@ def seen_from(m: MapArrays, k: int, place: int, level: int, x: float, y: float) 
     return point_distance(0.0, 0.0, ax, ay, bx, by), middle, 0.5 * np.sqrt((bx - ax) ** 2 + (by - ay) ** 2)
 
 
-@compiled
+@compiled(reassociate=True)
 def gather(
     m: MapArrays, k: int, place: int, level: int, opened: bool, seen: tuple[float, float, float],
     x: float, y: float, radius: float, nodes: FloatArray,
@@ -86,7 +86,7 @@ def gather(
     return REFINED_NODES
 
 
-@compiled
+@compiled(reassociate=True)
 def _gather_tail(m: MapArrays, k: int, level: int, x: float, y: float, nodes: FloatArray) -> int:
     """The same for a corner's compressed density at a level."""
     n, grid, first = m.corner_index[k, 2], m.corner_index[k, 3], m.corner_index[k, 6]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.fields.compiled import compiled
+from coop_drake.compiled import compiled
 from coop_drake.fields.quadrature import FloatArray
 
 __all__ = ["is_inside", "nearest_on_edges"]
 
 
-@compiled
+@compiled(reassociate=True)
 def is_inside(edges: FloatArray, x: float, y: float) -> bool:
     """Whether a point is inside by the crossing number of all rings."""
     inside = False
@@ -23,7 +23,7 @@ def is_inside(edges: FloatArray, x: float, y: float) -> bool:
     return inside
 
 
-@compiled
+@compiled(reassociate=True)
 def nearest_on_edges(edges: FloatArray, x: float, y: float) -> tuple[float, float]:
     """The nearest point of the boundary."""
     best, bx, by = np.inf, x, y

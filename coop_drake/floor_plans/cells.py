@@ -10,7 +10,7 @@ from shapely import LineString, Polygon
 from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans.map_file import BoolGrid, OccupancyMap
 from coop_drake.floor_plans.rooms import Inside, Room
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["room_of_map"]
 

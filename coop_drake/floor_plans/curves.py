@@ -7,7 +7,7 @@ from math import ceil, isfinite, sqrt
 
 import numpy as np
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["flatten"]
 

@@ -13,7 +13,7 @@ import yaml
 from numpy.typing import NDArray
 
 from coop_drake.errors import FloorPlanError
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["BoolGrid", "OccupancyMap", "read_map"]
 

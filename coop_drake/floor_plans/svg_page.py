@@ -12,7 +12,7 @@ import numpy as np
 
 from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans.settings import UNITS, FloorPlanSettings
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

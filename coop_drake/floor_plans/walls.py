@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coop_drake.errors import FloorPlanError
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Drawing", "Wall", "refuse_many"]
 

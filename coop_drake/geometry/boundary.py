@@ -5,16 +5,16 @@ from __future__ import annotations
 from math import sqrt
 from typing import cast
 
-import numba
 import numpy as np
 import shapely
 from numpy.typing import ArrayLike
 from shapely import Polygon
 
+from coop_drake.compiled import compiled
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BoundaryDistance", "edges_of", "signed_distance_compiled", "squared_distance_compiled"]
+__all__ = ["BoundaryDistance", "edges_of", "signed_distance", "squared_distance"]
 
 
 def edges_of(polygon: Polygon) -> FloatArray:
@@ -23,7 +23,8 @@ def edges_of(polygon: Polygon) -> FloatArray:
     return np.vstack([np.hstack([ring[:-1], ring[1:]]) for ring in rings])
 
 
-def _squared_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
+@compiled
+def squared_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
     """Squared distance of a point to the segment from (x0, y0) to (x1, y1), which may be a point."""
     dx, dy = x1 - x0, y1 - y0
     px, py = x - x0, y - y0
@@ -34,24 +35,20 @@ def _squared_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: f
     return ex * ex + ey * ey
 
 
-squared_distance_compiled = numba.njit(cache=True)(_squared_distance)
-
-
-def _signed_distance(edges: FloatArray, x: float, y: float) -> float:
+@compiled
+def signed_distance(edges: FloatArray, x: float, y: float) -> float:
     """Distance to the nearest edge, positive where a ray to the right crosses an odd number of edges."""
     nearest = np.inf
     inside = False
     for k in range(edges.shape[0]):
         x0, y0, x1, y1 = edges[k, 0], edges[k, 1], edges[k, 2], edges[k, 3]
-        nearest = min(nearest, squared_distance_compiled(x, y, x0, y0, x1, y1))
+        nearest = min(nearest, squared_distance(x, y, x0, y0, x1, y1))
         if (y0 > y) != (y1 > y) and ((x - x0) * (y1 - y0) < (y - y0) * (x1 - x0)) == (y1 > y0):
             inside = not inside
     return sqrt(nearest) if inside else -sqrt(nearest)
 
 
-signed_distance_compiled = numba.njit(cache=True)(_signed_distance)
-
-
+@compiled
 def _segment_clearance(edges: FloatArray, ax: float, ay: float, bx: float, by: float) -> float:
     """Distance between the segment from a to b and the nearest edge, zero where they cross."""
     nearest = np.inf
@@ -63,25 +60,20 @@ def _segment_clearance(edges: FloatArray, ax: float, ay: float, bx: float, by: f
         side_b = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
         if side_c * side_d < 0.0 and side_a * side_b < 0.0:
             return 0.0
-        nearest = min(nearest, squared_distance_compiled(ax, ay, cx, cy, dx, dy))
-        nearest = min(nearest, squared_distance_compiled(bx, by, cx, cy, dx, dy))
-        nearest = min(nearest, squared_distance_compiled(cx, cy, ax, ay, bx, by))
-        nearest = min(nearest, squared_distance_compiled(dx, dy, ax, ay, bx, by))
+        nearest = min(nearest, squared_distance(ax, ay, cx, cy, dx, dy))
+        nearest = min(nearest, squared_distance(bx, by, cx, cy, dx, dy))
+        nearest = min(nearest, squared_distance(cx, cy, ax, ay, bx, by))
+        nearest = min(nearest, squared_distance(dx, dy, ax, ay, bx, by))
     return sqrt(nearest)
 
 
-_segment_clearance_compiled = numba.njit(cache=True)(_segment_clearance)
-
-
+@compiled
 def _signed_distances(edges: FloatArray, points: FloatArray) -> FloatArray:
     """The same for many points, shape (n, 2) -> (n,)."""
     result = np.empty(points.shape[0])
     for k in range(points.shape[0]):
-        result[k] = signed_distance_compiled(edges, points[k, 0], points[k, 1])
+        result[k] = signed_distance(edges, points[k, 0], points[k, 1])
     return result
-
-
-_signed_distances_compiled = numba.njit(cache=True)(_signed_distances)
 
 
 class BoundaryDistance:
@@ -114,7 +106,7 @@ class BoundaryDistance:
             Distance [m], positive inside the polygon, negative outside.
         """
         x, y = cast(FloatArray, point)
-        return cast(float, signed_distance_compiled(self._edges, float(x), float(y)))
+        return signed_distance(self._edges, float(x), float(y))
 
     def batch(self, points: ArrayLike) -> FloatArray:
         """Distances of many points.
@@ -126,7 +118,7 @@ class BoundaryDistance:
             Distances, shape (n,) [m], positive inside the polygon, negative outside.
         """
         rows = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 2)
-        return cast(FloatArray, _signed_distances_compiled(self._edges, rows))
+        return _signed_distances(self._edges, rows)
 
     def along(self, start: ArrayLike, end: ArrayLike) -> float:
         """Smallest distance of a straight segment to the boundary.
@@ -139,6 +131,4 @@ class BoundaryDistance:
             Distance [m], zero where the segment crosses the boundary, also for a segment that lies outside.
         """
         (ax, ay), (bx, by) = cast(FloatArray, start), cast(FloatArray, end)
-        return cast(
-            float, _segment_clearance_compiled(self._edges, float(ax), float(ay), float(bx), float(by))
-        )
+        return _segment_clearance(self._edges, float(ax), float(ay), float(bx), float(by))

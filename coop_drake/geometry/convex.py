@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 SLACK = 1e-9
 """Directed rounding [m]: outer offsets grow and inner offsets shrink by it."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from math import pi, sqrt
 
-import numba
 import numpy as np
 import shapely
 from shapely import LineString, Point, Polygon
 
-from coop_drake.geometry.boundary import BoundaryDistance, signed_distance_compiled
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.compiled import compiled
+from coop_drake.geometry.boundary import BoundaryDistance, signed_distance
 from coop_drake.geometry.slits import component_at
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["corridor_around"]
 
@@ -51,7 +51,7 @@ def corridor_around(polygon: Polygon, path: LineString, widening: float) -> Poly
     return component_at(shapely.union_all(links).intersection(polygon), Point(path.coords[0]))
 
 
-@numba.njit(cache=True)
+@compiled
 def _stops(edges: FloatArray, path: FloatArray) -> FloatArray:
     """Places along a path, both ends among them, with their clearances (x, y, d), shape (k, 3)."""
     stops = []
@@ -62,10 +62,10 @@ def _stops(edges: FloatArray, path: FloatArray) -> FloatArray:
         length = sqrt(dx * dx + dy * dy)
         while left < length:
             px, py = x + left / length * dx, y + left / length * dy
-            room = signed_distance_compiled(edges, px, py)
+            room = signed_distance(edges, px, py)
             stops.append((px, py, room))
             left += max(STRIDE * room, SHORTEST_STRIDE)
         left -= length
     x, y = path[-1, 0], path[-1, 1]
-    stops.append((x, y, signed_distance_compiled(edges, x, y)))
+    stops.append((x, y, signed_distance(edges, x, y)))
     return np.array(stops)

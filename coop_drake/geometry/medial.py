@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import sqrt
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
@@ -13,8 +12,9 @@ from scipy.sparse.csgraph import breadth_first_order, dijkstra, minimum_spanning
 from scipy.spatial import Delaunay
 from shapely import Polygon
 
-from coop_drake.geometry.boundary import BoundaryDistance, edges_of, squared_distance_compiled
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.compiled import compiled
+from coop_drake.geometry.boundary import BoundaryDistance, edges_of, squared_distance
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Graph", "medial_graph", "widest_path"]
 
@@ -144,9 +144,7 @@ def _samples_of(polygon: Polygon) -> tuple[FloatArray, IndexArray]:
     """Samples of every ring, shape (n, 2), and for each the index of the next one on its ring, shape (n,)."""
     sizes = [len(ring.coords) - 1 for ring in (polygon.exterior, *polygon.interiors)]
     coarsest = polygon.exterior.length / SAMPLES_PER_BOUNDARY
-    samples, owners = _sample_edges_compiled(
-        edges_of(polygon), SHORTEST_SAMPLE, coarsest, SAMPLES_PER_CLEARANCE
-    )
+    samples, owners = _sample_edges(edges_of(polygon), SHORTEST_SAMPLE, coarsest, SAMPLES_PER_CLEARANCE)
     rings = np.repeat(np.arange(len(sizes)), sizes)[owners]
     successor = np.arange(1, len(samples) + 1)
     for ring in range(len(sizes)):
@@ -155,6 +153,7 @@ def _samples_of(polygon: Polygon) -> tuple[FloatArray, IndexArray]:
     return samples, successor
 
 
+@compiled
 def _opposite_wall(edges: FloatArray, k: int, x: float, y: float) -> float:
     """Distance of a point of edge k to the nearest edge that does not touch it [m]."""
     gap = np.inf
@@ -162,15 +161,11 @@ def _opposite_wall(edges: FloatArray, k: int, x: float, y: float) -> float:
         follows = edges[j, 0] == edges[k, 2] and edges[j, 1] == edges[k, 3]
         precedes = edges[j, 2] == edges[k, 0] and edges[j, 3] == edges[k, 1]
         if j != k and not follows and not precedes:
-            gap = min(
-                gap, squared_distance_compiled(x, y, edges[j, 0], edges[j, 1], edges[j, 2], edges[j, 3])
-            )
+            gap = min(gap, squared_distance(x, y, edges[j, 0], edges[j, 1], edges[j, 2], edges[j, 3]))
     return sqrt(gap)
 
 
-_opposite_wall_compiled = numba.njit(cache=True)(_opposite_wall)
-
-
+@compiled
 def _sample_edges(
     edges: FloatArray, shortest: float, coarsest: float, per_clearance: float
 ) -> tuple[FloatArray, IndexArray]:
@@ -187,7 +182,7 @@ def _sample_edges(
         stack = [(0.0, 1.0)]
         while len(stack) > 0:
             s, t = stack.pop()
-            gap = _opposite_wall_compiled(edges, k, x0 + 0.5 * (s + t) * dx, y0 + 0.5 * (s + t) * dy)
+            gap = _opposite_wall(edges, k, x0 + 0.5 * (s + t) * dx, y0 + 0.5 * (s + t) * dy)
             if (t - s) * length > max(shortest, min(coarsest, gap / per_clearance)):
                 stack.append((0.5 * (s + t), t))
                 stack.append((s, 0.5 * (s + t)))
@@ -195,6 +190,3 @@ def _sample_edges(
                 samples.append((x0 + s * dx, y0 + s * dy))
                 owners.append(k)
     return np.array(samples[1:]), np.array(owners[1:])
-
-
-_sample_edges_compiled = numba.njit(cache=True)(_sample_edges)

@@ -11,9 +11,9 @@ from shapely import MultiPolygon, Polygon
 from shapely.geometry.polygon import orient
 
 from coop_drake.geometry.convex import following
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.safeguards import checked_buffer, second_opinion
 from coop_drake.geometry.sum_kernels import fitting_cycles
+from coop_drake.tree.pose import FloatArray
 
 SAFE_SIDE = 1e-6
 """How far a workspace is shrunk or grown once [m]: a hundred times the clipping library's grid."""

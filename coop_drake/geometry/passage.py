@@ -14,7 +14,7 @@ from shapely import LineString, Polygon
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.medial import Graph, medial_graph, widest_path
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Passage", "PassageFinder", "pole"]
 

@@ -11,7 +11,7 @@ from shapely import MultiPolygon, Polygon
 from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 _FAILURES = (RuntimeError, ValueError, ArithmeticError)
 _ROUNDING = 1e-6

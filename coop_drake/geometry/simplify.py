@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
-import numba
 import numpy as np
 import shapely
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from coop_drake.geometry.boundary import squared_distance_compiled
+from coop_drake.compiled import compiled
+from coop_drake.geometry.boundary import squared_distance
 from coop_drake.geometry.medial import IndexArray
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["sharpest_angle", "simplify_inward", "vertex_angles"]
 
@@ -46,7 +46,7 @@ def simplify_inward(polygon: Polygon, tolerance: float, slack: float = 0.0) -> P
     index = np.arange(len(points)) - starts
     following = starts + (index + 1) % np.repeat(sizes, sizes)
     preceding = starts + (index - 1) % np.repeat(sizes, sizes)
-    alive = _simplify_compiled(points, following, preceding, tolerance, slack)
+    alive = _simplify(points, following, preceding, tolerance, slack)
     first = np.cumsum(sizes) - sizes
     kept = [points[a : a + n][alive[a : a + n]] for a, n in zip(first, sizes, strict=True)]
     simple = Polygon(kept[0], kept[1:])
@@ -71,14 +71,13 @@ def sharpest_angle(polygon: Polygon) -> float:
     return float(min(angles.min(), 2.0 * np.pi - angles.max()))
 
 
+@compiled
 def _cross(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
     """Twice the signed area of a triangle, positive counter-clockwise."""
     return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
 
 
-_cross_compiled = numba.njit(cache=True)(_cross)
-
-
+@compiled
 def _drop_depth(points: FloatArray, a: int, b: int, c: int, slack: float) -> float:
     """Depth that leaving out b cuts off; infinite where b is reflex by more than the slack."""
     ax, ay, bx, by, cx, cy = (
@@ -89,13 +88,11 @@ def _drop_depth(points: FloatArray, a: int, b: int, c: int, slack: float) -> flo
         points[c, 0],
         points[c, 1],
     )
-    depth = sqrt(squared_distance_compiled(bx, by, ax, ay, cx, cy))
-    return depth if _cross_compiled(ax, ay, bx, by, cx, cy) >= 0.0 or depth <= slack else inf
+    depth = sqrt(squared_distance(bx, by, ax, ay, cx, cy))
+    return depth if _cross(ax, ay, bx, by, cx, cy) >= 0.0 or depth <= slack else inf
 
 
-_drop_depth_compiled = numba.njit(cache=True)(_drop_depth)
-
-
+@compiled
 def _prolong(points: FloatArray, a: int, b: int, c: int, d: int) -> tuple[float, float, float]:
     """Where a b and d c, prolonged, meet beyond the reflex edge b c, and how far from it: (x, y, depth)."""
     ux, uy = points[b, 0] - points[a, 0], points[b, 1] - points[a, 1]
@@ -108,13 +105,11 @@ def _prolong(points: FloatArray, a: int, b: int, c: int, d: int) -> tuple[float,
         return 0.0, 0.0, inf
     s = (wx * vy - wy * vx) / (ux * vy - uy * vx)
     x, y = points[b, 0] + s * ux, points[b, 1] + s * uy
-    squared = squared_distance_compiled(x, y, points[b, 0], points[b, 1], points[c, 0], points[c, 1])
+    squared = squared_distance(x, y, points[b, 0], points[b, 1], points[c, 0], points[c, 1])
     return x, y, sqrt(squared)
 
 
-_prolong_compiled = numba.njit(cache=True)(_prolong)
-
-
+@compiled
 def _is_free(
     points: FloatArray,
     alive: NDArray[np.bool_],
@@ -126,7 +121,7 @@ def _is_free(
     """Whether triangle b, (x, y), c holds no vertex but ``own`` = a, b, c, d, and no edge cuts it."""
     a, b, c, d = own
     bx, by, cx, cy = points[b, 0], points[b, 1], points[c, 0], points[c, 1]
-    turn = 1.0 if _cross_compiled(bx, by, x, y, cx, cy) >= 0.0 else -1.0
+    turn = 1.0 if _cross(bx, by, x, y, cx, cy) >= 0.0 else -1.0
     for v in range(points.shape[0]):
         if not alive[v]:
             continue
@@ -135,9 +130,9 @@ def _is_free(
             v not in (a, b, c, d)
             and min(bx, x, cx) <= px <= max(bx, x, cx)
             and min(by, y, cy) <= py <= max(by, y, cy)
-            and turn * _cross_compiled(bx, by, x, y, px, py) >= -1e-12
-            and turn * _cross_compiled(x, y, cx, cy, px, py) >= -1e-12
-            and turn * _cross_compiled(cx, cy, bx, by, px, py) >= -1e-12
+            and turn * _cross(bx, by, x, y, px, py) >= -1e-12
+            and turn * _cross(x, y, cx, cy, px, py) >= -1e-12
+            and turn * _cross(cx, cy, bx, by, px, py) >= -1e-12
         ):
             return False
         w = following[v]
@@ -146,32 +141,28 @@ def _is_free(
         qx, qy = points[w, 0], points[w, 1]
         for ex, ey in ((bx, by), (cx, cy)):
             if (
-                _cross_compiled(ex, ey, x, y, px, py) * _cross_compiled(ex, ey, x, y, qx, qy) < 0.0
-                and _cross_compiled(px, py, qx, qy, ex, ey) * _cross_compiled(px, py, qx, qy, x, y) < 0.0
+                _cross(ex, ey, x, y, px, py) * _cross(ex, ey, x, y, qx, qy) < 0.0
+                and _cross(px, py, qx, qy, ex, ey) * _cross(px, py, qx, qy, x, y) < 0.0
             ):
                 return False
     return True
 
 
-_is_free_compiled = numba.njit(cache=True)(_is_free)
-
-
+@compiled
 def _best_step(
     points: FloatArray, around: tuple[int, int, int, int], error: FloatArray, tolerance: float, slack: float
 ) -> tuple[float, int]:
     """Depth of the cheaper step at b, added to what its edges have lost already, and which step it is."""
     a, b, c, d = around
-    drop = max(error[a], error[b]) + _drop_depth_compiled(points, a, b, c, slack)
-    _, _, depth = _prolong_compiled(points, a, b, c, d)
+    drop = max(error[a], error[b]) + _drop_depth(points, a, b, c, slack)
+    _, _, depth = _prolong(points, a, b, c, d)
     prolong = max(error[a], error[b] + depth, error[c])
     if min(drop, prolong) > tolerance:
         return inf, 0
     return (drop, DROP) if drop <= prolong else (prolong, PROLONG)
 
 
-_best_step_compiled = numba.njit(cache=True)(_best_step)
-
-
+@compiled
 def _simplify(
     points: FloatArray, following: IndexArray, preceding: IndexArray, tolerance: float, slack: float
 ) -> NDArray[np.bool_]:
@@ -187,7 +178,7 @@ def _simplify(
                 continue
             if stale[b]:
                 around = (preceding[b], b, following[b], following[following[b]])
-                cost[b], step[b] = _best_step_compiled(points, around, error, tolerance, slack)
+                cost[b], step[b] = _best_step(points, around, error, tolerance, slack)
                 stale[b] = False
             if cost[b] < inf and (best < 0 or cost[b] < cost[best]):
                 best = b
@@ -200,14 +191,14 @@ def _simplify(
             cost[b] = inf
             continue
         if step[b] == DROP:
-            if not _is_free_compiled(points, alive, following, (a, a, c, b), points[b, 0], points[b, 1]):
+            if not _is_free(points, alive, following, (a, a, c, b), points[b, 0], points[b, 1]):
                 cost[b] = inf
                 continue
             error[a] = cost[b]
             gone = b
         else:
-            x, y, depth = _prolong_compiled(points, a, b, c, d)
-            if not _is_free_compiled(points, alive, following, (a, b, c, d), x, y):
+            x, y, depth = _prolong(points, a, b, c, d)
+            if not _is_free(points, alive, following, (a, b, c, d), x, y):
                 cost[b] = inf
                 continue
             lost = error[b] + depth
@@ -219,6 +210,3 @@ def _simplify(
         following[before], preceding[after] = after, before
         for v in (preceding[preceding[before]], preceding[before], before, after, following[after]):
             stale[v] = True
-
-
-_simplify_compiled = numba.njit(cache=True)(_simplify)

@@ -11,8 +11,8 @@ from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.triangles import IndexArray, Triangles, triangulate
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["WIDTH", "component_at", "cut_holes", "slits_of"]
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.compiled import compiled
 from coop_drake.geometry.sweep_kernels import IntArray
+from coop_drake.tree.pose import FloatArray
 
 _NEEDLE = 1e-12
 
 
-@numba.njit(cache=True)
+@compiled
 def fitting_cycles(
     points: FloatArray, first: IntArray, rooms: FloatArray, convex: FloatArray
 ) -> tuple[FloatArray, IntArray]:
@@ -60,7 +60,7 @@ def fitting_cycles(
     return drawn, starts
 
 
-@numba.njit(cache=True)
+@compiled
 def _furthest(points: FloatArray, first: IntArray, convex: FloatArray) -> IntArray:
     """Vertex of the footprint that lies furthest out beyond each edge, shape (E,)."""
     furthest = np.zeros(len(points), np.int64)
@@ -76,7 +76,7 @@ def _furthest(points: FloatArray, first: IntArray, convex: FloatArray) -> IntArr
     return furthest
 
 
-@numba.njit(cache=True)
+@compiled
 def _bends_in(before: FloatArray, here: FloatArray, after: FloatArray) -> bool:
     """Whether a wall's corner points into the floor; a needle counts for one, which blocks no more."""
     ax, ay = here[0] - before[0], here[1] - before[1]

@@ -5,12 +5,12 @@ from __future__ import annotations
 from math import atan2, ceil, cos, hypot, pi, sin, sqrt
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from coop_drake.compiled import compiled
 from coop_drake.geometry.convex import SLACK
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 IntArray = NDArray[np.int64]
 
@@ -43,19 +43,19 @@ class SweepArrays(NamedTuple):
     joint: FloatArray
 
 
-@numba.njit(cache=True)
+@compiled
 def arc_parts(half_width: float) -> int:
     """How many chords or tangents stand in for an arc: their error vanishes faster than the slice's."""
     return max(1, ceil(sqrt(_ARC_SHARE * min(half_width, pi))))
 
 
-@numba.njit(cache=True)
+@compiled
 def disc_turn(half_width: float) -> float:
     """Largest angle between neighbouring normals of a polygon that stands in for a disc [rad]."""
     return min(0.6, max(0.05, 0.9 * sqrt(half_width))) if half_width > 0.0 else 0.6
 
 
-@numba.njit(cache=True)
+@compiled
 def closed_directions(angles: FloatArray, largest_turn: float = _LARGEST_TURN) -> FloatArray:
     """Sort directions, drop repeated ones and fill gaps so that no two neighbours are further apart.
 
@@ -89,7 +89,7 @@ def closed_directions(angles: FloatArray, largest_turn: float = _LARGEST_TURN) -
     return filled
 
 
-@numba.njit(cache=True)
+@compiled
 def circumscribed(angles: FloatArray, offsets: FloatArray) -> FloatArray:
     """Polygon whose edges lie on supporting lines of one convex set; it encloses that set.
 
@@ -119,7 +119,7 @@ def circumscribed(angles: FloatArray, offsets: FloatArray) -> FloatArray:
     return distinct[:size].copy() if size >= 3 else vertices
 
 
-@numba.njit(cache=True)
+@compiled
 def support(vertices: FloatArray, angles: FloatArray) -> FloatArray:
     """Support function of the hull of the vertices: largest n . v; shapes (n, 2), (k,) to (k,) [m]."""
     best = np.empty(len(angles))
@@ -131,7 +131,7 @@ def support(vertices: FloatArray, angles: FloatArray) -> FloatArray:
     return best
 
 
-@numba.njit(cache=True)
+@compiled
 def edge_directions(vertices: FloatArray) -> FloatArray:
     """Angles of the outward normals of a counter-clockwise ring; shape (n, 2) to (n,), empty for a point."""
     count = len(vertices) if len(vertices) > 1 else 0
@@ -142,7 +142,7 @@ def edge_directions(vertices: FloatArray) -> FloatArray:
     return angles
 
 
-@numba.njit(cache=True)
+@compiled
 def _furthest(vertices: FloatArray, i: int) -> bool:
     """Whether a vertex is no nearer to the origin than the points of its edges close by."""
     x, y = vertices[i]
@@ -152,7 +152,7 @@ def _furthest(vertices: FloatArray, i: int) -> bool:
     return outermost
 
 
-@numba.njit(cache=True)
+@compiled
 def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> FloatArray:
     """Enclose a convex set turned about the origin by every angle of an interval.
 
@@ -199,7 +199,7 @@ def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> Flo
     return swept
 
 
-@numba.njit(cache=True)
+@compiled
 def over_prismatic(vertices: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray:
     """Enclose a convex set moved along a segment of displacements: the hull of both end copies.
 
@@ -219,7 +219,7 @@ def over_prismatic(vertices: FloatArray, first: FloatArray, last: FloatArray) ->
     return swept
 
 
-@numba.njit(cache=True)
+@compiled
 def grown(vertices: FloatArray, radius: float, largest_turn: float) -> FloatArray:
     """Enclose a convex set grown by a radius in a polygon.
 
@@ -233,7 +233,7 @@ def grown(vertices: FloatArray, radius: float, largest_turn: float) -> FloatArra
     return outer
 
 
-@numba.njit(cache=True)
+@compiled
 def over_piece(
     sweeps: SweepArrays, piece: int, lower: FloatArray, upper: FloatArray, stages: int, rounded: bool
 ) -> FloatArray:
@@ -268,7 +268,7 @@ def over_piece(
     return ring
 
 
-@numba.njit(cache=True)
+@compiled
 def separated(first: FloatArray, second: FloatArray, gap: float = 0.0) -> bool:
     """Whether some edge's line keeps two convex polygons further apart than ``gap`` [m].
 
@@ -278,7 +278,7 @@ def separated(first: FloatArray, second: FloatArray, gap: float = 0.0) -> bool:
     return apart
 
 
-@numba.njit(cache=True)
+@compiled
 def _edge_separates(first: FloatArray, second: FloatArray, gap: float) -> bool:
     for i in range(len(first)):
         k = i + 1 if i + 1 < len(first) else 0

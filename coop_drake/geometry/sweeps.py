@@ -10,8 +10,8 @@ import numpy as np
 
 from coop_drake.geometry import under_kernels
 from coop_drake.geometry.convex import edge_angles, normals, preceding
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.sweep_kernels import closed_directions
+from coop_drake.tree.pose import FloatArray
 
 _NUDGE = 1e-6
 

@@ -8,10 +8,10 @@ from math import cos, sin
 
 import numpy as np
 
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.sweep_kernels import SweepArrays, disc_turn, over_piece
 from coop_drake.geometry.sweeps import common_disc, inscribed, under_prismatic, under_revolute
-from coop_drake.geometry.tree import ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.component_tree import ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.pose import FloatArray
 
 Interval = tuple[float, float]
 Intervals = tuple[Interval, ...]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from math import cos, pi, sin, sqrt
 
-import numba
 import numpy as np
 
+from coop_drake.compiled import compiled
 from coop_drake.geometry.convex import SLACK
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.sweep_kernels import arc_parts, closed_directions, edge_directions, support
+from coop_drake.tree.pose import FloatArray
 
 _TURN = 2.0 * pi
 _SAME_ANGLE = 1e-12
@@ -17,7 +17,7 @@ _PARALLEL = 1e-12
 _SHORTEST = 1e-9
 
 
-@numba.njit(cache=True)
+@compiled
 def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray:
     """Intersection of half-planes that bound a polygon, a hair inside.
 
@@ -61,7 +61,7 @@ def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray:
     return vertices[:size].copy() if size >= 3 else np.empty((0, 2))
 
 
-@numba.njit(cache=True)
+@compiled
 def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> FloatArray:
     """Find points that a convex polygon covers at every angle of an interval about the origin.
 
@@ -97,7 +97,7 @@ def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> Fl
     return found
 
 
-@numba.njit(cache=True)
+@compiled
 def under_prismatic(vertices: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray:
     """Find points that a convex polygon covers at every displacement of a segment: both ends' overlap.
 
@@ -115,7 +115,7 @@ def under_prismatic(vertices: FloatArray, first: FloatArray, last: FloatArray) -
     return found
 
 
-@numba.njit(cache=True)
+@compiled
 def common_disc(centres: FloatArray, radius: float, largest_turn: float) -> FloatArray:
     """Polygon inside every disc of one radius whose centre lies in a convex polygon.
 

@@ -6,14 +6,15 @@ from dataclasses import replace
 
 from shapely.errors import ShapelyError
 
-from coop_drake.control import GainSet
+from coop_drake.answers.plan import Found, Infeasible, PlanningResult, Undecided
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PlanError, StallError
-from coop_drake.planning.channel import NoChannel, SearchReport
-from coop_drake.planning.plan import Found, Infeasible, PlanningResult, Undecided
-from coop_drake.planning.problem import PlanningProblem
-from coop_drake.planning.quickest import quickest_plan
-from coop_drake.planning.search import find_way
-from coop_drake.planning.transitions import Progress
+from coop_drake.laws import GainSet
+from coop_drake.planning.boxes.channel import NoChannel
+from coop_drake.planning.execution.transitions import Progress
+from coop_drake.planning.improvement.quickest import quickest_plan
+from coop_drake.planning.search.search import find_way
 
 __all__ = ["plan"]
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from shapely import Polygon, box
 
-from coop_drake.control import ScheduledGains
+from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.passage import PassageFinder
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan
-from coop_drake.planning.problem import PlannerSettings, PlanningProblem
-from coop_drake.planning.proofs import Proofs
+from coop_drake.planning.proofs.proofs import Proofs
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.pose import PlanarPose
 
 _SLICES = 8
 

@@ -11,7 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, MultibodyForces, PlanarJoint, RigidBody
 from pydrake.systems.framework import Context
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["ConstrainedGrasp", "ConstrainedGrasps"]
 

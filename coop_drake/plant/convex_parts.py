@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from shapely import Polygon, constrained_delaunay_triangles
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 Ring = list[tuple[float, float]]
 

@@ -8,10 +8,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, Joint, RigidBody
 from pydrake.systems.framework import Context
 
-from coop_drake.geometry.pose import FloatArray, PlanarPose
 from coop_drake.plant.chain import scoped
 from coop_drake.plant.parsing import bodies_of, joints_of, refusal
 from coop_drake.scenario import Assembly, RobotAssembly, Scenario
+from coop_drake.tree.pose import FloatArray, PlanarPose
 
 TILT = 1e-5
 """Largest sine of a tilt that passes for round-off in a file; pi / 2 written with six digits passes [-]."""

@@ -7,9 +7,9 @@ from pydrake.geometry import Box, Capsule, Convex, Cylinder, Ellipsoid, Mesh, Sh
 from pydrake.math import RigidTransform
 from shapely import MultiPoint, Polygon
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ConvexShape
 from coop_drake.plant.shadows import enclosed_in_fewer
+from coop_drake.tree.component_tree import ConvexShape
+from coop_drake.tree.pose import FloatArray
 
 SUPPORTS = 64
 """Tangent lines that enclose a curved outline: the polygon exceeds it by at most 0.13 % of its radius."""

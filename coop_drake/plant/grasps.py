@@ -11,9 +11,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import WeldJoint
 from pydrake.systems.framework import Context
 
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant.parsing import joints_of
 from coop_drake.scenario import RobotAssembly
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Grasps", "WeldedGrasps"]
 

@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 
 from coop_drake.errors import ScenarioError
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element

@@ -5,8 +5,8 @@ from collections.abc import Iterator
 from shapely import LineString, Point, Polygon, get_coordinates
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.pose import FloatArray, PlanarPose
-from coop_drake.geometry.tree import Body, ComponentTree, ConvexShape
+from coop_drake.tree.component_tree import Body, ComponentTree, ConvexShape
+from coop_drake.tree.pose import FloatArray, PlanarPose
 
 
 def core(shape: ConvexShape, X_WC: PlanarPose) -> BaseGeometry:

@@ -9,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, Joint, RigidBody
 from pydrake.systems.framework import Context
 
-from coop_drake.control.planar_chain import (
+from coop_drake.laws.planar_chain import (
     COLUMNS,
     COM_X,
     COM_Y,
@@ -27,9 +27,9 @@ from coop_drake.control.planar_chain import (
     X,
     Y,
 )
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant.robot import RobotPlant
 from coop_drake.plant.team import RobotModel, TeamPlant
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["BaseChain", "base_chain", "robot_chain"]
 

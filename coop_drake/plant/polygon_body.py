@@ -12,8 +12,8 @@ from shapely import Polygon
 
 from coop_drake.errors import GeometryError
 from coop_drake.files import write_atomically
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant.convex_parts import convex_parts
+from coop_drake.tree.pose import FloatArray
 
 Point = Sequence[float]
 

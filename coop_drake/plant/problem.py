@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.plant.component_tree import read_component_tree
 from coop_drake.plant.team import TeamPlant
 from coop_drake.plant.validation import check_joints, check_places
 from coop_drake.scenario import Scenario
+from coop_drake.tree.pose import FloatArray
 
 
 def planning_problem(scenario: Scenario, team: TeamPlant) -> PlanningProblem:

@@ -21,11 +21,11 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant.chain import find_base
 from coop_drake.plant.fixing import fix_joints
 from coop_drake.plant.parsing import add_models, bodies_of, finalize, set_actuators
 from coop_drake.scenario import Scenario, assemble
+from coop_drake.tree.pose import FloatArray
 
 _PLANAR = [3, 4, 2]
 """Drake's spatial order is rotation first; the plane's is (x, y, rotation)."""

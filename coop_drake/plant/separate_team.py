@@ -11,7 +11,6 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, DiscreteContact
 from pydrake.multibody.tree import FixedOffsetFrame, Joint, PlanarJoint, RigidBody
 from pydrake.systems.framework import Context, DiagramBuilder
 
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant.chain import find_base
 from coop_drake.plant.constrained_grasps import ConstrainedGrasp, ConstrainedGrasps
 from coop_drake.plant.fixing import fix_joints
@@ -19,6 +18,7 @@ from coop_drake.plant.flatness import object_frame, planar_pose
 from coop_drake.plant.parsing import add_models, finalize, set_actuators
 from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
 from coop_drake.scenario import Assembly, Scenario
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["SeparateTeam", "build_separate_team"]
 

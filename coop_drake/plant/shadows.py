@@ -7,8 +7,8 @@ import shapely
 from shapely import MultiPoint, Polygon, box
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import Body, ConvexShape
+from coop_drake.tree.component_tree import Body, ConvexShape
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["enclosed_in_fewer", "without_covered"]
 

@@ -19,13 +19,13 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context, DiagramBuilder
 
-from coop_drake.geometry.pose import FloatArray, PlanarPose
 from coop_drake.plant.chain import find_base, scoped
 from coop_drake.plant.fixing import fix_joints
 from coop_drake.plant.flatness import check_flat, check_masses, object_frame, planar_pose
 from coop_drake.plant.grasps import Grasps, WeldedGrasps
 from coop_drake.plant.parsing import add_models, bodies_of, finalize, set_actuators
 from coop_drake.scenario import Assembly, RobotAssembly, Scenario, assemble
+from coop_drake.tree.pose import FloatArray, PlanarPose
 
 
 @dataclass(frozen=True)

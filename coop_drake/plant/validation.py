@@ -2,8 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import ScenarioError
-from coop_drake.planning.problem import PlanningProblem
 from coop_drake.plant.chain import limits_of
 from coop_drake.plant.placement import collisions, wall_clearance
 from coop_drake.plant.team import TeamPlant

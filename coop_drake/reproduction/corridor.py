@@ -11,12 +11,12 @@ from dataclasses import replace
 import numpy as np
 from shapely import box
 
-from coop_drake.control import GainSet
+from coop_drake.answers import PlanningProblem
+from coop_drake.answers.plan import Plan
 from coop_drake.errors import ScenarioError
-from coop_drake.planning import PlanningProblem
-from coop_drake.planning.channel import Channel, FreeBox
-from coop_drake.planning.plan import Plan
-from coop_drake.planning.transitions import make_plan
+from coop_drake.laws import GainSet
+from coop_drake.planning.boxes.channel import Channel, FreeBox
+from coop_drake.planning.execution.transitions import make_plan
 from coop_drake.reproduction.table_1 import ANGLE_TOLERANCE, CORRECTED, GOAL_ANGLE, START
 from coop_drake.scenario import Goal, ObjectPose, Scenario, Start, Tolerances, Workspace
 

@@ -8,11 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from coop_drake.control import energy_margin, total_wrench, tracking_energy, wrench_share
-from coop_drake.control.ready import EROSION, clearance_margin
 from coop_drake.drawing.canvas import house_style, new_figure, save_figure
 from coop_drake.drawing.colours import BLUE, GREY, VERMILLION
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.laws import energy_margin, total_wrench, tracking_energy, wrench_share
+from coop_drake.laws.ready import EROSION, clearance_margin
 from coop_drake.reproduction import printed
 from coop_drake.reproduction.funnel_errata_panels import (
     draw_hand_over_acceleration,
@@ -28,6 +27,7 @@ from coop_drake.reproduction.governor_run import (
     run_governor,
     straight_field,
 )
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["errata_figure", "write_errata_figure"]
 

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from shapely import distance, points
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import PlanningProblem
+from coop_drake.answers import PlanningProblem
 from coop_drake.reproduction.approximation import Approximation
 from coop_drake.reproduction.exhibits import Statement
 from coop_drake.reproduction.runs import Run
 from coop_drake.reproduction.stated import GOAL, START
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["approximation_statements", "end_statements", "way_statements"]
 

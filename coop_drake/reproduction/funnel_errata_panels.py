@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from scipy.integrate import solve_ivp
 
-from coop_drake.control import Funnel, funnel_walls
 from coop_drake.drawing.colours import BLUE, GREY, VERMILLION
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.laws import Funnel, funnel_walls
 from coop_drake.reproduction import printed
 from coop_drake.reproduction.table_1 import CORRECTED, START
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["draw_hand_over_acceleration", "draw_log_decay", "draw_log_term", "draw_walls"]
 

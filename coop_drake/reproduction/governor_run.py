@@ -9,8 +9,8 @@ from typing import Protocol
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from coop_drake.control import energy_margin, governed_acceleration, governor_velocity, tracking_energy
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.laws import energy_margin, governed_acceleration, governor_velocity, tracking_energy
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Clearance", "GovernorRun", "Margin", "box_clearance", "run_governor", "straight_field"]
 

@@ -7,11 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from coop_drake.answers import Plan
 from coop_drake.drawing.canvas import new_figure
 from coop_drake.drawing.colours import GREY, INK, OBJECT, robot_colour
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import Plan
 from coop_drake.reproduction.table_1 import CORRECTED, PRINTED
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["interval_figure"]
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.control import FixedGains
+from coop_drake.answers import PlanningProblem
 from coop_drake.errors import ScenarioError
 from coop_drake.fields import MapStore
-from coop_drake.planning import PlanningProblem
+from coop_drake.laws import FixedGains
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.plant.team import ObjectInertia
 from coop_drake.reproduction.approximation import Approximation, approximations, two_components

@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
+from coop_drake.answers import Plan, table_1
 from coop_drake.drawing.canvas import house_style, save_figure
 from coop_drake.files import write_atomically
-from coop_drake.planning import Plan, table_1
 from coop_drake.reproduction.approximation import two_components
 from coop_drake.reproduction.approximation_figure import approximation_figure
 from coop_drake.reproduction.background import explanation

@@ -7,14 +7,14 @@ from math import degrees
 
 import numpy as np
 
-from coop_drake.control import FixedGains
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import Plan
+from coop_drake.answers import Plan
+from coop_drake.laws import FixedGains
 from coop_drake.plant.team import ObjectInertia
 from coop_drake.reproduction.comparison import GainFigures
 from coop_drake.reproduction.exhibits import Statement
 from coop_drake.reproduction.stated import CELLS, START, TABLE_2, Parameter
 from coop_drake.reproduction.table_1 import CORRECTED, GOAL_ANGLE
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["interval_statements", "parameter_statements", "played_statements"]
 

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning import PlanningProblem
-from coop_drake.planning.transport_kernels import RATE_TOLERANCE, SPEED_TOLERANCE
+from coop_drake.answers import PlanningProblem
+from coop_drake.planning.execution.transport_kernels import RATE_TOLERANCE, SPEED_TOLERANCE
 from coop_drake.reproduction.exhibits import Statement
 from coop_drake.reproduction.runs import Run
 from coop_drake.reproduction.stated import CELLS, GOAL
 from coop_drake.simulation import WRENCH_TOLERANCE
+from coop_drake.tree.pose import FloatArray
 
 __all__ = [
     "angle_statements",

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from pydrake.common.yaml import yaml_dump_typed
 
-from coop_drake.control.gains import GainSet
 from coop_drake.errors import ScenarioError
+from coop_drake.laws.gains import GainSet
 from coop_drake.scenario.model import Gains, Scenario
 from coop_drake.scenario.reading import read_file
 from coop_drake.scenario.schema import draft, thaw

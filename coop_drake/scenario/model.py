@@ -7,11 +7,11 @@ from typing import Literal
 from pydrake.multibody.parsing import ModelDirective
 from shapely import Polygon
 
-from coop_drake.control.gains import FixedGains, GainSet, ScheduledGains
+from coop_drake.answers.problem import PlannerSettings
 from coop_drake.fields.harmonic_map import TOLERANCE
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.planning.problem import PlannerSettings
+from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains
 from coop_drake.scenario.deployment import Deployment
+from coop_drake.tree.pose import PlanarPose
 
 # No `from __future__ import annotations` here: Drake's YAML loader reads the types of the fields.
 

@@ -9,10 +9,10 @@ from shapely import Polygon
 
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.boundary import edges_of
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import Component, ComponentTree
 from coop_drake.simulation.convex_distance import IntArray
 from coop_drake.simulation.step_kernels import team_distances
+from coop_drake.tree.component_tree import Component, ComponentTree
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Clearance", "TeamClearance"]
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from math import hypot, inf
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.compiled import compiled
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["core_distance", "nearest_pair", "nearest_to_walls", "wall_distance"]
 
@@ -22,7 +22,7 @@ IntArray = NDArray[np.int64]
 _ROUNDING = 1e-9
 
 
-@njit(cache=True)
+@compiled
 def wall_distance(core: FloatArray, walls: FloatArray) -> float:
     """Signed distance of a core to the walls: positive inside the floor, minus the depth outside it.
 
@@ -45,7 +45,7 @@ def wall_distance(core: FloatArray, walls: FloatArray) -> float:
     return nearest if nearest > 0.0 else -depth
 
 
-@njit(cache=True)
+@compiled
 def core_distance(first: FloatArray, second: FloatArray) -> float:
     """Signed distance of two cores: minus the depth of the deepest vertex where they overlap.
 
@@ -78,7 +78,7 @@ def core_distance(first: FloatArray, second: FloatArray) -> float:
     return nearest if nearest > 0.0 else -depth
 
 
-@njit(cache=True)
+@compiled
 def nearest_to_walls(placed: FloatArray, pieces: FloatArray, walls: FloatArray) -> tuple[float, int]:
     """Smallest signed distance of several footprints to the walls, and whose it is.
 
@@ -99,7 +99,7 @@ def nearest_to_walls(placed: FloatArray, pieces: FloatArray, walls: FloatArray) 
     return nearest, which
 
 
-@njit(cache=True)
+@compiled
 def _wall_distance_within(core: FloatArray, walls: FloatArray, limit: float) -> float:
     """`wall_distance` where it is below a limit, else anything from the limit on."""
     low_x, low_y, high_x, high_y = _box(core)
@@ -122,7 +122,7 @@ def _wall_distance_within(core: FloatArray, walls: FloatArray, limit: float) -> 
     return nearest
 
 
-@njit(cache=True)
+@compiled
 def _squared_gap(wall: FloatArray, low_x: float, low_y: float, high_x: float, high_y: float) -> float:
     """Squared distance of a box from that about a wall."""
     dx = max(0.0, max(min(wall[0], wall[2]) - high_x, low_x - max(wall[0], wall[2])))
@@ -130,7 +130,7 @@ def _squared_gap(wall: FloatArray, low_x: float, low_y: float, high_x: float, hi
     return dx * dx + dy * dy
 
 
-@njit(cache=True)
+@compiled
 def _ring_to_wall(core: FloatArray, wall: FloatArray) -> float:
     """Distance of a core's edges to a wall, zero where they cross."""
     nearest = inf
@@ -144,7 +144,7 @@ def _ring_to_wall(core: FloatArray, wall: FloatArray) -> float:
     return nearest
 
 
-@njit(cache=True)
+@compiled
 def nearest_pair(placed: FloatArray, pieces: FloatArray, pairs: IntArray) -> tuple[float, int]:
     """Smallest signed distance of some pairs of footprints, shape (pairs, 2), and which pair's it is.
 
@@ -169,13 +169,13 @@ def nearest_pair(placed: FloatArray, pieces: FloatArray, pairs: IntArray) -> tup
     return nearest, which
 
 
-@njit(cache=True)
+@compiled
 def _core(placed: FloatArray, pieces: FloatArray, index: int) -> FloatArray:
     core: FloatArray = placed[int(pieces[index, 0]) : int(pieces[index, 1])]
     return core
 
 
-@njit(cache=True)
+@compiled
 def _box(core: FloatArray) -> tuple[float, float, float, float]:
     low_x, low_y, high_x, high_y = inf, inf, -inf, -inf
     for i in range(core.shape[0]):
@@ -184,7 +184,7 @@ def _box(core: FloatArray) -> tuple[float, float, float, float]:
     return low_x, low_y, high_x, high_y
 
 
-@njit(cache=True)
+@compiled
 def _point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
     dx, dy = bx - ax, by - ay
     length = dx * dx + dy * dy
@@ -192,12 +192,12 @@ def _point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: f
     return hypot(px - ax - t * dx, py - ay - t * dy)
 
 
-@njit(cache=True)
+@compiled
 def _side(ax: float, ay: float, bx: float, by: float, px: float, py: float) -> float:
     return (bx - ax) * (py - ay) - (by - ay) * (px - ax)
 
 
-@njit(cache=True)
+@compiled
 def _segment_distance(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
 ) -> float:
@@ -212,7 +212,7 @@ def _segment_distance(
     )
 
 
-@njit(cache=True)
+@compiled
 def _core_holds(core: FloatArray, px: float, py: float) -> bool:
     count = core.shape[0]
     if count < 3:
@@ -224,7 +224,7 @@ def _core_holds(core: FloatArray, px: float, py: float) -> bool:
     return True
 
 
-@njit(cache=True)
+@compiled
 def _ring_distance(core: FloatArray, px: float, py: float) -> float:
     nearest = inf
     count = core.shape[0]
@@ -234,7 +234,7 @@ def _ring_distance(core: FloatArray, px: float, py: float) -> float:
     return nearest
 
 
-@njit(cache=True)
+@compiled
 def _walls_to_point(walls: FloatArray, px: float, py: float) -> float:
     nearest = inf
     for w in range(walls.shape[0]):
@@ -242,7 +242,7 @@ def _walls_to_point(walls: FloatArray, px: float, py: float) -> float:
     return nearest
 
 
-@njit(cache=True)
+@compiled
 def _floor_holds(walls: FloatArray, px: float, py: float) -> bool:
     inside = False
     for w in range(walls.shape[0]):

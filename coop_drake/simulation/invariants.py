@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from coop_drake.answers.plan import Plan
 from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.planning.plan import Plan
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.step_kernels import margins
 from coop_drake.simulation.telemetry import Sample

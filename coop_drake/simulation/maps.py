@@ -10,10 +10,10 @@ from typing import Any
 from shapely import Point
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
+from coop_drake.answers.plan import Plan
 from coop_drake.errors import FieldError
 from coop_drake.fields import HarmonicMap, MapStore
 from coop_drake.fields.harmonic_map import TOLERANCE
-from coop_drake.planning.plan import Plan
 
 __all__ = ["build_maps", "certificate_rows"]
 

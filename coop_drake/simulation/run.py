@@ -8,9 +8,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
+from coop_drake.answers.plan import Plan
 from coop_drake.diagram import Blocks, ClosedLoop, build_closed_loop
 from coop_drake.fields import HarmonicMap
-from coop_drake.planning.plan import Plan
 from coop_drake.plant import read_component_tree
 from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.control.governor import energy_margin, tracking_energy
-from coop_drake.control.ready import arrival_margin, clearance_margin, funnel_margin, interval_margin
+from coop_drake.answers.plan import Plan
 from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.plan import Plan
+from coop_drake.laws.governor import energy_margin, tracking_energy
+from coop_drake.laws.ready import arrival_margin, clearance_margin, funnel_margin, interval_margin
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems import axis_laws
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["blocking_margin", "narrowest_funnel", "patience"]
 

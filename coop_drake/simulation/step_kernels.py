@@ -6,10 +6,10 @@ from math import cos, inf, sin
 
 import numpy as np
 
-from coop_drake.control.kernels import compiled
-from coop_drake.geometry.boundary import signed_distance_compiled
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.compiled import compiled
+from coop_drake.geometry.boundary import signed_distance
 from coop_drake.simulation.convex_distance import IntArray, nearest_pair, nearest_to_walls
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["LINK_COLUMNS", "largest_difference", "margins", "object_wrench", "team_distances"]
 
@@ -72,7 +72,7 @@ def margins(
         the axis; smallest margin to the slice and the axis; largest difference of wrenches.
     """
     wall, piece, between, pair = team_distances(links, vertices, pieces, pairs, walls, z)
-    in_cell = signed_distance_compiled(cell, z[0], z[1])
+    in_cell = signed_distance(cell, z[0], z[1])
     funnel, funnel_axis = _narrowest(z, funnel_lower, funnel_upper)
     room, slice_axis = _narrowest(z, lower, upper)
     error = largest_difference(measured, commanded)

@@ -11,8 +11,8 @@ import numpy as np
 from pydrake.systems.framework import Context, System
 
 from coop_drake.diagram import TELEMETRY, ClosedLoop
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.simulation.step_kernels import largest_difference, object_wrench
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Sample", "Telemetry", "port_reader"]
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 from pydrake.systems.framework import Context, EventStatus
 
+from coop_drake.answers.plan import Plan
 from coop_drake.diagram import ClosedLoop
-from coop_drake.planning.plan import Plan
 from coop_drake.simulation.fused_telemetry import FusedTelemetry
 from coop_drake.simulation.invariants import Invariants
 from coop_drake.simulation.recorder import Recorder

@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from coop_drake.control.funnels import Funnel
-from coop_drake.control.gains import TransitionGains
-from coop_drake.control.kernels import LAW_COLUMNS
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.plan import Plan
+from coop_drake.answers.plan import Plan
+from coop_drake.laws.funnels import Funnel
+from coop_drake.laws.gains import TransitionGains
+from coop_drake.laws.kernels import LAW_COLUMNS
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["AxisLaw", "axis_laws"]
 

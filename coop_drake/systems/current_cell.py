@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["CURRENT_CELL_SIZE", "READY_SIZE", "index_of"]
 

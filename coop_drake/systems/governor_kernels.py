@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.control.kernels import compiled, governed_acceleration, governor_velocity
+from coop_drake.compiled import compiled
 from coop_drake.fields.flat_field import velocity_in_field
-from coop_drake.geometry.boundary import signed_distance_compiled
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.geometry.boundary import signed_distance
+from coop_drake.laws.kernels import governed_acceleration, governor_velocity
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["VELOCITY_STEP", "cell_margin", "govern"]
 
@@ -30,7 +31,7 @@ def cell_margin(edges: FloatArray, stiffness: float, state: FloatArray, governor
     vy = np.rint(state[4] / VELOCITY_STEP) * VELOCITY_STEP
     x, y = state[0] - governor[0], state[1] - governor[1]
     energy: float = 0.5 * (vx**2 + vy**2 + stiffness * (x * x + y * y))
-    clearance: float = signed_distance_compiled(edges, governor[0], governor[1])
+    clearance: float = signed_distance(edges, governor[0], governor[1])
     return 0.5 * stiffness * clearance * abs(clearance) - energy
 
 

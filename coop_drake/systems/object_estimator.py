@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.control.planar_chain import object_state
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.laws.planar_chain import object_state
 from coop_drake.plant import RobotPlant, robot_chain
 from coop_drake.systems.block import Block
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["ObjectEstimator"]
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.control.kernels import compiled, track_row
-from coop_drake.control.ready import CLEARANCE_FRACTION, EROSION, RATE_TOLERANCE, SPEED_TOLERANCE
-from coop_drake.geometry.boundary import signed_distance_compiled
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.compiled import compiled
+from coop_drake.geometry.boundary import signed_distance
+from coop_drake.laws.kernels import track_row
+from coop_drake.laws.ready import CLEARANCE_FRACTION, EROSION, RATE_TOLERANCE, SPEED_TOLERANCE
+from coop_drake.tree.pose import FloatArray
 
 __all__ = [
     "axis_ready",
@@ -34,7 +35,7 @@ def position_ready(
     """
     x, y = state[0] - governor[0], state[1] - governor[1]
     energy = 0.5 * (state[3] ** 2 + state[4] ** 2 + next_stiffness * (x * x + y * y))
-    clearance = signed_distance_compiled(next_edges, governor[0], governor[1])
+    clearance = signed_distance(next_edges, governor[0], governor[1])
     margin = 0.5 * next_stiffness * clearance * abs(clearance) - energy
     floor = 0.5 * next_stiffness * CLEARANCE_FRACTION * inradius * abs(CLEARANCE_FRACTION * inradius)
     return (margin - floor) / max(abs(margin), floor)

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.ready_kernels import robot_arrival, robot_ready
 from coop_drake.systems.reference_governor import GovernedCell
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["ReadyMonitor"]
 

@@ -9,15 +9,15 @@ from functools import cached_property
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.control import kernels
-from coop_drake.control.gains import TransitionGains
-from coop_drake.control.governor import energy_margin, tracking_energy
 from coop_drake.fields import VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.laws import kernels
+from coop_drake.laws.gains import TransitionGains
+from coop_drake.laws.governor import energy_margin, tracking_energy
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 from coop_drake.systems.governor_kernels import VELOCITY_STEP, cell_margin, govern
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["VELOCITY_STEP", "GovernedCell", "ReferenceGovernor"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.control.planar_chain import axes_effort
+from coop_drake.laws.planar_chain import axes_effort
 from coop_drake.plant import RobotPlant, robot_chain
 from coop_drake.systems.block import Block
 

@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 from pydrake.systems.primitives import Selector
 
-from coop_drake.control.planar_chain import read_team
+from coop_drake.laws.planar_chain import read_team
 from coop_drake.plant import SeparateTeam, TeamPlant, base_chain
 from coop_drake.systems.block import Block
 from coop_drake.systems.selector import build_selector

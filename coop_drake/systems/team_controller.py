@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.team_kernels import (
@@ -19,6 +18,7 @@ from coop_drake.systems.team_kernels import (
     team_ready,
     team_telemetry,
 )
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["TeamController", "TeamReport"]
 

@@ -7,11 +7,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coop_drake.control.kernels import compiled, governed_acceleration, hand_command, track_row, write_walls
-from coop_drake.control.planar_chain import chain_effort, read_robot
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.compiled import compiled
+from coop_drake.laws.kernels import governed_acceleration, hand_command, track_row, write_walls
+from coop_drake.laws.planar_chain import chain_effort, read_robot
 from coop_drake.systems.governor_kernels import cell_margin, govern
 from coop_drake.systems.ready_kernels import axis_ready, axis_rests, position_arrived, position_ready
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["FusedCell", "FusedTeam", "team_arrival", "team_command", "team_ready", "team_telemetry"]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.control.kernels import command_hand
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.laws.kernels import command_hand
 from coop_drake.systems.block import Block
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["WrenchLaw"]
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from coop_drake.control.gains import FixedGains, FloatArray, GainSet
 from coop_drake.errors import TuningError
+from coop_drake.laws.gains import FixedGains, FloatArray, GainSet
 
 __all__ = ["Knob", "decoded", "encoded", "knobs_of"]
 

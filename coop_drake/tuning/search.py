@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import cma
 import numpy as np
 
-from coop_drake.control import GainSet
+from coop_drake.laws import GainSet
 from coop_drake.tuning.knobs import Knob, decoded, encoded
 from coop_drake.tuning.objective import Objective
 from coop_drake.tuning.trial import Trial

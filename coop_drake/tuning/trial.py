@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from coop_drake.control import GainSet
+from coop_drake.answers import Found, Plan, PlanningProblem
 from coop_drake.diagram import Blocks, build_closed_loop
 from coop_drake.errors import ScenarioError
 from coop_drake.fields import HarmonicMap
-from coop_drake.planning import Found, Plan, PlanningProblem, reschedule
+from coop_drake.laws import GainSet
+from coop_drake.planning import reschedule
 from coop_drake.planning.planner import plan
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import SimulationLog, build_maps, simulate

@@ -9,9 +9,9 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
-from coop_drake.control import GainSet
+from coop_drake.answers import Plan
 from coop_drake.fields import HarmonicMap
-from coop_drake.planning import Plan
+from coop_drake.laws import GainSet
 from coop_drake.scenario import load_scenario
 from coop_drake.tuning.trial import Trial, Workbench, quickest_blocks
 

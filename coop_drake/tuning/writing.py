@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from coop_drake.control import GainSet
 from coop_drake.files import write_atomically
+from coop_drake.laws import GainSet
 from coop_drake.scenario import dump_gains
 from coop_drake.tuning.search import Search
 

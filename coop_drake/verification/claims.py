@@ -11,10 +11,10 @@ import numpy as np
 import shapely
 from shapely import Point, Polygon
 
-from coop_drake.control import GainSet, TransitionGains, transition_gains
+from coop_drake.answers.plan import Plan, Transition
 from coop_drake.errors import RefusalError
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.plan import Plan, Transition
+from coop_drake.laws import GainSet, TransitionGains, transition_gains
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 
 __all__ = ["check_claims"]

@@ -10,7 +10,7 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.errors import RefusalError
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.may_be_free import FreePositions
 
 __all__ = ["check_blocked", "check_cover", "uncovered"]

@@ -7,11 +7,11 @@ import shapely
 from shapely import MultiPoint, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.proof import DiscSeparation
 from coop_drake.errors import RefusalError
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ConvexShape
-from coop_drake.planning.problem import PlanningProblem
-from coop_drake.planning.separation import DiscSeparation
+from coop_drake.tree.component_tree import ConvexShape
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.covers import uncovered
 from coop_drake.verification.inner_sweeps import inscribed_circle

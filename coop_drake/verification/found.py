@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from coop_drake.control import GainSet
+from coop_drake.answers.plan import Cell, Plan
+from coop_drake.answers.problem import LIMIT_ROOM, PlanningProblem
 from coop_drake.errors import RefusalError
-from coop_drake.planning.plan import Cell, Plan
-from coop_drake.planning.problem import LIMIT_ROOM, PlanningProblem
+from coop_drake.laws import GainSet
 from coop_drake.verification.checks import Check, Progress, Verified
 from coop_drake.verification.claims import check_claims
 from coop_drake.verification.free_cells import check_apart, check_clear_of_walls

@@ -9,7 +9,7 @@ import shapely
 from shapely import Point, Polygon
 
 from coop_drake.errors import RefusalError
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.outer_sweeps import outer_sweep
 from coop_drake.verification.solids import Solid
 from coop_drake.verification.walls import Walls, wall_sums

@@ -6,10 +6,10 @@ import numpy as np
 import shapely
 from shapely import Point, Polygon
 
+from coop_drake.answers.plan import Cell, Plan, Transition
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.plan import Cell, Plan, Transition
-from coop_drake.planning.problem import PlanningProblem
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 
 __all__ = ["check_ends", "check_handovers", "check_nesting"]

@@ -6,10 +6,10 @@ from math import remainder
 
 import numpy as np
 
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.proof import BlockedGoal, DiscSeparation, Separation, SliceSeparation
 from coop_drake.errors import RefusalError
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.problem import PlanningProblem
-from coop_drake.planning.separation import BlockedGoal, DiscSeparation, Separation, SliceSeparation
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check, Progress, Verified
 from coop_drake.verification.covers import check_blocked, check_cover
 from coop_drake.verification.discs import check_disc

@@ -7,7 +7,7 @@ from math import ceil, pi, sqrt
 import numpy as np
 from shapely import Polygon
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.outer_sweeps import hull_vertices, outer_sweep, turned
 from coop_drake.verification.solids import Solid, Stage
 

@@ -10,9 +10,9 @@ import shapely
 from numpy.typing import NDArray
 from shapely import Point
 
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.proof import OverSlice
 from coop_drake.errors import RefusalError
-from coop_drake.planning.problem import PlanningProblem
-from coop_drake.planning.separation import OverSlice
 from coop_drake.verification.checks import Check
 from coop_drake.verification.tiling import TURN, facet_pairs
 

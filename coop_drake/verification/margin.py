@@ -9,8 +9,8 @@ import shapely
 from shapely import MultiPoint
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.outer_sweeps import outer_sweep
 from coop_drake.verification.solids import Solid
 from coop_drake.verification.walls import Walls

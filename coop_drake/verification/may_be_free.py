@@ -7,8 +7,8 @@ import shapely
 from shapely import MultiPolygon, Polygon, affinity, box
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ComponentTree
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.inner_sweeps import HAIR, inner_sweep
 from coop_drake.verification.solids import colliding_pairs, team_solids
 from coop_drake.verification.walls import Walls, wall_edges, wall_sums

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 from shapely import LineString, Point
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.solids import Solid, Stage
 
 __all__ = ["outer_sweep"]

@@ -6,10 +6,10 @@ from math import remainder, tau
 
 import numpy as np
 
+from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
-from coop_drake.planning.digest import problem_digest
-from coop_drake.planning.plan import Plan
-from coop_drake.planning.problem import PlanningProblem
 from coop_drake.verification.checks import Check
 
 __all__ = ["check_question", "same_question"]

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import shapely
 
-from coop_drake.control import GainSet
+from coop_drake.answers.digest import content_digest
+from coop_drake.answers.document import Entry
+from coop_drake.answers.plan_reader import FORMAT as PLAN_FORMAT
+from coop_drake.answers.plan_reader import read_plan
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.proof_reader import FORMAT as SEPARATION_FORMAT
+from coop_drake.answers.proof_reader import read_separation
 from coop_drake.errors import RefusalError
-from coop_drake.planning.digest import content_digest
-from coop_drake.planning.document import Entry
-from coop_drake.planning.plan_reader import FORMAT as PLAN_FORMAT
-from coop_drake.planning.plan_reader import read_plan
-from coop_drake.planning.problem import PlanningProblem
-from coop_drake.planning.separation_reader import FORMAT as SEPARATION_FORMAT
-from coop_drake.planning.separation_reader import read_separation
+from coop_drake.laws import GainSet
 from coop_drake.verification.checks import Check, Progress, Verified
 from coop_drake.verification.found import verify_plan
 from coop_drake.verification.infeasible import verify_separation

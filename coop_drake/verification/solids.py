@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from coop_drake.geometry.pose import FloatArray, PlanarPose
-from coop_drake.geometry.tree import ComponentTree, TreeJoint
+from coop_drake.tree.component_tree import ComponentTree, TreeJoint
+from coop_drake.tree.pose import FloatArray, PlanarPose
 
 __all__ = ["Solid", "Stage", "colliding_pairs", "component_stages", "team_solids"]
 

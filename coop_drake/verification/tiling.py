@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coop_drake.errors import RefusalError
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["check_tiling", "facet_pairs", "turn_is_whole"]
 

@@ -1,6 +1,6 @@
 """Figures of the paper, and a transport in Meshcat: live, and as a recording."""
 
-from coop_drake.planning import table_1
+from coop_drake.answers import table_1
 from coop_drake.viz.block_diagram import block_diagram_figure
 from coop_drake.viz.effort_figures import summary_figure
 from coop_drake.viz.figures import write_figures

@@ -8,8 +8,8 @@ import numpy as np
 from pydrake.geometry import Cylinder, Meshcat, MeshcatCone, Rgba
 from pydrake.math import RigidTransform, RotationMatrix
 
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant import TeamPlant
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["ABOVE", "LONGEST", "arrow_path", "arrow_sizes", "force_of_a_metre", "set_arrows"]
 

@@ -7,13 +7,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from shapely import Polygon
 
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.drawing.canvas import new_figure
 from coop_drake.drawing.colours import INK
 from coop_drake.drawing.floor import draw_team, draw_workspace
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ComponentTree
-from coop_drake.planning.plan import Plan
-from coop_drake.planning.problem import PlanningProblem
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["at_goal", "draw_ends", "floor_figure", "joints_at_end"]
 

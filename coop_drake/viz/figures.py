@@ -8,10 +8,10 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from shapely import Polygon
 
+from coop_drake.answers.plan import Plan
 from coop_drake.drawing.canvas import house_style, save_figure
-from coop_drake.geometry.tree import ComponentTree
-from coop_drake.planning.plan import Plan
 from coop_drake.simulation import SimulationLog
+from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.viz import effort_figures, place_figures, state_figures
 
 __all__ = ["write_figures"]

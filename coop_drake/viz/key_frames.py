@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydrake.geometry import MeshcatAnimation
 from pydrake.math import RigidTransform, RotationMatrix
 
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Tracks", "key_frames"]
 

@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.geometry import Meshcat
 from pydrake.math import RigidTransform, RotationMatrix
 
-from coop_drake.planning.plan import Plan
+from coop_drake.answers.plan import Plan
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import Sample
 from coop_drake.viz.arrows import ABOVE, arrow_path, arrow_sizes

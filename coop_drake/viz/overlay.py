@@ -9,8 +9,8 @@ import numpy as np
 from pydrake.geometry import Rgba
 from shapely import Polygon, box
 
+from coop_drake.answers.plan import Plan
 from coop_drake.errors import CoopDrakeError
-from coop_drake.planning.plan import Plan
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import SimulationLog
 from coop_drake.templates import rendered

@@ -7,11 +7,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.drawing.canvas import legend_above
 from coop_drake.drawing.colours import INK, SKY
 from coop_drake.drawing.floor import draw_polygon, team_legend
-from coop_drake.planning.plan import Plan
-from coop_drake.planning.problem import PlanningProblem
 from coop_drake.viz.ends import at_goal, draw_ends, floor_figure, joints_at_end
 
 __all__ = ["overview_figure"]

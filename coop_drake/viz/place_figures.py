@@ -9,13 +9,13 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from shapely import Polygon
 
+from coop_drake.answers.plan import Plan
 from coop_drake.drawing.canvas import legend_above
 from coop_drake.drawing.colours import VERMILLION
 from coop_drake.drawing.floor import draw_team, team_legend
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ComponentTree
-from coop_drake.planning.plan import Plan
 from coop_drake.simulation import SimulationLog
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.ends import at_goal, draw_ends, floor_figure, joints_at_end
 
 __all__ = ["path_figure", "start_and_goal_figure"]

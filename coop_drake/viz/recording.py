@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from coop_drake.answers.plan import Plan
 from coop_drake.files import write_atomically
-from coop_drake.planning.plan import Plan
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import SimulationLog
 from coop_drake.viz.overlay import story_of, with_overlay

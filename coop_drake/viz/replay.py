@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from pydrake.geometry import MeshcatAnimation
 from pydrake.math import RigidTransform
 
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.simulation import SimulationLog
+from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.arrows import ABOVE, arrow_path, arrow_sizes
 from coop_drake.viz.cells import cell_paths
 from coop_drake.viz.key_frames import Tracks

@@ -7,13 +7,13 @@ from pydrake.geometry import Meshcat
 from shapely import union_all
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.answers.plan import Plan
 from coop_drake.drawing.colours import INK
 from coop_drake.drawing.footprints import team_footprints
 from coop_drake.drawing.solids import flat_mesh, parts_of
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.plan import Plan
 from coop_drake.plant import read_component_tree
 from coop_drake.scenario import Scenario
+from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.arrows import force_of_a_metre, set_arrows
 from coop_drake.viz.cells import set_cells, set_goal
 from coop_drake.viz.paint import rgba

@@ -20,7 +20,7 @@ from coop_drake.drawing.solids import (
     wall_mesh,
     wall_polygons,
 )
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.paint import set_mesh
 
 __all__ = ["place_camera", "set_stage"]

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 
 from coop_drake.drawing.canvas import legend_above
 from coop_drake.drawing.colours import GREY, INK, OBJECT, SKY, robot_colour
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.geometry.tree import ComponentTree
 from coop_drake.simulation import SimulationLog
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.time_axes import SWITCHES, break_at, mark_switches, switch_times, time_axes
 
 __all__ = ["angle_figure", "angular_velocity_figure", "joints_figure", "position_figure", "velocity_figure"]

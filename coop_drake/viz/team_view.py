@@ -18,9 +18,9 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.drawing.colours import robot_colour
 from coop_drake.drawing.solids import TriangleMesh
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.plant import TeamPlant, build_team_plant, set_configuration
 from coop_drake.scenario import Scenario
+from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.paint import rgba, set_mesh
 
 __all__ = ["TeamView"]

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 
 from coop_drake.drawing.canvas import new_figure
 from coop_drake.drawing.colours import GREY
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.simulation.log import IntArray
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["SWITCHES", "break_at", "mark_switches", "switch_times", "time_axes"]
 

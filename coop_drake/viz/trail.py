@@ -7,7 +7,7 @@ from pydrake.geometry import Meshcat
 
 from coop_drake.drawing.colours import INK
 from coop_drake.drawing.solids import ribbon_mesh
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.paint import rgba, set_mesh
 
 __all__ = ["INDICES", "STEP", "TRAIL_COLOUR", "set_trail", "trail_points"]

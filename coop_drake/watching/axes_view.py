@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
 from coop_drake.drawing.colours import INK
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Interval, Intervals
-from coop_drake.planning.cell_graph import Kind
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.tree.pose import FloatArray
 from coop_drake.watching import look
 from coop_drake.watching.moments import Leaf, Link
 from coop_drake.watching.stack import THETA, on_turn

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from coop_drake.planning.cell_graph import Kind
-from coop_drake.planning.exploration import Verdict
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.watching.film import BOXES, Film
 from coop_drake.watching.moments import Moment
 

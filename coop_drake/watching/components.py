@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.cell_graph import Kind
-from coop_drake.planning.cells import Region
-from coop_drake.planning.slices import holds, share_facet
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.slices import holds, share_facet
+from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.moments import Leaf
 
 __all__ = ["Parts", "parts_from_start"]

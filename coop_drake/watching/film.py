@@ -9,14 +9,14 @@ from enum import Enum
 import numpy as np
 from manifold3d import CrossSection, FillRule
 
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import polygon_rings
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.cell_graph import Kind
-from coop_drake.planning.cells import Region
-from coop_drake.planning.channel import Channel
-from coop_drake.planning.events import (
+from coop_drake.planning.boxes.channel import Channel
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.events import (
     ChannelSearched,
     Event,
     ExplorationBegan,
@@ -24,11 +24,11 @@ from coop_drake.planning.events import (
     SeenCell,
     SliceAdded,
 )
-from coop_drake.planning.exploration import Exploration, Verdict
-from coop_drake.planning.margins import marginal_workspace
-from coop_drake.planning.paper import PaperExploration
-from coop_drake.planning.problem import PlanningProblem
-from coop_drake.planning.search import find_channel
+from coop_drake.planning.cells.exploration import Exploration, Verdict
+from coop_drake.planning.cells.printed_algorithms import PaperExploration
+from coop_drake.planning.questions.margins import marginal_workspace
+from coop_drake.planning.search.search import find_channel
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["BOXES", "Film", "Strategy", "record"]
 

@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.drawing import draw_team, draw_workspace
 from coop_drake.drawing.colours import INK
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.cell_graph import Kind
-from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.tree.pose import FloatArray
 from coop_drake.watching import look
 from coop_drake.watching.way import Leg
 

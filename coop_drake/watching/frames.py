@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from coop_drake.drawing.colours import GREY, INK
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 from coop_drake.watching import look
 from coop_drake.watching.axes_view import (
     cut,

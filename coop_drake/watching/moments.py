@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.planning.cell_graph import Kind
-from coop_drake.planning.cells import Region
-from coop_drake.planning.events import (
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.events import (
     ChannelSearched,
     Event,
     ExplorationBegan,

@@ -17,7 +17,7 @@ from coop_drake.drawing.colours import INK
 from coop_drake.drawing.footprints import team_footprints
 from coop_drake.drawing.solids import parts_of, wall_polygons
 from coop_drake.geometry.minkowski import polygon_rings
-from coop_drake.geometry.pose import FloatArray
+from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.film import Film
 from coop_drake.watching.meshes import Triangles, joined, prism, tube
 from coop_drake.watching.space import Space

@@ -12,8 +12,8 @@ import numpy as np
 from meshcat.animation import Animation
 
 from coop_drake.files import write_atomically
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.cell_graph import Kind
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.tree.pose import FloatArray
 from coop_drake.watching import look
 from coop_drake.watching.film import Film
 from coop_drake.watching.meshes import joined, prism, tube

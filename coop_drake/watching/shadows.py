@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from manifold3d import CrossSection, OpType
 
-from coop_drake.planning.cell_graph import Kind
-from coop_drake.planning.cells import Region
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.cells import Region
 from coop_drake.watching.moments import Leaf
 
 __all__ = ["Shadow", "Shadows", "union"]

@@ -12,13 +12,13 @@ from matplotlib.patches import Patch
 from shapely import Polygon, union_all
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.drawing.canvas import new_figure
 from coop_drake.drawing.colours import FLOOR, INK
 from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.cells import CellMaker, Region
-from coop_drake.planning.problem import PlanningProblem
+from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.watching import look
 from coop_drake.watching.floor_view import draw_section
 

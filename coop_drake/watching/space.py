@@ -10,8 +10,8 @@ from shapely import Polygon
 from shapely.affinity import affine_transform
 
 from coop_drake.drawing.camera import camera_pose
-from coop_drake.geometry.pose import FloatArray
 from coop_drake.geometry.swept_tree import Interval
+from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.stack import THETA
 
 __all__ = ["Space"]

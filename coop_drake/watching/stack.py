@@ -11,7 +11,7 @@ from math import pi
 from manifold3d import CrossSection
 
 from coop_drake.geometry.swept_tree import Interval
-from coop_drake.planning.slices import nearest_turn
+from coop_drake.planning.cells.slices import nearest_turn
 from coop_drake.watching.components import Parts
 from coop_drake.watching.moments import Leaf
 from coop_drake.watching.shadows import Shadows, union

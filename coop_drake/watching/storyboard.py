@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.exploration import Verdict
+from coop_drake.planning.cells.exploration import Verdict
+from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.captions import counters, headline
 from coop_drake.watching.components import Parts, parts_from_start
 from coop_drake.watching.film import Film

@@ -12,9 +12,9 @@ from scipy.sparse.csgraph import dijkstra
 from shapely import Point, Polygon
 
 from coop_drake.geometry.minkowski import to_polygon
-from coop_drake.geometry.pose import FloatArray
-from coop_drake.planning.cell_graph import Kind
-from coop_drake.planning.slices import nearest_turn
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.slices import nearest_turn
+from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.moments import Link
 
 __all__ = ["Leg", "legs_through"]

@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks.planner.cases import CASES
 from benchmarks.planner.family import corridor_problem, crowd_problem, shelf_floor, shelf_problem
-from coop_drake.planning.collision_kernels import is_free
-from coop_drake.planning.team_arrays import team_arrays
-from coop_drake.planning.walls import walls_for
+from coop_drake.planning.sampling.collision_kernels import is_free
+from coop_drake.planning.sampling.obstacle_grid import walls_for
+from coop_drake.planning.sampling.team_arrays import team_arrays
 
 MAKERS = {
     "corridor": lambda: corridor_problem(0.9),

@@ -8,7 +8,7 @@ import pytest
 from pydrake.systems.analysis import ExtractSimulatorConfig, Simulator
 from pydrake.systems.primitives import ConstantVectorSource
 
-from coop_drake.control import FixedGains
+from coop_drake.laws import FixedGains
 from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
 from coop_drake.simulation import configure_simulator, simulate
 from tests.support.hand_over import assert_certified

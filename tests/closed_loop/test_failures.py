@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapely import box
 
-from coop_drake.planning.plan import Plan
+from coop_drake.answers.plan import Plan
 from coop_drake.simulation import simulate, stall
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_plan import ROOM

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coop_drake.control import FixedGains, ScheduledGains
+from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.simulation import communication, simulate
 from tests.support.hand_over import assert_certified
 from tests.support.small_loop import small_maps, small_problem

@@ -3,8 +3,8 @@
 import numpy as np
 from shapely import Polygon, box
 
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.diagnosis.along import is_free_along
-from coop_drake.planning.problem import PlanningProblem
 from tests.support.cases import team_tree
 
 PILLAR = box(4.0, 4.0, 9.0, 9.0)

@@ -6,8 +6,8 @@ from shapely import box
 
 from coop_drake.diagnosis.contacts import contacts, deepest, overlaps
 from coop_drake.diagnosis.gap import narrowest_gap
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.geometry.tree import Body, Component, ComponentTree, TreeJoint
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
+from coop_drake.tree.pose import PlanarPose
 from tests.support.cases import disc, rectangle, team_tree
 
 ROOM = box(0.0, 0.0, 4.0, 1.0)

@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 from shapely import box, union_all
 
+from coop_drake.answers import PlannerSettings, PlanningProblem
 from coop_drake.diagnosis import Answer, diagnose, diagnosis_figure, facts_of, sentences_of
 from coop_drake.diagnosis.bodies import without_walls
 from coop_drake.diagnosis.passages import stretches
 from coop_drake.diagnosis.relaxations import try_changes
 from coop_drake.diagnosis.trials import Trials
 from coop_drake.drawing import save_figure
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.geometry.tree import Body, Component, ComponentTree, TreeJoint
-from coop_drake.planning import Channel, PlannerSettings, PlanningProblem, find_channel
+from coop_drake.planning import Channel, find_channel
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
+from coop_drake.tree.pose import PlanarPose
 from tests.support.cases import case, rectangle
 
 ROD = 0.2

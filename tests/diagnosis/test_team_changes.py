@@ -7,7 +7,7 @@ from shapely import union_all
 
 from coop_drake.diagnosis.relaxations import changes
 from coop_drake.diagnosis.team_changes import shrunk_bodies
-from coop_drake.geometry.tree import Body, Component, ComponentTree
+from coop_drake.tree.component_tree import Body, Component, ComponentTree
 from tests.support.cases import disc, rectangle
 from tests.support.trees import placed_shape
 

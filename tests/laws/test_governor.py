@@ -1,89 +1,75 @@
-"""Behind its governor the object never has the energy to reach a wall, and every hand-over is reached."""
-
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
 
-from coop_drake.control import ScheduledGains, energy_margin, tracking_energy
-from coop_drake.control.ready import clearance_margin
-from coop_drake.control.schedule import stiffness_for_neck
-from coop_drake.reproduction.governor_run import box_clearance, run_governor, straight_field
-
-LOWER, UPPER = np.array([0.0, -1.0]), np.array([4.0, 1.0])
-fractions = st.tuples(st.floats(0.02, 0.98), st.floats(0.02, 0.98)).map(np.array)
-table_2 = (50.0, 5.0, 5.0)
-scheduled = [(k, np.sqrt(k), 0.8 * np.sqrt(k)) for k in (50.0, 400.0)]
-
-
-@settings(max_examples=20, deadline=None, derandomize=True)
-@given(
-    st.sampled_from([table_2, *scheduled]),
-    st.sampled_from([0.0, 0.001]),
-    fractions,
-    fractions,
-    st.floats(-np.pi, np.pi),
-    st.sampled_from([0.0, 0.1, 0.5, 0.95]),
-    st.sampled_from([0.0, 0.3, 1.0]),
+from coop_drake.laws import (
+    energy_margin,
+    governed_acceleration,
+    governor_velocity,
+    slowdown_radius,
+    tracking_energy,
 )
-def test_the_margin_never_becomes_negative(gains, smoothing, start, target, heading, filled, split):
-    """From any start whose energy fills a part of what the clearance allows, as speed or as distance."""
-    governor, target = LOWER + start * (UPPER - LOWER), LOWER + target * (UPPER - LOWER)
-    clearance = box_clearance(LOWER, UPPER)
-    stiffness = gains[0]
-    energy = filled * energy_margin(0.0, clearance(governor), stiffness=stiffness)
-    direction = np.array([np.cos(heading), np.sin(heading)])
-    velocity = np.sqrt(2.0 * split * energy) * direction
-    position = governor + np.sqrt(2.0 * (1.0 - split) * energy / stiffness) * direction
-    assume(
-        tracking_energy(position, velocity, governor, stiffness=stiffness) <= energy * (1.0 + 1e-9) + 1e-12
-    )
-    run = run_governor(
-        clearance,
-        straight_field(target),
-        position=position,
-        velocity=velocity,
-        governor=governor,
-        gains=(*gains, smoothing),
-        seconds=12.0,
-    )
-    assert run.margin.min() >= -1e-9
-    assert min(clearance(p) for p in run.position) >= 0.0
-    assert run.position[-1] == pytest.approx(target, abs=0.01)
+from coop_drake.laws.governor import ATTRACTION_RATE
+from coop_drake.scenario import SimulatorSettings
+
+GAINS = {"stiffness": 50.0, "governor_gain": 5.0}
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
-@given(st.floats(0.01, 0.4), st.floats(0.01, 0.4), st.floats(0.0, 1.0), st.sampled_from([0.0, 0.001]))
-def test_every_hand_over_is_reached_and_leaves_margin(half_height, half_overlap, heading, smoothing):
-    """Two corridors of any width overlap in a box: its pole is reached with margin to spare.
-
-    The next cell has its own stiffness, and the object comes with the speed that the last one allowed.
-    """
-    here = box_clearance(LOWER, np.array([3.0 + half_overlap, 1.0]))
-    height = np.array([0.0, half_height])
-    following = box_clearance(np.array([3.0 - half_overlap, 0.0]) - height, np.array([5.0, 0.0]) + height)
-    target, inradius = np.array([3.0, 0.0]), min(half_height, half_overlap)
-    stiffness = stiffness_for_neck(ScheduledGains(), half_height)
-    start = np.array([0.3, 1.8 * heading - 0.9])
-    run = run_governor(
-        here,
-        straight_field(target),
-        position=start,
-        velocity=np.zeros(2),
-        governor=start,
-        gains=(50.0, np.sqrt(50.0), 0.8 * np.sqrt(50.0), smoothing),
-        seconds=15.0,
+def test_acceleration_pulls_to_the_governor_and_brakes():
+    acceleration = governed_acceleration(
+        np.array([1.0, 2.0]), np.array([0.5, -1.0]), np.array([1.5, 2.0]), stiffness=50.0, damping=5.0
     )
-    margins = [
-        energy_margin(tracking_energy(p, v, g, stiffness=stiffness), following(g), stiffness=stiffness)
-        for p, v, g in zip(run.position, run.velocity, run.governor, strict=True)
+    assert acceleration.tolist() == [22.5, 5.0]
+
+
+def test_energy_is_kinetic_plus_elastic():
+    energy = tracking_energy(np.array([1.0, 2.0]), np.array([3.0, 4.0]), np.array([1.0, 2.2]), stiffness=50.0)
+    assert energy == pytest.approx(0.5 * 25.0 + 0.5 * 50.0 * 0.04)
+
+
+def test_margin_is_what_the_spring_may_still_store():
+    assert energy_margin(1.0, 0.4, stiffness=50.0) == pytest.approx(3.0)
+    assert energy_margin(0.0, 0.0, stiffness=50.0) == 0.0
+    assert energy_margin(0.0, -0.4, stiffness=50.0) == pytest.approx(-4.0)
+
+
+def test_the_field_leads_while_the_margin_is_large():
+    velocity = governor_velocity(np.array([0.3, -0.4]), 100.0, smoothing=0.0, **GAINS)
+    assert velocity == pytest.approx([1.5, -2.0])
+
+
+@pytest.mark.parametrize("smoothing", [0.0, 0.001, 0.1])
+def test_the_root_leads_while_the_margin_is_small(smoothing):
+    velocity = governor_velocity(np.array([0.6, -0.8]), 0.02, smoothing=smoothing, **GAINS)
+    root = np.sqrt(0.02 / 50.0 + smoothing**2) - smoothing
+    assert velocity == pytest.approx(5.0 * root * np.array([0.6, -0.8]))
+
+
+@pytest.mark.parametrize("smoothing", [0.0, 0.001])
+@pytest.mark.parametrize("margin", [0.0, -1e-12, -3.0])
+def test_the_governor_waits_without_margin(margin, smoothing):
+    assert governor_velocity(np.array([0.6, -0.8]), margin, smoothing=smoothing, **GAINS).tolist() == [
+        0.0,
+        0.0,
     ]
-    ready = [clearance_margin(m, stiffness=stiffness, inradius=inradius) >= 0.0 for m in margins]
-    first = ready.index(True)
-    assert following(run.position[first]) > 0.0
-    assert here(run.position[first]) > 0.0
-    # Nothing takes the readiness away again while other conditions are still waited for, once at rest.
-    assert ready[-1]
-    assert clearance_margin(margins[-1], stiffness=stiffness, inradius=inradius) == pytest.approx(
-        0.75, abs=0.01
-    )
+
+
+def test_the_governor_rests_where_the_field_vanishes():
+    assert governor_velocity(np.zeros(2), 1.0, smoothing=0.0, **GAINS).tolist() == [0.0, 0.0]
+
+
+def test_the_smoothed_root_is_lipschitz_and_the_printed_one_is_not():
+    def slope(smoothing, margin):
+        return governor_velocity(np.array([1.0, 0.0]), margin, smoothing=smoothing, **GAINS)[0] / margin
+
+    assert slope(0.0, 1e-12) > 1e3 * slope(0.0, 1e-4)
+    assert slope(0.001, 1e-12) <= 5.0 / (2.0 * 0.001 * 50.0)
+
+
+def test_a_target_is_approached_no_faster_than_the_integrator_can_follow():
+    """Copies of p_G that differ by rounding must not drift apart: the step stays in RK's stable region."""
+    for governor_gain in (5.0, 16.0):
+        near = 0.01 * slowdown_radius(0.7, governor_gain=governor_gain)
+        field = np.array([0.7 * near / slowdown_radius(0.7, governor_gain=governor_gain), 0.0])
+        speed = governor_velocity(field, 1e6, stiffness=50.0, governor_gain=governor_gain, smoothing=0.0)
+        assert speed[0] / near == pytest.approx(ATTRACTION_RATE)
+    assert ATTRACTION_RATE * SimulatorSettings().max_step_size < 1.0

@@ -1,58 +1,46 @@
-"""The wrench shares of any team sum to the commanded wrench, wherever grasps and centre of mass are."""
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from coop_drake.control import acceleration_at, object_twist, rotate, total_wrench, wrench_share
+from coop_drake.laws import acceleration_at, grasp_matrix, object_twist, rotate, total_wrench, wrench_share
 
-lengths = st.floats(-1.0, 1.0)
-vectors = st.tuples(lengths, lengths).map(np.array)
-accelerations = st.tuples(*[st.floats(-50.0, 50.0)] * 3).map(np.array)
-law = settings(max_examples=200, deadline=None, derandomize=True)
+OFFSET = np.array([0.4, -0.1])
 
 
-@law
-@given(
-    st.lists(vectors, min_size=2, max_size=8),
-    vectors,
-    accelerations,
-    st.floats(-5.0, 5.0),
-    st.floats(0.1, 20.0),
-    st.floats(0.01, 10.0),
-    st.data(),
-)
-def test_shares_sum_to_the_command(offsets, com_offset, acceleration, rate, mass, inertia, data):
-    weights = np.array(
-        data.draw(st.lists(st.floats(0.01, 1.0), min_size=len(offsets), max_size=len(offsets)))
+def test_rotate_is_counter_clockwise():
+    assert rotate(np.pi / 2, np.array([2.0, 1.0])) == pytest.approx([-1.0, 2.0])
+
+
+def test_a_grasp_ahead_of_a_turning_object_moves_to_the_left():
+    assert (grasp_matrix(np.array([0.4, 0.0])) @ np.array([0.0, 0.0, 1.0])).tolist() == [0.0, 0.4, 1.0]
+
+
+def test_the_object_twist_undoes_the_grasp_matrix():
+    twist = np.array([0.3, -0.2, 0.7])
+    assert object_twist(OFFSET, grasp_matrix(OFFSET) @ twist) == pytest.approx(twist)
+
+
+def test_acceleration_at_a_point_is_the_second_derivative_of_its_path():
+    acceleration, velocity, rate, alpha = np.array([0.5, -1.0]), np.array([0.2, 0.1]), 0.9, -2.0
+
+    def path(t):
+        return velocity * t + 0.5 * acceleration * t**2 + rotate(rate * t + 0.5 * alpha * t**2, OFFSET)
+
+    h = 1e-4
+    numeric = (path(h) - 2.0 * path(0.0) + path(-h)) / h**2
+    exact = acceleration_at(np.array([*acceleration, alpha]), rate, OFFSET)
+    assert exact[:2] == pytest.approx(numeric, abs=1e-6)
+    assert exact[2] == alpha
+
+
+def test_an_object_spinning_about_its_origin_needs_a_force_when_its_mass_is_elsewhere():
+    share = wrench_share(
+        np.zeros(3), 2.0, np.zeros(2), com_offset=np.array([0.1, 0.0]), mass=3.0, inertia=1.0, share=0.5
     )
-    weights /= weights.sum()
-    shares = np.array(
-        [
-            wrench_share(
-                acceleration,
-                rate,
-                offset,
-                com_offset=com_offset,
-                mass=mass,
-                inertia=inertia,
-                share=weight,
-            )
-            for offset, weight in zip(offsets, weights, strict=True)
-        ]
+    assert share == pytest.approx([-0.6, 0.0, 0.0])
+
+
+def test_a_force_beside_the_centre_of_mass_turns_the_object():
+    wrench = total_wrench(
+        np.array([[0.0, 2.0, 0.5]]), np.array([[0.5, 0.0]]), com_offset=np.array([0.1, 0.0])
     )
-    of_com = acceleration_at(acceleration, rate, com_offset)
-    commanded = np.array([mass * of_com[0], mass * of_com[1], inertia * of_com[2]])
-    # Every robot carries its part of the force.
-    assert shares[:, :2] == pytest.approx(weights[:, None] * commanded[:2], rel=1e-12, abs=1e-12)
-    total = total_wrench(shares, np.array(offsets), com_offset=com_offset)
-    assert total == pytest.approx(commanded, rel=1e-12, abs=1e-10)
-
-
-@law
-@given(vectors, accelerations, st.floats(-3.0, 3.0))
-def test_every_robot_knows_the_same_object_twist(offset_L, twist, theta):
-    offset = rotate(theta, offset_L)
-    at_grasp = np.array([twist[0] - twist[2] * offset[1], twist[1] + twist[2] * offset[0], twist[2]])
-    assert object_twist(offset, at_grasp) == pytest.approx(twist, rel=1e-12, abs=1e-12)
+    assert wrench == pytest.approx([0.0, 2.0, 1.3])

@@ -6,10 +6,10 @@ import pytest
 
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning import paper
-from coop_drake.planning.exploration import Verdict
-from coop_drake.planning.margins import shrunk
-from coop_drake.planning.paper import PaperExploration
+from coop_drake.planning.cells import printed_algorithms as paper
+from coop_drake.planning.cells.exploration import Verdict
+from coop_drake.planning.cells.printed_algorithms import PaperExploration
+from coop_drake.planning.questions.margins import shrunk
 from tests.planning.test_search import rod_problem
 
 

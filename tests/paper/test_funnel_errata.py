@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from coop_drake.control import Funnel, ScheduledGains, funnel_walls, prescribed_acceleration, transition_gains
-from coop_drake.control.ready import interval_margin
+from coop_drake.laws import Funnel, ScheduledGains, funnel_walls, prescribed_acceleration, transition_gains
+from coop_drake.laws.ready import interval_margin
 from coop_drake.reproduction import printed
 from coop_drake.reproduction.table_1 import CORRECTED
 from tests.support.table_1 import table_transitions

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from coop_drake.control import energy_margin, tracking_energy
-from coop_drake.control.ready import clearance_margin
+from coop_drake.laws import energy_margin, tracking_energy
+from coop_drake.laws.ready import clearance_margin
 from coop_drake.reproduction import printed
 from coop_drake.reproduction.governor_run import box_clearance, run_governor, straight_field
 

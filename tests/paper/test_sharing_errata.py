@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.control import total_wrench, wrench_share
+from coop_drake.laws import total_wrench, wrench_share
 from coop_drake.reproduction import printed
 
 FORCE, TORQUE = np.array([3.0, 4.0]), 0.7

@@ -7,13 +7,13 @@ import pytest
 from shapely import Polygon
 
 from coop_drake.errors import GeometryError
-from coop_drake.planning import attempts
-from coop_drake.planning.attempts import SampledAttempts
-from coop_drake.planning.band import likely_time, room_along
-from coop_drake.planning.channel import Channel, Way
-from coop_drake.planning.clear_ways import margins_along, with_room
-from coop_drake.planning.margins import exact_footprint
-from coop_drake.planning.search import find_channel, find_way
+from coop_drake.planning.boxes.channel import Channel, Way
+from coop_drake.planning.questions.margins import exact_footprint
+from coop_drake.planning.sampling.clear_paths import margins_along, with_room
+from coop_drake.planning.sampling.elastic_band import likely_time, room_along
+from coop_drake.planning.search import attempts
+from coop_drake.planning.search.attempts import SampledAttempts
+from coop_drake.planning.search.search import find_channel, find_way
 from tests.planning.test_search import rod_problem
 from tests.support.free_positions import FreePositions
 

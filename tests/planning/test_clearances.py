@@ -8,12 +8,12 @@ from hypothesis import strategies as st
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import polygon_rings
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.box_kernels import box_clearance
-from coop_drake.planning.cells import CellMaker
-from coop_drake.planning.certify import box_arrays
-from coop_drake.planning.collision_kernels import place, wall_clearance
-from coop_drake.planning.team_arrays import team_arrays
-from coop_drake.planning.walls import FAR, walls_near, walls_under
+from coop_drake.planning.boxes.box_kernels import box_clearance
+from coop_drake.planning.boxes.certify import box_arrays
+from coop_drake.planning.cells.cells import CellMaker
+from coop_drake.planning.sampling.collision_kernels import place, wall_clearance
+from coop_drake.planning.sampling.obstacle_grid import FAR, walls_near, walls_under
+from coop_drake.planning.sampling.team_arrays import team_arrays
 from tests.support.trees import configurations, footprint, room, slices_of, trees
 
 SLOW = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from shapely import Polygon, box
 
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.planning.channel import Channel
-from coop_drake.planning.problem import PlannerSettings, PlanningProblem
-from coop_drake.planning.search import find_channel
+from coop_drake.answers.problem import PlannerSettings, PlanningProblem
+from coop_drake.planning.boxes.channel import Channel
+from coop_drake.planning.search.search import find_channel
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.pose import PlanarPose
 from tests.support.cases import disc, rectangle
 from tests.support.soundness import assert_channel_is_sound
 

@@ -8,8 +8,9 @@ from pathlib import Path
 _SCRIPT = """
 import sys
 from pathlib import Path
-from coop_drake.control import ScheduledGains
-from coop_drake.planning import planner, save_plan
+from coop_drake.laws import ScheduledGains
+from coop_drake.answers import save_plan
+from coop_drake.planning import planner
 from tests.support.passages import FoldingArm
 problem = FoldingArm().problem(0.6)
 result = planner.plan(problem, ScheduledGains(), gain_set_name="scheduled")

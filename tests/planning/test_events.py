@@ -1,6 +1,6 @@
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.events import (
+from coop_drake.planning.cells.events import (
     ChannelSearched,
     Event,
     ExplorationBegan,
@@ -8,8 +8,8 @@ from coop_drake.planning.events import (
     SliceAdded,
     SliceSplit,
 )
-from coop_drake.planning.exploration import Exploration, Outcome
-from coop_drake.planning.margins import shrunk
+from coop_drake.planning.cells.exploration import Exploration, Outcome
+from coop_drake.planning.questions.margins import shrunk
 from tests.planning.test_search import rod_problem
 
 

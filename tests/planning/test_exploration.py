@@ -4,11 +4,11 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from coop_drake.planning.attempts import SampledAttempts
-from coop_drake.planning.cell_graph import Kind
-from coop_drake.planning.exploration import Verdict
-from coop_drake.planning.proofs import explorer
-from coop_drake.planning.relaxation import relaxed
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.exploration import Verdict
+from coop_drake.planning.proofs.proofs import explorer
+from coop_drake.planning.questions.relaxation import relaxed
+from coop_drake.planning.search.attempts import SampledAttempts
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case
 from tests.support.soundness import assert_channel_is_sound

@@ -10,13 +10,13 @@ from manifold3d import CrossSection
 
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.cell_graph import Cell, CellGraph, Kind
-from coop_drake.planning.cells import Region
-from coop_drake.planning.events import ChannelSearched, Event, SliceAdded, SliceSplit
-from coop_drake.planning.exploration import Outcome, Verdict
-from coop_drake.planning.margins import shrunk
-from coop_drake.planning.paper import PaperExploration, refine
-from coop_drake.planning.slices import Slices
+from coop_drake.planning.cells.cell_graph import Cell, CellGraph, Kind
+from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.events import ChannelSearched, Event, SliceAdded, SliceSplit
+from coop_drake.planning.cells.exploration import Outcome, Verdict
+from coop_drake.planning.cells.printed_algorithms import PaperExploration, refine
+from coop_drake.planning.cells.slices import Slices
+from coop_drake.planning.questions.margins import shrunk
 from tests.planning.test_search import rod_problem
 from tests.support.cases import team_tree, transport
 

@@ -5,9 +5,10 @@ from dataclasses import replace
 import pytest
 from shapely import box
 
-from coop_drake.control import ScheduledGains
-from coop_drake.planning import Found, Infeasible, SearchReport, Undecided, planner
-from coop_drake.planning.channel import NoChannel
+from coop_drake.answers import Found, Infeasible, SearchReport, Undecided
+from coop_drake.laws import ScheduledGains
+from coop_drake.planning import planner
+from coop_drake.planning.boxes.channel import NoChannel
 from tests.support.channels import bent_channel
 
 REPORT = SearchReport(10, 4, 2, ((0.1, "found"),))

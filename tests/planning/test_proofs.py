@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from shapely import Point, Polygon, box
 
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.planning.clearance_bound import clearance_bound
-from coop_drake.planning.exploration import Verdict
-from coop_drake.planning.free_flyer import disc_refuted, inscribed_disc
-from coop_drake.planning.goals import blocked_goal
-from coop_drake.planning.problem import PlanningProblem
-from coop_drake.planning.proofs import Proofs, explorer
-from coop_drake.planning.relaxation import relaxed
-from coop_drake.planning.separation import BlockedGoal, DiscSeparation, SliceSeparation
-from coop_drake.planning.split_rules import SplitRule
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.proof import BlockedGoal, DiscSeparation, SliceSeparation
+from coop_drake.planning.cells.exploration import Verdict
+from coop_drake.planning.cells.split_rules import SplitRule
+from coop_drake.planning.proofs.blocked_goals import blocked_goal
+from coop_drake.planning.proofs.clearance_bound import clearance_bound
+from coop_drake.planning.proofs.inscribed_disc import disc_refuted, inscribed_disc
+from coop_drake.planning.proofs.proofs import Proofs, explorer
+from coop_drake.planning.questions.relaxation import relaxed
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.pose import PlanarPose
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case, rectangle, transport
 

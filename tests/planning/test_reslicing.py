@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from shapely import Point
 
-from coop_drake.control import FixedGains, ScheduledGains, transition_gains
+from coop_drake.answers.plan_checks import check_plan
+from coop_drake.laws import FixedGains, ScheduledGains, transition_gains
 from coop_drake.planning import make_plan, plan_time
-from coop_drake.planning.box_crossing import cross_box, scheduled_laws
-from coop_drake.planning.cells import CellMaker
-from coop_drake.planning.channel_ends import turned_to_start
-from coop_drake.planning.estimate import speed_per_clearance
-from coop_drake.planning.plan_checks import check_plan
-from coop_drake.planning.quickest import quickest_plan, way_through
-from coop_drake.planning.reslicing import resliced, schedule_of
-from coop_drake.planning.search import find_channel
+from coop_drake.planning.cells.cells import CellMaker
+from coop_drake.planning.execution.channel_ends import turned_to_start
+from coop_drake.planning.execution.estimate import speed_per_clearance
+from coop_drake.planning.improvement.box_crossing import cross_box, scheduled_laws
+from coop_drake.planning.improvement.path_covering import resliced, schedule_of
+from coop_drake.planning.improvement.quickest import quickest_plan, way_through
+from coop_drake.planning.search.search import find_channel
 from tests.support.cases import case
 from tests.support.free_positions import FreePositions
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from shapely import Polygon, box, union_all
 
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.geometry.tree import Body, Component, ComponentTree, TreeJoint
-from coop_drake.planning.channel import Channel, NoChannel
-from coop_drake.planning.problem import PlannerSettings, PlanningProblem
-from coop_drake.planning.search import find_channel
+from coop_drake.answers.problem import PlannerSettings, PlanningProblem
+from coop_drake.planning.boxes.channel import Channel, NoChannel
+from coop_drake.planning.search.search import find_channel
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
+from coop_drake.tree.pose import PlanarPose
 from tests.support.cases import case, rectangle, transport
 from tests.support.soundness import assert_channel_is_sound
 

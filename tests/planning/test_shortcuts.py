@@ -6,7 +6,7 @@ import numpy as np
 from shapely import box
 
 from coop_drake.planning import Channel, FreeBox
-from coop_drake.planning.shortcuts import without_detours
+from coop_drake.planning.boxes.shortcuts import without_detours
 
 
 def chain(*intervals, places=None):

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coop_drake.planning.slices import Slices, holds, interval_overlap, share_facet
+from coop_drake.planning.cells.slices import Slices, holds, interval_overlap, share_facet
 from tests.support.cases import team_tree
 
 

@@ -8,7 +8,13 @@ import pytest
 from shapely import Point
 
 from coop_drake.planning import Channel, find_channel
-from coop_drake.planning.tightening import amount_needed, are_free, drawn_closer, fitted, widened
+from coop_drake.planning.sampling.narrow_passages import (
+    amount_needed,
+    are_free,
+    drawn_closer,
+    fitted,
+    widened,
+)
 from tests.planning.test_search import rod_problem
 from tests.support.cases import transport
 from tests.support.soundness import assert_channel_is_sound

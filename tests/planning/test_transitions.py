@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Point, box
 
-from coop_drake.control import FixedGains, ScheduledGains
+from coop_drake.answers.plan_checks import check_plan
 from coop_drake.errors import PlanError, StallError
 from coop_drake.geometry import BoundaryDistance, PassageFinder
+from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.planning import Channel, FreeBox, make_plan, reschedule
-from coop_drake.planning.plan_checks import check_plan
 from tests.support.cases import case
 from tests.support.channels import bent_channel
 from tests.support.point_mass import carry_out, straight_fields

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from coop_drake.control import ScheduledGains
-from coop_drake.planning import Found, load_plan, save_plan
-from coop_drake.planning.plan_checks import check_plan
+from coop_drake.answers import Found, load_plan, save_plan
+from coop_drake.answers.plan_checks import check_plan
+from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan
 from tests.support.cases import case
 from tests.support.point_mass import build_fields, carry_out

@@ -6,8 +6,8 @@ import shapely
 from shapely import LineString, MultiPolygon, Point, Polygon, box
 
 from coop_drake.geometry.minkowski import polygon_rings
-from coop_drake.planning.boxes import nearby
-from coop_drake.planning.walls import Walls, square_at, walls_near
+from coop_drake.planning.boxes.boxes import nearby
+from coop_drake.planning.sampling.obstacle_grid import Walls, square_at, walls_near
 from tests.support.cases import warehouse
 from tests.support.trees import room
 

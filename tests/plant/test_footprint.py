@@ -10,9 +10,9 @@ from pydrake.geometry import Box, Capsule, Convex, Cylinder, Ellipsoid, HalfSpac
 from pydrake.math import RigidTransform, RollPitchYaw
 from shapely import MultiPoint, points
 
-from coop_drake.geometry.pose import PlanarPose
 from coop_drake.plant.footprint import hull, project
 from coop_drake.plant.placement import core
+from coop_drake.tree.pose import PlanarPose
 
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 0.7 0\nv 0 0 0.5\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 

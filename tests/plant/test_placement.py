@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from shapely import Polygon, box
 
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.geometry.tree import Body, ConvexShape
 from coop_drake.plant.placement import body_clearance, wall_clearance
+from coop_drake.tree.component_tree import Body, ConvexShape
+from coop_drake.tree.pose import PlanarPose
 
 ROOM = Polygon(box(0.0, 0.0, 4.0, 3.0).exterior, [box(2.0, 1.0, 2.5, 1.5).exterior.coords])
 DISC = Body("disc", 0, (ConvexShape(np.array([[0.1, 0.0]]), 0.2),))

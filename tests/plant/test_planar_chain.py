@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.control import robot_acceleration
-from coop_drake.control.planar_chain import chain_effort, frame_twist, read_robot
+from coop_drake.laws import robot_acceleration
+from coop_drake.laws.planar_chain import chain_effort, frame_twist, read_robot
 from coop_drake.plant import base_chain, build_robot_plant, build_team_plant, robot_chain
 from coop_drake.systems import RobotEffort
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from shapely import Polygon, union_all
 
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.pose import PlanarPose
 from coop_drake.plant import planning_problem
 from coop_drake.plant.convex_parts import convex_parts
 from coop_drake.plant.placement import core
@@ -21,6 +20,7 @@ from coop_drake.plant.polygon_body import (
     write_polygon_body,
 )
 from coop_drake.scenario import load_scenario
+from coop_drake.tree.pose import PlanarPose
 from tests.support.edited_scenario import team_of, write_edited
 
 U_SHAPE = [

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from coop_drake.control import FixedGains
+from coop_drake.laws import FixedGains
 from coop_drake.plant.team import ObjectInertia
 from coop_drake.reproduction import GainFigures, Material, Verdict, exhibits, pages, write_report
 from coop_drake.reproduction.approximation import approximations, two_components

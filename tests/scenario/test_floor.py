@@ -6,9 +6,9 @@ import pytest
 import yaml
 from shapely import box
 
+from coop_drake.answers.digest import problem_digest
 from coop_drake.cli.reading import read_task
 from coop_drake.errors import FloorPlanError, ScenarioError
-from coop_drake.planning.digest import problem_digest
 from coop_drake.scenario import dump_scenario, load_scenario
 from tests.support.floor_plan_files import room_shades, write_map, write_svg
 from tests.support.scenarios import write_scenario

@@ -2,8 +2,8 @@
 
 import pytest
 
-from coop_drake.control import FixedGains, ScheduledGains
 from coop_drake.errors import ScenarioError
+from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.scenario import dump_gains, load_scenario, with_gains
 from tests.support.scenarios import MODELS, write_scenario
 

@@ -6,8 +6,8 @@ import re
 import pytest
 from shapely import normalize
 
-from coop_drake.control.gains import FixedGains, ScheduledGains
-from coop_drake.planning.problem import PlannerSettings
+from coop_drake.answers.problem import PlannerSettings
+from coop_drake.laws.gains import FixedGains, ScheduledGains
 from coop_drake.scenario import (
     Scenario,
     SimulatorSettings,

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.tree import Body, Component, ComponentTree
 from coop_drake.simulation.clearance import TeamClearance
+from coop_drake.tree.component_tree import Body, Component, ComponentTree
 from tests.support.cases import case, disc, rectangle, team_tree, warehouse
 
 CONFIGURATION = st.tuples(

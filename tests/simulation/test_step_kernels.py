@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from coop_drake.control import rotate, total_wrench
+from coop_drake.laws import rotate, total_wrench
 from coop_drake.simulation.step_kernels import object_wrench
 
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.control import Funnel, funnel_acceleration, funnel_walls, transition_gains
-from coop_drake.control.ready import funnel_margin, interval_margin
+from coop_drake.laws import Funnel, funnel_acceleration, funnel_walls, transition_gains
+from coop_drake.laws.ready import funnel_margin, interval_margin
 
 
 @dataclass(frozen=True)

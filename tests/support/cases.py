@@ -7,9 +7,9 @@ from math import pi
 import numpy as np
 from shapely import Polygon, box, normalize, union_all
 
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
-from coop_drake.planning.problem import PlannerSettings, PlanningProblem
+from coop_drake.answers.problem import PlannerSettings, PlanningProblem
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.pose import PlanarPose
 
 GRASPS = (
     PlanarPose(0.4, 0.0, 0.0),

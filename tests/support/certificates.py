@@ -6,9 +6,9 @@ from copy import deepcopy
 import numpy as np
 from shapely import Polygon, box, normalize, union_all
 
-from coop_drake.control import ScheduledGains
-from coop_drake.planning.digest import content_digest
-from coop_drake.planning.problem import PlanningProblem
+from coop_drake.answers.digest import content_digest
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.laws import ScheduledGains
 from tests.support.cases import team_tree
 
 GAINS = {"scheduled": ScheduledGains()}

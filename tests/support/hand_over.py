@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from shapely import Point
 
-from coop_drake.planning.plan import Plan
+from coop_drake.answers.plan import Plan
 from coop_drake.simulation import SimulationLog
 
 

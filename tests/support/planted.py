@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.tree import ComponentTree
-from coop_drake.planning.problem import PlannerSettings, PlanningProblem
-from coop_drake.planning.refine import configuration_scale
-from coop_drake.planning.sampler import densified
+from coop_drake.answers.problem import PlannerSettings, PlanningProblem
+from coop_drake.planning.sampling.sampler import densified
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.levers import configuration_scale
 from tests.support.free_positions import FreePositions
 from tests.support.trees import placed_shape, trees
 

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from shapely import Point
 
-from coop_drake.control import (
+from coop_drake.fields import HarmonicMap, VelocityField
+from coop_drake.geometry import BoundaryDistance
+from coop_drake.laws import (
     Funnel,
     arrival_margin,
     energy_margin,
@@ -19,8 +21,6 @@ from coop_drake.control import (
     slowdown_radius,
     tracking_energy,
 )
-from coop_drake.fields import HarmonicMap, VelocityField
-from coop_drake.geometry import BoundaryDistance
 
 
 @dataclass(frozen=True)

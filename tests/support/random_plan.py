@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from shapely import box
 
-from coop_drake.control import FixedGains, GainSet, ScheduledGains
-from coop_drake.planning.plan import Cell, Plan
+from coop_drake.answers.plan import Cell, Plan
+from coop_drake.laws import FixedGains, GainSet, ScheduledGains
 from tests.support.small_plan import ANGLE_TOLERANCE, START_POSE, plan_by_hand
 
 TURNS = np.array([[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from coop_drake.geometry.tree import ComponentTree
+from coop_drake.tree.component_tree import ComponentTree
 
 
 def with_sliding_joint(tree: ComponentTree) -> ComponentTree:

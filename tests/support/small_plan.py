@@ -8,8 +8,8 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 from shapely import Point, Polygon, box
 
-from coop_drake.control import GainSet, ScheduledGains, transition_gains
-from coop_drake.planning.plan import Cell, Plan, Transition
+from coop_drake.answers.plan import Cell, Plan, Transition
+from coop_drake.laws import GainSet, ScheduledGains, transition_gains
 
 ROOM = box(0.0, 0.0, 10.0, 7.0)
 START_POSE = (3.0, 3.0, 0.2)

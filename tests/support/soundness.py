@@ -6,8 +6,8 @@ import numpy as np
 import shapely
 from shapely import Point, maximum_inscribed_circle
 
-from coop_drake.planning.channel import Channel, FreeBox
-from coop_drake.planning.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.planning.boxes.channel import Channel, FreeBox
 from tests.support.free_positions import FreePositions
 
 _POSITIONS = 200

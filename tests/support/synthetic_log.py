@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from shapely import Point, Polygon
 
-from coop_drake.control.gains import TransitionGains
-from coop_drake.planning.plan import Cell, Plan, Transition
-from coop_drake.planning.problem import PlanningProblem
+from coop_drake.answers.plan import Cell, Plan, Transition
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.laws.gains import TransitionGains
 from coop_drake.simulation import SimulationLog
 
 SECONDS = 12.0

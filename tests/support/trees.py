@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from shapely import MultiPoint, Polygon, union_all
 from shapely.geometry.base import BaseGeometry
 
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.geometry.tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.pose import PlanarPose
 from tests.support.cases import disc, rectangle
 
 SHAPES = (

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.control import robot_acceleration, robot_torque
+from coop_drake.laws import robot_acceleration, robot_torque
 from coop_drake.plant import base_poses, build_robot_plant, build_team_plant, set_configuration
 from coop_drake.systems import ObjectEstimator, RobotEffort, TeamSensor
 from tests.support.small_scenario import small_scenario

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.control import funnel_walls, prescribed_acceleration
+from coop_drake.laws import funnel_walls, prescribed_acceleration
 from coop_drake.systems import AxisPpc, axis_laws
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes

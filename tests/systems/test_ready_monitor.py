@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from coop_drake.control import arrival_margin, ready_margin
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.laws import arrival_margin, ready_margin
 from coop_drake.systems import GovernedCell, ReadyMonitor, axis_laws
 from tests.support.small_plan import GOAL_POSE, POSITION_TOLERANCE, small_plan, stiffer_and_stiffer
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coop_drake.control import governed_acceleration, governor_velocity
-from coop_drake.control.governor import energy_margin, tracking_energy
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.laws import governed_acceleration, governor_velocity
+from coop_drake.laws.governor import energy_margin, tracking_energy
 from coop_drake.systems import GovernedCell, ReferenceGovernor
 from coop_drake.systems.reference_governor import VELOCITY_STEP
 from tests.support.small_plan import small_plan

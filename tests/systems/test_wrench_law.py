@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.control import acceleration_at, rotate, wrench_share
+from coop_drake.laws import acceleration_at, rotate, wrench_share
 from coop_drake.systems import WrenchLaw
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
 

@@ -8,8 +8,8 @@ from math import log
 import numpy as np
 import pytest
 
-from coop_drake.control import FixedGains, ScheduledGains
 from coop_drake.errors import TuningError
+from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.tuning import Objective, Outcome, Trial, knobs_of, search
 from coop_drake.tuning.knobs import decoded, encoded
 

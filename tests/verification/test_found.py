@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import shapely
 
+from coop_drake.answers import save_plan
+from coop_drake.answers.document import Entry
+from coop_drake.answers.plan_reader import read_plan
 from coop_drake.errors import PlanError, RefusalError
-from coop_drake.planning import save_plan
-from coop_drake.planning.document import Entry
-from coop_drake.planning.plan_reader import read_plan
 from coop_drake.planning.planner import plan as make
 from coop_drake.verification import verify_file
 from tests.support.cases import case

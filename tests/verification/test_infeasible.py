@@ -9,14 +9,14 @@ import pytest
 import shapely
 from shapely import Polygon
 
+from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.proof import BlockedGoal, DiscSeparation, SliceSeparation
+from coop_drake.answers.proof_file import load_separation, save_separation
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning import find_channel
-from coop_drake.planning.digest import problem_digest
-from coop_drake.planning.proofs import explorer
-from coop_drake.planning.relaxation import relaxed
-from coop_drake.planning.separation import BlockedGoal, DiscSeparation, SliceSeparation
-from coop_drake.planning.separation_file import load_separation, save_separation
-from coop_drake.planning.separation_making import slice_separation
+from coop_drake.planning.proofs.proof_making import slice_separation
+from coop_drake.planning.proofs.proofs import explorer
+from coop_drake.planning.questions.relaxation import relaxed
 from coop_drake.verification import verify_file, verify_separation
 from tests.support.certificates import (
     GAINS,

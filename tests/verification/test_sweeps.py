@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import MultiPoint, Polygon
 
-from coop_drake.geometry.tree import ComponentTree
+from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.verification.inner_sweeps import inner_sweep
 from coop_drake.verification.outer_sweeps import outer_sweep
 from coop_drake.verification.solids import colliding_pairs, team_solids

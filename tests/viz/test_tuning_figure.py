@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coop_drake.control import ScheduledGains
+from coop_drake.laws import ScheduledGains
 from coop_drake.tuning import CRITERIA, Limit, Objective, Outcome, Search, Trial
 from coop_drake.viz.tuning_figure import tuning_figure
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from coop_drake.geometry.pose import PlanarPose
-from coop_drake.geometry.tree import Component, ComponentTree, TreeJoint
-from coop_drake.planning.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.tree.component_tree import Component, ComponentTree, TreeJoint
+from coop_drake.tree.pose import PlanarPose
 from coop_drake.watching import Film, Strategy, record
 from tests.planning.test_search import rod_problem
 

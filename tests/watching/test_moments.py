@@ -8,8 +8,8 @@ import pytest
 
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.planning.cell_graph import Kind
-from coop_drake.planning.events import (
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.events import (
     ChannelSearched,
     ExplorationBegan,
     ExplorationEnded,
@@ -17,8 +17,8 @@ from coop_drake.planning.events import (
     SliceAdded,
     SliceSplit,
 )
-from coop_drake.planning.exploration import Exploration
-from coop_drake.planning.margins import shrunk
+from coop_drake.planning.cells.exploration import Exploration
+from coop_drake.planning.questions.margins import shrunk
 from coop_drake.watching import moments
 from tests.planning.test_search import rod_problem
 from tests.watching.rods import NARROW, WIDE, rod_film

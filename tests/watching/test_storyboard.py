@@ -10,8 +10,8 @@ import pytest
 from shapely import LineString, union_all
 
 from coop_drake.geometry.minkowski import to_polygon
-from coop_drake.planning.cell_graph import Kind
-from coop_drake.planning.slices import holds, nearest_turn, share_facet
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.slices import holds, nearest_turn, share_facet
 from coop_drake.watching import Strategy, record, storyboard
 from coop_drake.watching.axes_view import cut
 from coop_drake.watching.film import BOXES

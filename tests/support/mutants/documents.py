@@ -7,7 +7,7 @@ import random
 from collections.abc import Iterator
 from typing import Any
 
-from coop_drake.planning.digest import content_digest
+from coop_drake.answers.digest import content_digest
 from tests.support.mutants.mutant import Mutant, Place, at, dotted, leaves, put, renamed, without
 
 Document = dict[str, Any]

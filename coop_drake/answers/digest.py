@@ -1,0 +1,80 @@
+"""Digests: which question a file answers, and whether its content is still what was written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from hashlib import sha256
+from typing import Any
+
+import shapely
+
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape, TreeJoint
+
+__all__ = ["content_digest", "problem_digest"]
+
+DECIMALS = 9
+"""Numbers of a question are told apart to a nanometre: what a libm rounds does not make another question."""
+
+
+def content_digest(document: Mapping[str, Any]) -> str:
+    """SHA-256 over all of a JSON document but its entry ``digest``, whatever its layout; in hexadecimal."""
+    return _digest({key: value for key, value in document.items() if key != "digest"})
+
+
+def problem_digest(problem: PlanningProblem) -> str:
+    """SHA-256 over what is asked: floor, team, start, goal and tolerances; not how hard to try."""
+    rings = (problem.workspace.exterior, *problem.workspace.interiors)
+    return _digest(
+        {
+            "workspace": [_rounded(shapely.get_coordinates(ring).tolist()) for ring in rings],
+            "team": _tree(problem.tree),
+            "start": _rounded(problem.start.tolist()),
+            "goal_pose": _rounded(problem.goal_pose.tolist()),
+            "goal_joints": _rounded(list(problem.goal_joints)),
+            "tolerances": _rounded(
+                [problem.position_tolerance, problem.angle_tolerance, problem.joint_tolerance]
+            ),
+        }
+    )
+
+
+def _digest(value: Any) -> str:
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
+    return sha256(text.encode()).hexdigest()
+
+
+def _rounded(value: Any) -> Any:
+    """The same nested lists with rounded numbers, without negative zeros."""
+    if isinstance(value, list):
+        return [_rounded(entry) for entry in value]
+    return None if value is None else round(float(value), DECIMALS) + 0.0
+
+
+def _tree(tree: ComponentTree) -> dict[str, Any]:
+    return {
+        "components": [_component(component) for component in tree.components],
+        "sharing_joint": sorted(sorted(pair) for pair in tree.sharing_joint),
+    }
+
+
+def _component(component: Component) -> dict[str, Any]:
+    return {
+        "name": component.name,
+        "parent": component.parent,
+        "joint": None if component.joint is None else _joint(component.joint),
+        "bodies": [
+            [body.name, body.robot, [_shape(shape) for shape in body.shapes]] for body in component.bodies
+        ],
+    }
+
+
+def _joint(joint: TreeJoint) -> list[Any]:
+    X = joint.X_PJ
+    numbers = [X.x, X.y, X.angle, joint.sign, *joint.axis, joint.lower, joint.upper]
+    return [joint.name, joint.kind, joint.robot, joint.index, _rounded(numbers)]
+
+
+def _shape(shape: ConvexShape) -> list[Any]:
+    return [_rounded(shape.vertices.tolist()), _rounded(shape.radius)]

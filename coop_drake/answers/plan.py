@@ -1,0 +1,121 @@
+"""The plan: cells and the transitions between them; frozen data that crosses the house."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shapely import Polygon
+
+from coop_drake.answers.proof import Separation
+from coop_drake.answers.search_report import SearchReport
+from coop_drake.laws.gains import TransitionGains
+from coop_drake.tree.pose import FloatArray
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell of the plan: positions times intervals, all of it free.
+
+    Attributes:
+        safe: S_i, positions proved safe for every angle in the intervals [m].
+        core: The part of S_i that keeps the plan's margin [m].
+        tidied: Q_i inside S_i, simply connected, fit for a map and for the governor [m].
+        lower: Lower ends of (theta, q...), theta unwrapped along the plan, shape (1 + n,) [rad, m].
+        upper: Upper ends, shape (1 + n,).
+    """
+
+    safe: Polygon
+    core: Polygon
+    tidied: Polygon
+    lower: FloatArray
+    upper: FloatArray
+
+
+@dataclass(frozen=True)
+class Transition:
+    """How to leave a cell: one for each cell, the last one ends at the goal.
+
+    Attributes:
+        target: Point that the governor steers to, shape (2,) [m].
+        goal_region: Region of Q_i and Q_(i+1) around the target; for the last cell around the goal [m].
+        goal_lower: Lower ends of the goal intervals of (theta, q...), shape (1 + n,).
+        goal_upper: Upper ends, shape (1 + n,).
+        inradius: R_i, distance of the target to the boundary of ``goal_region`` [m].
+        neck: b_i, widest clearance that a path to the target can keep inside Q_i [m].
+        length: Length of such a path [m].
+        estimated_time: Estimated duration [s].
+        only_angles: True where the position is already at the target and only angles move.
+        gains: Gains of the governor and of the funnels.
+    """
+
+    target: FloatArray
+    goal_region: Polygon
+    goal_lower: FloatArray
+    goal_upper: FloatArray
+    inradius: float
+    neck: float
+    length: float
+    estimated_time: float
+    only_angles: bool
+    gains: TransitionGains
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A sequence of cells from start to goal, ready to be executed.
+
+    Attributes:
+        cells: From the start's cell to the goal's.
+        transitions: As many as cells.
+        start: z = (x, y, theta, q...), shape (3 + n,).
+        goal_pose: (x, y, theta), theta unwrapped along the plan, shape (3,).
+        goal_joints: Goal of each joint, None where free.
+        joint_names: Names of q's entries, length n.
+        margin: rho [m].
+        gain_set: Name of the gain set the gains were scheduled with.
+        problem: Digest of the question it answers; empty for a plan that answers none.
+    """
+
+    cells: tuple[Cell, ...]
+    transitions: tuple[Transition, ...]
+    start: FloatArray
+    goal_pose: FloatArray
+    goal_joints: tuple[float | None, ...]
+    joint_names: tuple[str, ...]
+    margin: float
+    gain_set: str
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A plan exists, and here it is."""
+
+    plan: Plan
+    report: SearchReport
+
+
+@dataclass(frozen=True)
+class Infeasible:
+    """No plan exists: the over-approximations separate start from goal.
+
+    Attributes:
+        reason: How, in a sentence.
+        report: What the search did.
+        separation: The proof, in a form that can be checked again.
+    """
+
+    reason: str
+    report: SearchReport
+    separation: Separation | None = None
+
+
+@dataclass(frozen=True)
+class Undecided:
+    """Neither answer was proved within the resolution or the work budget."""
+
+    reason: str
+    report: SearchReport
+
+
+PlanningResult = Found | Infeasible | Undecided

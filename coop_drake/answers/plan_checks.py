@@ -1,0 +1,78 @@
+"""What every executable plan satisfies: regions nested, targets shared by neighbours, goals inside slices."""
+
+from __future__ import annotations
+
+import numpy as np
+from shapely import Point, Polygon
+
+from coop_drake.answers.plan import Plan
+from coop_drake.errors import PlanError
+
+__all__ = ["check_plan"]
+
+ROUNDING = 1e-9
+"""Regions and intervals that share a boundary may differ by so much [m, rad]."""
+
+
+def check_plan(plan: Plan, file: str) -> None:
+    """Refuse a plan that could not be executed safely.
+
+    Args:
+        plan: The plan.
+        file: Where it comes from, for the message.
+
+    Raises:
+        PlanError: Names the file, the key and what is allowed.
+    """
+    for k, cell in enumerate(plan.cells):
+        _require_inside(cell.core, cell.safe, f"{file}: cells[{k}].core", f"cells[{k}].safe")
+        _require_inside(cell.tidied, cell.safe, f"{file}: cells[{k}].tidied", f"cells[{k}].safe")
+    _check_ends(plan, file)
+    for k, (cell, transition) in enumerate(zip(plan.cells, plan.transitions, strict=True)):
+        _require_inside(
+            transition.goal_region, cell.tidied, f"{file}: transitions[{k}].goal_region", f"cells[{k}].tidied"
+        )
+        for m in range(k, min(k + 2, len(plan.cells))):
+            _check_handover(plan, k, m, file)
+
+
+def _check_handover(plan: Plan, k: int, m: int, file: str) -> None:
+    """Transition k must end inside cell m, its own or the next one."""
+    transition, cell = plan.transitions[k], plan.cells[m]
+    if not cell.tidied.contains(Point(transition.target)):
+        raise PlanError(
+            f"{file}: transitions[{k}].target: {transition.target.tolist()} is not allowed; expected a point "
+            f"inside cells[{m}].tidied"
+        )
+    inside = (cell.lower - ROUNDING <= transition.goal_lower) & (
+        transition.goal_upper <= cell.upper + ROUNDING
+    )
+    if not inside.all():
+        axis = int(np.argmin(inside))
+        interval = [float(transition.goal_lower[axis]), float(transition.goal_upper[axis])]
+        raise PlanError(
+            f"{file}: transitions[{k}].goal_lower, goal_upper: axis {axis}: {interval} is not allowed; "
+            f"expected an interval inside cells[{m}]'s [{cell.lower[axis]}, {cell.upper[axis]}]"
+        )
+
+
+def _check_ends(plan: Plan, file: str) -> None:
+    first, last = plan.cells[0], plan.cells[-1]
+    start, goal = plan.start, plan.goal_pose
+    if not first.tidied.contains(Point(start[:2])) or not _holds(first.lower, start[2:], first.upper):
+        raise PlanError(
+            f"{file}: start: {start.tolist()} is not allowed; expected a configuration in cells[0]"
+        )
+    if not last.tidied.contains(Point(goal[:2])) or not _holds(last.lower[:1], goal[2:], last.upper[:1]):
+        raise PlanError(
+            f"{file}: goal_pose: {goal.tolist()} is not allowed; expected a pose in the last cell"
+        )
+
+
+def _holds(lower: np.ndarray, values: np.ndarray, upper: np.ndarray) -> bool:
+    return bool(((lower - ROUNDING <= values) & (values <= upper + ROUNDING)).all())
+
+
+def _require_inside(inner: Polygon, outer: Polygon, where: str, what: str) -> None:
+    if not (outer.covers(inner) or outer.buffer(ROUNDING).covers(inner)):
+        raise PlanError(f"{where}: leaves {what}; expected a region inside it")

@@ -1,0 +1,108 @@
+"""What the planner is asked: workspace, tree, start, goal and settings; plain data, no Drake."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+from shapely import Polygon
+
+from coop_drake.tree.component_tree import Component, ComponentTree
+from coop_drake.tree.pose import FloatArray
+
+LIMIT_ROOM = 0.01
+"""Room that a joint has about its start and goal, also beyond a limit: a funnel has two sides [rad].
+
+Prismatic joints have so much in units of the object's radius.
+"""
+
+ROUNDING = 1e-9
+"""A start or goal that misses a limit by no more than this is within it [rad or m]."""
+
+
+@dataclass(frozen=True)
+class PlannerSettings:
+    """How hard the planner tries.
+
+    Attributes:
+        margin: First margin rho tried [m]; smaller ones follow until a plan is found, 0 last. For teams of
+            another scale than usual one that they could not mean is replaced by the usual one, scaled.
+        slice_overlap: Overlap of neighbouring slices as a fraction of their width, for under-cells only.
+        angle_resolution: Slices of angles are not split below this width [rad].
+        length_resolution: Slices of prismatic joints are not split below this width [m].
+        max_slices: Work budget of explorations, in slices made by all of them.
+        max_transition_time: Longest estimated time of one transition that is accepted [s].
+        strategy: ``portfolio`` samples, certifies and proves; ``cells`` explores by cells alone; ``paper``
+            explores as the paper's Algorithms 1 and 2 are printed, at margin zero.
+    """
+
+    margin: float = 0.1
+    slice_overlap: float = 0.25
+    angle_resolution: float = 0.002
+    length_resolution: float = 0.001
+    max_slices: int = 4_000
+    max_transition_time: float = 60.0
+    strategy: Literal["portfolio", "cells", "paper"] = "portfolio"
+
+
+@dataclass(frozen=True)
+class PlanningProblem:
+    """One question to the planner.
+
+    A joint that starts or is to end nearer to a limit than ``LIMIT_ROOM``, or that cannot move, may be
+    planned up to so much beyond that limit, everywhere on the way: plans and proofs are about these wider
+    limits. A question whose start or goal is itself beyond a limit keeps the limits as they are.
+
+    Attributes:
+        workspace: The floor W, outer ring and holes [m].
+        tree: The team as seen from the object outwards, with that room.
+        start: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
+        goal_pose: (x, y, theta) of the object, shape (3,); theta is taken modulo 2 pi.
+        goal_joints: Goal value of each joint, None where the joint is free, length n.
+        position_tolerance: Final position tolerance [m].
+        angle_tolerance: Final angle tolerance [rad].
+        joint_tolerance: Final tolerance of joints that have a goal [rad or m].
+        settings: How hard to try.
+    """
+
+    workspace: Polygon
+    tree: ComponentTree
+    start: FloatArray
+    goal_pose: FloatArray
+    goal_joints: tuple[float | None, ...]
+    position_tolerance: float = 0.01
+    angle_tolerance: float = 0.02
+    joint_tolerance: float = 0.02
+    settings: PlannerSettings = field(default_factory=PlannerSettings)
+
+    def __post_init__(self) -> None:
+        """Give room to joints at their limits."""
+        joints = [component.joint for component in self.tree.components if component.joint is not None]
+        known = min(len(self.start) - 3, len(self.goal_joints))
+        if all(joint.index < known for joint in joints):
+            roomy = tuple(map(self._with_room, self.tree.components))
+            if any(new is not old for new, old in zip(roomy, self.tree.components, strict=True)):
+                object.__setattr__(self, "tree", replace(self.tree, components=roomy))
+
+    def _with_room(self, component: Component) -> Component:
+        """The component, its joint with room about its start and its goal; the same where it has that."""
+        joint = component.joint
+        if joint is None:
+            return component
+        room = LIMIT_ROOM if joint.kind == "revolute" else LIMIT_ROOM * object_radius(self.tree)
+        ends = (float(self.start[3 + joint.index]), self.goal_joints[joint.index])
+        values = [value for value in ends if value is not None]
+        if not all(joint.lower - ROUNDING <= value <= joint.upper + ROUNDING for value in values):
+            return component
+        lower = min([joint.lower, *[value - room for value in values]])
+        upper = max([joint.upper, *[value + room for value in values]])
+        if (lower, upper) == (joint.lower, joint.upper):
+            return component
+        return replace(component, joint=replace(joint, lower=lower, upper=upper))
+
+
+def object_radius(tree: ComponentTree) -> float:
+    """Distance of the furthest point of the object, with what is welded to it, from its origin [m]."""
+    shapes = [shape for body in tree.components[0].bodies for shape in body.shapes]
+    return max(float(np.hypot(*shape.vertices.T).max()) + shape.radius for shape in shapes)

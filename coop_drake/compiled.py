@@ -1,0 +1,84 @@
+"""The one decorator that compiles a numerical function, and the cache of machine code that is never stale."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from types import FunctionType
+from typing import Any, TypeVar, cast, overload
+
+import numba
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.registry import CPUDispatcher
+
+__all__ = ["compiled", "kernel_stamp"]
+
+F = TypeVar("F", bound=Callable[..., object])
+
+_REASSOCIATED = {"contract", "reassoc"}
+"""LLVM's flags for sums in any order: vector units are used; NaN and infinity keep their meaning."""
+
+
+@overload
+def compiled(function: F) -> F: ...
+@overload
+def compiled(*, reassociate: bool) -> Callable[[F], F]: ...
+def compiled(function: F | None = None, *, reassociate: bool = False) -> F | Callable[[F], F]:
+    """Compile a function of numbers and arrays at its first call, and keep its machine code on disk.
+
+    Compiled functions run without Python's global lock, and a division by zero gives infinity or NaN, as in
+    numpy. The machine code on disk is used again only while ``kernel_stamp`` is the same.
+
+    Args:
+        function: The function; only what numba can compile.
+        reassociate: Whether sums may be added in any order, which is quicker and rounds differently.
+
+    Returns:
+        The compiled function, or the decorator if only options are given.
+    """
+
+    def decorate(function: F) -> F:
+        flags = _REASSOCIATED if reassociate else False
+        dispatcher = numba.njit(nogil=True, error_model="numpy", fastmath=flags)(function)
+        dispatcher._cache = _KernelCache(function)
+        return cast(F, dispatcher)
+
+    return decorate if function is None else decorate(function)
+
+
+def kernel_stamp(function: FunctionType) -> str:
+    """Return a digest of all that a function's machine code depends on.
+
+    Numba's own cache looks at the file that holds the function. A function compiled from another file, or a
+    constant imported from one, is part of the machine code too, so the stamp also holds the stamps of all
+    compiled functions and the values of all numbers that the function's module has imported.
+
+    Args:
+        function: The function before it is compiled; its module's imports have been executed.
+    """
+    parts = [_file_digest(function.__code__.co_filename)]
+    for name, value in sorted(function.__globals__.items()):
+        if isinstance(value, CPUDispatcher):
+            if value.py_func.__module__ != function.__module__:
+                parts.append(f"{name}={value._cache.stamp}")
+        elif isinstance(value, (bool, int, float, tuple)):
+            parts.append(f"{name}={value!r}")
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+@cache
+def _file_digest(path: str) -> str:
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+class _KernelCache(FunctionCache):  # type: ignore[misc]
+    """Numba's cache on disk with ``kernel_stamp`` in place of the digest of one file."""
+
+    def __init__(self, function: Any) -> None:
+        super().__init__(function)
+        self.stamp = kernel_stamp(function)
+        self._cache_file = IndexDataCacheFile(
+            cache_path=self._cache_path, filename_base=self._impl.filename_base, source_stamp=self.stamp
+        )

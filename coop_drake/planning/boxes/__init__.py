@@ -1,0 +1,1 @@
+"""Boxes of configurations that are proved free, laid along a candidate path."""

@@ -1,0 +1,146 @@
+"""From free boxes along a path to a channel: unwrapped theta, full polygons, cores at the margin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from shapely import MultiPolygon, Polygon
+
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.minkowski import FreeSpace, to_polygon
+from coop_drake.geometry.swept_tree import Interval, Intervals, SweptTree
+from coop_drake.planning.boxes.certify import PathBox
+from coop_drake.planning.boxes.channel import Channel, FreeBox
+from coop_drake.planning.boxes.shortcuts import without_detours
+from coop_drake.planning.cells.cells import CellMaker, Region, regions_of
+from coop_drake.planning.cells.slices import nearest_turn
+from coop_drake.planning.questions.margins import disc_polygon, is_patched, marginal_workspace
+from coop_drake.tree.pose import FloatArray
+
+_MANY_VERTICES = 150
+_ELBOW_ROOM = 1.0
+
+
+@dataclass(frozen=True)
+class Box:
+    """A free box with its positions.
+
+    Attributes:
+        intervals: Expanded intervals of (theta, q...).
+        full: Positions that are free at no margin.
+        core: Those of them that keep the margin.
+    """
+
+    intervals: Intervals
+    full: Region
+    core: Region
+
+
+class Regions:
+    """Finds the positions of boxes along a path.
+
+    Args:
+        problem: The question.
+        swept: Sweeps of its tree.
+        pairs: Self-collision of its tree.
+        margin: Margin that cores keep [m].
+    """
+
+    def __init__(self, problem: PlanningProblem, swept: SweptTree, pairs: BodyPairs, margin: float) -> None:
+        self._swept, self._pairs, self._margin = swept, pairs, margin
+        self._floor: Polygon | MultiPolygon = problem.workspace
+        patched = margin > 0.0 and is_patched(problem, margin)
+        self._narrow = marginal_workspace(problem, margin) if patched else None
+        self._large = shapely.get_num_coordinates(problem.workspace) > _MANY_VERTICES
+        self._full = None if self._large else self._maker(self._floor)
+        self._core = None if self._large or self._narrow is None else self._maker(self._narrow)
+
+    def around(self, box: PathBox) -> Box | None:
+        """The positions that are joined to those of a box's way; None if geometry fails.
+
+        On a large floor only the part near the way is looked at: a smaller set is as free.
+        """
+        full = _joined(self._cells(self._full, self._floor, box), box)
+        if full is None:
+            return None
+        if self._margin == 0.0:
+            return Box(box.intervals, full, full)
+        if self._narrow is not None:
+            core = _joined(self._cells(self._core, self._narrow, box), box)
+        else:
+            section = FreeSpace(full.rings).minus(disc_polygon(self._margin))
+            core = _joined(regions_of(section, over=False), box)
+        return None if core is None else Box(box.intervals, full, core)
+
+    def _cells(
+        self, maker: CellMaker | None, floor: Polygon | MultiPolygon, box: PathBox
+    ) -> Sequence[Region]:
+        if maker is None:
+            near = nearby(floor, box.way, self._swept.tree.reach)
+            maker = None if near.is_empty else self._maker(near)
+        return [] if maker is None else maker.under_cells(box.intervals)
+
+    def _maker(self, floor: Polygon | MultiPolygon) -> CellMaker:
+        return CellMaker(self._swept, self._pairs, floor)
+
+
+def nearby(floor: Polygon | MultiPolygon, way: FloatArray, reach: float) -> MultiPolygon:
+    """The part of a floor that a team on its way can touch, and some more to both sides.
+
+    Args:
+        floor: Polygons with holes [m].
+        way: Positions p_WL, shape (k, 2) [m].
+        reach: Distance of the team's furthest point from p_WL [m].
+    """
+    lower, upper = way.min(axis=0) - reach - _ELBOW_ROOM, way.max(axis=0) + reach + _ELBOW_ROOM
+    parts = shapely.get_parts(floor.intersection(shapely.box(*lower, *upper)))
+    return MultiPolygon([part for part in parts if isinstance(part, Polygon)])
+
+
+def _joined(regions: Sequence[Region], box: PathBox) -> Region | None:
+    ends = box.way[[0, -1]]
+    return next((region for region in regions if region.depths(ends).min() > 0.0), None)
+
+
+def unwrapped(intervals: Sequence[Intervals], start_angle: float) -> list[Intervals]:
+    """Shift every theta interval by whole turns so that neighbours lie next to each other."""
+    result: list[Intervals] = []
+    near = start_angle
+    for box in intervals:
+        lower, upper = box[0]
+        centre = 0.5 * (lower + upper)
+        shift = near + nearest_turn(centre - near) - centre
+        moved: Interval = (lower + shift, upper + shift)
+        result.append((moved, *box[1:]))
+        near = centre + shift
+    return result
+
+
+def make_channel(
+    problem: PlanningProblem, boxes: Sequence[Box], margin: float, path: FloatArray | None
+) -> Channel:
+    """Join boxes to a channel and leave out those that are detours.
+
+    Args:
+        problem: The question.
+        boxes: Free boxes, consecutive ones overlap.
+        margin: The margin that the cores keep [m].
+        path: The path that they were laid along, if any, shape (m, 3 + n).
+    """
+    turned = unwrapped([box.intervals for box in boxes], float(problem.start[2]))
+    free = tuple(
+        FreeBox(
+            polygon=to_polygon(box.full.section),
+            core=to_polygon(box.core.section),
+            lower=np.array([lower for lower, _ in angles]),
+            upper=np.array([upper for _, upper in angles]),
+        )
+        for box, angles in zip(boxes, turned, strict=True)
+    )
+    middle = 0.5 * (free[-1].lower[0] + free[-1].upper[0])
+    goal = float(middle + nearest_turn(float(problem.goal_pose[2]) - middle))
+    return without_detours(Channel(free, margin, goal, path))

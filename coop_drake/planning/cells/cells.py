@@ -1,0 +1,201 @@
+"""Cells of one compound slice, eqs. (5), (8): what is free for sure, and what may be free."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from manifold3d import CrossSection
+from shapely import MultiPolygon, Polygon
+
+from coop_drake.geometry.body_pairs import BodyPair, BodyPairs
+from coop_drake.geometry.convex import following
+from coop_drake.geometry.minkowski import FreeSpace
+from coop_drake.geometry.safeguards import components, meet, shared
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.tree.pose import FloatArray
+
+_NEGLIGIBLE_AREA = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """One connected set of positions p_WL.
+
+    Attributes:
+        section: The set itself, with holes.
+        bounds: (x_min, y_min, x_max, y_max) [m].
+        area: Its area [m^2].
+    """
+
+    section: CrossSection
+    bounds: tuple[float, float, float, float]
+    area: float
+
+    @classmethod
+    def of(cls, section: CrossSection) -> Region:
+        """Measure a connected section."""
+        return cls(section, section.bounds(), section.area())
+
+    @cached_property
+    def rings(self) -> list[FloatArray]:
+        """Boundary rings, shape (n, 2) each [m]."""
+        return [np.asarray(ring, dtype=float) for ring in self.section.to_polygons()]
+
+    @cached_property
+    def breadth(self) -> float:
+        """Area over perimeter [m]: half the width of a strip."""
+        perimeter = sum(float(np.hypot(*(following(ring) - ring).T).sum()) for ring in self.rings)
+        return self.area / perimeter
+
+    def holds(self, point: FloatArray) -> bool:
+        """Whether the point lies inside (even-odd rule over all rings)."""
+        x, y = float(point[0]), float(point[1])
+        inside = False
+        for ring in self.rings:
+            tail = following(ring)
+            spans = (ring[:, 1] > y) != (tail[:, 1] > y)
+            a, b = ring[spans], tail[spans]
+            crossings = a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1]) > x
+            inside ^= bool(crossings.sum() % 2)
+        return inside
+
+    def depths(self, points: FloatArray) -> FloatArray:
+        """Signed distances from the boundary, positive inside; shape (k, 2) to (k,) [m]."""
+        nearest = np.full(len(points), np.inf)
+        inside = np.zeros(len(points), dtype=bool)
+        x, y = points[:, :1], points[:, 1:]
+        for ring in self.rings:
+            along = following(ring) - ring
+            ax, ay = x - ring[:, 0], y - ring[:, 1]
+            length = np.maximum((along**2).sum(axis=1), 1e-18)
+            share = np.clip((along[:, 0] * ax + along[:, 1] * ay) / length, 0.0, 1.0)
+            away = np.hypot(ax - share * along[:, 0], ay - share * along[:, 1])
+            nearest = np.minimum(nearest, away.min(axis=1))
+            spans = (ay < 0.0) != (ay - along[:, 1] < 0.0)
+            slope = along[:, 0] / np.where(along[:, 1] == 0.0, 1.0, along[:, 1])
+            inside ^= (spans & (ax < ay * slope)).sum(axis=1) % 2 == 1
+        return np.where(inside, nearest, -nearest)
+
+    def meets(self, other: Region, *, otherwise: bool = True) -> bool:
+        """Whether both sets share more than their boundary; ``otherwise`` where geometry fails."""
+        a, b = self.bounds, other.bounds
+        if a[0] > b[2] or b[0] > a[2] or a[1] > b[3] or b[1] > a[3]:
+            return False
+        return meet(self.section, other.section, otherwise=otherwise)
+
+
+class CellMaker:
+    """Builds the cells of slices; footprints and their differences are cached by the ancestors' slices.
+
+    Args:
+        swept: Sweeps of the team's pieces.
+        pairs: Self-collision of the team.
+        workspace: Where the team may be; the margin is already taken off [m].
+    """
+
+    def __init__(self, swept: SweptTree, pairs: BodyPairs, workspace: Polygon | MultiPolygon) -> None:
+        self._swept, self._pairs = swept, pairs
+        self._under_space, self._over_space = FreeSpace.under(workspace), FreeSpace.over(workspace)
+        self._everywhere = self._positions(workspace)
+        self._members = [
+            [n for n, piece in enumerate(swept.pieces) if piece.component == c]
+            for c in range(len(swept.tree.components))
+        ]
+        self._axes = [swept.pieces[members[0]].axes if members else () for members in self._members]
+        self._under: dict[tuple[object, ...], CrossSection | None] = {}
+        self._over: dict[tuple[object, ...], CrossSection | None] = {}
+
+    def _positions(self, workspace: Polygon | MultiPolygon) -> CrossSection:
+        """A box that holds every position worth asking about."""
+        x_min, y_min, x_max, y_max = workspace.bounds
+        reach = self._swept.tree.reach + 1.0
+        size = (x_max - x_min + 2.0 * reach, y_max - y_min + 2.0 * reach)
+        return CrossSection.square(size).translate((x_min - reach, y_min - reach))
+
+    def over_cells(self, intervals: Intervals) -> list[Region]:
+        """Regions outside which no configuration of the nominal slice is free."""
+        if self._pairs.overlapping(intervals) is not None:
+            return []
+        return regions_of(self._common(intervals, over=True), over=True)
+
+    def under_cells(self, expanded: Intervals) -> list[Region]:
+        """Regions in which every configuration of the expanded slice is free."""
+        if self._pairs.touching(expanded) is not None:
+            return []
+        regions = regions_of(self.under_region(expanded), over=False)
+        return [region for region in regions if region.area > _NEGLIGIBLE_AREA]
+
+    def guide_cells(self, intervals: Intervals) -> list[Region]:
+        """Free regions of the slice's middle configuration: a hint for the search, never a proof."""
+        middle = tuple((0.5 * (lower + upper), 0.5 * (lower + upper)) for lower, upper in intervals)
+        return self.under_cells(middle)
+
+    @property
+    def moving_axes(self) -> list[tuple[int, ...]]:
+        """Axes (theta, q...) that move each component; none of one without bodies."""
+        return self._axes
+
+    def places_for(self, component: int, angles: Sequence[float]) -> list[Region]:
+        """Positions at which one component, with bodies, is free at some angles (theta, q...)."""
+        section = self._under_component(component, tuple((angle, angle) for angle in angles))
+        return [] if section is None else regions_of(section, over=False)
+
+    def blocked_pair(self, expanded: Intervals) -> BodyPair | None:
+        """A pair of bodies that may touch somewhere in the expanded slice, None if there is none."""
+        return self._pairs.touching(expanded)
+
+    def under_region(self, expanded: Intervals) -> CrossSection:
+        """Positions at which the over-footprint fits, self-collision aside."""
+        return self._common(expanded, over=False)
+
+    def _common(self, intervals: Intervals, *, over: bool) -> CrossSection:
+        """What the positions for all components share; everywhere if none says anything."""
+        region: CrossSection | None = None
+        for component in reversed(range(len(self._members))):
+            one = (self._over_component if over else self._under_component)(component, intervals)
+            region = _shared(region, one, over)
+            if region is not None and region.is_empty():
+                return region
+        return self._everywhere if region is None else region
+
+    def _under_component(self, component: int, expanded: Intervals) -> CrossSection | None:
+        key = (component, *[expanded[axis] for axis in self._axes[component]])
+        if key not in self._under:
+            found: CrossSection | None = None
+            for index in self._members[component]:
+                found = _shared(found, self._under_space.minus(self._swept.over(index, expanded)), False)
+                if found is not None and found.is_empty():
+                    break
+            self._under[key] = found
+        return self._under[key]
+
+    def _over_component(self, component: int, intervals: Intervals) -> CrossSection | None:
+        key = (component, *[intervals[axis] for axis in self._axes[component]])
+        if key not in self._over:
+            found: CrossSection | None = None
+            for index in self._members[component]:
+                footprint = self._swept.under(index, intervals)
+                if footprint is not None:
+                    found = _shared(found, self._over_space.minus(footprint), True)
+            self._over[key] = found
+        return self._over[key]
+
+
+def _shared(first: CrossSection | None, second: CrossSection | None, over: bool) -> CrossSection | None:
+    """What two regions share; None stands for everywhere."""
+    if first is None or second is None:
+        return second if first is None else first
+    return shared(first, second, over=over)
+
+
+def regions_of(section: CrossSection, *, over: bool) -> list[Region]:
+    """Connected parts of a section, in a fixed order.
+
+    Args:
+        section: A region.
+        over: Whether nothing outside it is free; else all of it is.
+    """
+    return sorted(map(Region.of, components(section, over=over)), key=lambda region: region.bounds)

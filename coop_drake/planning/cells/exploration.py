@@ -1,0 +1,199 @@
+"""One exploration of the free configuration space at one margin: Algorithm 1 with better split rules."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from shapely import MultiPolygon, Polygon
+
+from coop_drake.answers.mixed_cell import MixedCell
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.planning.cells.cell_graph import Cell, CellGraph, Kind
+from coop_drake.planning.cells.cells import CellMaker, Region
+from coop_drake.planning.cells.events import (
+    ChannelSearched,
+    ExplorationBegan,
+    ExplorationEnded,
+    ExplorationResumed,
+    SliceAdded,
+    SliceSplit,
+    Watch,
+    seen,
+)
+from coop_drake.planning.cells.halves import Halves
+from coop_drake.planning.cells.mixed_cells import mixed_cells
+from coop_drake.planning.cells.slices import Slices, holds
+from coop_drake.planning.cells.split_rules import Refinement, SplitRule
+
+_FREE_TIME = 0.6
+_NARROW_TIME = 0.03
+_NARROWEST = 1e-3
+_GUIDE_WEIGHT = 10.0
+_MIXED_WEIGHT = 100.0
+_UNSPLITTABLE_WEIGHT = 1e4
+
+
+class Verdict(Enum):
+    """How an exploration ended."""
+
+    FOUND = "found"
+    INFEASIBLE = "infeasible"
+    RESOLUTION = "below resolution"
+    BUDGET = "budget spent"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Result of one exploration.
+
+    Attributes:
+        verdict: How it ended.
+        path: Cells of the last channel; all FREE if found, empty if infeasible.
+        slices: Compound slices made.
+    """
+
+    verdict: Verdict
+    path: tuple[Cell, ...]
+    slices: int
+
+
+class Exploration:
+    """Slices, cells and graph of one attempt.
+
+    Args:
+        problem: The question.
+        workspace: Floor with the margin taken off [m].
+        swept: Sweeps of the problem's tree, shared among attempts.
+        pairs: Self-collision of the problem's tree, shared among attempts.
+        watch: Called with every event, in order; None costs nothing.
+        question: What is explored, in words, for whoever watches.
+        split: Which axis of a slice is halved.
+    """
+
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        workspace: Polygon | MultiPolygon,
+        swept: SweptTree,
+        pairs: BodyPairs,
+        watch: Watch | None = None,
+        question: str = "the whole team",
+        split: SplitRule = "strong",
+    ) -> None:
+        self._problem, self._watch = problem, watch
+        self._question, self._paused = question, False
+        self.slices = Slices(problem.tree, problem.settings.slice_overlap)
+        self.maker = CellMaker(swept, pairs, workspace)
+        self.graph = CellGraph(self.slices)
+        self._halves = Halves(self.slices, self.maker)
+        self.refinement = Refinement(problem, self.slices, self.maker, self._halves, split)
+        self._starts: dict[int, list[Cell]] = {}
+        self._goals: dict[int, list[int]] = {}
+        if watch is not None:
+            robots = sorted({joint.robot for joint in problem.tree.joints})
+            watch(ExplorationBegan(question, tuple(robots)))
+        for index in self.slices.leaves():
+            self._add(index, self.maker.over_cells(self.slices.all[index].intervals))
+
+    def run(self, budget: int, progress: Callable[[int], None] | None = None) -> Outcome:
+        """Search and split until there is an answer or the budget of slices is spent.
+
+        The cheapest channel of FREE and undecided cells is searched, and slices on it are halved as the
+        split rule says. No channel at all is a proof that none exists. A spent budget may be raised: call
+        again, and the exploration goes on where it stopped.
+        """
+        if self._watch is not None and self._paused:
+            self._watch(ExplorationResumed(self._question))
+        self._paused = True
+        outcome = self._explored(budget, progress)
+        if self._watch is not None:
+            self._watch(ExplorationEnded(outcome.verdict.value, outcome.slices))
+        return outcome
+
+    def _explored(self, budget: int, progress: Callable[[int], None] | None) -> Outcome:
+        while True:
+            path = self._channel()
+            if self._watch is not None:
+                cost = sum(cell.weight for cell in path or ())
+                self._watch(ChannelSearched(seen(path or ()), cost))
+            made = len(self.slices.all)
+            if path is None:
+                return Outcome(Verdict.INFEASIBLE, (), made)
+            if all(cell.kind is Kind.FREE for cell in path):
+                return Outcome(Verdict.FOUND, tuple(path), made)
+            if made >= budget:
+                return Outcome(Verdict.BUDGET, tuple(path), made)
+            splits = self.refinement.splits(path)
+            if not splits:
+                return Outcome(Verdict.RESOLUTION, tuple(path), made)
+            for index, axis in splits:
+                self._split(index, axis)
+            if progress is not None:
+                progress(len(self.slices.all))
+
+    def _channel(self) -> list[Cell] | None:
+        starts = [cell for index in sorted(self._starts) for cell in self._starts[index]]
+        goals = {cell for cells in self._goals.values() for cell in cells}
+        return self.graph.cheapest(starts, goals)
+
+    def boxes(self, path: Sequence[Cell]) -> list[tuple[Intervals, Region]]:
+        """Expanded intervals and region of every cell of a free path."""
+        return [(self.slices.expanded(self.slices.all[cell.slice].intervals), cell.region) for cell in path]
+
+    def counts(self) -> tuple[int, int]:
+        """Numbers of FREE and of MIXED cells of the leaves."""
+        kinds = [cell.kind for cells in self.graph.by_slice.values() for cell in cells]
+        return kinds.count(Kind.FREE), kinds.count(Kind.MIXED)
+
+    def over_leaves(self) -> dict[int, list[Region]]:
+        """Over-cells of every leaf by its id; none where all of it is blocked."""
+        return {
+            index: [cell.region for cell in self.graph.by_slice[index] if cell.kind is Kind.MIXED]
+            for index in self.slices.leaves()
+        }
+
+    def undecided(self, path: Sequence[Cell]) -> tuple[MixedCell, ...]:
+        """Cells of a channel that are not free, the widest first."""
+        return mixed_cells(self._problem, self.slices, self.refinement.finest, path)
+
+    def _split(self, index: int, axis: int) -> None:
+        if self._watch is not None:
+            self._watch(SliceSplit(index, axis))
+        self.graph.remove(index)
+        self._starts.pop(index, None)
+        self._goals.pop(index, None)
+        parts = self._halves.taken(index, axis)
+        for half, part in zip(self.slices.split(index, axis), parts, strict=True):
+            self._add(half, part.regions)
+
+    def _add(self, index: int, mixed: Sequence[Region]) -> None:
+        intervals = self.slices.all[index].intervals
+        free = self.maker.under_cells(self.slices.expanded(intervals)) if mixed else []
+        guide = self.maker.guide_cells(intervals) if mixed else []
+        final = not self.refinement.splittable(intervals)
+        members = [(Kind.FREE, region, _free_weight(region)) for region in free]
+        members += [(Kind.GUIDE, region, _GUIDE_WEIGHT) for region in guide if not final]
+        weight = _UNSPLITTABLE_WEIGHT if final else _MIXED_WEIGHT
+        members += [(Kind.MIXED, region, weight) for region in mixed]
+        self.graph.add(index, members)
+        self._note_ends(index, intervals)
+        if self._watch is not None:
+            self._watch(SliceAdded(index, intervals, seen(self.graph.by_slice[index])))
+
+    def _note_ends(self, index: int, intervals: Intervals) -> None:
+        """Remember which cells of a new leaf hold the start and which hold the goal."""
+        cells = self.graph.by_slice[index]
+        start, goal = self._problem.start, self._problem.goal_pose
+        if holds(intervals, [float(angle) for angle in start[2:]]):
+            self._starts[index] = [cell for cell in cells if cell.region.holds(start[:2])]
+        if holds(intervals, [float(goal[2]), *self._problem.goal_joints]):
+            self._goals[index] = [cell.index for cell in cells if cell.region.holds(goal[:2])]
+
+
+def _free_weight(region: Region) -> float:
+    """Time to pass a free cell: a share for its angles and one for its narrowness [s]."""
+    return _FREE_TIME + _NARROW_TIME / max(region.breadth, _NARROWEST)

@@ -1,0 +1,37 @@
+"""Which cells of a channel are not proved free, and how far they could still be halved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from coop_drake.answers.mixed_cell import MixedCell
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.geometry.minkowski import to_polygon
+from coop_drake.planning.cells.cell_graph import Cell, Kind
+from coop_drake.planning.cells.slices import Slices
+
+
+def mixed_cells(
+    problem: PlanningProblem, slices: Slices, finest: Sequence[float], channel: Sequence[Cell]
+) -> tuple[MixedCell, ...]:
+    """Cells of a channel that are not free, the widest first.
+
+    Args:
+        problem: The question that was explored.
+        slices: The subdivision.
+        finest: Resolution of every axis.
+        channel: The last channel.
+    """
+    robots = tuple(sorted({joint.robot for joint in problem.tree.joints}))
+    cells = []
+    for cell in channel:
+        if cell.kind is Kind.FREE:
+            continue
+        lower, upper = np.array(slices.all[cell.slice].intervals).T.copy()
+        share = float(((upper - lower) / np.array(slices.axis_widths)).max())
+        done = bool((upper - lower <= np.array(finest)).all())
+        polygon = to_polygon(cell.region.section)
+        cells.append(MixedCell(robots, lower, upper, polygon, share, cell.kind is Kind.GUIDE, done))
+    return tuple(sorted(cells, key=lambda cell: -cell.share))

@@ -1,0 +1,214 @@
+"""The paper's exploration as printed: Algorithm 1, with Algorithm 2 to choose what is subdivided."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from shapely import MultiPolygon, Polygon
+
+from coop_drake.answers.mixed_cell import MixedCell
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.planning.cells.cell_graph import Cell, CellGraph, Kind
+from coop_drake.planning.cells.cells import CellMaker, Region
+from coop_drake.planning.cells.events import (
+    ChannelSearched,
+    ExplorationBegan,
+    ExplorationEnded,
+    ExplorationResumed,
+    SliceAdded,
+    SliceSplit,
+    Watch,
+    seen,
+)
+from coop_drake.planning.cells.exploration import Outcome, Verdict
+from coop_drake.planning.cells.mixed_cells import mixed_cells
+from coop_drake.planning.cells.slices import Slices
+from coop_drake.planning.cells.split_rules import finest_widths
+from coop_drake.tree.pose import FloatArray
+
+End = tuple[list[float | None], FloatArray]
+
+
+class PaperExploration:
+    """Under- and over-approximation cells of one subdivision, and the paper's way to refine it.
+
+    Each search halves one slice: the longest simple slice of the first two compound slices on the path of
+    over-approximation cells whose under-approximation cells do not connect. The paper does not say when to
+    give up (erratum EA1): here, when the slice to halve is below the resolution.
+
+    Args:
+        problem: The question.
+        workspace: The floor [m].
+        swept: Sweeps of the problem's tree.
+        pairs: Self-collision of the problem's tree.
+        watch: Called with every event; None costs nothing.
+
+    Attributes:
+        slices: The subdivision; it begins with one slice of everything.
+        under: Under-approximation cells of its leaves.
+        over: Over-approximation cells of its leaves.
+    """
+
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        workspace: Polygon | MultiPolygon,
+        swept: SweptTree,
+        pairs: BodyPairs,
+        watch: Watch | None = None,
+    ) -> None:
+        self._problem, self._watch = problem, watch
+        self._start: End = [float(angle) for angle in problem.start[2:]], problem.start[:2]
+        self._goal: End = [float(problem.goal_pose[2]), *problem.goal_joints], problem.goal_pose[:2]
+        self._maker = CellMaker(swept, pairs, workspace)
+        self._finest = finest_widths(problem)
+        self.slices = Slices(problem.tree, problem.settings.slice_overlap, printed=True)
+        self.under, self.over = CellGraph(self.slices), CellGraph(self.slices)
+        if watch is not None:
+            robots = sorted({joint.robot for joint in problem.tree.joints})
+            watch(ExplorationBegan("the whole team", tuple(robots)))
+        self._paused = False
+        self._add(0)
+
+    def run(self, budget: int, progress: Callable[[int], None] | None = None) -> Outcome:
+        """Go through Algorithm 1 until it returns or the budget of slices is spent; call again to go on."""
+        if self._watch is not None and self._paused:
+            self._watch(ExplorationResumed("the whole team"))
+        self._paused = True
+        while True:
+            outcome = self._once(budget)
+            if outcome is not None:
+                if self._watch is not None:
+                    self._watch(ExplorationEnded(outcome.verdict.value, outcome.slices))
+                return outcome
+            if progress is not None:
+                progress(len(self.slices.all))
+
+    def _once(self, budget: int) -> Outcome | None:
+        """The body of Algorithm 1's loop; None where the loop goes on."""
+        start = self._find_enclosing(self._start, budget)
+        if isinstance(start, Outcome):
+            return start
+        goal = self._find_enclosing(self._goal, budget)
+        if isinstance(goal, Outcome):
+            return goal
+        (over_start, under_start), (over_goal, under_goal) = start, goal
+        path = self._connect(self.under, under_start, under_goal)
+        if path:
+            return self._outcome(Verdict.FOUND, path)
+        path = self._connect(self.over, over_start, over_goal)
+        if not path:
+            return self._outcome(Verdict.INFEASIBLE, path)
+        if len(self.slices.all) >= budget:
+            return self._outcome(Verdict.BUDGET, path)
+        failing = refine(path, [under_start], [under_goal], self.under)
+        return None if self._subdivide_longest(failing) else self._outcome(Verdict.RESOLUTION, path)
+
+    def _find_enclosing(self, end: End, budget: int) -> tuple[Cell, Cell] | Outcome:
+        """The over- and the under-cell of one slice that hold an end, subdividing until there are such."""
+        angles, position = end
+        while True:
+            held = [
+                cell
+                for index in sorted(self.slices.holding(angles), key=lambda i: (self.slices.all[i].depth, i))
+                for cell in self.over.by_slice[index]
+                if cell.region.holds(position)
+            ]
+            if not held:
+                return self._outcome(Verdict.INFEASIBLE, [])
+            for over in held:
+                for under in self.under.by_slice[over.slice]:
+                    if under.region.holds(position):
+                        return over, under
+            if len(self.slices.all) >= budget:
+                return self._outcome(Verdict.BUDGET, held[:1])
+            if not self._subdivide_longest([held[0].slice]):
+                return self._outcome(Verdict.RESOLUTION, held[:1])
+
+    def _connect(self, graph: CellGraph, first: Cell, last: Cell) -> list[Cell]:
+        """Path through the cells of one kind that prefers large slices; empty where there is none."""
+        path = graph.cheapest([first], {last.index}) or []
+        if self._watch is not None and (path or graph is self.over):
+            self._watch(ChannelSearched(seen(path), sum(cell.weight for cell in path)))
+        return path
+
+    def _subdivide_longest(self, indices: Sequence[int]) -> bool:
+        """Halve the longest simple slice of some compound slices; False where it is below the resolution.
+
+        Lengths are compared as they are, radians with metres.
+        """
+        widths = {
+            (index, axis): upper - lower
+            for index in indices
+            for axis, (lower, upper) in enumerate(self.slices.all[index].intervals)
+        }
+        index, axis = max(widths, key=lambda key: widths[key])
+        if widths[index, axis] <= self._finest[axis]:
+            return False
+        if self._watch is not None:
+            self._watch(SliceSplit(index, axis))
+        self.under.remove(index)
+        self.over.remove(index)
+        for half in self.slices.split(index, axis):
+            self._add(half)
+        return True
+
+    def _add(self, index: int) -> None:
+        part = self.slices.all[index]
+        over = self._maker.over_cells(part.intervals)
+        under = self._maker.under_cells(self.slices.expanded(part.intervals)) if over else []
+        weight = 1.0 + part.depth
+        self.over.add(index, [(Kind.MIXED, region, weight) for region in over])
+        self.under.add(index, [(Kind.FREE, region, weight) for region in under])
+        if self._watch is not None:
+            cells = [*self.under.by_slice[index], *self.over.by_slice[index]]
+            self._watch(SliceAdded(index, part.intervals, seen(cells)))
+
+    def _outcome(self, verdict: Verdict, path: Sequence[Cell]) -> Outcome:
+        return Outcome(verdict, tuple(path), len(self.slices.all))
+
+    def boxes(self, path: Sequence[Cell]) -> list[tuple[Intervals, Region]]:
+        """Expanded intervals and region of every cell of a path of under-approximation cells."""
+        return [(self.slices.expanded(self.slices.all[cell.slice].intervals), cell.region) for cell in path]
+
+    def over_leaves(self) -> dict[int, list[Region]]:
+        """Over-cells of every leaf by its id; none where all of it is blocked."""
+        return {index: [cell.region for cell in self.over.by_slice[index]] for index in self.slices.leaves()}
+
+    def undecided(self, path: Sequence[Cell]) -> tuple[MixedCell, ...]:
+        """Cells of a path that are not free, the widest first."""
+        return mixed_cells(self._problem, self.slices, self._finest, path)
+
+    def counts(self) -> tuple[int, int]:
+        """Numbers of under- and of over-approximation cells of the leaves."""
+        free, mixed = (sum(map(len, graph.by_slice.values())) for graph in (self.under, self.over))
+        return free, mixed
+
+
+def refine(path: Sequence[Cell], source: Sequence[Cell], goal: Sequence[Cell], under: CellGraph) -> list[int]:
+    """Algorithm 2: follow a path of over-cells with the under-cells inside them until they do not connect.
+
+    As printed all under-cells of a slice would do, also those beside the path (erratum EA2).
+
+    Args:
+        path: Over-approximation cells.
+        source: Under-approximation cells of the first one's slice that are reached.
+        goal: Under-approximation cells to reach in the last one's.
+        under: All under-approximation cells.
+
+    Returns:
+        The slices of which the longest simple slice is to be halved: a pair that does not connect, or the
+        only one that is left.
+    """
+    if len(path) == 1:
+        return [path[0].slice]
+    here = path[1]
+    cells = [cell for cell in under.by_slice[here.slice] if cell.region.meets(here.region)]
+    if len(path) == 2:
+        cells = list(goal)
+    connected = [cell for cell in cells if any(one.region.meets(cell.region) for one in source)]
+    if connected:
+        return refine(path[1:], connected, goal, under)
+    return [path[0].slice, here.slice]

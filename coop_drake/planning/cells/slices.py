@@ -1,0 +1,144 @@
+"""Compound slices, eq. (7): boxes of intervals in (theta, q...), halved one by one, with their neighbours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import pi
+
+from coop_drake.geometry.swept_tree import Interval, Intervals
+from coop_drake.tree.component_tree import ComponentTree
+
+_TOUCH = 1e-9
+_FIRST_THETA_SLICES = 4
+
+
+@dataclass
+class Slice:
+    """One compound slice; a leaf of the subdivision while ``halves`` is None.
+
+    Attributes:
+        intervals: Nominal interval of every axis (theta, q...).
+        depth: How many halvings led to it.
+        neighbours: Ids of the leaves that share a facet with it.
+        halves: Ids of the two slices that replaced it, None for a leaf.
+    """
+
+    intervals: Intervals
+    depth: int
+    neighbours: set[int] = field(default_factory=set)
+    halves: tuple[int, int] | None = None
+
+
+class Slices:
+    """A cover of all angles by slices, each split on its own.
+
+    Theta is periodic: its first four slices are centred at 0, pi/2, pi, 3 pi/2, so that walls along the axes
+    do not fall between slices and no two slices meet at both ends.
+
+    Args:
+        tree: Gives the joints' limits.
+        overlap: Overlap of neighbours as a fraction of their width, used for under-cells only.
+        printed: Whether to begin with one slice of everything and to call slices neighbours that meet in a
+            corner or an edge too, as the paper does.
+    """
+
+    def __init__(self, tree: ComponentTree, overlap: float, *, printed: bool = False) -> None:
+        self._overlap, self._printed = overlap, printed
+        self._limits = tuple((joint.lower, joint.upper) for joint in tree.joints)
+        self.axis_widths = (2.0 * pi, *(upper - lower for lower, upper in self._limits))
+        count = 1 if printed else _FIRST_THETA_SLICES
+        part = 2.0 * pi / count
+        self.all: list[Slice] = [
+            Slice((((i - 0.5) * part, (i + 0.5) * part), *self._limits), 0) for i in range(count)
+        ]
+        for i in range(count):
+            self.all[i].neighbours |= {(i - 1) % count, (i + 1) % count} - {i}
+
+    def leaves(self) -> list[int]:
+        """Ids of all leaves in ascending order."""
+        return [i for i, part in enumerate(self.all) if part.halves is None]
+
+    def split(self, index: int, axis: int) -> tuple[int, int]:
+        """Halve a leaf along an axis; returns the ids of its halves."""
+        parent = self.all[index]
+        ids = len(self.all), len(self.all) + 1
+        self.all += [Slice(half, parent.depth + 1) for half in halves(parent.intervals, axis)]
+        parent.halves = ids
+        self.all[ids[0]].neighbours.add(ids[1])
+        self.all[ids[1]].neighbours.add(ids[0])
+        for other in parent.neighbours:
+            self.all[other].neighbours.discard(index)
+            for half in ids:
+                if self._adjacent(self.all[half].intervals, self.all[other].intervals):
+                    self.all[half].neighbours.add(other)
+                    self.all[other].neighbours.add(half)
+        parent.neighbours = set()
+        return ids
+
+    def _adjacent(self, first: Intervals, second: Intervals) -> bool:
+        touches = _touches(first, second)
+        return touches is not None and (self._printed or touches <= 1)
+
+    def expanded(self, intervals: Intervals) -> Intervals:
+        """Intervals with the overlap that under-cells keep, joints clipped at their limits."""
+        share = 0.5 * self._overlap
+        grown = [(a - share * (b - a), b + share * (b - a)) for a, b in intervals]
+        clipped = [
+            (max(a, lower), min(b, upper))
+            for (a, b), (lower, upper) in zip(grown[1:], self._limits, strict=True)
+        ]
+        return (grown[0], *clipped)
+
+    def holding(self, angles: Sequence[float | None]) -> list[int]:
+        """Leaves whose closed nominal intervals hold the angles (theta, q...); None holds anywhere."""
+        return [i for i in self.leaves() if holds(self.all[i].intervals, angles)]
+
+
+def halves(intervals: Intervals, axis: int) -> tuple[Intervals, Intervals]:
+    """Both halves of a slice along an axis, the lower one first."""
+    lower, upper = intervals[axis]
+    middle = 0.5 * (lower + upper)
+    before, after = intervals[:axis], intervals[axis + 1 :]
+    return (*before, (lower, middle), *after), (*before, (middle, upper), *after)
+
+
+def holds(intervals: Intervals, angles: Sequence[float | None]) -> bool:
+    """Whether intervals hold (theta, q...), theta modulo 2 pi; None is held by any interval."""
+    for axis, (angle, (lower, upper)) in enumerate(zip(angles, intervals, strict=True)):
+        if angle is None:
+            continue
+        centre, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+        offset = nearest_turn(angle - centre) if axis == 0 else angle - centre
+        if abs(offset) > half + _TOUCH:
+            return False
+    return True
+
+
+def nearest_turn(angle: float) -> float:
+    """The same angle modulo 2 pi in [-pi, pi)."""
+    return (angle + pi) % (2.0 * pi) - pi
+
+
+def interval_overlap(first: Interval, second: Interval, periodic: bool = False) -> float:
+    """Length that two intervals share; negative if there is a gap [rad or m]."""
+    halves = 0.5 * (first[1] - first[0] + second[1] - second[0])
+    offset = 0.5 * (first[0] + first[1] - second[0] - second[1])
+    return halves - abs(nearest_turn(offset) if periodic else offset)
+
+
+def share_facet(first: Intervals, second: Intervals) -> bool:
+    """Whether two boxes touch in every axis and merely touch in at most one: paths cross facets only."""
+    touches = _touches(first, second)
+    return touches is not None and touches <= 1
+
+
+def _touches(first: Intervals, second: Intervals) -> int | None:
+    """In how many axes two boxes merely touch, None if there is a gap in one."""
+    touches = 0
+    for axis, (a, b) in enumerate(zip(first, second, strict=True)):
+        shared = interval_overlap(a, b, periodic=axis == 0)
+        if shared < -_TOUCH:
+            return None
+        touches += shared <= _TOUCH
+    return touches

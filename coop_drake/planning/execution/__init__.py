@@ -1,0 +1,1 @@
+"""From a channel of free boxes to a plan that controllers can follow."""

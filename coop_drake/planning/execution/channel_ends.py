@@ -1,0 +1,85 @@
+"""The ends of a channel: turned to the start, checked, and what must be reached in each of its boxes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf, tau
+
+import numpy as np
+from shapely import Point
+
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.errors import PlanError
+from coop_drake.planning.boxes.channel import Channel
+from coop_drake.tree.pose import FloatArray
+
+__all__ = ["check_ends", "final_intervals", "goal_intervals", "turned_to_start"]
+
+GOAL_SHARE = 0.9
+"""Share of a tolerance that a goal interval takes: arriving in it is arriving within tolerance [-]."""
+
+Intervals = tuple[FloatArray, FloatArray]
+
+
+def final_intervals(problem: PlanningProblem, goal_angle: float) -> Intervals:
+    """Intervals of (theta, q...) in which the goal is reached, infinite where a joint is free.
+
+    Args:
+        problem: What was asked.
+        goal_angle: The goal's theta, unwrapped [rad].
+    """
+    goals: list[tuple[float | None, float]] = [(goal_angle, problem.angle_tolerance)]
+    goals += [(goal, problem.joint_tolerance) for goal in problem.goal_joints]
+    lower = [-inf if goal is None else goal - GOAL_SHARE * tolerance for goal, tolerance in goals]
+    upper = [inf if goal is None else goal + GOAL_SHARE * tolerance for goal, tolerance in goals]
+    return np.array(lower), np.array(upper)
+
+
+def goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Intervals:
+    """Intervals of (theta, q...) that must be reached in a box: those of the next box too, or the goal's."""
+    lower, upper = channel.boxes[index].lower.copy(), channel.boxes[index].upper.copy()
+    if index + 1 < len(channel.boxes):
+        following = channel.boxes[index + 1]
+        lower, upper = np.maximum(lower, following.lower), np.minimum(upper, following.upper)
+    else:
+        goals = final_intervals(problem, channel.goal_angle)
+        lower, upper = np.maximum(lower, goals[0]), np.minimum(upper, goals[1])
+    if not (lower < upper).all():
+        axis = int(np.argmin(lower < upper))
+        raise PlanError(
+            f"cell {index}: axis {axis} has no interval to leave in: [{lower[axis]}, {upper[axis]}]"
+        )
+    return lower, upper
+
+
+def turned_to_start(channel: Channel, start_angle: float) -> Channel:
+    """Shift theta of all boxes by full turns so that the first one holds the start's angle."""
+    first = channel.boxes[0]
+    turns = round((start_angle - 0.5 * (first.lower[0] + first.upper[0])) / tau)
+    shift = np.zeros_like(first.lower)
+    shift[0] = turns * tau
+    boxes = tuple(replace(box, lower=box.lower + shift, upper=box.upper + shift) for box in channel.boxes)
+    path = None if channel.path is None else channel.path + np.concatenate([[0.0, 0.0], shift])
+    return replace(channel, boxes=boxes, goal_angle=channel.goal_angle + shift[0], path=path)
+
+
+def check_ends(problem: PlanningProblem, channel: Channel) -> None:
+    """Refuse a channel whose first box does not hold the start, or whose last one does not hold the goal.
+
+    Raises:
+        PlanError: Names the end and the box.
+    """
+    first, last = channel.boxes[0], channel.boxes[-1]
+    start, goal = problem.start[2:], channel.goal_angle
+    if not first.polygon.contains(Point(problem.start[:2])):
+        raise PlanError("the start's position lies outside the first cell")
+    if not ((first.lower < start) & (start < first.upper)).all():
+        raise PlanError(
+            f"the start's angles {start} lie outside the first cell's [{first.lower}, {first.upper}]"
+        )
+    if not last.polygon.contains(Point(problem.goal_pose[:2])):
+        raise PlanError("the goal's position lies outside the last cell")
+    if not last.lower[0] <= goal <= last.upper[0]:
+        raise PlanError(
+            f"the goal's angle {goal} lies outside the last cell's [{last.lower[0]}, {last.upper[0]}]"
+        )

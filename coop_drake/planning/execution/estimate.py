@@ -1,0 +1,156 @@
+"""How long a transport will take, estimated before it is mapped and simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from math import inf, isfinite, sqrt
+
+import numpy as np
+import shapely
+from shapely import LineString
+
+from coop_drake.answers.plan import Cell, Plan, Transition
+from coop_drake.geometry.boundary import edges_of
+from coop_drake.geometry.passage import PassageFinder
+from coop_drake.laws import TransitionGains, slowdown_radius
+from coop_drake.planning.execution.transport_kernels import cross_cell
+from coop_drake.tree.pose import FloatArray
+
+__all__ = [
+    "SETTLING_TIME",
+    "SPEED_PER_CLEARANCE",
+    "plan_time",
+    "speed_per_clearance",
+    "timed",
+    "transition_time",
+    "travel_time",
+]
+
+SETTLING_TIME = 0.6
+"""Time that angles and joints need whatever the distance, for choices made before gains are [s]."""
+
+SPEED_PER_CLEARANCE = 3.0
+"""Speed over clearance with the paper's gains, for choices that are made before gains are [1/s]."""
+
+MAX_SPEED = 1.0
+"""Largest magnitude of the velocity fields [m/s]."""
+
+LONGEST = 120.0
+"""A transition that takes longer than this is not integrated to its end [s]."""
+
+
+def speed_per_clearance(gains: TransitionGains) -> float:
+    """Speed of the governed object in a long aisle over its clearance there.
+
+    At a steady speed v behind the governor (14)-(16) the object lags by zeta v / K, so that
+    E = v^2 (1 + zeta^2 / K) / 2, and v = K_G sqrt(Delta E / K) gives
+    v / d = sqrt(K / (2 K / K_G^2 + 1 + zeta^2 / K)).
+
+    Args:
+        gains: Gains of the transition.
+
+    Returns:
+        v / d [1/s].
+    """
+    K, K_G, zeta = gains.stiffness, gains.governor_gain, gains.damping
+    return sqrt(K / (2.0 * K / K_G**2 + 1.0 + zeta**2 / K))
+
+
+def travel_time(length: float, neck: float, speed: float = SPEED_PER_CLEARANCE) -> float:
+    """Time that the object itself needs for a path whose clearance is the neck everywhere [s].
+
+    Args:
+        length: L, length of the path to the target [m].
+        neck: b, clearance that the path keeps [m].
+        speed: Speed over clearance [1/s].
+    """
+    return length / (speed * neck) if neck > 0.0 else inf
+
+
+def transition_time(length: float, neck: float, speed: float = SPEED_PER_CLEARANCE) -> float:
+    """Rule of thumb for one transition, 0.6 s more than its travel [s]; arguments as above."""
+    return SETTLING_TIME + travel_time(length, neck, speed)
+
+
+def plan_time(plan: Plan) -> float:
+    """Estimated duration of the whole transport [s]."""
+    return sum(transition.estimated_time for transition in plan.transitions)
+
+
+def timed(plan: Plan, paths: Sequence[LineString] | None = None) -> Plan:
+    """Estimate the time of every transition of a plan.
+
+    The closed loop is integrated from cell to cell: a point mass behind the governor (14)-(16) with the exact
+    distance to the boundary of Q_i, a double integrator in its funnel for every axis, and the conditions of
+    readiness. The state is carried along, for object and axes do not stop where cells are handed over. p_G
+    follows the widest path instead of a harmonic map, which would have to be computed first.
+
+    Args:
+        plan: The plan; the estimates that it has are not looked at.
+        paths: For each transition the path from where its cell is entered to its target; the widest ones
+            inside the tidied cells if not given.
+
+    Returns:
+        The plan with estimates; the rule of thumb where a transition is not left within two minutes.
+    """
+    paths = paths if paths is not None else _widest_paths(plan)
+    crossings = [
+        (np.ascontiguousarray(edges_of(cell.tidied)), _governor(transition.gains), _axes(cell, transition))
+        for cell, transition in zip(plan.cells, plan.transitions, strict=True)
+    ]
+    following = [*crossings[1:], crossings[-1]]
+    state = _at_rest(plan.start[:2], plan.start[2:])
+    transitions = []
+    for index, (transition, (edges, governor, axes)) in enumerate(
+        zip(plan.transitions, crossings, strict=True)
+    ):
+        last = index + 1 == len(crossings)
+        path = shapely.get_coordinates(paths[index])
+        next_edges, next_governor, next_axes = following[index]
+        seconds = cross_cell(
+            state, edges, path, governor, axes, transition.inradius, next_edges, next_governor, next_axes,
+            last, LONGEST,
+        )  # fmt: skip
+        if not isfinite(seconds):
+            speed = speed_per_clearance(transition.gains)
+            seconds = LONGEST + transition_time(transition.length, transition.neck, speed)
+            state = _at_rest(transition.target, 0.5 * (transition.goal_lower + transition.goal_upper))
+        transitions.append(replace(transition, estimated_time=seconds))
+    return replace(plan, transitions=tuple(transitions))
+
+
+def _widest_paths(plan: Plan) -> list[LineString]:
+    points = [plan.start[:2], *(transition.target for transition in plan.transitions)]
+    return [
+        PassageFinder(cell.tidied).find(entry, target).path
+        for cell, (entry, target) in zip(plan.cells, pairwise(points), strict=True)
+    ]
+
+
+def _at_rest(position: FloatArray, axes: FloatArray) -> FloatArray:
+    """State (p, p', p_G, axes, axis rates) without motion."""
+    return np.concatenate([position, np.zeros(2), position, axes, np.zeros(len(axes))])
+
+
+def _governor(gains: TransitionGains) -> FloatArray:
+    """Numbers of the governor and of all axes, as ``cross_cell`` takes them."""
+    radius = slowdown_radius(MAX_SPEED, governor_gain=gains.governor_gain)
+    return np.array(
+        [
+            gains.stiffness, gains.damping, gains.governor_gain, gains.smoothing, radius,
+            float(gains.funnel == "smooth"), gains.position_gain, gains.rate_gain,
+        ]
+    )  # fmt: skip
+
+
+def _axes(cell: Cell, transition: Transition) -> FloatArray:
+    """Numbers of every axis, as ``cross_cell`` takes them."""
+    gains = transition.gains
+    return np.array(
+        [
+            cell.lower, cell.upper, transition.goal_lower, transition.goal_upper,
+            gains.decay_rate, gains.log_gain, gains.energy_bound,
+        ]
+    )  # fmt: skip

@@ -1,0 +1,108 @@
+"""Where to hand over from cell to cell: a point in every overlap of cores, so that the whole way is quick."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from coop_drake.errors import GeometryError, PlanError
+from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.passage import PassageFinder, pole
+from coop_drake.planning.boxes.channel import Channel, FreeBox
+from coop_drake.planning.execution.estimate import transition_time
+from coop_drake.tree.pose import FloatArray
+
+__all__ = ["choose_targets"]
+
+LARGEST_PARTS = 3
+"""Of an overlap in several parts only so many are considered, those with the most room first."""
+
+ROOM_TO_STAY = 0.7
+"""A target may serve the next overlap too if it has this share of the room that overlap's own target has."""
+
+
+def choose_targets(channel: Channel, start: FloatArray, goal: FloatArray) -> tuple[FloatArray, ...]:
+    """Choose a target for every box: poles of inaccessibility of overlapping cores, the last one the goal.
+
+    An overlap may have several parts, and a target may serve several overlaps in a row (then only angles
+    move): of all chains the one with the least estimated time is taken.
+
+    Args:
+        channel: Boxes whose cores overlap.
+        start: Start position, in the first box, shape (2,) [m].
+        goal: Goal position, in the last box, shape (2,) [m].
+
+    Returns:
+        As many points as boxes, each of shape (2,) [m].
+
+    Raises:
+        PlanError: If consecutive cores do not overlap, or a box does not join its ends.
+    """
+    layers = [[start], *_candidates(channel.boxes), [goal]]
+    times = np.zeros(1)
+    choices = []
+    for index, box in enumerate(channel.boxes):
+        costs = times[:, None] + _crossing_times(box, layers[index], layers[index + 1])
+        if not np.isfinite(costs).any():
+            raise PlanError(f"cell {index}: no passage joins where it is entered to where it is left")
+        choices.append(np.argmin(costs, axis=0))
+        times = costs.min(axis=0)
+    chosen = [0]
+    for choice in reversed(choices[1:]):
+        chosen.append(int(choice[chosen[-1]]))
+    return tuple(layer[k] for layer, k in zip(layers[1:], reversed(chosen), strict=True))
+
+
+def _crossing_times(box: FreeBox, entries: Sequence[FloatArray], exits: Sequence[FloatArray]) -> FloatArray:
+    """Estimated time from every entry to every exit, infinite where none joins them, (entries, exits) [s]."""
+    if len(entries) == 1 and len(exits) == 1:
+        return np.zeros((1, 1))
+    finder = PassageFinder(box.polygon)
+
+    def time(entry: FloatArray, exit_: FloatArray) -> float:
+        try:
+            passage = finder.find(entry, exit_)
+        except GeometryError:
+            return float("inf")
+        return transition_time(passage.length, passage.neck)
+
+    return np.array([[time(entry, exit_) for exit_ in exits] for entry in entries])
+
+
+def _candidates(boxes: Sequence[FreeBox]) -> list[list[FloatArray]]:
+    """For every overlap its own poles, and those of the neighbouring overlaps that fit into it too."""
+    overlaps = [_parts(first, second, index) for index, (first, second) in enumerate(pairwise(boxes))]
+    own = [[pole(part) for part in parts] for parts in overlaps]
+    layers = [[point for point, _ in poles] for poles in own]
+    for order in (range(1, len(overlaps)), range(len(overlaps) - 2, -1, -1)):
+        before = 1 if order.step == -1 else -1
+        for index in order:
+            _adopt(layers[index], layers[index + before], overlaps[index], [room for _, room in own[index]])
+    return layers
+
+
+def _adopt(
+    layer: list[FloatArray], others: Sequence[FloatArray], parts: Sequence[Polygon], rooms: Sequence[float]
+) -> None:
+    """Add those points of a neighbouring overlap that have enough room in one of the parts."""
+    for point in others:
+        known = any(np.array_equal(point, mine) for mine in layer)
+        fits = any(
+            BoundaryDistance(part)(point) >= ROOM_TO_STAY * room
+            for part, room in zip(parts, rooms, strict=True)
+        )
+        if fits and not known:
+            layer.append(point)
+
+
+def _parts(first: FreeBox, second: FreeBox, index: int) -> list[Polygon]:
+    """Parts of the overlap of two cores that have the most room."""
+    overlap = first.core.intersection(second.core)
+    parts = [part for part in shapely.get_parts(overlap) if isinstance(part, Polygon) and part.area > 0.0]
+    if not parts:
+        raise PlanError(f"cells {index} and {index + 1}: their cores do not overlap")
+    return sorted(parts, key=lambda part: -pole(part)[1])[:LARGEST_PARTS]

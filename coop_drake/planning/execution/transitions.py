@@ -1,0 +1,215 @@
+"""From a channel of free boxes to a plan: tidied cells, targets, goal intervals and gains, (10)-(12)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import cos, pi, sin
+
+import numpy as np
+from shapely import Point, Polygon
+
+from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.plan import Cell, Plan, Transition
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.errors import GeometryError, StallError
+from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.passage import Passage, PassageFinder
+from coop_drake.geometry.slits import component_at
+from coop_drake.geometry.tidy import tidy_cell
+from coop_drake.laws import GainSet, TransitionGains, transition_gains
+from coop_drake.planning.boxes.channel import Channel, FreeBox
+from coop_drake.planning.boxes.shortcuts import without_detours
+from coop_drake.planning.execution.channel_ends import check_ends, goal_intervals, turned_to_start
+from coop_drake.planning.execution.estimate import timed, travel_time
+from coop_drake.planning.execution.targets import choose_targets
+from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.usual_unit import usual_unit
+
+__all__ = ["make_plan", "reschedule"]
+
+NARROWEST = 1e-3
+"""Necks and goal regions below this clearance are refused, of a team of the usual size: the governor would
+crawl [m]."""
+
+ENOUGH = 0.9
+"""The region of the goal need not be wider than this share of the position tolerance [-]."""
+
+DISC_VERTICES = 32
+"""Vertices of the last goal region, inscribed in the disc of the position tolerance."""
+
+SAME_PLACE = 1e-9
+"""Targets closer than this to where a cell is entered leave only angles to move [m]."""
+
+Progress = Callable[[str, float], None]
+Intervals = tuple[FloatArray, FloatArray]
+
+
+def make_plan(
+    problem: PlanningProblem,
+    channel: Channel,
+    gain_set: GainSet,
+    *,
+    gain_set_name: str,
+    targets: Sequence[FloatArray] | None = None,
+    progress: Progress | None = None,
+) -> Plan:
+    """Make a channel ready to be executed.
+
+    Args:
+        problem: What was asked.
+        channel: The boxes that a search found.
+        gain_set: Gains, fixed or to be scheduled.
+        gain_set_name: Name under which the scenario knows them.
+        targets: Where to hand over from each box to the next, the last one the goal; if not given, they are
+            chosen, and boxes that are detours are left out.
+        progress: Called with a stage and the share of it that is done.
+
+    Raises:
+        PlanError: If the channel does not join the start to the goal.
+        StallError: If a passage is too narrow or too slow to be executed; names it.
+    """
+    channel = turned_to_start(channel, problem.start[2])
+    start, goal = problem.start[:2], problem.goal_pose[:2]
+    check_ends(problem, channel)
+    if targets is None:
+        channel = without_detours(channel)
+        targets = choose_targets(channel, start, goal)
+    entries = (start, *targets[:-1])
+    cells = []
+    for index, (box, entry, target) in enumerate(zip(channel.boxes, entries, targets, strict=True)):
+        cells.append(_cell(box, entry, target, index))
+        if progress is not None:
+            progress("tidying", (index + 1) / len(targets))
+    ways, transitions, resting = [], [], problem.start[2:]
+    for index, (entry, target) in enumerate(zip(entries, targets, strict=True)):
+        goals = goal_intervals(problem, channel, index)
+        ways.append(_way(problem, cells[index : index + 2], entry, target, index))
+        transitions.append(_transition(gain_set, cells[index], ways[-1], goals, resting))
+        resting = 0.5 * (goals[0] + goals[1])
+    made = Plan(
+        cells=tuple(cells),
+        transitions=tuple(transitions),
+        start=problem.start.copy(),
+        goal_pose=np.array([*goal, channel.goal_angle]),
+        goal_joints=problem.goal_joints,
+        joint_names=tuple(joint.name for joint in problem.tree.joints),
+        margin=channel.margin,
+        gain_set=gain_set_name,
+        problem=problem_digest(problem),
+    )
+    return _timed(problem, made, ways)
+
+
+def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
+    """Give a plan the gains of another gain set.
+
+    Args:
+        plan: The plan.
+        gain_set: Gains, fixed or to be scheduled.
+        name: Name under which the scenario knows them.
+    """
+    resting = plan.start[2:]
+    transitions = []
+    for cell, transition in zip(plan.cells, plan.transitions, strict=True):
+        goals = (transition.goal_lower, transition.goal_upper)
+        gains = _gains(gain_set, cell, transition.neck, goals, resting)
+        transitions.append(replace(transition, gains=gains))
+        resting = 0.5 * (transition.goal_lower + transition.goal_upper)
+    return timed(replace(plan, transitions=tuple(transitions), gain_set=name))
+
+
+@dataclass(frozen=True)
+class _Way:
+    """What a transition knows about positions."""
+
+    target: FloatArray
+    region: Polygon
+    inradius: float
+    passage: Passage
+
+
+def _way(
+    problem: PlanningProblem, cells: Sequence[Cell], entry: FloatArray, target: FloatArray, index: int
+) -> _Way:
+    """The way from entry to target in the first cell; the second one, if any, is entered there."""
+    here = cells[0].tidied
+    if len(cells) > 1:
+        region = component_at(here.intersection(cells[1].tidied), Point(target))
+    else:
+        region = component_at(_disc(target, problem.position_tolerance).intersection(here), Point(target))
+    inradius = 0.0 if region.is_empty else BoundaryDistance(region)(target)
+    way = _Way(target, region, inradius, PassageFinder(here).find(entry, target))
+    narrowest = NARROWEST * usual_unit(problem.tree)
+    wanted = narrowest if len(cells) > 1 else min(narrowest, ENOUGH * problem.position_tolerance)
+    if inradius < wanted or way.passage.neck < narrowest:
+        seconds = travel_time(way.passage.length, way.passage.neck)
+        raise StallError(_stall(problem, index, way, seconds))
+    return way
+
+
+def _timed(problem: PlanningProblem, plan: Plan, ways: Sequence[_Way]) -> Plan:
+    """The plan with estimated times, if all of them are accepted."""
+    plan = timed(plan, [way.passage.path for way in ways])
+    for index, (way, transition) in enumerate(zip(ways, plan.transitions, strict=True)):
+        if transition.estimated_time > problem.settings.max_transition_time:
+            raise StallError(_stall(problem, index, way, transition.estimated_time))
+    return plan
+
+
+def _transition(
+    gain_set: GainSet, cell: Cell, way: _Way, goals: Intervals, resting: FloatArray
+) -> Transition:
+    """A transition whose time is not estimated yet."""
+    return Transition(
+        target=way.target,
+        goal_region=way.region,
+        goal_lower=goals[0],
+        goal_upper=goals[1],
+        inradius=way.inradius,
+        neck=way.passage.neck,
+        length=way.passage.length,
+        estimated_time=0.0,
+        only_angles=bool(way.passage.length <= SAME_PLACE),
+        gains=_gains(gain_set, cell, way.passage.neck, goals, resting),
+    )
+
+
+def _stall(problem: PlanningProblem, index: int, way: _Way, seconds: float) -> str:
+    passage = way.passage
+    x, y = passage.narrowest
+    narrowest = NARROWEST * usual_unit(problem.tree)
+    return (
+        f"cell {index}: the object's passage through ({x:.3f}, {y:.3f}) is {2e3 * passage.neck:.1f} mm "
+        f"wide and {passage.length:.2f} m long, about {seconds:.0f} s, and its target "
+        f"({way.target[0]:.3f}, {way.target[1]:.3f}) has {1e3 * way.inradius:.1f} mm around it; expected "
+        f"at least {2e3 * narrowest:g} mm and {1e3 * narrowest:g} mm, and at most "
+        f"{problem.settings.max_transition_time:.0f} s"
+    )
+
+
+def _cell(box: FreeBox, entry: FloatArray, target: FloatArray, index: int) -> Cell:
+    try:
+        tidied = tidy_cell(box.polygon, (entry, target))
+    except GeometryError as error:
+        raise StallError(f"cell {index}: {error}") from error
+    return Cell(box.polygon, box.core, tidied, box.lower, box.upper)
+
+
+def _gains(
+    gain_set: GainSet, cell: Cell, neck: float, goal: Intervals, resting: FloatArray
+) -> TransitionGains:
+    return transition_gains(
+        gain_set,
+        neck=neck,
+        slice_lower=cell.lower,
+        slice_upper=cell.upper,
+        goal_lower=goal[0],
+        goal_upper=goal[1],
+        resting=resting,
+    )
+
+
+def _disc(centre: FloatArray, radius: float) -> Polygon:
+    angles = [2.0 * pi * k / DISC_VERTICES for k in range(DISC_VERTICES)]
+    return Polygon([(centre[0] + radius * cos(angle), centre[1] + radius * sin(angle)) for angle in angles])

@@ -1,0 +1,218 @@
+"""Other boxes for a channel: along the same way, but such that the transport takes less time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil, sqrt
+
+import numpy as np
+
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.minkowski import to_polygon
+from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.laws import FixedGains, GainSet
+from coop_drake.laws.governor import ATTRACTION_RATE
+from coop_drake.planning.boxes.box_kernels import BoxArrays, padded
+from coop_drake.planning.boxes.boxes import Regions
+from coop_drake.planning.boxes.certify import PathBox, box_arrays
+from coop_drake.planning.boxes.channel import Channel, FreeBox
+from coop_drake.planning.cells.slices import nearest_turn
+from coop_drake.planning.execution.channel_ends import final_intervals
+from coop_drake.planning.improvement.box_choice import Course, choose_boxes, fits
+from coop_drake.planning.improvement.box_crossing import Schedule
+from coop_drake.planning.questions.margins import shrunk
+from coop_drake.planning.sampling.obstacle_grid import Walls, walls_under
+from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.usual_unit import usual_unit
+
+__all__ = ["Resliced", "resliced"]
+
+LENGTH_STEP, ANGLE_STEP = 0.3, 0.15
+"""Waypoints lie no farther apart than this [m, rad or m]."""
+
+
+HALVINGS = 6
+"""So often the stretch between two waypoints is halved until a box holds both."""
+
+PADS = (0.005, 0.015, 0.03, 0.06)
+"""Boxes are padded by one of these in every angle and joint [rad or m]."""
+
+NARROW_PADS = (0.001, 0.003, 0.01, 0.03)
+"""And by one of these where a box padded by the least of the others does not hold two waypoints."""
+
+LEVELS = ((0.3, PADS), (0.1, PADS), (0.1, NARROW_PADS))
+"""Shares of the margin that was found that waypoints keep [-], and paddings; tried in this order."""
+
+LEAST = 2e-3
+"""Waypoints keep at least this clearance, of a team of the usual size [m]."""
+
+CORE_SHARE = 0.9
+"""Share of the waypoints' clearance that cores keep, so that waypoints lie well inside [-]."""
+
+REPAIRS = 3
+"""So often a chain is chosen again because boxes of it could not be proved."""
+
+
+@dataclass(frozen=True)
+class Resliced:
+    """Boxes, and where to hand over from each to the next.
+
+    Attributes:
+        channel: The boxes.
+        targets: A point for every box, in it and in the next one, the last one the goal, each (2,) [m].
+    """
+
+    channel: Channel
+    targets: tuple[FloatArray, ...]
+
+
+def resliced(problem: PlanningProblem, way: FloatArray, margin: float, gain_set: GainSet) -> Resliced | None:
+    """Lay boxes along a way anew: merged where that saves hand-overs, narrow where clearance saves time.
+
+    Which boxes is decided by a compiled simulation of the closed loop; whether they are free is proved as in
+    the search, by over-sweeps and Minkowski differences at margin zero, and a box that is not is not used.
+
+    Args:
+        problem: What was asked.
+        way: Free configurations from start to goal, theta unwrapped, shape (m, 3 + n).
+        margin: The margin that was found [m].
+        gain_set: Gains, fixed or to be scheduled.
+
+    Returns:
+        The boxes, or None where no chain of such boxes exists.
+    """
+    swept = SweptTree(problem.tree)
+    pairs = BodyPairs(swept)
+    floor = shrunk(problem.workspace, 0.0)
+    boxes, walls = box_arrays(swept, pairs), walls_under(floor, problem.tree.reach)
+    angle = float(way[-1, 2] + nearest_turn(float(problem.goal_pose[2] - way[-1, 2])))
+    goals = np.array(final_intervals(problem, angle))
+    smallest = LEAST * usual_unit(problem.tree)
+    # At a small margin levels are the same: each is tried once.
+    for least, pads in dict.fromkeys((max(share * margin, smallest), pads) for share, pads in LEVELS):
+        points = _waypoints(boxes, walls, way, least, pads[0])
+        if points is None:
+            continue
+        places = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
+        course = Course(
+            boxes, walls, points, places, np.array(pads), goals, schedule_of(gain_set), least,
+            problem.position_tolerance,
+        )  # fmt: skip
+        found = _chain(course, Regions(problem, swept, pairs, CORE_SHARE * least))
+        if found is not None:
+            free, ends = found
+            targets = (*(points[j, :2] for j in ends[:-1]), problem.goal_pose[:2])
+            return Resliced(Channel(tuple(free), CORE_SHARE * least, angle), targets)
+    return None
+
+
+def _waypoints(
+    boxes: BoxArrays, walls: Walls, way: FloatArray, least: float, pad: float
+) -> FloatArray | None:
+    """Waypoints evenly along a way, closer where that is needed for boxes to hold neighbours, (n, 3 + m).
+
+    None if some two neighbours are not held by a box however close they are.
+    """
+    moves = np.abs(np.diff(way, axis=0))
+    paces = np.hypot(moves[:, 0], moves[:, 1]) / LENGTH_STEP, moves[:, 2:].max(axis=1) / ANGLE_STEP
+    at = np.concatenate([[0.0], np.cumsum(np.maximum(*paces))])
+
+    def configuration(s: float) -> FloatArray:
+        return np.array([np.interp(s, at, column) for column in way.T])
+
+    def between(first: float, last: float, halvings: int) -> list[FloatArray] | None:
+        """Waypoints after the first place up to the last."""
+        pair = np.stack([configuration(first), configuration(last)])
+        lower, upper = padded(boxes, pair, pad)
+        if fits(boxes, walls, lower, upper, pair[:, :2].copy(), least):
+            return [pair[1]]
+        if halvings == 0:
+            return None
+        middle = 0.5 * (first + last)
+        one = between(first, middle, halvings - 1)
+        other = None if one is None else between(middle, last, halvings - 1)
+        return None if one is None or other is None else one + other
+
+    stops = np.linspace(0.0, at[-1], max(1, ceil(at[-1])) + 1)
+    points = [way[0]]
+    for first, last in pairwise(stops.tolist()):
+        held = between(first, last, HALVINGS)
+        if held is None:
+            return None
+        points += held
+    return np.array(points)
+
+
+def _chain(course: Course, regions: Regions) -> tuple[list[FreeBox], list[int]] | None:
+    """The quickest chain of which every box is proved, and the waypoint where each ends."""
+    n = len(course.way)
+    banned = np.zeros((n, n, len(course.pads)))
+    for _ in range(1 + REPAIRS):
+        _, rows = choose_boxes(course, banned)
+        if not len(rows):
+            return None
+        free = [_proved(course, regions, first, last, pad) for first, last, pad in rows]
+        proved = [box for box in free if box is not None]
+        if len(proved) == len(rows):
+            return proved, rows[:, 1].tolist()
+        for (first, last, pad), box in zip(rows, free, strict=True):
+            banned[first, last, pad] = float(box is None)
+    return None
+
+
+def _proved(course: Course, regions: Regions, first: int, last: int, pad: int) -> FreeBox | None:
+    """The box of a stretch of the way if over-sweeps prove a region free that holds both its ends."""
+    part, width = course.way[first : last + 1], course.pads[pad]
+    lower = np.maximum(course.boxes.lower, part[:, 2:].min(axis=0) - width)
+    upper = np.minimum(course.boxes.upper, part[:, 2:].max(axis=0) + width)
+    intervals = tuple(zip(lower.tolist(), upper.tolist(), strict=True))
+    box = regions.around(PathBox(intervals, part[:, :2].copy()))
+    if box is None:
+        return None
+    return FreeBox(to_polygon(box.full.section), to_polygon(box.core.section), lower, upper)
+
+
+def schedule_of(gain_set: GainSet) -> Schedule:
+    """The numbers of a gain set, fixed gains as a schedule whose bounds are equal."""
+    if isinstance(gain_set, FixedGains):
+        root = sqrt(gain_set.stiffness)
+        rates = [[gain_set.angle_decay_rate] * 2, [gain_set.joint_decay_rate] * 2]
+        return _schedule(
+            gain_set, (0.0, gain_set.stiffness, gain_set.stiffness),
+            (gain_set.damping / root, gain_set.governor_gain / root), (0.0, rates),
+            (gain_set.log_gain, np.inf),
+        )  # fmt: skip
+    rates = [[gain_set.min_decay_rate, gain_set.max_decay_rate]] * 2
+    return _schedule(
+        gain_set, (gain_set.wall_stiffness, gain_set.min_stiffness, gain_set.max_stiffness),
+        (gain_set.damping_factor, gain_set.governor_factor), (gain_set.funnel_acceleration, rates),
+        (gain_set.max_log_gain, gain_set.log_acceleration),
+    )  # fmt: skip
+
+
+def _schedule(
+    gain_set: GainSet,
+    stiffness: tuple[float, float, float],
+    factors: tuple[float, float],
+    decay: tuple[float, Sequence[Sequence[float]]],
+    log_gains: tuple[float, float],
+) -> Schedule:
+    return Schedule(
+        wall_stiffness=stiffness[0],
+        stiffness=np.array(stiffness[1:]),
+        damping=factors[0],
+        governor=factors[1],
+        smoothing=gain_set.smoothing,
+        attraction=ATTRACTION_RATE,
+        smooth=gain_set.funnel == "smooth",
+        acceleration=decay[0],
+        decay=np.array(decay[1], dtype=float),
+        log_gain=log_gains[0],
+        log_acceleration=log_gains[1],
+        position_gain=gain_set.position_gain,
+        rate_gain=gain_set.rate_gain,
+        allowance=gain_set.energy_allowance,
+    )

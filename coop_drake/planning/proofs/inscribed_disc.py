@@ -1,0 +1,89 @@
+"""The free-flyer relaxation: where a disc inside the team cannot get from start to goal, nobody can."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import pi
+
+import numpy as np
+import shapely
+from shapely import Point, Polygon
+from shapely.geometry.base import BaseGeometry
+
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.proof import DiscSeparation
+from coop_drake.geometry.convex import normals
+from coop_drake.geometry.minkowski import FreeSpace, to_polygon
+from coop_drake.geometry.sweep_kernels import over_piece
+from coop_drake.geometry.swept_tree import Piece, sweep_arrays
+from coop_drake.planning.cells.cells import regions_of
+from coop_drake.planning.proofs.proof_making import disc_separation
+from coop_drake.tree.component_tree import ComponentTree, ConvexShape
+from coop_drake.tree.pose import FloatArray
+
+_DIRECTIONS = normals(np.arange(0.0, 32.0) * (pi / 16.0))
+_INSIDE = 1.0 - 1e-9
+
+
+def disc_refuted(problem: PlanningProblem) -> DiscSeparation | None:
+    """Look for a disc of the team whose centre start and goal put into different parts of the floor.
+
+    Args:
+        problem: The question, whose margin is zero.
+
+    Returns:
+        The proof, or None where every disc gets through.
+    """
+    space = FreeSpace.over(problem.workspace)
+    for component, disc in _discs(problem.tree):
+        centre, radius = disc.vertices[0], disc.radius
+        regions = regions_of(space.minus(radius * _INSIDE * _DIRECTIONS), over=True)
+        start = problem.tree.poses(problem.start)[component].apply(disc.vertices)[0]
+        goals = _places(problem, component, centre)
+        reached = [to_polygon(region.section) for region in regions if region.holds(start)]
+        if not any(polygon.intersects(goals) for polygon in reached):
+            found = disc_separation(component, centre, radius, regions, start, goals)
+            if found is not None:
+                return found
+    return None
+
+
+def _discs(tree: ComponentTree) -> Iterator[tuple[int, ConvexShape]]:
+    """The largest disc inside every convex piece, with its component."""
+    for index, component in enumerate(tree.components):
+        for body in component.bodies:
+            for shape in body.shapes:
+                disc = inscribed_disc(shape)
+                if disc.radius > 0.0:
+                    yield index, disc
+
+
+def inscribed_disc(shape: ConvexShape) -> ConvexShape:
+    """A disc inside a convex shape, as large as one fits; of radius 0 where there is none."""
+    if len(shape.vertices) < 3:
+        return ConvexShape(shape.vertices.mean(axis=0, keepdims=True), shape.radius)
+    ring = Polygon(shape.vertices)
+    pole = shapely.maximum_inscribed_circle(ring, tolerance=1e-4)
+    centre = np.asarray(pole.coords[0])
+    return ConvexShape(centre[None, :], float(ring.exterior.distance(Point(centre))) + shape.radius)
+
+
+def _places(problem: PlanningProblem, component: int, centre: FloatArray) -> BaseGeometry:
+    """All places in W where a point of a component may be at the goal, enclosed."""
+    tree = problem.tree
+    chain = tree.ancestors[component]
+    joints = [tree.components[i].joint for i in chain]
+    axes = (*[1 + joint.index for joint in joints if joint is not None], 0)
+    piece = Piece(component, 0, ConvexShape(centre[None, :]), chain, axes)
+    angle = float(problem.goal_pose[2])
+    bounds = np.array(
+        [(angle, angle)]
+        + [
+            (joint.lower, joint.upper) if goal is None else (goal, goal)
+            for joint, goal in zip(tree.joints, problem.goal_joints, strict=True)
+        ]
+    )
+    ring = over_piece(
+        sweep_arrays(tree, (piece,)), 0, bounds[:, 0].copy(), bounds[:, 1].copy(), len(axes), False
+    )
+    return shapely.MultiPoint(ring + problem.goal_pose[:2]).convex_hull

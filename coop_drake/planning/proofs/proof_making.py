@@ -1,0 +1,177 @@
+"""From an exploration that ended without a channel to a proof that can be checked again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
+
+import numpy as np
+import shapely
+from shapely import Point, Polygon
+from shapely.errors import ShapelyError
+from shapely.geometry.base import BaseGeometry
+
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.proof import (
+    BlockedGoal,
+    DiscSeparation,
+    OverCell,
+    OverSlice,
+    SliceSeparation,
+)
+from coop_drake.geometry.minkowski import to_polygon
+from coop_drake.geometry.swept_tree import Intervals
+from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.slices import Slices
+from coop_drake.tree.pose import FloatArray
+
+Found = TypeVar("Found")
+
+__all__ = ["blocked_goal_proof", "disc_separation", "slice_separation"]
+
+GROWTHS = (1e-3, 1e-4, 1e-5, 0.0, -5e-7)
+"""Cells are grown by the first of these that keeps start and goal apart: the more, the quicker the check [m].
+
+The last one takes back half of the hair by which the planner grows them, for cells that merely touch.
+"""
+
+
+def slice_separation(
+    question: PlanningProblem, robots: Sequence[int], slices: Slices, regions: Mapping[int, Sequence[Region]]
+) -> SliceSeparation | None:
+    """State an exploration's leaves and over-cells as a proof.
+
+    Args:
+        question: The question that was explored, with the kept robots only.
+        robots: Indices of these robots in the whole team.
+        slices: The subdivision.
+        regions: Over-cells of every leaf by its id.
+
+    Returns:
+        The proof, or None where none can be stated: the cells all but touch, or geometry fails.
+    """
+    leaves = slices.leaves()
+    joined = {
+        leaf: [other for other in sorted(slices.all[leaf].neighbours) if other > leaf] for leaf in leaves
+    }
+    starts = set(slices.holding([float(angle) for angle in question.start[2:]]))
+    goals = set(slices.holding([float(question.goal_pose[2]), *question.goal_joints]))
+
+    def separated(growth: float) -> dict[int, list[OverCell]] | None:
+        cells = {leaf: _grown(regions[leaf], growth) for leaf in leaves}
+        labels = _reached(cells, joined, starts, Point(question.start[:2]))
+        goal = Point(question.goal_pose[:2])
+        if any(
+            label and cell.intersects(goal)
+            for leaf in goals
+            for cell, label in zip(cells[leaf], labels[leaf], strict=True)
+        ):
+            return None
+        return {leaf: list(map(OverCell, cells[leaf], labels[leaf])) for leaf in leaves}
+
+    found = _first(separated)
+    if found is None:
+        return None
+    boxes = [(slices.all[leaf].intervals, found[leaf]) for leaf in leaves]
+    return SliceSeparation(tuple(robots), tuple(_slice(intervals, cells) for intervals, cells in boxes))
+
+
+def disc_separation(
+    component: int,
+    centre: FloatArray,
+    radius: float,
+    regions: Sequence[Region],
+    start: FloatArray,
+    goals: BaseGeometry,
+) -> DiscSeparation | None:
+    """State the regions between which a disc cannot pass as a proof.
+
+    Args:
+        component: The component that the disc lies in.
+        centre: Its centre in the component's frame, shape (2,) [m].
+        radius: Its radius [m].
+        regions: Over-approximation of the positions in W at which the disc fits.
+        start: Where the centre is at the start, shape (2,) [m].
+        goals: All places where the centre may be at the goal.
+
+    Returns:
+        The proof, or None where the regions touch so closely that none can be stated.
+    """
+
+    def separated(growth: float) -> list[OverCell] | None:
+        cells = _grown(regions, growth)
+        labels = [cell.intersects(Point(start)) for cell in cells]
+        if any(label and cell.intersects(goals) for cell, label in zip(cells, labels, strict=True)):
+            return None
+        return list(map(OverCell, cells, labels))
+
+    found = _first(separated)
+    return None if found is None else DiscSeparation(component, centre, radius, tuple(found))
+
+
+def blocked_goal_proof(robots: Sequence[int], boxes: Sequence[Intervals]) -> BlockedGoal:
+    """State boxes of angles at the goal, in all of which the team collides, as a proof.
+
+    Args:
+        robots: Robots that are kept.
+        boxes: They cover the free joints' limits, with the goal's theta and joints on the other axes.
+    """
+    return BlockedGoal(tuple(robots), tuple(_slice(intervals, []) for intervals in sorted(boxes)))
+
+
+def _first(separated: Callable[[float], Found | None]) -> Found | None:
+    for growth in GROWTHS:
+        try:
+            found = separated(growth)
+        except (ShapelyError, ValueError):
+            continue
+        if found is not None:
+            return found
+    return None
+
+
+def _slice(intervals: Intervals, cells: Sequence[OverCell]) -> OverSlice:
+    bounds = np.array(intervals, dtype=float).reshape(-1, 2)
+    return OverSlice(bounds[:, 0].copy(), bounds[:, 1].copy(), tuple(cells))
+
+
+def _grown(regions: Sequence[Region], growth: float) -> list[Polygon]:
+    """Components of some regions grown by a length, in a fixed order."""
+    polygons = [shapely.make_valid(to_polygon(region.section)) for region in regions]
+    grown = shapely.union_all([polygon.buffer(growth, join_style="mitre") for polygon in polygons])
+    parts = [part for part in shapely.get_parts(grown) if isinstance(part, Polygon) and part.area > 0.0]
+    return sorted(parts, key=lambda part: (part.bounds, part.area))
+
+
+def _reached(
+    cells: Mapping[int, Sequence[Polygon]],
+    joined: Mapping[int, Sequence[int]],
+    starts: set[int],
+    start: Point,
+) -> dict[int, list[bool]]:
+    """Which cells a chain of touching cells of neighbouring leaves joins to the start."""
+    flat = [(leaf, i) for leaf in cells for i in range(len(cells[leaf]))]
+    place = {entry: k for k, entry in enumerate(flat)}
+    pairs = np.array(
+        [
+            (place[leaf, i], place[other, j])
+            for leaf, others in joined.items()
+            for other in others
+            for i in range(len(cells[leaf]))
+            for j in range(len(cells[other]))
+        ],
+        dtype=np.int64,
+    ).reshape(-1, 2)
+    polygons = np.array([cells[leaf][i] for leaf, i in flat], dtype=object)
+    touching = pairs[shapely.intersects(polygons[pairs[:, 0]], polygons[pairs[:, 1]])]
+    neighbours: list[list[int]] = [[] for _ in flat]
+    for a, b in touching:
+        neighbours[a].append(int(b))
+        neighbours[b].append(int(a))
+    left = [k for k, (leaf, _) in enumerate(flat) if leaf in starts and polygons[k].intersects(start)]
+    reached = set(left)
+    while left:
+        onwards = [k for k in neighbours[left.pop()] if k not in reached]
+        reached.update(onwards)
+        left += onwards
+    return {leaf: [place[leaf, i] in reached for i in range(len(cells[leaf]))] for leaf in cells}

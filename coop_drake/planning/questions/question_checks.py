@@ -1,0 +1,65 @@
+"""What a question must satisfy before it is searched: numbers that mean something, joints within limits."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from coop_drake.answers.problem import ROUNDING, PlanningProblem
+from coop_drake.errors import PlanError
+from coop_drake.tree.component_tree import TreeJoint
+from coop_drake.tree.pose import FloatArray
+
+__all__ = ["check_question", "goal_beyond_limits"]
+
+
+def check_question(problem: PlanningProblem) -> None:
+    """Refuse a question that cannot be meant.
+
+    Raises:
+        PlanError: Names the entry, its value and what is allowed.
+    """
+    joints = problem.tree.joints
+    _check_numbers("start", problem.start, 3 + len(joints), "x, y, theta and every joint")
+    _check_numbers("goal_pose", problem.goal_pose, 3, "x, y and theta")
+    if len(problem.goal_joints) != len(joints):
+        raise PlanError(
+            f"goal_joints: {list(problem.goal_joints)} is not allowed; expected {len(joints)} entries, a "
+            f"value or None for every joint"
+        )
+    if not np.isfinite(shapely.get_coordinates(problem.workspace)).all():
+        raise PlanError("workspace: has corners that are not allowed; expected finite numbers")
+    for joint in joints:
+        if not -np.inf < joint.lower <= joint.upper < np.inf:
+            raise PlanError(
+                f"limits of {joint.name}: [{joint.lower}, {joint.upper}] are not allowed; expected two "
+                f"finite limits, the lower one first; a revolute joint without limits has [-pi, pi]"
+            )
+        start, goal = float(problem.start[3 + joint.index]), problem.goal_joints[joint.index]
+        if not _within(start, joint):
+            raise PlanError(
+                f"start: {start} of {joint.name} is not allowed; expected a value within its limits "
+                f"[{joint.lower}, {joint.upper}]"
+            )
+        if goal is not None and not np.isfinite(goal):
+            raise PlanError(f"goal_joints: {goal} of {joint.name} is not allowed; expected a finite number")
+
+
+def goal_beyond_limits(problem: PlanningProblem) -> str | None:
+    """Which joint has a goal beyond its limits, in words; None if all can get there."""
+    for joint in problem.tree.joints:
+        goal = problem.goal_joints[joint.index]
+        if goal is not None and not _within(goal, joint):
+            return f"at the goal {joint.name} is {goal}, beyond its limits [{joint.lower}, {joint.upper}]"
+    return None
+
+
+def _check_numbers(key: str, values: FloatArray, count: int, names: str) -> None:
+    if np.shape(values) != (count,) or not np.isfinite(values).all():
+        raise PlanError(
+            f"{key}: {np.asarray(values).tolist()} is not allowed; expected {count} finite numbers: {names}"
+        )
+
+
+def _within(value: float, joint: TreeJoint) -> bool:
+    return joint.lower - ROUNDING <= value <= joint.upper + ROUNDING

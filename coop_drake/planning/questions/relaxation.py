@@ -1,0 +1,45 @@
+"""Relaxations: the same question with fewer robots; what is infeasible for them is infeasible for all."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.tree.component_tree import Component, ComponentTree
+
+
+def relaxed(problem: PlanningProblem, robots: Collection[int]) -> tuple[PlanningProblem, tuple[int, ...]]:
+    """Leave out what moves against the object of every other robot.
+
+    Args:
+        problem: The whole question.
+        robots: Robots whose arms and bases stay; what is welded to the object stays in any case.
+
+    Returns:
+        The relaxed question, and for each of its joints the index of that joint in the whole q.
+    """
+    tree = problem.tree
+    kept = [
+        index
+        for index, component in enumerate(tree.components)
+        if component.joint is None or component.joint.robot in robots
+    ]
+    joints = [joint.index for joint in tree.joints if joint.robot in robots]
+    components = tuple(_renumbered(tree.components[index], kept, joints) for index in kept)
+    question = replace(
+        problem,
+        tree=ComponentTree(components, tree.sharing_joint),
+        start=np.concatenate((problem.start[:3], problem.start[3:][joints])),
+        goal_joints=tuple(problem.goal_joints[index] for index in joints),
+    )
+    return question, tuple(joints)
+
+
+def _renumbered(component: Component, kept: list[int], joints: list[int]) -> Component:
+    if component.joint is None or component.parent is None:
+        return component
+    joint = replace(component.joint, index=joints.index(component.joint.index))
+    return replace(component, parent=kept.index(component.parent), joint=joint)

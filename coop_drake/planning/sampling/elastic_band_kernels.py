@@ -1,0 +1,132 @@
+"""Compiled improvement of candidate paths: shorter in every axis, further from the walls."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coop_drake.compiled import compiled
+from coop_drake.planning.sampling.collision_kernels import bodies_apart, place, wall_clearance
+from coop_drake.planning.sampling.obstacle_grid import Walls
+from coop_drake.planning.sampling.team_arrays import TeamArrays
+from coop_drake.tree.pose import FloatArray
+
+STRIDES = (7, 3, 5, 1, 6, 2, 4, 0)
+"""Order in which samples of a move are looked at, each time every eighth one."""
+
+
+@compiled
+def _price(team: TeamArrays, walls: Walls, z: FloatArray, gap: float, rate: FloatArray) -> float:
+    """Price of a sample: inverse to its clearance up to a limit, infinite where it is not free."""
+    poses = place(team, z)
+    clearance = wall_clearance(team, walls, poses, rate[2])
+    if clearance <= 0.0 or not bodies_apart(team, poses, gap):
+        return np.inf
+    price: float = rate[0] / (rate[1] + clearance)
+    return price
+
+
+@compiled
+def improve(
+    team: TeamArrays,
+    walls: Walls,
+    rate: FloatArray,
+    path: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    scale: FloatArray,
+    weights: FloatArray,
+    gap: float,
+    free_end: bool,
+    uniforms: FloatArray,
+) -> FloatArray:
+    """Lower the cost of a path move by move: bumps and straightenings of one axis over a window.
+
+    The cost is the length in the sum of all weighted axes plus a price for every sample by its clearance.
+
+    Args:
+        team: The team.
+        walls: The floor that the path stays on.
+        rate: A sample with clearance c costs rate[0] / (rate[1] + min(c, rate[2])).
+        path: Samples, close together, shape (m, d).
+        lower: Lower limits, shape (d,); minus infinity where there is none.
+        upper: Upper limits, shape (d,).
+        scale: How far a unit of each axis moves the team, shape (d,).
+        weights: What a unit of each axis costs, shape (d,).
+        gap: Distance that pairs of bodies must keep [m].
+        free_end: Whether the joints of the last sample may move.
+        uniforms: Random numbers in [0, 1), one row for each move, shape (k, 5).
+    """
+    path = path.copy()
+    count, size = path.shape
+    cost = np.empty(count)
+    least = rate[0] / (rate[1] + rate[2])
+    for k in range(count):
+        cost[k] = _price(team, walls, path[k], gap, rate)
+    fresh = np.empty((count, size))
+    fresh_cost = np.empty(count)
+    for row in range(len(uniforms)):
+        u = uniforms[row]
+        axis = int(u[0] * size)
+        half = 1 << int(u[1] * 7.0)
+        middle = 1 + int(u[2] * (count - 1))
+        last_free = free_end and axis > 2
+        i = max(0, middle - half)
+        j = min(count if last_free else count - 1, middle + half)
+        if j - i < 2:
+            continue
+        straight = u[3] < 0.5
+        shift = (2.0 * u[4] - 1.0) * 0.3 / scale[axis]
+        change = 0.0
+        for k in range(i + 1, j):
+            share = (k - i) / (j - i)
+            value = path[k, axis]
+            if straight:
+                end = path[j, axis] if j < count else path[i, axis]
+                value = path[i, axis] + share * (end - path[i, axis])
+            elif j == count:
+                value += shift * min(1.0, 2.0 * share)
+            else:
+                value += shift * min(1.0, 3.0 * min(share, 1.0 - share))
+            fresh[k] = path[k]
+            fresh[k, axis] = min(upper[axis], max(lower[axis], value))
+            change += weights[axis] * abs(
+                fresh[k, axis] - (path[k - 1, axis] if k == i + 1 else fresh[k - 1, axis])
+            )
+            change -= weights[axis] * abs(path[k, axis] - path[k - 1, axis])
+        if j < count:
+            change += weights[axis] * (
+                abs(path[j, axis] - fresh[j - 1, axis]) - abs(path[j, axis] - path[j - 1, axis])
+            )
+        for k in range(i + 1, j):
+            change += least - cost[k]
+        # Most moves fail: samples far apart from each other tell so soonest.
+        for first in STRIDES:
+            for k in range(i + 1 + first, j, len(STRIDES)):
+                if change >= -1e-9:
+                    break
+                fresh_cost[k] = _price(team, walls, fresh[k], gap, rate)
+                change += fresh_cost[k] - least
+        if change < -1e-9:
+            for k in range(i + 1, j):
+                path[k] = fresh[k]
+                cost[k] = fresh_cost[k]
+    return path
+
+
+@compiled
+def clearances(team: TeamArrays, walls: Walls, path: FloatArray, most: float) -> FloatArray:
+    """Distance of the team from the walls at every sample, at most ``most``; -1 where it meets one.
+
+    Args:
+        team: The team.
+        walls: The floor.
+        path: Configurations, shape (m, 3 + n).
+        most: Distances above this one do not matter [m].
+
+    Returns:
+        Distances, shape (m,) [m].
+    """
+    result = np.empty(len(path))
+    for k in range(len(path)):
+        result[k] = wall_clearance(team, walls, place(team, path[k]), most)
+    return result

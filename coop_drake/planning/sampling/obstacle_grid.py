@@ -1,0 +1,181 @@
+"""The walls near any place, for the compiled checks: a grid whose squares list their edges, nearest first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+from shapely import MultiPolygon, Polygon
+
+from coop_drake.compiled import compiled
+from coop_drake.geometry.convex import following
+from coop_drake.geometry.minkowski import FreeSpace, polygon_rings
+from coop_drake.geometry.sweep_kernels import IntArray
+from coop_drake.planning.sampling.team_arrays import TeamArrays
+from coop_drake.tree.pose import FloatArray
+
+FAR = 0.2
+"""Distances from walls that are larger than this one do not matter [m]."""
+
+_MOST_SQUARES = 40_000
+_SQUARES_PER_REACH = 6.0
+_OFF_THE_EDGES = np.array([0.317, 0.291])  # Middles of squares must not lie on walls; these hardly ever do.
+
+
+class Walls(NamedTuple):
+    """Edges of a floor and a grid over it, E edges, S squares, L entries in all lists.
+
+    Attributes:
+        edges: Edges (x0, y0, x1, y1) of closed rings, shape (E, 4) [m].
+        corner: Lower corner of the grid, shape (2,) [m].
+        side: Side of a square [m].
+        rows: Number of squares along y.
+        columns: Number of squares along x.
+        reach: The lists hold every edge that comes this close to a point of their square [m].
+        first: Where each square's list begins, squares along y first, shape (S + 1,).
+        listed: Edges, nearest to the square's middle first, shape (L,).
+        away: Their distances from that middle, shape (L,) [m].
+        inside: Whether the middle of a square lies on the floor, shape (S,).
+    """
+
+    edges: FloatArray
+    corner: FloatArray
+    side: float
+    rows: int
+    columns: int
+    reach: float
+    first: IntArray
+    listed: IntArray
+    away: FloatArray
+    inside: IntArray
+
+
+def walls_near(rings: Sequence[FloatArray], reach: float) -> Walls:
+    """Lay a grid over a floor.
+
+    Args:
+        rings: Closed rings of the floor, holes too, in any direction, shape (n, 2) each [m].
+        reach: How far from a place its walls are wanted [m].
+
+    Returns:
+        The walls; of a floor without rings a grid without squares, on which nothing is inside.
+    """
+    if not rings:
+        none = np.empty(0, np.int64)
+        return Walls(
+            np.empty((0, 4)), np.zeros(2), 1.0, 0, 0, reach, np.zeros(1, np.int64), none, np.empty(0), none
+        )
+    edges = np.concatenate([np.hstack((ring, following(ring))) for ring in rings])
+    ends = edges.reshape(-1, 2)
+    corner, size = ends.min(axis=0), np.ptp(ends, axis=0)
+    side = max(reach / _SQUARES_PER_REACH, sqrt(float(size[0] * size[1]) / _MOST_SQUARES))
+    corner = corner - side * _OFF_THE_EDGES
+    columns, rows = (int(count) + 2 for count in size / side)
+    radius = reach + 0.5 * sqrt(2.0) * side
+    first, listed, away = _lists(edges, corner, side, rows, columns, radius)
+    inside = _insides(edges, corner, side, rows, columns)
+    return Walls(edges, corner, side, rows, columns, reach, first, listed, away, inside)
+
+
+@compiled
+def point_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
+    """Squared distance of a point from a segment."""
+    ux, uy = bx - ax, by - ay
+    length = ux * ux + uy * uy
+    t = 0.0 if length == 0.0 else min(1.0, max(0.0, ((px - ax) * ux + (py - ay) * uy) / length))
+    dx, dy = px - ax - t * ux, py - ay - t * uy
+    return dx * dx + dy * dy
+
+
+@compiled
+def square_at(walls: Walls, x: float, y: float) -> int:
+    """Number of the square that holds a point, -1 if none does."""
+    column, row = np.floor((x - walls.corner[0]) / walls.side), np.floor((y - walls.corner[1]) / walls.side)
+    if column < 0 or row < 0 or column >= walls.columns or row >= walls.rows:
+        return -1
+    return int(column) * walls.rows + int(row)
+
+
+@compiled
+def crosses(ax: float, ay: float, bx: float, by: float, ux: float, uy: float, wx: float, wy: float) -> bool:
+    """Whether segments a-b and u-w cross; an end of u-w on the line of a-b counts for one side of it."""
+    dx, dy = bx - ax, by - ay
+    first, last = dx * (uy - ay) - dy * (ux - ax), dx * (wy - ay) - dy * (wx - ax)
+    if (first > 0.0) == (last > 0.0):
+        return False
+    ex, ey = wx - ux, wy - uy
+    apart: bool = (ex * (ay - uy) - ey * (ax - ux) > 0.0) != (ex * (by - uy) - ey * (bx - ux) > 0.0)
+    return apart
+
+
+@compiled
+def _lists(
+    edges: FloatArray, corner: FloatArray, side: float, rows: int, columns: int, radius: float
+) -> tuple[IntArray, IntArray, FloatArray]:
+    """For each square the edges within a radius of its middle, nearest first."""
+    first = np.zeros(rows * columns + 1, np.int64)
+    fill = np.zeros(1, np.int64)
+    listed, away = np.zeros(0, np.int64), np.zeros(0)
+    for writing in range(2):
+        for e in range(len(edges)):
+            x0, y0, x1, y1 = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+            west = max(0, int((min(x0, x1) - radius - corner[0]) / side))
+            east = min(columns, int((max(x0, x1) + radius - corner[0]) / side) + 1)
+            south = max(0, int((min(y0, y1) - radius - corner[1]) / side))
+            north = min(rows, int((max(y0, y1) + radius - corner[1]) / side) + 1)
+            for column in range(west, east):
+                x = corner[0] + (column + 0.5) * side
+                for row in range(south, north):
+                    y = corner[1] + (row + 0.5) * side
+                    square = column * rows + row
+                    gap = point_segment(x, y, x0, y0, x1, y1)
+                    if gap > radius * radius:
+                        continue
+                    if writing == 0:
+                        first[square + 1] += 1
+                        continue
+                    gap = sqrt(gap)
+                    k = fill[square]
+                    while k > first[square] and away[k - 1] > gap:
+                        away[k], listed[k] = away[k - 1], listed[k - 1]
+                        k -= 1
+                    away[k], listed[k] = gap, e
+                    fill[square] += 1
+        if writing == 0:
+            first = np.cumsum(first)
+            fill = first[:-1].copy()
+            listed, away = np.empty(first[-1], np.int64), np.empty(first[-1])
+    return first, listed, away
+
+
+@compiled
+def _insides(edges: FloatArray, corner: FloatArray, side: float, rows: int, columns: int) -> IntArray:
+    """Whether the middle of each square lies on the floor, by the even-odd rule along its row."""
+    inside = np.zeros(rows * columns, np.int64)
+    for e in range(len(edges)):
+        x0, y0, x1, y1 = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
+        south = max(0, int((min(y0, y1) - corner[1]) / side) - 1)
+        north = min(rows, int((max(y0, y1) - corner[1]) / side) + 1)
+        for row in range(south, north):
+            y = corner[1] + (row + 0.5) * side
+            if (y0 > y) == (y1 > y):
+                continue
+            x = x0 + (y - y0) * (x1 - x0) / (y1 - y0)
+            for column in range(columns):
+                if corner[0] + (column + 0.5) * side < x:
+                    inside[column * rows + row] ^= 1
+                else:
+                    break
+    return inside
+
+
+def walls_for(workspace: Polygon | MultiPolygon, team: TeamArrays) -> Walls:
+    """Lay a grid over a floor, fine and wide enough for a team and for distances up to ``FAR``."""
+    return walls_near(polygon_rings(workspace), float(team.disc[:, 2].max(initial=0.0)) + FAR)
+
+
+def walls_under(workspace: Polygon | MultiPolygon, reach: float) -> Walls:
+    """Lay a grid over a floor shrunk by a hair: what stays on it is on the floor in spite of rounding."""
+    return walls_near(FreeSpace.under(workspace).rings, reach + FAR)

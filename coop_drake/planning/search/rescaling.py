@@ -1,0 +1,184 @@
+"""Teams much larger or smaller than usual are planned for at the usual size: lengths change their unit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from coop_drake.answers.mixed_cell import MixedCell
+from coop_drake.answers.problem import PlannerSettings, PlanningProblem
+from coop_drake.answers.proof import BlockedGoal, DiscSeparation, OverCell, OverSlice, Separation
+from coop_drake.answers.search_report import SearchReport
+from coop_drake.geometry.swept_tree import Intervals
+from coop_drake.planning.boxes.channel import Channel, NoChannel, Way
+from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.events import ChannelSearched, Event, SeenCell, SliceAdded, Watch
+from coop_drake.planning.questions.margins import SMALLEST_MARGIN
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.pose import FloatArray, PlanarPose
+
+_USUAL_MARGINS = (SMALLEST_MARGIN, 0.4)
+
+
+@dataclass(frozen=True)
+class Rescaling:
+    """A question in another unit, and its answers back in metres.
+
+    Attributes:
+        problem: The question in metres.
+        unit: The other unit [m].
+    """
+
+    problem: PlanningProblem
+    unit: float
+
+    def question(self) -> PlanningProblem:
+        """The question with all lengths in the unit."""
+        problem, scale = self.problem, 1.0 / self.unit
+        tree = problem.tree
+        components = tuple(_component(component, scale) for component in tree.components)
+        units = 1.0 / self._configuration_units()
+        goals = zip(problem.goal_joints, units[3:], strict=True)
+        return replace(
+            problem,
+            workspace=_scaled(problem.workspace, scale),
+            tree=ComponentTree(components, tree.sharing_joint),
+            start=problem.start * units,
+            goal_pose=problem.goal_pose * units[:3],
+            goal_joints=tuple(None if goal is None else float(goal * unit) for goal, unit in goals),
+            position_tolerance=scale * problem.position_tolerance,
+            settings=_settings(problem.settings, scale),
+        )
+
+    def answer(self, found: Way | Channel | NoChannel) -> Way | Channel | NoChannel:
+        """An answer with all lengths in metres."""
+        if isinstance(found, Channel):
+            return self._channel(found)
+        if isinstance(found, Way):
+            path = found.path * self._configuration_units()
+            channel = found.channel
+            return replace(
+                found, path=path, margin=self.unit * found.margin, channel=lambda: self._channel(channel())
+            )
+        proof = None if found.separation is None else self._separation(found.separation)
+        return replace(found, mixed=tuple(map(self._mixed, found.mixed)), separation=proof)
+
+    def _mixed(self, cell: MixedCell) -> MixedCell:
+        units = self._robot_units(cell.robots)
+        polygon = _scaled(cell.polygon, self.unit)
+        return replace(cell, lower=cell.lower * units, upper=cell.upper * units, polygon=polygon)
+
+    def _channel(self, found: Channel) -> Channel:
+        units = self._axis_units(range(len(self.problem.tree.joints)))
+        boxes = tuple(
+            replace(
+                box,
+                polygon=_scaled(box.polygon, self.unit),
+                core=_scaled(box.core, self.unit),
+                lower=box.lower * units,
+                upper=box.upper * units,
+            )
+            for box in found.boxes
+        )
+        path = None if found.path is None else found.path * self._configuration_units()
+        return replace(found, boxes=boxes, margin=self.unit * found.margin, path=path)
+
+    def report(self, found: SearchReport) -> SearchReport:
+        """A report with all lengths in metres."""
+        return replace(
+            found, margins=tuple((self.unit * margin, verdict) for margin, verdict in found.margins)
+        )
+
+    def watched(self, watch: Watch | None) -> Watch | None:
+        """Somebody who watches the question in metres."""
+        if watch is None:
+            return None
+        robots: tuple[int, ...] = ()
+
+        def see(event: Event) -> None:
+            nonlocal robots
+            robots = getattr(event, "robots", robots)
+            if isinstance(event, SliceAdded):
+                intervals = self._intervals(event.intervals, self._robot_units(robots))
+                event = replace(event, intervals=intervals, cells=self._seen(event.cells))
+            elif isinstance(event, ChannelSearched):
+                event = replace(event, cells=self._seen(event.cells))
+            watch(event)
+
+        return see
+
+    def _separation(self, proof: Separation) -> Separation:
+        if isinstance(proof, DiscSeparation):
+            cells = self._cells(proof.cells)
+            return replace(
+                proof, centre=self.unit * proof.centre, radius=self.unit * proof.radius, cells=cells
+            )
+        units = self._robot_units(proof.robots)
+        slices = tuple(
+            OverSlice(part.lower * units, part.upper * units, self._cells(part.cells))
+            for part in proof.slices
+        )
+        return (
+            BlockedGoal(proof.robots, slices)
+            if isinstance(proof, BlockedGoal)
+            else replace(proof, slices=slices)
+        )
+
+    def _cells(self, cells: Sequence[OverCell]) -> tuple[OverCell, ...]:
+        return tuple(OverCell(_scaled(cell.polygon, self.unit), cell.reached) for cell in cells)
+
+    def _seen(self, cells: Sequence[SeenCell]) -> tuple[SeenCell, ...]:
+        scale = (self.unit, self.unit)
+        return tuple(replace(cell, region=Region.of(cell.region.section.scale(scale))) for cell in cells)
+
+    @staticmethod
+    def _intervals(intervals: Intervals, units: FloatArray) -> Intervals:
+        return tuple((a * unit, b * unit) for (a, b), unit in zip(intervals, units.tolist(), strict=True))
+
+    def _configuration_units(self) -> FloatArray:
+        """Units of (x, y, theta, q...)."""
+        return np.concatenate(
+            ((self.unit, self.unit), self._axis_units(range(len(self.problem.tree.joints))))
+        )
+
+    def _robot_units(self, robots: Sequence[int]) -> FloatArray:
+        """Units of theta and of the joints of some robots."""
+        return self._axis_units([j.index for j in self.problem.tree.joints if j.robot in robots])
+
+    def _axis_units(self, joints: Sequence[int]) -> FloatArray:
+        kinds = [self.problem.tree.joints[joint].kind for joint in joints]
+        return np.array([1.0, *(self.unit if kind == "prismatic" else 1.0 for kind in kinds)])
+
+
+def _settings(settings: PlannerSettings, scale: float) -> PlannerSettings:
+    """Settings in another unit; a margin that no team of usual size could mean is the usual one."""
+    margin, (least, most) = scale * settings.margin, _USUAL_MARGINS
+    if settings.margin > 0.0 and not least <= margin <= most:
+        margin = PlannerSettings().margin
+    return replace(settings, margin=margin, length_resolution=scale * settings.length_resolution)
+
+
+def _scaled(polygon: Polygon, scale: float) -> Polygon:
+    scaled: Polygon = shapely.transform(polygon, lambda points: scale * points)
+    return scaled
+
+
+def _component(component: Component, scale: float) -> Component:
+    joint = None if component.joint is None else _joint(component.joint, scale)
+    bodies = tuple(_body(body, scale) for body in component.bodies)
+    return replace(component, joint=joint, bodies=bodies)
+
+
+def _joint(joint: TreeJoint, scale: float) -> TreeJoint:
+    X, unit = joint.X_PJ, scale if joint.kind == "prismatic" else 1.0
+    moved = PlanarPose(scale * X.x, scale * X.y, X.angle)
+    return replace(joint, X_PJ=moved, lower=unit * joint.lower, upper=unit * joint.upper)
+
+
+def _body(body: Body, scale: float) -> Body:
+    shapes = tuple(ConvexShape(scale * shape.vertices, scale * shape.radius) for shape in body.shapes)
+    return replace(body, shapes=shapes)

@@ -1,0 +1,49 @@
+"""How far the team moves per unit of each axis; the metric between configurations."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
+
+__all__ = ["axis_levers", "configuration_scale"]
+
+_LEAST_LEVER = 0.01
+"""A joint that moves no solid body counts this much in distances [m per unit]: it still has to be moved."""
+
+
+def axis_levers(tree: ComponentTree) -> tuple[float, ...]:
+    """How far a unit of each axis (theta, q...) moves the furthest point it carries [m/rad or 1]."""
+    reaches = [0.0] * len(tree.components)
+    levers = [0.0] * (1 + len(tree.joints))
+    for index in range(len(tree.components) - 1, -1, -1):
+        component = tree.components[index]
+        own = max(
+            (
+                float((shape.vertices**2).sum(axis=1).max() ** 0.5) + shape.radius
+                for body in component.bodies
+                for shape in body.shapes
+            ),
+            default=0.0,
+        )
+        reaches[index] = max(reaches[index], own)
+        joint = component.joint
+        if joint is None or component.parent is None:
+            levers[0] = reaches[index]
+            continue
+        length = (joint.axis[0] ** 2 + joint.axis[1] ** 2) ** 0.5
+        revolute = joint.kind == "revolute"
+        levers[1 + joint.index] = reaches[index] if revolute else length
+        slide = 0.0 if revolute else length * max(abs(joint.lower), abs(joint.upper))
+        offset = (joint.X_PJ.x**2 + joint.X_PJ.y**2) ** 0.5
+        reaches[component.parent] = max(reaches[component.parent], offset + slide + reaches[index])
+    return tuple(levers)
+
+
+def configuration_scale(tree: ComponentTree) -> FloatArray:
+    """What a unit of each axis of z counts in distances between configurations, shape (3 + n,) [m/unit].
+
+    It is the lever, but never nothing: a joint that moves no solid body still has to be moved.
+    """
+    return np.maximum([1.0, 1.0, *axis_levers(tree)], _LEAST_LEVER)

@@ -1,0 +1,72 @@
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from coop_drake.laws import FixedGains, ScheduledGains, TransitionGains
+
+
+def test_defaults_of_the_fixed_set_are_table_2():
+    gains = FixedGains()
+    table_2 = {
+        "stiffness": 50.0,
+        "damping": 5.0,
+        "governor_gain": 5.0,
+        "angle_decay_rate": 2.0,
+        "joint_decay_rate": 2.0,
+        "position_gain": 1.0,
+        "rate_gain": 1.0,
+    }
+    assert {name: getattr(gains, name) for name in table_2} == table_2
+    assert gains.funnel == "exponential"
+    assert gains.smoothing == 0.0
+
+
+@pytest.mark.parametrize("gain_set", [FixedGains, ScheduledGains])
+def test_a_file_reader_sees_plain_types(gain_set):
+    assert {field.type for field in fields(gain_set)} == {float, str}
+
+
+@pytest.mark.parametrize("gain_set", [FixedGains, ScheduledGains])
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("rate_gain", 0.0, "rate_gain must be finite and positive, got 0.0"),
+        ("rate_gain", float("nan"), "rate_gain must be finite and positive, got nan"),
+        ("energy_allowance", -0.5, "energy_allowance must be finite and positive, got -0.5"),
+        ("smoothing", -0.001, "smoothing must be finite and not negative, got -0.001"),
+        ("funnel", "cubic", "funnel must be one of exponential, smooth, got 'cubic'"),
+        ("energy_factor", 0.9, "energy_factor below 1 lets no transition begin; expected 1 or more, got 0.9"),
+    ],
+)
+def test_bad_gains_are_refused_by_name(gain_set, name, value, message):
+    with pytest.raises(ValueError, match="^" + message + "$"):
+        gain_set(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [("min_stiffness", "max_stiffness"), ("min_decay_rate", "max_decay_rate")]
+)
+def test_bounds_in_the_wrong_order_are_refused(low, high):
+    with pytest.raises(ValueError, match=f"^{low} must not exceed {high}, got 9.0 > 3.0$"):
+        ScheduledGains(**{low: 9.0, high: 3.0})
+
+
+def test_select_keeps_the_axes_asked_for():
+    gains = TransitionGains(
+        stiffness=50.0,
+        damping=5.0,
+        governor_gain=5.0,
+        smoothing=0.0,
+        funnel="smooth",
+        decay_rate=np.array([1.0, 2.0, 3.0]),
+        log_gain=np.array([4.0, 5.0, 6.0]),
+        position_gain=1.0,
+        rate_gain=8.0,
+        energy_bound=np.array([7.0, 8.0, 9.0]),
+    )
+    own = gains.select(np.array([0, 2]))
+    assert own.decay_rate.tolist() == [1.0, 3.0]
+    assert own.log_gain.tolist() == [4.0, 6.0]
+    assert own.energy_bound.tolist() == [7.0, 9.0]
+    assert own.rate_gain == 8.0

@@ -1,0 +1,116 @@
+import numpy as np
+import pytest
+
+from coop_drake.laws import (
+    acceleration_at,
+    consistent_projector,
+    grasp_matrix,
+    robot_acceleration,
+    robot_torque,
+    wrench_share,
+)
+from tests.support.planar_arm import random_arm, random_state
+
+
+@pytest.mark.parametrize("joints", [0, 1, 2, 4])
+def test_the_closed_form_of_the_arm_satisfies_the_equations_of_motion(joints):
+    """Check the tests' own model: M' - 2 C is skew, so bias forces do the work that changes M."""
+    rng = np.random.default_rng(joints)
+    arm = random_arm(rng, joints)
+    z, v = random_state(rng, joints)
+    _, bias = arm.dynamics(z, v)
+    h = 1e-5
+    mass_rate = (arm.dynamics(z + h * v, v)[0] - arm.dynamics(z - h * v, v)[0]) / (2.0 * h)
+    assert v @ bias == pytest.approx(0.5 * v @ mass_rate @ v, rel=1e-6, abs=1e-8)
+    _, jacobian, rate_term = arm.end_effector(z, v)
+    ahead, behind = arm.end_effector(z + h * v, v)[1], arm.end_effector(z - h * v, v)[1]
+    assert rate_term == pytest.approx((ahead - behind) @ v / (2.0 * h), abs=1e-7)
+    assert jacobian.shape == (3, 3 + joints)
+
+
+@pytest.mark.parametrize("joints", [0, 1, 2, 4])
+def test_end_effector_and_joints_accelerate_as_asked(joints):
+    rng = np.random.default_rng(10 + joints)
+    arm = random_arm(rng, joints)
+    z, v = random_state(rng, joints)
+    _, jacobian, rate_term = arm.end_effector(z, v)
+    wanted, joint_wanted = rng.normal(size=3), rng.normal(size=joints)
+    acceleration = robot_acceleration(wanted, joint_wanted, jacobian=jacobian, jacobian_rate_term=rate_term)
+    assert jacobian @ acceleration + rate_term == pytest.approx(wanted, abs=1e-12)
+    assert acceleration[3:].tolist() == joint_wanted.tolist()
+
+
+def test_any_invertible_base_and_memory_layout_will_do():
+    """Bases may be driven in any directions, and matrices may lie in memory column by column."""
+    rng = np.random.default_rng(3)
+    jacobian, wanted, joints = rng.normal(size=(3, 5)), rng.normal(size=3), rng.normal(size=2)
+    for same in (jacobian, np.asfortranarray(jacobian), np.repeat(jacobian, 2, axis=1)[:, ::2]):
+        z = robot_acceleration(wanted, joints, jacobian=same, jacobian_rate_term=np.ones(3))
+        assert jacobian @ z + 1.0 == pytest.approx(wanted, abs=1e-12)
+
+
+@pytest.mark.parametrize("joints", [(1, 1), (2, 1, 3), (1, 0, 2, 1, 2)])
+def test_the_team_moves_the_object_as_commanded_and_loads_every_grasp_by_its_share(joints):
+    """Solve the team's constrained dynamics, (2) and (27), and find what every robot meant to happen."""
+    rng = np.random.default_rng(sum(joints))
+    mass, inertia, com_offset = 1.7, 0.6, np.array([0.05, -0.12])
+    wanted, rate = rng.normal(size=3), 1.3
+    robots, columns = len(joints), 3
+    sizes = [3 + n for n in joints]
+    unknowns = 3 + sum(sizes) + 3 * robots
+    system, right = np.zeros((unknowns, unknowns)), np.zeros(unknowns)
+    # Object: M a_com = sum of the wrenches, torques about the centre of mass.
+    body = np.diag([mass, mass, inertia])
+    system[:3, :3] = body @ grasp_matrix(com_offset)
+    right[:3] = body @ np.array([*(rate**2 * com_offset), 0.0])
+    row, wrench_at = 3, 3 + sum(sizes)
+    shares = rng.dirichlet(np.ones(robots))
+    commanded = []
+    for k, n in enumerate(joints):
+        arm = random_arm(rng, n)
+        z, v = random_state(rng, n)
+        offset = rng.uniform(-0.5, 0.5, 2)
+        # The grasp is rigid, so the base moves such that J z' is the twist of the grasp.
+        _, jacobian, _ = arm.end_effector(z, v)
+        twist = grasp_matrix(offset) @ np.array([0.3, -0.2, rate])
+        v[:3] = np.linalg.solve(jacobian[:, :3], twist - jacobian[:, 3:] @ v[3:])
+        _, jacobian, rate_term = arm.end_effector(z, v)
+        mass_matrix, bias = arm.dynamics(z, v)
+        joint_wanted = rng.normal(size=n)
+        share = wrench_share(
+            wanted, rate, offset, com_offset=com_offset, mass=mass, inertia=inertia, share=shares[k]
+        )
+        at_grasp = acceleration_at(wanted, rate, offset)
+        z_wanted = robot_acceleration(at_grasp, joint_wanted, jacobian=jacobian, jacobian_rate_term=rate_term)
+        torque = robot_torque(z_wanted, share, mass_matrix=mass_matrix, bias=bias, jacobian=jacobian)
+        commanded.append((z_wanted, share))
+        z_slice, w_slice = slice(columns, columns + 3 + n), slice(wrench_at + 3 * k, wrench_at + 3 * k + 3)
+        system[:3, w_slice] = -grasp_matrix(offset - com_offset).T
+        system[row : row + 3 + n, z_slice] = mass_matrix
+        system[row : row + 3 + n, w_slice] = jacobian.T
+        right[row : row + 3 + n] = torque - bias
+        row += 3 + n
+        system[row : row + 3, z_slice] = jacobian
+        system[row : row + 3, :3] = -grasp_matrix(offset)
+        right[row : row + 3] = np.array([*(-(rate**2) * offset), 0.0]) - rate_term
+        row += 3
+        columns += 3 + n
+    solution = np.linalg.solve(system, right)
+    assert solution[:3] == pytest.approx(wanted, abs=1e-9)
+    expected = np.concatenate([z for z, _ in commanded] + [share for _, share in commanded])
+    assert solution[3:] == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3])
+def test_projected_forces_leave_the_end_effector_alone(joints):
+    rng = np.random.default_rng(joints)
+    arm = random_arm(rng, joints)
+    z, v = random_state(rng, joints)
+    _, jacobian, _ = arm.end_effector(z, v)
+    mass_matrix, _ = arm.dynamics(z, v)
+    projector = consistent_projector(mass_matrix, jacobian)
+    assert projector @ projector == pytest.approx(projector, abs=1e-10)
+    assert jacobian @ np.linalg.solve(mass_matrix, projector) == pytest.approx(
+        np.zeros((3, 3 + joints)), abs=1e-10
+    )
+    assert np.linalg.matrix_rank(projector, tol=1e-8) == joints

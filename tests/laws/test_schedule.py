@@ -1,0 +1,120 @@
+import numpy as np
+import pytest
+
+from coop_drake.laws import FixedGains, Funnel, ScheduledGains, funnel_acceleration, transition_gains
+from coop_drake.laws.schedule import stiffness_for_neck
+
+SLICE = {"slice_lower": np.array([0.0, -1.0]), "slice_upper": np.array([1.0, 1.0])}
+GOAL = {"goal_lower": np.array([0.8, -1.0]), "goal_upper": np.array([1.0, 1.0])}
+RESTING = np.array([0.4, 0.5])
+
+
+def schedule(gain_set, *, neck=0.2, **changes):
+    return transition_gains(gain_set, neck=neck, **({**SLICE, **GOAL, "resting": RESTING} | changes))
+
+
+@pytest.mark.parametrize(
+    ("neck", "stiffness"),
+    [(1.0, 50.0), (0.4, 50.0), (0.2, 100.0), (0.05, 400.0), (0.01, 400.0), (0.0, 400.0)],
+)
+def test_stiffness_follows_the_neck_between_its_bounds(neck, stiffness):
+    gains = schedule(ScheduledGains(), neck=neck)
+    assert stiffness_for_neck(ScheduledGains(), neck) == pytest.approx(stiffness, rel=1e-14)
+    assert gains.stiffness == pytest.approx(stiffness, rel=1e-14)
+    assert gains.damping == pytest.approx(np.sqrt(stiffness))
+    assert gains.governor_gain == pytest.approx(0.8 * np.sqrt(stiffness))
+
+
+def test_walls_that_close_far_close_slowly():
+    gains = schedule(
+        ScheduledGains(),
+        slice_lower=np.array([0.0, 0.0, 0.0, 0.0]),
+        slice_upper=np.array([10.0, 2.0, 2.0, 2.0]),
+        goal_lower=np.array([9.0, 0.8, 1.9, 0.0]),
+        goal_upper=np.array([10.0, 2.0, 2.0, 2.0]),
+        resting=np.array([5.0, 1.0, 1.0, 1.0]),
+    )
+    assert gains.decay_rate == pytest.approx([2.0, 5.0, np.sqrt(20.0 / 1.9), 8.0])
+
+
+def test_the_log_term_at_rest_stays_below_its_acceleration():
+    lower, upper, rest = np.zeros(3), np.ones(3), np.array([0.5, 0.01, 1.0 - 1e-4])
+    goal_upper = np.array([1.0, 1.0, 1.0])
+    gains = schedule(
+        ScheduledGains(),
+        slice_lower=lower,
+        slice_upper=upper,
+        goal_lower=lower,
+        goal_upper=goal_upper,
+        resting=rest,
+    )
+    pull = np.abs(np.log(rest / (1.0 - rest))) / (rest * (1.0 - rest))
+    assert gains.log_gain[0] == 0.1
+    assert gains.log_gain[1:] * pull[1:] == pytest.approx(20.0)
+
+
+def test_the_energy_bound_lies_above_the_energy_at_rest():
+    s = np.log(0.4 / 0.6)
+    gains = schedule(ScheduledGains())
+    # C1 walls stand still at first, so the wanted rate is that of the log term alone.
+    at_rest = 0.5 * 0.1 * s**2 + 0.5 * (s * 0.4 * 0.6) ** 2
+    assert gains.energy_bound[0] == pytest.approx(1.2 * at_rest + 0.05)
+
+
+def test_fixed_gains_do_not_look_at_the_cell():
+    wide, narrow = (
+        schedule(FixedGains(joint_decay_rate=3.0)),
+        schedule(FixedGains(joint_decay_rate=3.0), neck=1e-6),
+    )
+    for gains in (wide, narrow):
+        assert (gains.stiffness, gains.damping, gains.governor_gain) == (50.0, 5.0, 5.0)
+        assert gains.decay_rate.tolist() == [2.0, 3.0]
+        assert gains.log_gain.tolist() == [1.0, 1.0]
+        assert gains.funnel == "exponential"
+
+
+@pytest.mark.parametrize("gain_set", [FixedGains(), ScheduledGains()])
+@pytest.mark.parametrize("resting", [[0.0, -1.0], [1.0, 1.0], [-0.3, 2.0], [5.0, -5.0]])
+def test_rest_on_or_outside_the_border_gives_finite_gains_that_lead_back(gain_set, resting):
+    resting = np.array(resting)
+    gains = schedule(gain_set, resting=resting)
+    for values in (gains.decay_rate, gains.log_gain, gains.energy_bound):
+        assert np.all(np.isfinite(values))
+        assert np.all(values > 0.0)
+    funnel = Funnel(**SLICE, **GOAL, decay_rate=gains.decay_rate, shape=gains.funnel)
+    acceleration = funnel_acceleration(
+        resting,
+        np.zeros(2),
+        funnel,
+        0.0,
+        log_gain=gains.log_gain,
+        position_gain=gains.position_gain,
+        rate_gain=gains.rate_gain,
+    )
+    assert np.all(np.isfinite(acceleration))
+    assert np.all(np.sign(acceleration) == np.where(resting <= SLICE["slice_lower"], 1.0, -1.0))
+
+
+def test_a_goal_as_wide_as_the_slice_is_allowed():
+    gains = schedule(ScheduledGains(), goal_lower=SLICE["slice_lower"], goal_upper=SLICE["slice_upper"])
+    assert gains.decay_rate.tolist() == [8.0, 8.0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"goal_lower": np.array([0.8, 1.0])}, r"axis 1: goal interval \[1.0, 1.0\] must be inside slice"),
+        (
+            {"goal_upper": np.array([1.1, 1.0])},
+            r"axis 0: goal interval \[0.8, 1.1\] must be inside slice \[0.0, 1.0\]",
+        ),
+        (
+            {"slice_upper": np.array([0.0, 1.0])},
+            r"axis 0: .* must be inside slice \[0.0, 0.0\], and both longer",
+        ),
+        ({"goal_lower": np.array([np.nan, -1.0])}, "axis 0: goal interval"),
+    ],
+)
+def test_funnels_without_inside_are_refused(changes, message):
+    with pytest.raises(ValueError, match=message):
+        schedule(ScheduledGains(), **changes)
