@@ -17,7 +17,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers import load_plan, save_plan
 from coop_drake.answers.digest import problem_digest
-from coop_drake.answers.proof_file import save_separation
+from coop_drake.answers.proof_file import save_proof
 from coop_drake.cli import simulating, verify
 from coop_drake.cli.question import Question
 from coop_drake.cli.reading import Task, read_task
@@ -245,12 +245,12 @@ def test_malformed_plans_are_refused(bench, monkeypatch):
 def proved(index: int):
     """A question of a kind and its answer."""
     answer, _ = find_channel(CORRIDORS[index])
-    return answer.separation
+    return answer.proof
 
 
 def proof_mutants(index: int, folder: Path) -> list[Mutant]:
     problem = CORRIDORS[index]
-    document = document_of(lambda path: save_separation(proved(index), problem, path), folder / "proof.json")
+    document = document_of(lambda path: save_proof(proved(index), problem, path), folder / "proof.json")
     return [
         *sampled(documents.document_mutants(document, (60, 12, 1)[index]), (140, 60, 50)[index], 20),
         *(documents.json_mutants(document, 21) if index == 1 else ()),
@@ -264,7 +264,7 @@ def test_malformed_proofs_are_refused(index, bench, monkeypatch):
     question = Question("corridor", Path("corridor.scenario.yaml"), problem, GAINS, "scheduled")
     monkeypatch.setattr(verify, "read_apart", lambda *_: question)
     file = bench.folder / "mutant.json"
-    save_separation(proved(index), problem, file)
+    save_proof(proved(index), problem, file)
     assert verify_file(file, problem, GAINS).answer == "infeasible"
     bench.judge(
         proof_mutants(index, bench.folder),

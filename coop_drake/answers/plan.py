@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from shapely import Polygon
 
-from coop_drake.answers.proof import Separation
+from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.tree.pose import FloatArray
@@ -102,12 +102,12 @@ class Infeasible:
     Attributes:
         reason: How, in a sentence.
         report: What the search did.
-        separation: The proof, in a form that can be checked again.
+        proof: The proof, in a form that can be checked again.
     """
 
     reason: str
     report: SearchReport
-    separation: Separation | None = None
+    proof: InfeasibilityProof | None = None
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from shapely import Polygon
 
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BlockedGoal", "DiscSeparation", "OverCell", "OverSlice", "Separation", "SliceSeparation"]
+__all__ = ["BlockedGoalProof", "DiscProof", "InfeasibilityProof", "OverCell", "OverSlice", "SlicesProof"]
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class OverSlice:
 
 
 @dataclass(frozen=True)
-class SliceSeparation:
+class SlicesProof:
     """The over-approximations of some robots with the object keep start and goal apart.
 
     The slices cover theta (a whole turn, in any unwrapping) and the limits of the kept joints without gap or
@@ -58,7 +58,7 @@ class SliceSeparation:
 
 
 @dataclass(frozen=True)
-class DiscSeparation:
+class DiscProof:
     """A disc inside one component cannot get from where the start puts it to where the goal wants it.
 
     Attributes:
@@ -75,11 +75,11 @@ class DiscSeparation:
 
 
 @dataclass(frozen=True)
-class BlockedGoal:
+class BlockedGoalProof:
     """The team collides at the goal pose whatever its free joints.
 
     Attributes:
-        robots: Robots that are kept, ascending, as in ``SliceSeparation``.
+        robots: Robots that are kept, ascending, as in ``SlicesProof``.
         slices: Boxes that cover the goal's theta (both ends of axis 0 are the goal's), the goals of joints
             that have one, and the limits of the other joints; none of them has a cell that holds the goal's
             position, and their ``cells`` are empty.
@@ -89,4 +89,4 @@ class BlockedGoal:
     slices: tuple[OverSlice, ...]
 
 
-Separation = SliceSeparation | DiscSeparation | BlockedGoal
+InfeasibilityProof = SlicesProof | DiscProof | BlockedGoalProof

@@ -9,18 +9,18 @@ from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.document import Entry
 from coop_drake.answers.document_text import document_text, polygon_entry
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import DiscSeparation, OverCell, OverSlice, Separation, SliceSeparation
-from coop_drake.answers.proof_reader import FORMAT, KINDS, VERSION, SavedSeparation, read_separation
+from coop_drake.answers.proof import DiscProof, InfeasibilityProof, OverCell, OverSlice, SlicesProof
+from coop_drake.answers.proof_reader import FORMAT, KINDS, VERSION, SavedProof, read_proof
 from coop_drake.files import write_atomically
 
-__all__ = ["load_separation", "save_separation"]
+__all__ = ["load_proof", "save_proof"]
 
 
-def save_separation(separation: Separation, problem: PlanningProblem, path: Path | str) -> Path:
+def save_proof(proof: InfeasibilityProof, problem: PlanningProblem, path: Path | str) -> Path:
     """Write a proof of infeasibility; the file is written whole or not at all.
 
     Args:
-        separation: The proof.
+        proof: The proof.
         problem: The question that has no answer.
         path: Where to write it.
 
@@ -31,33 +31,31 @@ def save_separation(separation: Separation, problem: PlanningProblem, path: Path
         "format": FORMAT,
         "version": VERSION,
         "problem": problem_digest(problem),
-        "kind": KINDS[type(separation)],
+        "kind": KINDS[type(proof)],
     }
-    if isinstance(separation, DiscSeparation):
-        head.update(
-            component=separation.component, centre=separation.centre.tolist(), radius=separation.radius
-        )
-        rows = {"cells": [_cell_entry(cell) for cell in separation.cells]}
-    elif isinstance(separation, SliceSeparation):
-        head["robots"] = separation.robots
-        rows = {"slices": [_slice_entry(part) for part in separation.slices]}
+    if isinstance(proof, DiscProof):
+        head.update(component=proof.component, centre=proof.centre.tolist(), radius=proof.radius)
+        rows = {"cells": [_cell_entry(cell) for cell in proof.cells]}
+    elif isinstance(proof, SlicesProof):
+        head["robots"] = proof.robots
+        rows = {"slices": [_slice_entry(part) for part in proof.slices]}
     else:
-        head["robots"] = separation.robots
-        rows = {"slices": [_bounds_entry(part) for part in separation.slices]}
+        head["robots"] = proof.robots
+        rows = {"slices": [_bounds_entry(part) for part in proof.slices]}
     return write_atomically(path, document_text(head, rows).encode())
 
 
-def load_separation(path: Path | str) -> SavedSeparation:
+def load_proof(path: Path | str) -> SavedProof:
     """Read a proof of infeasibility.
 
     Args:
-        path: A file that ``save_separation`` wrote.
+        path: A file that ``save_proof`` wrote.
 
     Raises:
         PlanError: If the file is no such proof: names the file, the key, the value and what is allowed.
     """
     root = Entry.load(path, "a proof of infeasibility")
-    saved = read_separation(root)
+    saved = read_proof(root)
     root.check_digest()
     return saved
 

@@ -8,16 +8,16 @@ import numpy as np
 
 from coop_drake.answers.document import Entry
 from coop_drake.answers.proof import (
-    BlockedGoal,
-    DiscSeparation,
+    BlockedGoalProof,
+    DiscProof,
+    InfeasibilityProof,
     OverCell,
     OverSlice,
-    Separation,
-    SliceSeparation,
+    SlicesProof,
 )
 from coop_drake.errors import PlanError
 
-__all__ = ["FORMAT", "KINDS", "VERSION", "SavedSeparation", "read_separation"]
+__all__ = ["FORMAT", "KINDS", "VERSION", "SavedProof", "read_proof"]
 
 FORMAT = "coop_drake proof of infeasibility"
 """What the document says it is."""
@@ -25,26 +25,26 @@ FORMAT = "coop_drake proof of infeasibility"
 VERSION = 1
 """Version of its layout; another one is refused."""
 
-KINDS: dict[type, str] = {SliceSeparation: "slices", DiscSeparation: "disc", BlockedGoal: "blocked goal"}
+KINDS: dict[type, str] = {SlicesProof: "slices", DiscProof: "disc", BlockedGoalProof: "blocked goal"}
 """How the document names the kinds of proof."""
 
 _HEAD = ("format", "version", "problem", "kind", "digest")
 
 
 @dataclass(frozen=True)
-class SavedSeparation:
+class SavedProof:
     """A proof with the question it belongs to.
 
     Attributes:
         problem: Digest of the question.
-        separation: The proof.
+        proof: The proof.
     """
 
     problem: str
-    separation: Separation
+    proof: InfeasibilityProof
 
 
-def read_separation(root: Entry) -> SavedSeparation:
+def read_proof(root: Entry) -> SavedProof:
     """Read a proof from a document.
 
     Args:
@@ -59,9 +59,9 @@ def read_separation(root: Entry) -> SavedSeparation:
     entry["format"].one_of(FORMAT)
     entry["version"].one_of(VERSION)
     entry["kind"].one_of(*KINDS.values())
-    separation: Separation
+    proof: InfeasibilityProof
     if kind == "disc":
-        separation = DiscSeparation(
+        proof = DiscProof(
             component=_count(entry["component"]),
             centre=entry["centre"].numbers(2),
             radius=entry["radius"].number(positive=True),
@@ -71,10 +71,10 @@ def read_separation(root: Entry) -> SavedSeparation:
         robots = tuple(_count(robot) for robot in entry["robots"].items())
         parts = entry["slices"].items(at_least=1)
         if kind == "slices":
-            separation = SliceSeparation(robots, tuple(_slice(part) for part in parts))
+            proof = SlicesProof(robots, tuple(_slice(part) for part in parts))
         else:
-            separation = BlockedGoal(robots, tuple(_box(part.fields("lower", "upper")) for part in parts))
-    return SavedSeparation(entry["problem"].text(), separation)
+            proof = BlockedGoalProof(robots, tuple(_box(part.fields("lower", "upper")) for part in parts))
+    return SavedProof(entry["problem"].text(), proof)
 
 
 def _slice(entry: Entry) -> OverSlice:

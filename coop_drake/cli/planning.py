@@ -20,7 +20,7 @@ from coop_drake.answers import (
     table_1,
 )
 from coop_drake.answers.digest import problem_digest
-from coop_drake.answers.proof_file import save_separation
+from coop_drake.answers.proof_file import save_proof
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.measures import answer_of, plan_measures, planning_measures
 from coop_drake.cli.question import Question
@@ -71,8 +71,8 @@ def plan_question(question: Question, folder: ResultFolder, reporter: Reporter) 
     if isinstance(result, Found):
         save_plan(result.plan, folder.plan)
         write_atomically(folder.table, table_1(result.plan).encode())
-    elif isinstance(result, Infeasible) and result.separation is not None:
-        save_separation(result.separation, question.problem, folder.certificate)
+    elif isinstance(result, Infeasible) and result.proof is not None:
+        save_proof(result.proof, question.problem, folder.certificate)
     return result
 
 

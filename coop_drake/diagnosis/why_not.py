@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.answers.proof import BlockedGoal
+from coop_drake.answers.proof import BlockedGoalProof
 from coop_drake.diagnosis.blocking import Growths, blocking_passages
 from coop_drake.diagnosis.bodies import without_walls
 from coop_drake.diagnosis.bracket import Steps, bracketed
@@ -49,7 +49,7 @@ def diagnose(problem: PlanningProblem, progress: Progress | None = None) -> Diag
         Answer.INFEASIBLE if answer.proved else Answer.UNDECIDED, answer.reason, mixed=answer.mixed
     )
     growth = Growth(problem.workspace, problem.start[:2], _MOST_OF_REACH * problem.tree.reach)
-    if isinstance(answer.separation, BlockedGoal):
+    if isinstance(answer.proof, BlockedGoalProof):
         made = replace(first, goal=blocked_pose(problem, growth, trials))
     else:
         findings = _passages(problem, growth, trials, refuted=answer.proved)

@@ -46,7 +46,7 @@ def plan(
         report = _added(report, latest)
         if isinstance(answer, NoChannel):
             if answer.proved:
-                return Infeasible(answer.reason, report, answer.separation)
+                return Infeasible(answer.reason, report, answer.proof)
             return Undecided(stall or answer.reason, report)
         try:
             made = quickest_plan(question, answer, gain_set, gain_set_name=gain_set_name, progress=progress)

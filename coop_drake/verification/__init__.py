@@ -2,7 +2,7 @@
 
 from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.found import verify_plan
-from coop_drake.verification.infeasible import verify_separation
+from coop_drake.verification.infeasible import verify_proof
 from coop_drake.verification.saved import verify_file
 
-__all__ = ["Check", "Verified", "verify_file", "verify_plan", "verify_separation"]
+__all__ = ["Check", "Verified", "verify_file", "verify_plan", "verify_proof"]

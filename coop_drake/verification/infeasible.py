@@ -7,7 +7,7 @@ from math import remainder
 import numpy as np
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import BlockedGoal, DiscSeparation, Separation, SliceSeparation
+from coop_drake.answers.proof import BlockedGoalProof, DiscProof, InfeasibilityProof, SlicesProof
 from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check, Progress, Verified
@@ -17,14 +17,14 @@ from coop_drake.verification.labels import check_labels
 from coop_drake.verification.may_be_free import FreePositions
 from coop_drake.verification.tiling import TURN, check_tiling, turn_is_whole
 
-__all__ = ["verify_separation"]
+__all__ = ["verify_proof"]
 
 SAME_ANGLE = 1e-9
 """Rounding of the goal's angle in any unwrapping [rad]."""
 
 
-def verify_separation(
-    separation: Separation, problem: PlanningProblem, progress: Progress | None = None
+def verify_proof(
+    proof: InfeasibilityProof, problem: PlanningProblem, progress: Progress | None = None
 ) -> Verified:
     """Check a proof that no plan exists.
 
@@ -32,7 +32,7 @@ def verify_separation(
     of them. The goal is the pose itself, not the tolerances about it.
 
     Args:
-        separation: The proof.
+        proof: The proof.
         problem: The question that it should refute.
         progress: Called with a phase and the share of it that is done.
 
@@ -42,20 +42,20 @@ def verify_separation(
     Raises:
         RefusalError: Names the first claim that does not hold.
     """
-    if isinstance(separation, DiscSeparation):
-        checks = check_disc(separation, problem)
-        carrier = problem.tree.components[separation.component].name
-        subject = f"a disc of {separation.radius:.4f} m in {carrier} cannot get from start to goal"
+    if isinstance(proof, DiscProof):
+        checks = check_disc(proof, problem)
+        carrier = problem.tree.components[proof.component].name
+        subject = f"a disc of {proof.radius:.4f} m in {carrier} cannot get from start to goal"
         return Verified("infeasible", subject, checks)
-    robots = separation.robots
+    robots = proof.robots
     team = f"the object with robots {list(robots)}" if robots else "the object alone"
     bodies = _check_robots(robots, problem)
-    if isinstance(separation, SliceSeparation):
-        checks = (bodies, *_separated(separation, problem, progress))
-        subject = f"{len(separation.slices)} slices keep {team} from the goal"
+    if isinstance(proof, SlicesProof):
+        checks = (bodies, *_separated(proof, problem, progress))
+        subject = f"{len(proof.slices)} slices keep {team} from the goal"
     else:
-        checks = (bodies, *_blocked(separation, problem, progress))
-        subject = f"{team} collides at the goal in {len(separation.slices)} slices"
+        checks = (bodies, *_blocked(proof, problem, progress))
+        subject = f"{team} collides at the goal in {len(proof.slices)} slices"
     return Verified("infeasible", subject, checks)
 
 
@@ -72,23 +72,21 @@ def _axes(robots: tuple[int, ...], problem: PlanningProblem) -> list[int]:
 
 
 def _ends(
-    separation: SliceSeparation | BlockedGoal, problem: PlanningProblem
+    proof: SlicesProof | BlockedGoalProof, problem: PlanningProblem
 ) -> tuple[list[int], FloatArray, FloatArray]:
     """The kept axes and both ends of all slices on them, shape (N, m) each."""
-    axes = _axes(separation.robots, problem)
-    for k, part in enumerate(separation.slices):
+    axes = _axes(proof.robots, problem)
+    for k, part in enumerate(proof.slices):
         if len(part.lower) != len(axes):
             raise RefusalError(
                 f"slices[{k}]", f"has {len(part.lower)} axes; the kept bodies have {len(axes)}"
             )
-    lower = np.array([part.lower for part in separation.slices])
-    return axes, lower, np.array([part.upper for part in separation.slices])
+    lower = np.array([part.lower for part in proof.slices])
+    return axes, lower, np.array([part.upper for part in proof.slices])
 
 
-def _separated(
-    separation: SliceSeparation, problem: PlanningProblem, progress: Progress | None
-) -> tuple[Check, ...]:
-    axes, lower, upper = _ends(separation, problem)
+def _separated(proof: SlicesProof, problem: PlanningProblem, progress: Progress | None) -> tuple[Check, ...]:
+    axes, lower, upper = _ends(proof, problem)
     limits = problem.tree.joint_lower, problem.tree.joint_upper
     kept = np.array(axes[1:], dtype=int) - 1
     low = np.array([lower[:, 0].min(), *limits[0][kept]])
@@ -98,10 +96,10 @@ def _separated(
     check_tiling(lower, upper, (low, high))
     goals = [problem.goal_joints[joint] for joint in kept]
     starts = [float(problem.start[2 + axis]) for axis in axes]
-    labels = check_labels(separation.slices, starts, [float(problem.goal_pose[2]), *goals], problem)
-    free = FreePositions(problem.tree, separation.robots, problem.workspace)
+    labels = check_labels(proof.slices, starts, [float(problem.goal_pose[2]), *goals], problem)
+    free = FreePositions(problem.tree, proof.robots, problem.workspace)
     finest = float("inf")
-    for k, part in enumerate(separation.slices):
+    for k, part in enumerate(proof.slices):
         ends = _in_all(lower[k], axes, problem), _in_all(upper[k], axes, problem)
         polygons = [cell.polygon for cell in part.cells]
         finest = min(finest, check_cover(free, *ends, polygons, f"slices[{k}]"))
@@ -115,10 +113,10 @@ def _separated(
 
 
 def _blocked(
-    separation: BlockedGoal, problem: PlanningProblem, progress: Progress | None
+    proof: BlockedGoalProof, problem: PlanningProblem, progress: Progress | None
 ) -> tuple[Check, ...]:
-    axes, lower, upper = _ends(separation, problem)
-    if any(part.cells for part in separation.slices):
+    axes, lower, upper = _ends(proof, problem)
+    if any(part.cells for part in proof.slices):
         raise RefusalError("slices", "have cells, where all should be blocked")
     low, high = lower.min(axis=0), upper.max(axis=0)
     if low[0] != high[0] or abs(remainder(float(low[0] - problem.goal_pose[2]), TURN)) > SAME_ANGLE:
@@ -130,7 +128,7 @@ def _blocked(
         expected = (limits.lower, limits.upper) if goal is None else (goal, goal)
         low[axis], high[axis] = expected
     check_tiling(lower, upper, (low, high))
-    free = FreePositions(problem.tree, separation.robots, problem.workspace)
+    free = FreePositions(problem.tree, proof.robots, problem.workspace)
     for k in range(len(lower)):
         ends = _in_all(lower[k], axes, problem), _in_all(upper[k], axes, problem)
         check_blocked(free, *ends, problem.goal_pose[:2], f"slices[{k}]")

@@ -12,13 +12,13 @@ from coop_drake.answers.document import Entry
 from coop_drake.answers.plan_reader import FORMAT as PLAN_FORMAT
 from coop_drake.answers.plan_reader import read_plan
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof_reader import FORMAT as SEPARATION_FORMAT
-from coop_drake.answers.proof_reader import read_separation
+from coop_drake.answers.proof_reader import FORMAT as PROOF_FORMAT
+from coop_drake.answers.proof_reader import read_proof
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
 from coop_drake.verification.checks import Check, Progress, Verified
 from coop_drake.verification.found import verify_plan
-from coop_drake.verification.infeasible import verify_separation
+from coop_drake.verification.infeasible import verify_proof
 from coop_drake.verification.question import same_question
 
 __all__ = ["verify_file"]
@@ -30,7 +30,7 @@ def verify_file(
     gain_sets: Mapping[str, GainSet],
     progress: Progress | None = None,
 ) -> Verified:
-    """Verify a file that ``save_plan`` or ``save_separation`` wrote.
+    """Verify a file that ``save_plan`` or ``save_proof`` wrote.
 
     Args:
         path: The file.
@@ -47,17 +47,17 @@ def verify_file(
     """
     root = Entry.load(path, "a plan or a proof of infeasibility")
     known = root.value if isinstance(root.value, dict) else {}
-    Entry(root.file, "format", known.get("format")).one_of(PLAN_FORMAT, SEPARATION_FORMAT)
+    Entry(root.file, "format", known.get("format")).one_of(PLAN_FORMAT, PROOF_FORMAT)
     try:
         if known["format"] == PLAN_FORMAT:
             plan = read_plan(root)
             digest = _check_digest(root)
             verified = verify_plan(plan, problem, gain_sets, progress)
         else:
-            saved = read_separation(root)
+            saved = read_proof(root)
             digest = _check_digest(root)
             same_question(saved.problem, problem)
-            verified = verify_separation(saved.separation, problem, progress)
+            verified = verify_proof(saved.proof, problem, progress)
     except shapely.errors.GEOSException as error:
         raise RefusalError("document", f"geometry in it cannot be worked with: {error}") from error
     return Verified(verified.answer, verified.subject, (digest, *verified.checks))

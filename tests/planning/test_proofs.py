@@ -7,7 +7,7 @@ import pytest
 from shapely import Point, Polygon, box
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import BlockedGoal, DiscSeparation, SliceSeparation
+from coop_drake.answers.proof import BlockedGoalProof, DiscProof, SlicesProof
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.cells.split_rules import SplitRule
 from coop_drake.planning.proofs.blocked_goals import blocked_goal
@@ -78,7 +78,7 @@ def test_a_relaxation_refutes_the_whole() -> None:
         share *= 2
     assert proofs.refutation is not None
     assert proofs.refutation.robots == (2,)
-    assert isinstance(proofs.refutation.separation, SliceSeparation)
+    assert isinstance(proofs.refutation.proof, SlicesProof)
     assert proofs.slices < 600
 
 
@@ -113,7 +113,7 @@ def test_a_disc_that_cannot_pass_refutes_at_once() -> None:
     proofs = Proofs(transport(0.45))
     assert proofs.run(1) is Verdict.INFEASIBLE
     assert proofs.refutation is not None
-    assert isinstance(proofs.refutation.separation, DiscSeparation)
+    assert isinstance(proofs.refutation.proof, DiscProof)
     assert proofs.slices == 0
 
 
@@ -137,14 +137,14 @@ def test_inscribed_discs_lie_inside(ring: list[tuple[float, float]], radius: flo
 
 def test_a_goal_in_collision_is_stated() -> None:
     problem = case("base")
-    separation, slices = blocked_goal(
+    proof, slices = blocked_goal(
         PlanningProblem(
             problem.workspace, problem.tree, problem.start, np.array([6.2, 4.5, 0.0]), (None, None)
         )
     )
-    assert isinstance(separation, BlockedGoal)
+    assert isinstance(proof, BlockedGoalProof)
     assert slices <= 128
-    assert {len(part.lower) for part in separation.slices} == {1 + len(separation.robots)}
+    assert {len(part.lower) for part in proof.slices} == {1 + len(proof.robots)}
     assert blocked_goal(problem)[0] is None
 
 

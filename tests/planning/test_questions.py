@@ -15,7 +15,7 @@ from coop_drake.planning.planner import plan
 from coop_drake.planning.search.search import find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
 from coop_drake.tree.pose import PlanarPose
-from coop_drake.verification import verify_plan, verify_separation
+from coop_drake.verification import verify_plan, verify_proof
 from tests.planning.test_search import rod_problem
 from tests.support.cases import rectangle
 from tests.support.moved import Similarity
@@ -133,5 +133,5 @@ def test_proofs_at_other_scales_hold(scale: float) -> None:
     refuted = Similarity(scale=scale).question(rod_problem(0.19))
     answer, _ = find_channel(refuted)
     assert isinstance(answer, NoChannel)
-    assert answer.separation is not None
-    verify_separation(answer.separation, refuted)
+    assert answer.proof is not None
+    verify_proof(answer.proof, refuted)

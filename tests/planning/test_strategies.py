@@ -3,7 +3,7 @@
 import pytest
 
 from coop_drake.answers.problem import PlannerSettings
-from coop_drake.answers.proof import SliceSeparation
+from coop_drake.answers.proof import SlicesProof
 from coop_drake.planning.boxes.channel import Channel, NoChannel
 from coop_drake.planning.cells.events import ChannelSearched, Event, ExplorationBegan
 from coop_drake.planning.search.search import find_channel
@@ -28,7 +28,7 @@ def test_a_corridor_narrower_than_the_rod_is_refuted(strategy: str) -> None:
     answer, _ = find_channel(rod_problem(0.19, PlannerSettings(strategy=strategy)))
     assert isinstance(answer, NoChannel)
     assert answer.proved
-    assert isinstance(answer.separation, SliceSeparation)
+    assert isinstance(answer.proof, SlicesProof)
 
 
 @pytest.mark.parametrize("strategy", ["cells", "paper"])

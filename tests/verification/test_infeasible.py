@@ -10,14 +10,14 @@ import shapely
 from shapely import Polygon
 
 from coop_drake.answers.digest import problem_digest
-from coop_drake.answers.proof import BlockedGoal, DiscSeparation, SliceSeparation
-from coop_drake.answers.proof_file import load_separation, save_separation
+from coop_drake.answers.proof import BlockedGoalProof, DiscProof, SlicesProof
+from coop_drake.answers.proof_file import load_proof, save_proof
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning import find_channel
-from coop_drake.planning.proofs.proof_making import slice_separation
+from coop_drake.planning.proofs.proof_making import slices_proof
 from coop_drake.planning.proofs.proofs import explorer
 from coop_drake.planning.questions.relaxation import relaxed
-from coop_drake.verification import verify_file, verify_separation
+from coop_drake.verification import verify_file, verify_proof
 from tests.support.certificates import (
     GAINS,
     bent_corridor,
@@ -31,12 +31,12 @@ from tests.support.free_positions import FreePositions
 PROBLEM = bent_corridor(0.62)
 BY_DISC = bent_corridor(0.45)
 AT_GOAL = bent_corridor(1.2, goal=(5.6, 5.0, 0.1))
-KINDS = {SliceSeparation: PROBLEM, DiscSeparation: BY_DISC, BlockedGoal: AT_GOAL}
+KINDS = {SlicesProof: PROBLEM, DiscProof: BY_DISC, BlockedGoalProof: AT_GOAL}
 
 
 def proof_of(problem):
     answer, _ = find_channel(problem)
-    return answer.separation
+    return answer.proof
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +47,7 @@ def proofs():
 @pytest.fixture(scope="module")
 def documents(proofs, tmp_path_factory):
     folder = tmp_path_factory.mktemp("proofs")
-    paths = {kind: save_separation(proofs[kind], KINDS[kind], folder / kind.__name__) for kind in KINDS}
+    paths = {kind: save_proof(proofs[kind], KINDS[kind], folder / kind.__name__) for kind in KINDS}
     return {kind: json.loads(path.read_text()) for kind, path in paths.items()}
 
 
@@ -63,8 +63,8 @@ def refusal(document, tmp_path, problem, *, signed=True):
 @pytest.mark.parametrize("kind", KINDS)
 def test_proofs_are_stated_saved_and_verified(proofs, documents, tmp_path, kind):
     assert isinstance(proofs[kind], kind)
-    path = save_separation(proofs[kind], KINDS[kind], tmp_path / "certificate.json")
-    again = save_separation(load_separation(path).separation, KINDS[kind], tmp_path / "again.json")
+    path = save_proof(proofs[kind], KINDS[kind], tmp_path / "certificate.json")
+    again = save_proof(load_proof(path).proof, KINDS[kind], tmp_path / "again.json")
     assert again.read_bytes() == path.read_bytes()
     verified = verify_file(path, KINDS[kind], GAINS)
     assert verified.answer == "infeasible"
@@ -82,7 +82,7 @@ def test_no_number_can_be_altered_be_it_by_a_bit(documents, tmp_path, kind):
 
 def test_bounds_and_labels_are_refused_under_a_new_digest(documents, tmp_path):
     """Every label, and every end by one bit; where the turn closes, by more than 2 pi is rounded."""
-    document = documents[SliceSeparation]
+    document = documents[SlicesProof]
     lower, upper = ([part[end][0] for part in document["slices"]] for end in ("lower", "upper"))
     closing = (min(lower), max(upper))
     for k, part in enumerate(document["slices"]):
@@ -96,7 +96,7 @@ def test_bounds_and_labels_are_refused_under_a_new_digest(documents, tmp_path):
 
 
 def test_cells_that_are_accepted_under_a_new_digest_still_cover(documents, tmp_path):
-    document = documents[SliceSeparation]
+    document = documents[SlicesProof]
     places = [way for way in number_places(document) if "cells" in way][::61]
     accepted = 0
     for number, way in enumerate(places):
@@ -123,7 +123,7 @@ def assert_covers(part):
 
 
 def test_no_slice_and_no_cell_can_be_left_out_doubled_or_moved(documents, tmp_path):
-    document = documents[SliceSeparation]
+    document = documents[SlicesProof]
     for k, part in list(enumerate(document["slices"]))[::4]:
         for change in ("drop", "double"):
             altered = deepcopy(document)
@@ -143,10 +143,10 @@ def test_no_slice_and_no_cell_can_be_left_out_doubled_or_moved(documents, tmp_pa
 
 def test_a_proof_about_one_floor_does_not_hold_on_a_wider_one(documents, tmp_path):
     wider = bent_corridor(0.9)
-    assert "problem: " in refusal(documents[SliceSeparation], tmp_path, wider)
-    forged = {**documents[SliceSeparation], "problem": problem_digest(wider)}
+    assert "problem: " in refusal(documents[SlicesProof], tmp_path, wider)
+    forged = {**documents[SlicesProof], "problem": problem_digest(wider)}
     assert "no cell covers" in refusal(forged, tmp_path, wider)
-    forged = {**documents[DiscSeparation], "problem": problem_digest(wider)}
+    forged = {**documents[DiscProof], "problem": problem_digest(wider)}
     assert "none covers" in refusal(forged, tmp_path, wider)
 
 
@@ -156,14 +156,14 @@ def test_a_cut_through_free_space_is_refused():
     question, _ = relaxed(feasible, ())
     exploration = explorer(question)
     exploration.run(24)
-    assert slice_separation(question, (), exploration.slices, exploration.over_leaves()) is None
+    assert slices_proof(question, (), exploration.slices, exploration.over_leaves()) is None
     far = replace(question, goal_pose=np.array([50.0, 50.0, 0.0]))
-    stated = slice_separation(far, (), exploration.slices, exploration.over_leaves())
+    stated = slices_proof(far, (), exploration.slices, exploration.over_leaves())
     with pytest.raises(RefusalError, match="holds the goal and touching cells join it to the start"):
-        verify_separation(stated, feasible)
+        verify_proof(stated, feasible)
     unlabelled = replace(stated, slices=tuple(without_label(part, feasible) for part in stated.slices))
     with pytest.raises(RefusalError, match="touching cells"):
-        verify_separation(unlabelled, feasible)
+        verify_proof(unlabelled, feasible)
 
 
 def without_label(part, problem):
@@ -177,30 +177,30 @@ def without_label(part, problem):
 @pytest.mark.parametrize(
     ("kind", "way", "value", "message"),
     [
-        (SliceSeparation, ("robots",), [3], r"robots: \[3\] are not some of \[0\]"),
-        (SliceSeparation, ("robots",), [0], r"slices\[0\]: has 1 axes; the kept bodies have 2"),
-        (SliceSeparation, ("robots",), [0.5], r"robots\[0\]: 0.5 is not allowed; expected a whole number"),
-        (SliceSeparation, ("kind",), "guess", r"kind: 'guess' is not allowed"),
+        (SlicesProof, ("robots",), [3], r"robots: \[3\] are not some of \[0\]"),
+        (SlicesProof, ("robots",), [0], r"slices\[0\]: has 1 axes; the kept bodies have 2"),
+        (SlicesProof, ("robots",), [0.5], r"robots\[0\]: 0.5 is not allowed; expected a whole number"),
+        (SlicesProof, ("kind",), "guess", r"kind: 'guess' is not allowed"),
         (
-            SliceSeparation,
+            SlicesProof,
             ("format",),
             "song",
             r"format: 'song' is not allowed; expected 'coop_drake plan'",
         ),
-        (SliceSeparation, ("slices", 0, "lower", 0), 9.0, r"slices\[0\].upper\[0\]: .* 9.0 or more"),
-        (DiscSeparation, ("component",), 7, r"component: 7 is not below"),
-        (DiscSeparation, ("component",), 1, r"the disc leaves every shape|none covers|holds the goal"),
-        (DiscSeparation, ("radius",), 0.26, r"radius: the disc leaves every shape of its component by 0.01"),
-        (DiscSeparation, ("radius",), 0.2, r"cells: none covers"),
-        (DiscSeparation, ("centre", 1), 0.01, r"radius: the disc leaves every shape"),
+        (SlicesProof, ("slices", 0, "lower", 0), 9.0, r"slices\[0\].upper\[0\]: .* 9.0 or more"),
+        (DiscProof, ("component",), 7, r"component: 7 is not below"),
+        (DiscProof, ("component",), 1, r"the disc leaves every shape|none covers|holds the goal"),
+        (DiscProof, ("radius",), 0.26, r"radius: the disc leaves every shape of its component by 0.01"),
+        (DiscProof, ("radius",), 0.2, r"cells: none covers"),
+        (DiscProof, ("centre", 1), 0.01, r"radius: the disc leaves every shape"),
         (
-            DiscSeparation,
+            DiscProof,
             ("cells", 0, "reached"),
             None,
             r"reached: None is not allowed; expected True",
         ),
-        (BlockedGoal, ("slices", 0, "upper", 0), 0.2, r"slices: are about theta in \[0.1, 0.2\]"),
-        (BlockedGoal, ("robots",), [0, 0], r"robots: \[0, 0\] are not some of"),
+        (BlockedGoalProof, ("slices", 0, "upper", 0), 0.2, r"slices: are about theta in \[0.1, 0.2\]"),
+        (BlockedGoalProof, ("robots",), [0, 0], r"robots: \[0, 0\] are not some of"),
     ],
 )
 def test_refusals_under_a_new_digest_say_what_and_where(documents, tmp_path, kind, way, value, message):
@@ -212,4 +212,4 @@ def test_refusals_under_a_new_digest_say_what_and_where(documents, tmp_path, kin
 def test_a_goal_is_not_blocked_where_the_team_fits(proofs):
     fits = bent_corridor(1.2)
     with pytest.raises(RefusalError, match=r"slices\[0\]: the team may be free at \(5.1, 5.0\)"):
-        verify_separation(proofs[BlockedGoal], fits)
+        verify_proof(proofs[BlockedGoalProof], fits)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from shapely import Polygon
 
 from coop_drake.answers.mixed_cell import MixedCell
-from coop_drake.answers.proof import Separation
+from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.tree.pose import FloatArray
 
 
@@ -71,11 +71,11 @@ class NoChannel:
     Attributes:
         proved: True if none exists, False if the work or the resolution ended first.
         reason: Why, in a sentence.
-        separation: The proof in a form that can be checked again, where there is one.
+        proof: The proof in a form that can be checked again, where there is one.
         mixed: Where nothing was proved: what the last exploration left undecided, the widest first.
     """
 
     proved: bool
     reason: str
-    separation: Separation | None = None
+    proof: InfeasibilityProof | None = None
     mixed: tuple[MixedCell, ...] = ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import BlockedGoal
+from coop_drake.answers.proof import BlockedGoalProof
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region
@@ -15,7 +15,7 @@ from coop_drake.planning.questions.relaxation import relaxed
 _BUDGET = 128
 
 
-def blocked_goal(problem: PlanningProblem) -> tuple[BlockedGoal | None, int]:
+def blocked_goal(problem: PlanningProblem) -> tuple[BlockedGoalProof | None, int]:
     """Whether no values of the free joints put the team freely at its goal; a proof, by under-sweeps.
 
     The object goes first, then each robot alone, then all: what is blocked for some is blocked for the team.

@@ -11,13 +11,13 @@ from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import DiscSeparation
+from coop_drake.answers.proof import DiscProof
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.sweep_kernels import over_piece
 from coop_drake.geometry.swept_tree import Piece, sweep_arrays
 from coop_drake.planning.cells.cells import regions_of
-from coop_drake.planning.proofs.proof_making import disc_separation
+from coop_drake.planning.proofs.proof_making import disc_proof
 from coop_drake.tree.component_tree import ComponentTree, ConvexShape
 from coop_drake.tree.pose import FloatArray
 
@@ -25,7 +25,7 @@ _DIRECTIONS = normals(np.arange(0.0, 32.0) * (pi / 16.0))
 _INSIDE = 1.0 - 1e-9
 
 
-def disc_refuted(problem: PlanningProblem) -> DiscSeparation | None:
+def disc_refuted(problem: PlanningProblem) -> DiscProof | None:
     """Look for a disc of the team whose centre start and goal put into different parts of the floor.
 
     Args:
@@ -42,7 +42,7 @@ def disc_refuted(problem: PlanningProblem) -> DiscSeparation | None:
         goals = _places(problem, component, centre)
         reached = [to_polygon(region.section) for region in regions if region.holds(start)]
         if not any(polygon.intersects(goals) for polygon in reached):
-            found = disc_separation(component, centre, radius, regions, start, goals)
+            found = disc_proof(component, centre, radius, regions, start, goals)
             if found is not None:
                 return found
     return None

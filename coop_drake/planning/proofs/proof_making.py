@@ -13,11 +13,11 @@ from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import (
-    BlockedGoal,
-    DiscSeparation,
+    BlockedGoalProof,
+    DiscProof,
     OverCell,
     OverSlice,
-    SliceSeparation,
+    SlicesProof,
 )
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import Intervals
@@ -27,7 +27,7 @@ from coop_drake.tree.pose import FloatArray
 
 Found = TypeVar("Found")
 
-__all__ = ["blocked_goal_proof", "disc_separation", "slice_separation"]
+__all__ = ["blocked_goal_proof", "disc_proof", "slices_proof"]
 
 GROWTHS = (1e-3, 1e-4, 1e-5, 0.0, -5e-7)
 """Cells are grown by the first of these that keeps start and goal apart: the more, the quicker the check [m].
@@ -36,9 +36,9 @@ The last one takes back half of the hair by which the planner grows them, for ce
 """
 
 
-def slice_separation(
+def slices_proof(
     question: PlanningProblem, robots: Sequence[int], slices: Slices, regions: Mapping[int, Sequence[Region]]
-) -> SliceSeparation | None:
+) -> SlicesProof | None:
     """State an exploration's leaves and over-cells as a proof.
 
     Args:
@@ -73,17 +73,17 @@ def slice_separation(
     if found is None:
         return None
     boxes = [(slices.all[leaf].intervals, found[leaf]) for leaf in leaves]
-    return SliceSeparation(tuple(robots), tuple(_slice(intervals, cells) for intervals, cells in boxes))
+    return SlicesProof(tuple(robots), tuple(_slice(intervals, cells) for intervals, cells in boxes))
 
 
-def disc_separation(
+def disc_proof(
     component: int,
     centre: FloatArray,
     radius: float,
     regions: Sequence[Region],
     start: FloatArray,
     goals: BaseGeometry,
-) -> DiscSeparation | None:
+) -> DiscProof | None:
     """State the regions between which a disc cannot pass as a proof.
 
     Args:
@@ -106,17 +106,17 @@ def disc_separation(
         return list(map(OverCell, cells, labels))
 
     found = _first(separated)
-    return None if found is None else DiscSeparation(component, centre, radius, tuple(found))
+    return None if found is None else DiscProof(component, centre, radius, tuple(found))
 
 
-def blocked_goal_proof(robots: Sequence[int], boxes: Sequence[Intervals]) -> BlockedGoal:
+def blocked_goal_proof(robots: Sequence[int], boxes: Sequence[Intervals]) -> BlockedGoalProof:
     """State boxes of angles at the goal, in all of which the team collides, as a proof.
 
     Args:
         robots: Robots that are kept.
         boxes: They cover the free joints' limits, with the goal's theta and joints on the other axes.
     """
-    return BlockedGoal(tuple(robots), tuple(_slice(intervals, []) for intervals in sorted(boxes)))
+    return BlockedGoalProof(tuple(robots), tuple(_slice(intervals, []) for intervals in sorted(boxes)))
 
 
 def _first(separated: Callable[[float], Found | None]) -> Found | None:

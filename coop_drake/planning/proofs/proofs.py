@@ -8,7 +8,7 @@ from itertools import combinations
 
 from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import Separation
+from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cells import Region
@@ -16,7 +16,7 @@ from coop_drake.planning.cells.events import Watch
 from coop_drake.planning.cells.exploration import Exploration, Outcome, Verdict
 from coop_drake.planning.cells.split_rules import SplitRule
 from coop_drake.planning.proofs.inscribed_disc import disc_refuted
-from coop_drake.planning.proofs.proof_making import slice_separation
+from coop_drake.planning.proofs.proof_making import slices_proof
 from coop_drake.planning.proofs.relaxation_test import Doubts
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.questions.relaxation import relaxed
@@ -32,12 +32,12 @@ class Refutation:
     Attributes:
         reason: Why, in a sentence.
         robots: Robots that the proof is about, with the object.
-        separation: The proof in a form that can be checked again.
+        proof: The proof in a form that can be checked again.
     """
 
     reason: str
     robots: tuple[int, ...]
-    separation: Separation
+    proof: InfeasibilityProof
 
 
 class Proofs:
@@ -160,11 +160,11 @@ class Proofs:
         """State the proof; one that cannot be stated is none: cells all but touch, or geometry fails."""
         question, _ = relaxed(self._problem, chosen)
         exploration = self._exploration(chosen)
-        separation = slice_separation(question, chosen, exploration.slices, exploration.over_leaves())
-        if separation is None:
+        proof = slices_proof(question, chosen, exploration.slices, exploration.over_leaves())
+        if proof is None:
             return False
         reason = f"the over-approximations of {self._words(chosen)} separate start from goal"
-        self.refutation = Refutation(reason, chosen, separation)
+        self.refutation = Refutation(reason, chosen, proof)
         return True
 
 

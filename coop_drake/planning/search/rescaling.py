@@ -11,7 +11,7 @@ from shapely import Polygon
 
 from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
-from coop_drake.answers.proof import BlockedGoal, DiscSeparation, OverCell, OverSlice, Separation
+from coop_drake.answers.proof import BlockedGoalProof, DiscProof, InfeasibilityProof, OverCell, OverSlice
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.boxes.channel import Channel, NoChannel, Way
@@ -64,8 +64,8 @@ class Rescaling:
             return replace(
                 found, path=path, margin=self.unit * found.margin, channel=lambda: self._channel(channel())
             )
-        proof = None if found.separation is None else self._separation(found.separation)
-        return replace(found, mixed=tuple(map(self._mixed, found.mixed)), separation=proof)
+        proof = None if found.proof is None else self._proof(found.proof)
+        return replace(found, mixed=tuple(map(self._mixed, found.mixed)), proof=proof)
 
     def _mixed(self, cell: MixedCell) -> MixedCell:
         units = self._robot_units(cell.robots)
@@ -111,8 +111,8 @@ class Rescaling:
 
         return see
 
-    def _separation(self, proof: Separation) -> Separation:
-        if isinstance(proof, DiscSeparation):
+    def _proof(self, proof: InfeasibilityProof) -> InfeasibilityProof:
+        if isinstance(proof, DiscProof):
             cells = self._cells(proof.cells)
             return replace(
                 proof, centre=self.unit * proof.centre, radius=self.unit * proof.radius, cells=cells
@@ -123,8 +123,8 @@ class Rescaling:
             for part in proof.slices
         )
         return (
-            BlockedGoal(proof.robots, slices)
-            if isinstance(proof, BlockedGoal)
+            BlockedGoalProof(proof.robots, slices)
+            if isinstance(proof, BlockedGoalProof)
             else replace(proof, slices=slices)
         )
 

@@ -8,7 +8,7 @@ from time import process_time
 from shapely.errors import ShapelyError
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import Separation
+from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError
 from coop_drake.planning.boxes.channel import Channel, NoChannel, Way
@@ -132,7 +132,7 @@ class _Search:
             verdict = self._explored(share)
             refutation = self._proofs.refutation
             if refutation is not None:
-                return self._refuted(refutation.reason, refutation.separation)
+                return self._refuted(refutation.reason, refutation.proof)
             if verdict is Verdict.FOUND:
                 return self._explored_channel()
             chain = self._sampled(_TRIES)
@@ -188,9 +188,9 @@ class _Search:
         channel = self._attempts.channel_of(self._proofs.boxes())
         return channel, self._report(*self._proofs.counts())
 
-    def _refuted(self, reason: str, separation: Separation | None) -> tuple[NoChannel, SearchReport]:
+    def _refuted(self, reason: str, proof: InfeasibilityProof | None) -> tuple[NoChannel, SearchReport]:
         self._tried.append((0.0, Verdict.INFEASIBLE.value))
-        return NoChannel(True, reason, separation), self._report(0, 0)
+        return NoChannel(True, reason, proof), self._report(0, 0)
 
     def _undecided(self, verdict: Verdict) -> tuple[NoChannel, SearchReport]:
         self._tried.append((0.0, verdict.value))

@@ -15,7 +15,7 @@ from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.events import Watch
 from coop_drake.planning.cells.exploration import Exploration, Outcome, Verdict
 from coop_drake.planning.cells.printed_algorithms import PaperExploration
-from coop_drake.planning.proofs.proof_making import slice_separation
+from coop_drake.planning.proofs.proof_making import slices_proof
 from coop_drake.planning.questions.margins import marginal_workspace, margins
 
 Progress = Callable[[str, float], None]
@@ -112,11 +112,11 @@ def _none(
     if outcome.verdict is Verdict.INFEASIBLE:
         robots = sorted({joint.robot for joint in problem.tree.joints})
         leaves = exploration.over_leaves()
-        separation = slice_separation(problem, robots, exploration.slices, leaves)
-        if separation is None:
+        proof = slices_proof(problem, robots, exploration.slices, leaves)
+        if proof is None:
             return NoChannel(False, "the proof that was found cannot be stated"), search.report(exploration)
         reason = f"the over-approximations of {outcome.slices} slices separate start from goal"
-        return NoChannel(True, reason, separation), search.report(exploration)
+        return NoChannel(True, reason, proof), search.report(exploration)
     mixed = exploration.undecided(outcome.path)
     resolution = max((cell.share for cell in mixed), default=None)
     reason = f"no answer after {outcome.slices} slices: {outcome.verdict.value}"
