@@ -5,7 +5,7 @@ PYTHON ?= $(shell for python in python3 python3.11 python3.12 python3.13; do \
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-CODE := coop_drake tests benchmarks notebooks docs
+CODE := coop_drake tests benchmarks notebooks docs paper
 # The kernels are small; threads of BLAS would only get into each other's way.
 export OMP_NUM_THREADS ?= 1
 

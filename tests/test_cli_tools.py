@@ -188,12 +188,13 @@ def test_no_other_kind_of_picture(tmp_path):
     assert "neither in .png nor in .svg" in " ".join(result.output.split())
 
 
-def test_benchmarks_that_are_not_there_are_an_error_that_says_so(tmp_path, monkeypatch):
+@pytest.mark.parametrize(("command", "package"), [("bench", "benchmarks"), ("reproduce", "paper")])
+def test_what_only_a_clone_has_is_an_error_that_says_so(tmp_path, monkeypatch, command, package):
     monkeypatch.setattr(coop_drake, "__file__", str(tmp_path / "coop_drake" / "__init__.py"))
-    result = invoke("bench", "planner")
+    result = invoke(command)
     assert result.exit_code == 2
-    assert "benchmarks: are not here" in result.stderr
-    assert "a clone of the repository" in result.stderr
+    assert f"{package}: not found" in result.stderr
+    assert "a clone of the repository" in " ".join(result.stderr.split())
 
 
 @pytest.mark.parametrize(("asked", "passed_on"), [([], ["--list"]), (["all"], ["all"])])

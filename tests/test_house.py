@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-HOUSE = Path(__file__).parents[1] / "coop_drake"
-ROOMS = sorted(path.parent for path in HOUSE.glob("*/__init__.py"))
-FILES = sorted(HOUSE.rglob("*.py"))
+ROOT = Path(__file__).parents[1]
+HOUSE = ROOT / "coop_drake"
+ROOMS = sorted(path.parent for path in [*HOUSE.glob("*/__init__.py"), ROOT / "paper" / "__init__.py"])
+FILES = sorted([*HOUSE.rglob("*.py"), *(ROOT / "paper").rglob("*.py")])
 WITHOUT_DRAKE = [
     "errors",
     "tree",
@@ -50,7 +51,7 @@ def test_a_room_opens_with_a_caption_and_a_sorted_list_of_names(room):
     assert names == sorted(set(names), key=lambda name: (not name.isupper(), not name[0].isupper(), name))
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(HOUSE)))
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_a_file_holds_one_idea_on_at_most_300_lines(path):
     text = path.read_text()
     assert ast.get_docstring(ast.parse(text))

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from coop_drake.cli.clone import root_of_clone
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import run_guarded
 from coop_drake.cli.options import Machine, Quiet
@@ -35,10 +36,11 @@ def reproduce_command(
 
 
 def _reproduce(scenario: Path | None, out: Path, reporter: Reporter) -> ExitCode:
-    # Here and not above: no other command should wait for Drake.
+    root_of_clone("paper")
+    # Here and not above: no other command should wait for Drake, and only a clone has the package `paper`.
     from coop_drake.cli.map_cache import map_cache
-    from coop_drake.reproduction import Verdict, gather, write_report
     from coop_drake.scenario import load_scenario
+    from paper import Verdict, gather, write_report
 
     task = load_scenario(scenario if scenario is not None else "base")
     with reporter.stage("simulating") as progress:

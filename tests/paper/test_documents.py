@@ -26,7 +26,7 @@ def test_the_guarding_test_exists_and_speaks_of_its_erratum(identifier, path, na
 
 def test_every_erratum_named_in_the_code_is_in_the_table():
     named = set()
-    for path in sorted((ROOT / "coop_drake").rglob("*.py")):
+    for path in sorted([*(ROOT / "coop_drake").rglob("*.py"), *(ROOT / "paper").rglob("*.py")]):
         for phrase in re.findall(r"errat(?:a|um) ((?:E\w+(?:, | and )?)+)", path.read_text(encoding="utf-8")):
             named |= set(re.findall(r"E\w+", phrase))
     assert named <= IDS

@@ -5,8 +5,8 @@ import pytest
 
 from coop_drake.laws import Funnel, ScheduledGains, funnel_walls, prescribed_acceleration, transition_gains
 from coop_drake.laws.ready import interval_margin
-from coop_drake.reproduction import printed
-from coop_drake.reproduction.table_1 import CORRECTED
+from paper import printed
+from paper.table_1 import CORRECTED
 from tests.support.table_1 import table_transitions
 
 ONE_AXIS = {

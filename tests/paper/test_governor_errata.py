@@ -5,8 +5,8 @@ import pytest
 
 from coop_drake.laws import energy_margin, tracking_energy
 from coop_drake.laws.ready import clearance_margin
-from coop_drake.reproduction import printed
-from coop_drake.reproduction.governor_run import box_clearance, run_governor, straight_field
+from paper import printed
+from paper.governor_run import box_clearance, run_governor, straight_field
 
 TABLE_2 = (50.0, 5.0, 5.0, 0.0)
 ROOM = box_clearance(np.array([0.0, -1.0]), np.array([4.0, 1.0]))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from coop_drake.laws import consistent_projector, robot_acceleration, robot_torque
-from coop_drake.reproduction import printed
+from paper import printed
 from tests.support.planar_arm import random_arm, random_state
 
 JOINTS = [1, 2, 3]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from coop_drake.laws import total_wrench, wrench_share
-from coop_drake.reproduction import printed
+from paper import printed
 
 FORCE, TORQUE = np.array([3.0, 4.0]), 0.7
 NO_COM_OFFSET = np.zeros(2)

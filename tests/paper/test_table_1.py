@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from coop_drake.laws import FixedGains, ScheduledGains, transition_gains
-from coop_drake.reproduction.table_1 import (
+from paper.table_1 import (
     ANGLE_TOLERANCE,
     CORRECTED,
     GOAL_ANGLE,

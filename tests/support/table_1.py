@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.reproduction.table_1 import ANGLE_TOLERANCE, GOAL_ANGLE, START
 from coop_drake.tree.pose import FloatArray
+from paper.table_1 import ANGLE_TOLERANCE, GOAL_ANGLE, START
 
 
 def table_transitions(table: FloatArray) -> list[dict[str, FloatArray]]:

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from coop_drake.laws import ScheduledGains, energy_margin, tracking_energy
 from coop_drake.laws.ready import clearance_margin
 from coop_drake.laws.schedule import stiffness_for_neck
-from coop_drake.reproduction.governor_run import box_clearance, run_governor, straight_field
+from paper.governor_run import box_clearance, run_governor, straight_field
 
 LOWER, UPPER = np.array([0.0, -1.0]), np.array([4.0, 1.0])
 fractions = st.tuples(st.floats(0.02, 0.98), st.floats(0.02, 0.98)).map(np.array)

@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 
 from coop_drake.drawing.colours import BLUE, GREY, VERMILLION
 from coop_drake.laws import Funnel, funnel_walls
-from coop_drake.reproduction import printed
-from coop_drake.reproduction.table_1 import CORRECTED, START
 from coop_drake.tree.pose import FloatArray
+from paper import printed
+from paper.table_1 import CORRECTED, START
 
 __all__ = ["draw_hand_over_acceleration", "draw_log_decay", "draw_log_term", "draw_walls"]
 

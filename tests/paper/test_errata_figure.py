@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from coop_drake.drawing.colours import BLUE, VERMILLION
-from coop_drake.reproduction.errata_figure import errata_figure, write_errata_figure
+from paper.errata_figure import errata_figure, write_errata_figure
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_the_funnel_has_room_in_blue_only(panels):
 
 
 def test_the_picture_is_written_where_it_is_said_to_be(figure, tmp_path, monkeypatch):
-    monkeypatch.setattr("coop_drake.reproduction.errata_figure.errata_figure", lambda: figure)
+    monkeypatch.setattr("paper.errata_figure.errata_figure", lambda: figure)
     path = write_errata_figure(tmp_path / "new")
     assert path.parent == tmp_path / "new"
     assert path.stat().st_size > 10_000

@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from coop_drake.reproduction.exhibits import Exhibit, Picture, Statement
-from coop_drake.reproduction.floor_statements import (
+from paper.exhibits import Exhibit, Picture, Statement
+from paper.floor_statements import (
     approximation_statements,
     end_statements,
     way_statements,
 )
-from coop_drake.reproduction.material import Material
-from coop_drake.reproduction.runs import GAIN_SETS
-from coop_drake.reproduction.table_statements import (
+from paper.material import Material
+from paper.runs import GAIN_SETS
+from paper.table_statements import (
     interval_statements,
     parameter_statements,
     played_statements,
 )
-from coop_drake.reproduction.time_statements import (
+from paper.time_statements import (
     angle_statements,
     joint_statements,
     position_statements,

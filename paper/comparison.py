@@ -10,11 +10,11 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.plant import build_team_plant, planning_problem
-from coop_drake.reproduction.corridor import corridor_plan, corridor_scenario
-from coop_drake.reproduction.runs import GAIN_SETS, part_of
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import SimulationLog, build_maps, simulate
 from coop_drake.tuning import CRITERIA
+from paper.corridor import corridor_plan, corridor_scenario
+from paper.runs import GAIN_SETS, part_of
 
 __all__ = ["GainFigures", "compare_gains"]
 

@@ -12,11 +12,11 @@ from coop_drake.fields import MapStore
 from coop_drake.laws import FixedGains
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.plant.team import ObjectInertia
-from coop_drake.reproduction.approximation import Approximation, approximations, two_components
-from coop_drake.reproduction.comparison import GainFigures, compare_gains
-from coop_drake.reproduction.runs import Progress, Run, part_of, reproduce_runs
-from coop_drake.reproduction.stated import FIGURE_3_SLICES
 from coop_drake.scenario import Scenario
+from paper.approximation import Approximation, approximations, two_components
+from paper.comparison import GainFigures, compare_gains
+from paper.runs import Progress, Run, part_of, reproduce_runs
+from paper.stated import FIGURE_3_SLICES
 
 __all__ = ["Material", "gather"]
 

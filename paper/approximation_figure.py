@@ -16,9 +16,9 @@ from coop_drake.drawing.canvas import new_figure
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK
 from coop_drake.drawing.floor import draw_polygon, draw_team, team_legend
 from coop_drake.geometry.swept_tree import Interval
-from coop_drake.reproduction.approximation import Approximation
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
+from paper.approximation import Approximation
 
 __all__ = ["approximation_figure"]
 

@@ -10,11 +10,11 @@ import numpy as np
 from coop_drake.answers import Plan
 from coop_drake.laws import FixedGains
 from coop_drake.plant.team import ObjectInertia
-from coop_drake.reproduction.comparison import GainFigures
-from coop_drake.reproduction.exhibits import Statement
-from coop_drake.reproduction.stated import CELLS, START, TABLE_2, Parameter
-from coop_drake.reproduction.table_1 import CORRECTED, GOAL_ANGLE
 from coop_drake.tree.pose import FloatArray
+from paper.comparison import GainFigures
+from paper.exhibits import Statement
+from paper.stated import CELLS, START, TABLE_2, Parameter
+from paper.table_1 import CORRECTED, GOAL_ANGLE
 
 __all__ = ["interval_statements", "parameter_statements", "played_statements"]
 

@@ -12,14 +12,15 @@ from coop_drake.drawing.canvas import house_style, new_figure, save_figure
 from coop_drake.drawing.colours import BLUE, GREY, VERMILLION
 from coop_drake.laws import energy_margin, total_wrench, tracking_energy, wrench_share
 from coop_drake.laws.ready import EROSION, clearance_margin
-from coop_drake.reproduction import printed
-from coop_drake.reproduction.funnel_errata_panels import (
+from coop_drake.tree.pose import FloatArray
+from paper import printed
+from paper.funnel_errata_panels import (
     draw_hand_over_acceleration,
     draw_log_decay,
     draw_log_term,
     draw_walls,
 )
-from coop_drake.reproduction.governor_run import (
+from paper.governor_run import (
     Clearance,
     GovernorRun,
     Margin,
@@ -27,7 +28,6 @@ from coop_drake.reproduction.governor_run import (
     run_governor,
     straight_field,
 )
-from coop_drake.tree.pose import FloatArray
 
 __all__ = ["errata_figure", "write_errata_figure"]
 

@@ -8,11 +8,11 @@ import numpy as np
 from shapely import distance, points
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.reproduction.approximation import Approximation
-from coop_drake.reproduction.exhibits import Statement
-from coop_drake.reproduction.runs import Run
-from coop_drake.reproduction.stated import GOAL, START
 from coop_drake.tree.pose import FloatArray
+from paper.approximation import Approximation
+from paper.exhibits import Statement
+from paper.runs import Run
+from paper.stated import GOAL, START
 
 __all__ = ["approximation_statements", "end_statements", "way_statements"]
 

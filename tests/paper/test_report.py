@@ -12,11 +12,11 @@ from PIL import Image
 
 from coop_drake.laws import FixedGains
 from coop_drake.plant.team import ObjectInertia
-from coop_drake.reproduction import GainFigures, Material, Verdict, exhibits, pages, write_report
-from coop_drake.reproduction.approximation import approximations, two_components
-from coop_drake.reproduction.background import ASSUMPTIONS, ERRATA
-from coop_drake.reproduction.runs import GAIN_SETS, Run
-from coop_drake.reproduction.stated import FIGURE_3_SLICES
+from paper import GainFigures, Material, Verdict, exhibits, pages, write_report
+from paper.approximation import approximations, two_components
+from paper.background import ASSUMPTIONS, ERRATA
+from paper.runs import GAIN_SETS, Run
+from paper.stated import FIGURE_3_SLICES
 from tests.support.cases import case
 from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
 from tests.support.synthetic_log import synthetic_log, synthetic_plan

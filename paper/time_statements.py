@@ -8,11 +8,11 @@ import numpy as np
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.planning.execution.transport_kernels import RATE_TOLERANCE, SPEED_TOLERANCE
-from coop_drake.reproduction.exhibits import Statement
-from coop_drake.reproduction.runs import Run
-from coop_drake.reproduction.stated import CELLS, GOAL
 from coop_drake.simulation import WRENCH_TOLERANCE
 from coop_drake.tree.pose import FloatArray
+from paper.exhibits import Statement
+from paper.runs import Run
+from paper.stated import CELLS, GOAL
 
 __all__ = [
     "angle_statements",

@@ -6,8 +6,8 @@ from pydrake.systems.framework import DiagramBuilder
 from coop_drake.errors import ScenarioError
 from coop_drake.laws import ScheduledGains
 from coop_drake.plant import build_team_plant, planning_problem
-from coop_drake.reproduction import CORRECTED, compare_gains, corridor_plan, corridor_scenario
 from coop_drake.scenario import load_scenario
+from paper import CORRECTED, compare_gains, corridor_plan, corridor_scenario
 from tests.support.scenarios import MODELS
 
 

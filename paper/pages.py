@@ -11,18 +11,18 @@ from pathlib import Path
 from coop_drake.answers import Plan, table_1
 from coop_drake.drawing.canvas import house_style, save_figure
 from coop_drake.files import write_atomically
-from coop_drake.reproduction.approximation import two_components
-from coop_drake.reproduction.approximation_figure import approximation_figure
-from coop_drake.reproduction.background import explanation
-from coop_drake.reproduction.errata_figure import write_errata_figure
-from coop_drake.reproduction.exhibits import Exhibit, Statement, Verdict
-from coop_drake.reproduction.interval_figure import interval_figure
-from coop_drake.reproduction.material import Material
-from coop_drake.reproduction.report import exhibits
-from coop_drake.reproduction.runs import GAIN_SETS
-from coop_drake.reproduction.table_1 import CORRECTED, PRINTED
 from coop_drake.templates import rendered
 from coop_drake.viz import write_figures
+from paper.approximation import two_components
+from paper.approximation_figure import approximation_figure
+from paper.background import explanation
+from paper.errata_figure import write_errata_figure
+from paper.exhibits import Exhibit, Statement, Verdict
+from paper.interval_figure import interval_figure
+from paper.material import Material
+from paper.report import exhibits
+from paper.runs import GAIN_SETS
+from paper.table_1 import CORRECTED, PRINTED
 
 __all__ = ["write_report"]
 
@@ -54,7 +54,7 @@ def write_report(material: Material, folder: Path, progress: Progress | None = N
         "background": tuple(dict.fromkeys(key for exhibit in found for key in exhibit.because)),
     }
     for name in ("report.md", "index.html"):
-        write_atomically(folder / name, rendered("coop_drake.reproduction", name, **content).encode())
+        write_atomically(folder / name, rendered("paper", name, **content).encode())
     return found
 
 
