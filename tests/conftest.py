@@ -2,6 +2,9 @@
 
 import os
 
+# The matrices are small: threads of BLAS would get into each other's way, and change the order of sums.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
 import pytest
 from hypothesis import settings
 
