@@ -1,40 +1,5 @@
 """Floor plans, footprints, meshes and blank figures: what every picture is drawn with."""
 
-from coop_drake.drawing.camera import camera_pose
-from coop_drake.drawing.canvas import house_style, legend_above, new_figure, save_figure
-from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace, team_legend
-from coop_drake.drawing.footprints import BodyFootprint, team_footprints
-from coop_drake.drawing.solids import (
-    TriangleMesh,
-    flat_mesh,
-    joined,
-    parts_of,
-    ribbon_mesh,
-    ring_lines,
-    slab_mesh,
-    wall_mesh,
-    wall_polygons,
-)
+import lazy_loader
 
-__all__ = [
-    "BodyFootprint",
-    "TriangleMesh",
-    "camera_pose",
-    "draw_polygon",
-    "draw_team",
-    "draw_workspace",
-    "flat_mesh",
-    "house_style",
-    "joined",
-    "legend_above",
-    "new_figure",
-    "parts_of",
-    "ribbon_mesh",
-    "ring_lines",
-    "save_figure",
-    "slab_mesh",
-    "team_footprints",
-    "team_legend",
-    "wall_mesh",
-    "wall_polygons",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -12,11 +12,9 @@ from coop_drake.fields.outline import outline_of
 from coop_drake.fields.points import as_points
 from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.solving import Solution, solve
+from coop_drake.fields.tolerance import TOLERANCE
 
-__all__ = ["TOLERANCE", "HarmonicMap", "Solution"]
-
-TOLERANCE = 1e-8
-"""Largest certified error of a map that is accepted, if none is given."""
+__all__ = ["HarmonicMap", "Solution"]
 
 
 class HarmonicMap:

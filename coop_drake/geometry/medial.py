@@ -1,20 +1,24 @@
-"""The medial graph of a polygon: the Voronoi graph of samples of its boundary, as far as it lies inside."""
+"""The medial graph of a polygon: the Voronoi graph of samples of its boundary, as far as it lies inside.
+
+scipy's graphs and triangulations are imported where they are used: to read a scenario takes neither.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from math import sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import breadth_first_order, dijkstra, minimum_spanning_tree
-from scipy.spatial import Delaunay
 from shapely import Polygon
 
 from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import BoundaryDistance, edges_of, squared_distance
 from coop_drake.tree.pose import FloatArray
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 __all__ = ["Graph", "medial_graph", "widest_path"]
 
@@ -86,6 +90,8 @@ def widest_path(graph: Graph, start: int, end: int) -> IndexArray | None:
     Returns:
         Indices of the nodes, or None where no path exists.
     """
+    from scipy.sparse.csgraph import breadth_first_order, dijkstra, minimum_spanning_tree
+
     count = len(graph.nodes)
     # The widest path runs inside the spanning tree of greatest clearance; its weights must be positive.
     tree = minimum_spanning_tree(_matrix(graph.pairs, 1.0 + graph.clearance.max() - graph.clearance, count))
@@ -105,6 +111,8 @@ def widest_path(graph: Graph, start: int, end: int) -> IndexArray | None:
 
 
 def _matrix(pairs: IndexArray, weights: FloatArray, count: int) -> csr_matrix:
+    from scipy.sparse import csr_matrix
+
     return csr_matrix((weights, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
 
 
@@ -120,6 +128,8 @@ def _trace(before: NDArray[np.integer], start: int, end: int) -> IndexArray | No
 
 def _voronoi(samples: FloatArray) -> tuple[FloatArray, IndexArray, IndexArray]:
     """Voronoi vertices (n, 2), which pairs of them edges join, and which samples stand beside each edge."""
+    from scipy.spatial import Delaunay
+
     # Centred, so that far-away samples lose no digits in the lifted paraboloid.
     centre = samples.mean(axis=0)
     delaunay = Delaunay(samples - centre)

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from html import escape
 from itertools import dropwhile, takewhile
 from pathlib import Path
-from xml.sax.saxutils import escape
 
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import AddModel, GetScopedFrameByName, ModelDirective, Parser

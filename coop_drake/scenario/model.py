@@ -8,7 +8,7 @@ from pydrake.multibody.parsing import ModelDirective
 from shapely import Polygon
 
 from coop_drake.answers.problem import PlannerSettings
-from coop_drake.fields.harmonic_map import TOLERANCE
+from coop_drake.fields.tolerance import TOLERANCE
 from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains
 from coop_drake.scenario.deployment import Deployment
 from coop_drake.tree.pose import PlanarPose

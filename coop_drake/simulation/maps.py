@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import FieldError
 from coop_drake.fields import HarmonicMap, MapStore
-from coop_drake.fields.harmonic_map import TOLERANCE
+from coop_drake.fields.tolerance import TOLERANCE
 
 __all__ = ["build_maps", "certificate_rows"]
 

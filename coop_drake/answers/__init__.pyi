@@ -1,0 +1,21 @@
+from .cell_table import table_1
+from .plan import Cell, Found, Infeasible, Plan, PlanningResult, Transition, Undecided
+from .plan_file import load_plan, save_plan
+from .problem import PlannerSettings, PlanningProblem
+from .search_report import SearchReport
+
+__all__ = [
+    "Cell",
+    "Found",
+    "Infeasible",
+    "Plan",
+    "PlannerSettings",
+    "PlanningProblem",
+    "PlanningResult",
+    "SearchReport",
+    "Transition",
+    "Undecided",
+    "load_plan",
+    "save_plan",
+    "table_1",
+]

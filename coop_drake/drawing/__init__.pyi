@@ -1,0 +1,38 @@
+from .camera import camera_pose
+from .canvas import house_style, legend_above, new_figure, save_figure
+from .floor import draw_polygon, draw_team, draw_workspace, team_legend
+from .footprints import BodyFootprint, team_footprints
+from .solids import (
+    TriangleMesh,
+    flat_mesh,
+    joined,
+    parts_of,
+    ribbon_mesh,
+    ring_lines,
+    slab_mesh,
+    wall_mesh,
+    wall_polygons,
+)
+
+__all__ = [
+    "BodyFootprint",
+    "TriangleMesh",
+    "camera_pose",
+    "draw_polygon",
+    "draw_team",
+    "draw_workspace",
+    "flat_mesh",
+    "house_style",
+    "joined",
+    "legend_above",
+    "new_figure",
+    "parts_of",
+    "ribbon_mesh",
+    "ring_lines",
+    "save_figure",
+    "slab_mesh",
+    "team_footprints",
+    "team_legend",
+    "wall_mesh",
+    "wall_polygons",
+]

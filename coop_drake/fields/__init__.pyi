@@ -1,0 +1,18 @@
+from .blunting import blunted
+from .certificate import MapCertificate
+from .cuts import cut_open
+from .harmonic_map import HarmonicMap
+from .store import MapStore
+from .streamlines import Streamlines, trace_streamlines
+from .velocity_field import VelocityField
+
+__all__ = [
+    "HarmonicMap",
+    "MapCertificate",
+    "MapStore",
+    "Streamlines",
+    "VelocityField",
+    "blunted",
+    "cut_open",
+    "trace_streamlines",
+]

@@ -1,0 +1,27 @@
+from .component_tree import read_component_tree
+from .configuration import base_poses, get_configuration, get_rates, set_configuration
+from .planar_chain import BaseChain, base_chain, robot_chain
+from .problem import planning_problem
+from .robot import RobotPlant, build_robot_plant
+from .separate_team import SeparateTeam, build_separate_team
+from .team import ObjectInertia, RobotModel, TeamPlant, build_team_plant
+
+__all__ = [
+    "BaseChain",
+    "ObjectInertia",
+    "RobotModel",
+    "RobotPlant",
+    "SeparateTeam",
+    "TeamPlant",
+    "base_chain",
+    "base_poses",
+    "build_robot_plant",
+    "build_separate_team",
+    "build_team_plant",
+    "get_configuration",
+    "get_rates",
+    "planning_problem",
+    "read_component_tree",
+    "robot_chain",
+    "set_configuration",
+]

@@ -1,0 +1,44 @@
+from .assembly import Assembly, RobotAssembly, assemble
+from .deployment import ActuatorLimits, Deployment, Measurements, Messages
+from .gain_file import dump_gains, with_gains
+from .load import dump_scenario, load_scenario
+from .model import (
+    Gains,
+    Goal,
+    MapSettings,
+    ObjectPose,
+    PlantSettings,
+    Scenario,
+    SimulatorSettings,
+    Start,
+    Tolerances,
+    VisualizationSettings,
+    Workspace,
+)
+from .packages import package_map
+
+__all__ = [
+    "ActuatorLimits",
+    "Assembly",
+    "Deployment",
+    "Gains",
+    "Goal",
+    "MapSettings",
+    "Measurements",
+    "Messages",
+    "ObjectPose",
+    "PlantSettings",
+    "RobotAssembly",
+    "Scenario",
+    "SimulatorSettings",
+    "Start",
+    "Tolerances",
+    "VisualizationSettings",
+    "Workspace",
+    "assemble",
+    "dump_gains",
+    "dump_scenario",
+    "load_scenario",
+    "package_map",
+    "with_gains",
+]

@@ -1,0 +1,24 @@
+from .clearance import Clearance, TeamClearance
+from .invariants import ACCELERATION_TOLERANCE, WRENCH_TOLERANCE, Invariants, Margins
+from .ledger import Ledger, communication
+from .log import SimulationLog
+from .maps import build_maps, certificate_rows
+from .run import configure_simulator, simulate
+from .telemetry import Sample
+
+__all__ = [
+    "ACCELERATION_TOLERANCE",
+    "WRENCH_TOLERANCE",
+    "Clearance",
+    "Invariants",
+    "Ledger",
+    "Margins",
+    "Sample",
+    "SimulationLog",
+    "TeamClearance",
+    "build_maps",
+    "certificate_rows",
+    "communication",
+    "configure_simulator",
+    "simulate",
+]

@@ -1,0 +1,21 @@
+from .block_diagram import block_diagram_figure
+from .effort_figures import summary_figure
+from .figures import write_figures
+from .live import LiveView
+from .place_figures import path_figure
+from .recording import inline_frame, recording_html, write_recording
+from .scene import TransportScene
+from .state_figures import angle_figure
+
+__all__ = [
+    "LiveView",
+    "TransportScene",
+    "angle_figure",
+    "block_diagram_figure",
+    "inline_frame",
+    "path_figure",
+    "recording_html",
+    "summary_figure",
+    "write_figures",
+    "write_recording",
+]
