@@ -1,11 +1,17 @@
-"""The plan: cells and the transitions between them; frozen data that crosses the house."""
+"""The planner's answers: a plan of cells and transitions, a proof that there is none, or neither.
+
+The fields of what is written to files stand in the order of the files; their types are checked when read.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
+import msgspec
 from shapely import Polygon
 
+from coop_drake.answers.document import NonNegative, Positive
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.laws.gains import TransitionGains
@@ -17,18 +23,18 @@ class Cell:
     """One cell of the plan: positions times intervals, all of it free.
 
     Attributes:
+        lower: Lower ends of (theta, q...), theta unwrapped along the plan, shape (1 + n,) [rad, m].
+        upper: Upper ends, shape (1 + n,).
         safe: S_i, positions proved safe for every angle in the intervals [m].
         core: The part of S_i that keeps the plan's margin [m].
         tidied: Q_i inside S_i, simply connected, fit for a map and for the governor [m].
-        lower: Lower ends of (theta, q...), theta unwrapped along the plan, shape (1 + n,) [rad, m].
-        upper: Upper ends, shape (1 + n,).
     """
 
+    lower: FloatArray
+    upper: FloatArray
     safe: Polygon
     core: Polygon
     tidied: Polygon
-    lower: FloatArray
-    upper: FloatArray
 
 
 @dataclass(frozen=True)
@@ -37,7 +43,6 @@ class Transition:
 
     Attributes:
         target: Point that the governor steers to, shape (2,) [m].
-        goal_region: Region of Q_i and Q_(i+1) around the target; for the last cell around the goal [m].
         goal_lower: Lower ends of the goal intervals of (theta, q...), shape (1 + n,).
         goal_upper: Upper ends, shape (1 + n,).
         inradius: R_i, distance of the target to the boundary of ``goal_region`` [m].
@@ -46,45 +51,46 @@ class Transition:
         estimated_time: Estimated duration [s].
         only_angles: True where the position is already at the target and only angles move.
         gains: Gains of the governor and of the funnels.
+        goal_region: Region of Q_i and Q_(i+1) around the target; for the last cell around the goal [m].
     """
 
     target: FloatArray
-    goal_region: Polygon
     goal_lower: FloatArray
     goal_upper: FloatArray
-    inradius: float
-    neck: float
-    length: float
-    estimated_time: float
+    inradius: Positive
+    neck: Positive
+    length: NonNegative
+    estimated_time: NonNegative
     only_angles: bool
     gains: TransitionGains
+    goal_region: Polygon
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Plan:
     """A sequence of cells from start to goal, ready to be executed.
 
     Attributes:
-        cells: From the start's cell to the goal's.
-        transitions: As many as cells.
+        problem: Digest of the planning problem that it solves; empty for a plan made by hand.
+        gain_set: Name of the gain set the gains were scheduled with.
+        margin: rho, clearance that the cores keep from the walls [m].
+        joint_names: Names of q's entries, length n.
         start: z = (x, y, theta, q...), shape (3 + n,).
         goal_pose: (x, y, theta), theta unwrapped along the plan, shape (3,).
         goal_joints: Goal of each joint, None where free.
-        joint_names: Names of q's entries, length n.
-        margin: rho [m].
-        gain_set: Name of the gain set the gains were scheduled with.
-        problem: Digest of the question it answers; empty for a plan that answers none.
+        cells: From the start's cell to the goal's.
+        transitions: As many as cells.
     """
 
-    cells: tuple[Cell, ...]
-    transitions: tuple[Transition, ...]
+    problem: str = ""
+    gain_set: str
+    margin: NonNegative
+    joint_names: tuple[str, ...]
     start: FloatArray
     goal_pose: FloatArray
     goal_joints: tuple[float | None, ...]
-    joint_names: tuple[str, ...]
-    margin: float
-    gain_set: str
-    problem: str = ""
+    cells: Annotated[tuple[Cell, ...], msgspec.Meta(min_length=1)]
+    transitions: tuple[Transition, ...]
 
 
 @dataclass(frozen=True)

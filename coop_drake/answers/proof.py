@@ -1,41 +1,59 @@
-"""Why no plan exists, in a form that can be checked again: covers whose parts keep start and goal apart."""
+"""Proofs of infeasibility: regions that cover all free configurations and keep start and goal apart.
+
+The fields stand in the order of the file ``certificate.json``; their types are checked when it is read.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated
 
+import msgspec
 from shapely import Polygon
 
+from coop_drake.answers.document import Positive
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["BlockedGoalProof", "DiscProof", "InfeasibilityProof", "OverCell", "OverSlice", "SlicesProof"]
 
 
+RobotIndex = Annotated[int, msgspec.Meta(ge=0)]
+
+
 @dataclass(frozen=True)
 class OverCell:
-    """A region of positions outside which, cells beside it aside, nothing is free.
+    """A region of positions; all free positions lie in this cell or in another one of its cover.
 
     Attributes:
-        polygon: The positions, closed [m].
-        reached: Whether some chain of touching cells joins it to the start.
+        reached: Whether a sequence of touching cells joins it to the start.
+        polygon: The positions, a closed set [m].
     """
 
-    polygon: Polygon
     reached: bool
+    polygon: Polygon
 
 
 @dataclass(frozen=True)
-class OverSlice:
-    """One leaf of a subdivision with everything in it that may be free.
+class AngleBox:
+    """Intervals of theta and of the joints of the robots that are kept.
 
     Attributes:
         lower: Lower ends of the nominal intervals of (theta, kept joints...), shape (1 + m,) [rad, m].
         upper: Upper ends, shape (1 + m,).
-        cells: Regions of p_WL that cover all free positions of the slice; none where all of it is blocked.
     """
 
     lower: FloatArray
     upper: FloatArray
+
+
+@dataclass(frozen=True)
+class OverSlice(AngleBox):
+    """One leaf of a subdivision with everything in it that may be free.
+
+    Attributes:
+        cells: Regions of p_WL that cover all free positions of the slice; none where all of it is blocked.
+    """
+
     cells: tuple[OverCell, ...]
 
 
@@ -53,8 +71,8 @@ class SlicesProof:
         slices: The cover.
     """
 
-    robots: tuple[int, ...]
-    slices: tuple[OverSlice, ...]
+    robots: tuple[RobotIndex, ...]
+    slices: Annotated[tuple[OverSlice, ...], msgspec.Meta(min_length=1)]
 
 
 @dataclass(frozen=True)
@@ -68,9 +86,9 @@ class DiscProof:
         cells: Regions of the centre's positions in W that cover all those at which the disc fits.
     """
 
-    component: int
+    component: Annotated[int, msgspec.Meta(ge=0)]
     centre: FloatArray
-    radius: float
+    radius: Positive
     cells: tuple[OverCell, ...]
 
 
@@ -81,12 +99,12 @@ class BlockedGoalProof:
     Attributes:
         robots: Robots that are kept, ascending, as in ``SlicesProof``.
         slices: Boxes that cover the goal's theta (both ends of axis 0 are the goal's), the goals of joints
-            that have one, and the limits of the other joints; none of them has a cell that holds the goal's
-            position, and their ``cells`` are empty.
+            that have one, and the limits of the other joints. In each of them the team collides at the goal's
+            position.
     """
 
-    robots: tuple[int, ...]
-    slices: tuple[OverSlice, ...]
+    robots: tuple[RobotIndex, ...]
+    slices: Annotated[tuple[AngleBox, ...], msgspec.Meta(min_length=1)]
 
 
 InfeasibilityProof = SlicesProof | DiscProof | BlockedGoalProof

@@ -1,19 +1,53 @@
-"""Proofs of infeasibility on disk: JSON, the same bytes for the same proof, bound to their question."""
+"""The file ``certificate.json``: a proof of infeasibility, bound to the planning problem that it refutes."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from coop_drake.answers.digest import problem_digest
-from coop_drake.answers.document import Entry
-from coop_drake.answers.document_text import document_text, polygon_entry
+from coop_drake.answers.digest import as_json, problem_digest
+from coop_drake.answers.document import Document, Head, document_text
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import DiscProof, InfeasibilityProof, OverCell, OverSlice, SlicesProof
-from coop_drake.answers.proof_reader import FORMAT, KINDS, VERSION, SavedProof, read_proof
+from coop_drake.answers.proof import BlockedGoalProof, DiscProof, InfeasibilityProof, SlicesProof
 from coop_drake.files import write_atomically
 
-__all__ = ["load_proof", "save_proof"]
+__all__ = ["FORMAT", "SavedProof", "load_proof", "read_proof", "save_proof"]
+
+FORMAT = "coop_drake proof of infeasibility"
+"""What the document says it is."""
+
+VERSION = 1
+"""Version of its layout; another one is refused."""
+
+KINDS: dict[str, type[InfeasibilityProof]] = {
+    "slices": SlicesProof,
+    "disc": DiscProof,
+    "blocked goal": BlockedGoalProof,
+}
+"""How the document names the kinds of proof."""
+
+
+class ProofHead(Head):
+    """What every proof of infeasibility begins with.
+
+    Attributes:
+        kind: Which kind of proof follows.
+    """
+
+    kind: str
+
+
+@dataclass(frozen=True)
+class SavedProof:
+    """A proof with the planning problem that it belongs to.
+
+    Attributes:
+        problem: Digest of the planning problem.
+        proof: The proof.
+    """
+
+    problem: str
+    proof: InfeasibilityProof
 
 
 def save_proof(proof: InfeasibilityProof, problem: PlanningProblem, path: Path | str) -> Path:
@@ -21,27 +55,21 @@ def save_proof(proof: InfeasibilityProof, problem: PlanningProblem, path: Path |
 
     Args:
         proof: The proof.
-        problem: The question that has no answer.
+        problem: The planning problem that has no solution.
         path: Where to write it.
 
     Returns:
         The path written.
     """
-    head: dict[str, Any] = {
+    kind = next(name for name, kind in KINDS.items() if isinstance(proof, kind))
+    head = {
         "format": FORMAT,
         "version": VERSION,
         "problem": problem_digest(problem),
-        "kind": KINDS[type(proof)],
+        "kind": kind,
+        **as_json(proof),
     }
-    if isinstance(proof, DiscProof):
-        head.update(component=proof.component, centre=proof.centre.tolist(), radius=proof.radius)
-        rows = {"cells": [_cell_entry(cell) for cell in proof.cells]}
-    elif isinstance(proof, SlicesProof):
-        head["robots"] = proof.robots
-        rows = {"slices": [_slice_entry(part) for part in proof.slices]}
-    else:
-        head["robots"] = proof.robots
-        rows = {"slices": [_bounds_entry(part) for part in proof.slices]}
+    rows = {key: head.pop(key) for key in ("cells", "slices") if key in head}
     return write_atomically(path, document_text(head, rows).encode())
 
 
@@ -54,19 +82,27 @@ def load_proof(path: Path | str) -> SavedProof:
     Raises:
         PlanError: If the file is no such proof: names the file, the key, the value and what is allowed.
     """
-    root = Entry.load(path, "a proof of infeasibility")
-    saved = read_proof(root)
-    root.check_digest()
+    document = Document.load(path, "a proof of infeasibility")
+    saved = read_proof(document)
+    document.check_digest()
     return saved
 
 
-def _cell_entry(cell: OverCell) -> dict[str, Any]:
-    return {"reached": cell.reached, "polygon": polygon_entry(cell.polygon)}
+def read_proof(document: Document) -> SavedProof:
+    """Read a proof from a document; every key, length and number is checked, but not what it proves.
 
+    Args:
+        document: The whole document.
 
-def _bounds_entry(part: OverSlice) -> dict[str, Any]:
-    return {"lower": part.lower.tolist(), "upper": part.upper.tolist()}
-
-
-def _slice_entry(part: OverSlice) -> dict[str, Any]:
-    return {**_bounds_entry(part), "cells": [_cell_entry(cell) for cell in part.cells]}
+    Raises:
+        PlanError: Names the file, the key, the value and what is allowed there.
+    """
+    head = document.read_head(ProofHead, format=[FORMAT], version=[VERSION], kind=KINDS)
+    proof = document.read(KINDS[head.kind], head)
+    if isinstance(proof, DiscProof):
+        document.check_length("centre", proof.centre, 2)
+    else:
+        for k, part in enumerate(proof.slices):
+            axes = max(1, len(part.lower))
+            document.check_intervals(f"slices[{k}].", part.lower, part.upper, axes, points=True)
+    return SavedProof(head.problem, proof)

@@ -116,8 +116,6 @@ def _blocked(
     proof: BlockedGoalProof, problem: PlanningProblem, progress: Progress | None
 ) -> tuple[Check, ...]:
     axes, lower, upper = _ends(proof, problem)
-    if any(part.cells for part in proof.slices):
-        raise RefusalError("slices", "have cells, where all should be blocked")
     low, high = lower.min(axis=0), upper.max(axis=0)
     if low[0] != high[0] or abs(remainder(float(low[0] - problem.goal_pose[2]), TURN)) > SAME_ANGLE:
         raise RefusalError(

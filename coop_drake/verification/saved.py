@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import shapely
 
+from coop_drake.answers import plan_file, proof_file
 from coop_drake.answers.digest import content_digest
-from coop_drake.answers.document import Entry
-from coop_drake.answers.plan_reader import FORMAT as PLAN_FORMAT
-from coop_drake.answers.plan_reader import read_plan
+from coop_drake.answers.document import Document, Head
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof_reader import FORMAT as PROOF_FORMAT
-from coop_drake.answers.proof_reader import read_proof
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
 from coop_drake.verification.checks import Check, Progress, Verified
@@ -45,17 +43,16 @@ def verify_file(
         PlanError: The file is neither a plan nor a proof: names the file, the key and what is allowed.
         RefusalError: It is one, but something in it does not hold: names the place.
     """
-    root = Entry.load(path, "a plan or a proof of infeasibility")
-    known = root.value if isinstance(root.value, dict) else {}
-    Entry(root.file, "format", known.get("format")).one_of(PLAN_FORMAT, PROOF_FORMAT)
+    document = Document.load(path, "a plan or a proof of infeasibility")
+    form = document.read_head(Head, format=(plan_file.FORMAT, proof_file.FORMAT)).format
     try:
-        if known["format"] == PLAN_FORMAT:
-            plan = read_plan(root)
-            digest = _check_digest(root)
+        if form == plan_file.FORMAT:
+            plan = plan_file.read_plan(document)
+            digest = _check_digest(document.content)
             verified = verify_plan(plan, problem, gain_sets, progress)
         else:
-            saved = read_proof(root)
-            digest = _check_digest(root)
+            saved = proof_file.read_proof(document)
+            digest = _check_digest(document.content)
             same_question(saved.problem, problem)
             verified = verify_proof(saved.proof, problem, progress)
     except shapely.errors.GEOSException as error:
@@ -63,10 +60,10 @@ def verify_file(
     return Verified(verified.answer, verified.subject, (digest, *verified.checks))
 
 
-def _check_digest(root: Entry) -> Check:
-    expected = content_digest(root.value)
-    if root.value["digest"] != expected:
+def _check_digest(content: Mapping[str, Any]) -> Check:
+    expected = content_digest(content)
+    if content["digest"] != expected:
         raise RefusalError(
-            "digest", f"{root.value['digest']!r} is not that of the content, '{expected}': it was altered"
+            "digest", f"{content['digest']!r} is not that of the content, '{expected}': it was altered"
         )
     return Check("content is what was written, for this scenario", 1)

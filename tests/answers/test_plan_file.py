@@ -101,30 +101,30 @@ FAR = {"outer": [[90, 90], [91, 90], [91, 91]], "holes": []}
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (drop("goal_pose"), r"goal_pose: is missing; expected the keys format, version"),
+        (drop("goal_pose"), r"goal_pose: is missing; expected a value of this name"),
         (drop("cells", 1, "upper"), r"cells\[1\].upper: is missing"),
         (put(1, "colour"), r"colour: is unknown; expected the keys"),
         (put("song", "format"), r"format: 'song' is not allowed; expected 'coop_drake plan'"),
         (put(1, "version"), r"version: 1 is not allowed; expected 2"),
         (put(True, "version"), r"version: True is not allowed"),
         (put(7, "gain_set"), r"gain_set: 7 is not allowed; expected a string"),
-        (put(-0.1, "margin"), r"margin: -0.1 is not allowed; expected a finite number, at least 0"),
-        (put(float("nan"), "start", 2), r"start\[2\]: nan is not allowed; expected a finite number"),
+        (put(-0.1, "margin"), r"margin: -0.1 is not allowed; expected a finite number >= 0.0"),
+        (put(float("nan"), "start", 2), r"start\[2\]: 'NaN' is not allowed; expected a finite number"),
         (put("a", "start", 0), r"start\[0\]: 'a' is not allowed"),
-        (put([0.0, 1.0], "goal_pose"), r"goal_pose: .* is not allowed; expected a list of 3"),
-        (put([0.0] * 4, "goal_pose"), r"goal_pose: has 4 entries; expected 3"),
-        (put({}, "cells"), r"cells: \{\} is not allowed; expected a list of 1 or more"),
+        (put([0.0, 1.0], "goal_pose"), r"goal_pose: .* is not allowed; expected 3 entries, not 2"),
+        (put([0.0] * 4, "goal_pose"), r"goal_pose: .* is not allowed; expected 3 entries, not 4"),
+        (put({}, "cells"), r"cells: \{\} is not allowed; expected a list$"),
         (put([], "cells"), r"cells: \[\] is not allowed"),
-        (put([0.0] * 2, "cells", 0, "lower"), r"cells\[0\].lower: .* expected a list of 3"),
+        (put([0.0] * 2, "cells", 0, "lower"), r"cells\[0\].lower: .* expected 3 entries, not 2"),
         (
             put(9.0, "cells", 0, "lower", 1),
             r"cells\[0\].upper\[1\]: .* expected more than cells\[0\].lower\[1\], 9",
         ),
-        (put(BOW, "cells", 2, "safe"), r"cells\[2\].safe: Self-intersection.* cross neither"),
-        (put([[0, 0]], "cells", 2, "safe", "outer"), r"cells\[2\].safe.outer: .* list of 3 or more"),
+        (put(BOW, "cells", 2, "safe"), r"cells\[2\].safe: .* cross neither .*Self-intersection"),
+        (put([[0, 0]], "cells", 2, "safe", "outer"), r"cells\[2\].safe.outer: .* list of length >= 3"),
         (
             put([0, 0, 0], "cells", 2, "safe", "outer", 1),
-            r"cells\[2\].safe.outer\[1\]: has 3 entries; expected 2",
+            r"cells\[2\].safe.outer\[1\]: .* expected a list of length 2",
         ),
         (put(FAR, "cells", 1, "core"), r"cells\[1\].core: leaves cells\[1\].safe"),
         (put(FAR, "cells", 1, "tidied"), r"cells\[1\].tidied: leaves cells\[1\].safe"),
@@ -137,11 +137,14 @@ FAR = {"outer": [[90, 90], [91, 90], [91, 91]], "holes": []}
             r"transitions\[0\].target: .* inside cells\[0\].tidied",
         ),
         (put(-9.0, "transitions", 0, "goal_lower", 0), r"transitions\[0\].goal_lower.* axis 0: \[-9.0"),
-        (drop("transitions", 2), r"transitions: has 2 entries; expected 3|list of 3 or more"),
-        (put(0.0, "transitions", 0, "neck"), r"transitions\[0\].neck: 0.0 is not allowed; .* positive"),
+        (drop("transitions", 2), r"transitions: .* expected 3 entries, not 2"),
+        (
+            put(0.0, "transitions", 0, "neck"),
+            r"transitions\[0\].neck: 0.0 is not allowed; expected .* > 0.0",
+        ),
         (
             put(1, "transitions", 0, "only_angles"),
-            r"transitions\[0\].only_angles: 1 is not allowed; expected True",
+            r"transitions\[0\].only_angles: 1 is not allowed; expected true or false",
         ),
         (
             put("loose", "transitions", 0, "gains", "funnel"),
@@ -177,5 +180,5 @@ def test_files_that_are_no_json_or_not_there_are_refused(tmp_path):
     with pytest.raises(PlanError, match=r"format: stands twice in one mapping; expected every key once"):
         load_plan(path)
     path.write_text("[1, 2]")
-    with pytest.raises(PlanError, match=r"document: .* expected a mapping with the keys format"):
+    with pytest.raises(PlanError, match=r"document: .* expected a mapping"):
         load_plan(path)

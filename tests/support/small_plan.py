@@ -98,7 +98,7 @@ def stiffer_and_stiffer(plan: Plan) -> Plan:
 
 def _cell(polygon: Polygon, angle: tuple[float, float], joint: tuple[float, float], n: int) -> Cell:
     lower, upper = np.array([angle[0], *[joint[0]] * n]), np.array([angle[1], *[joint[1]] * n])
-    return Cell(polygon, polygon.buffer(-0.1), polygon, lower, upper)
+    return Cell(lower, upper, polygon, polygon.buffer(-0.1), polygon)
 
 
 def _transition(

@@ -86,7 +86,7 @@ def _cell(point: np.ndarray, angle: float, n: int) -> Cell:
         return Point(point).buffer(half, cap_style="square")
 
     centre = np.concatenate([[angle], np.zeros(n)])
-    return Cell(square(0.5), square(0.4), square(0.45), centre - 0.6, centre + 0.6)
+    return Cell(centre - 0.6, centre + 0.6, square(0.5), square(0.4), square(0.45))
 
 
 def _transition(cell: Cell, target: np.ndarray) -> Transition:

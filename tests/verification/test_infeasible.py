@@ -197,7 +197,7 @@ def without_label(part, problem):
             DiscProof,
             ("cells", 0, "reached"),
             None,
-            r"reached: None is not allowed; expected True",
+            r"reached: None is not allowed; expected true or false",
         ),
         (BlockedGoalProof, ("slices", 0, "upper", 0), 0.2, r"slices: are about theta in \[0.1, 0.2\]"),
         (BlockedGoalProof, ("robots",), [0, 0], r"robots: \[0, 0\] are not some of"),

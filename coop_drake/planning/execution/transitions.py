@@ -193,7 +193,7 @@ def _cell(box: FreeBox, entry: FloatArray, target: FloatArray, index: int) -> Ce
         tidied = tidy_cell(box.polygon, (entry, target))
     except GeometryError as error:
         raise StallError(f"cell {index}: {error}") from error
-    return Cell(box.polygon, box.core, tidied, box.lower, box.upper)
+    return Cell(box.lower, box.upper, box.polygon, box.core, tidied)
 
 
 def _gains(

@@ -13,6 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import (
+    AngleBox,
     BlockedGoalProof,
     DiscProof,
     OverCell,
@@ -67,13 +68,13 @@ def slices_proof(
             for cell, label in zip(cells[leaf], labels[leaf], strict=True)
         ):
             return None
-        return {leaf: list(map(OverCell, cells[leaf], labels[leaf])) for leaf in leaves}
+        return {leaf: list(map(OverCell, labels[leaf], cells[leaf])) for leaf in leaves}
 
     found = _first(separated)
     if found is None:
         return None
-    boxes = [(slices.all[leaf].intervals, found[leaf]) for leaf in leaves]
-    return SlicesProof(tuple(robots), tuple(_slice(intervals, cells) for intervals, cells in boxes))
+    parts = [OverSlice(*_ends(slices.all[leaf].intervals), tuple(found[leaf])) for leaf in leaves]
+    return SlicesProof(tuple(robots), tuple(parts))
 
 
 def disc_proof(
@@ -103,7 +104,7 @@ def disc_proof(
         labels = [cell.intersects(Point(start)) for cell in cells]
         if any(label and cell.intersects(goals) for cell, label in zip(cells, labels, strict=True)):
             return None
-        return list(map(OverCell, cells, labels))
+        return list(map(OverCell, labels, cells))
 
     found = _first(separated)
     return None if found is None else DiscProof(component, centre, radius, tuple(found))
@@ -116,7 +117,7 @@ def blocked_goal_proof(robots: Sequence[int], boxes: Sequence[Intervals]) -> Blo
         robots: Robots that are kept.
         boxes: They cover the free joints' limits, with the goal's theta and joints on the other axes.
     """
-    return BlockedGoalProof(tuple(robots), tuple(_slice(intervals, []) for intervals in sorted(boxes)))
+    return BlockedGoalProof(tuple(robots), tuple(AngleBox(*_ends(intervals)) for intervals in sorted(boxes)))
 
 
 def _first(separated: Callable[[float], Found | None]) -> Found | None:
@@ -130,9 +131,9 @@ def _first(separated: Callable[[float], Found | None]) -> Found | None:
     return None
 
 
-def _slice(intervals: Intervals, cells: Sequence[OverCell]) -> OverSlice:
+def _ends(intervals: Intervals) -> tuple[FloatArray, FloatArray]:
     bounds = np.array(intervals, dtype=float).reshape(-1, 2)
-    return OverSlice(bounds[:, 0].copy(), bounds[:, 1].copy(), tuple(cells))
+    return bounds[:, 0].copy(), bounds[:, 1].copy()
 
 
 def _grown(regions: Sequence[Region], growth: float) -> list[Polygon]:

@@ -11,7 +11,14 @@ from shapely import Polygon
 
 from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
-from coop_drake.answers.proof import BlockedGoalProof, DiscProof, InfeasibilityProof, OverCell, OverSlice
+from coop_drake.answers.proof import (
+    AngleBox,
+    BlockedGoalProof,
+    DiscProof,
+    InfeasibilityProof,
+    OverCell,
+    OverSlice,
+)
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.boxes.channel import Channel, NoChannel, Way
@@ -118,18 +125,17 @@ class Rescaling:
                 proof, centre=self.unit * proof.centre, radius=self.unit * proof.radius, cells=cells
             )
         units = self._robot_units(proof.robots)
+        if isinstance(proof, BlockedGoalProof):
+            boxes = [AngleBox(box.lower * units, box.upper * units) for box in proof.slices]
+            return replace(proof, slices=tuple(boxes))
         slices = tuple(
             OverSlice(part.lower * units, part.upper * units, self._cells(part.cells))
             for part in proof.slices
         )
-        return (
-            BlockedGoalProof(proof.robots, slices)
-            if isinstance(proof, BlockedGoalProof)
-            else replace(proof, slices=slices)
-        )
+        return replace(proof, slices=slices)
 
     def _cells(self, cells: Sequence[OverCell]) -> tuple[OverCell, ...]:
-        return tuple(OverCell(_scaled(cell.polygon, self.unit), cell.reached) for cell in cells)
+        return tuple(OverCell(cell.reached, _scaled(cell.polygon, self.unit)) for cell in cells)
 
     def _seen(self, cells: Sequence[SeenCell]) -> tuple[SeenCell, ...]:
         scale = (self.unit, self.unit)
