@@ -1,15 +1,16 @@
 """What the planner is asked: workspace, tree, start, goal and settings; plain data, no Drake."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from shapely import Polygon
 
 from coop_drake.tree.component_tree import Component, ComponentTree
 from coop_drake.tree.pose import FloatArray
+from coop_drake.typed_data import Limits, NotNegative, Positive
+
+# No `from __future__ import annotations` here: `typed_data` reads the types of the fields.
 
 LIMIT_ROOM = 0.01
 """Room that a joint has about its start and goal, also beyond a limit: a funnel has two sides [rad].
@@ -37,12 +38,12 @@ class PlannerSettings:
             explores as the paper's Algorithms 1 and 2 are printed, at margin zero.
     """
 
-    margin: float = 0.1
-    slice_overlap: float = 0.25
-    angle_resolution: float = 0.002
-    length_resolution: float = 0.001
-    max_slices: int = 4_000
-    max_transition_time: float = 60.0
+    margin: NotNegative = 0.1
+    slice_overlap: Annotated[float, Limits(at_least=0.0, at_most=1.0)] = 0.25
+    angle_resolution: Positive = 0.002
+    length_resolution: Positive = 0.001
+    max_slices: Annotated[int, Limits(above=0)] = 4_000
+    max_transition_time: Positive = 60.0
     strategy: Literal["portfolio", "cells", "paper"] = "portfolio"
 
 

@@ -1,15 +1,20 @@
 """Gain sets: fixed gains (the paper's Table 2) or scheduled by cell; and the gains of one transition."""
 
-# Field types stay real objects (no postponed annotations): scenario files are read by looking at them.
-from dataclasses import dataclass, fields, replace
-from typing import Literal
+# No `from __future__ import annotations` here: `typed_data` reads the types of the fields.
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coop_drake.typed_data import DataError, Limits, NotNegative, Positive, check_fields
+
 FloatArray = NDArray[np.float64]
 FunnelShape = Literal["exponential", "smooth"]
-FUNNEL_SHAPES: tuple[FunnelShape, ...] = ("exponential", "smooth")
+FUNNEL_SHAPES: tuple[FunnelShape, ...] = get_args(FunnelShape)
+
+EnergyFactor = Annotated[float, Limits(at_least=1.0)]
+"""A multiple of the energy at rest; below 1 no transition could begin [-]."""
 
 
 @dataclass(frozen=True)
@@ -72,21 +77,21 @@ class FixedGains:
         energy_allowance: ... plus this multiple of kappa.
     """
 
-    stiffness: float = 50.0
-    damping: float = 5.0
-    governor_gain: float = 5.0
-    smoothing: float = 0.0
-    funnel: str = "exponential"
-    angle_decay_rate: float = 2.0
-    joint_decay_rate: float = 2.0
-    log_gain: float = 1.0
-    position_gain: float = 1.0
-    rate_gain: float = 1.0
-    energy_factor: float = 1.2
-    energy_allowance: float = 0.5
+    stiffness: Positive = 50.0
+    damping: Positive = 5.0
+    governor_gain: Positive = 5.0
+    smoothing: NotNegative = 0.0
+    funnel: FunnelShape = "exponential"
+    angle_decay_rate: Positive = 2.0
+    joint_decay_rate: Positive = 2.0
+    log_gain: Positive = 1.0
+    position_gain: Positive = 1.0
+    rate_gain: Positive = 1.0
+    energy_factor: EnergyFactor = 1.2
+    energy_allowance: Positive = 0.5
 
     def __post_init__(self) -> None:
-        _check(self)
+        check_fields(self)
 
 
 @dataclass(frozen=True)
@@ -112,55 +117,29 @@ class ScheduledGains:
         energy_allowance: ... plus this multiple of kappa.
     """
 
-    wall_stiffness: float = 20.0
-    min_stiffness: float = 50.0
-    max_stiffness: float = 400.0
-    damping_factor: float = 1.0
-    governor_factor: float = 0.8
-    smoothing: float = 0.001
-    funnel: str = "smooth"
-    funnel_acceleration: float = 20.0
-    min_decay_rate: float = 2.0
-    max_decay_rate: float = 8.0
-    max_log_gain: float = 0.1
-    log_acceleration: float = 20.0
-    position_gain: float = 1.0
-    rate_gain: float = 8.0
-    energy_factor: float = 1.2
-    energy_allowance: float = 0.5
+    wall_stiffness: Positive = 20.0
+    min_stiffness: Positive = 50.0
+    max_stiffness: Positive = 400.0
+    damping_factor: Positive = 1.0
+    governor_factor: Positive = 0.8
+    smoothing: NotNegative = 0.001
+    funnel: FunnelShape = "smooth"
+    funnel_acceleration: Positive = 20.0
+    min_decay_rate: Positive = 2.0
+    max_decay_rate: Positive = 8.0
+    max_log_gain: Positive = 0.1
+    log_acceleration: Positive = 20.0
+    position_gain: Positive = 1.0
+    rate_gain: Positive = 8.0
+    energy_factor: EnergyFactor = 1.2
+    energy_allowance: Positive = 0.5
 
     def __post_init__(self) -> None:
-        _check(self)
-        for low, high in (
-            ("min_stiffness", "max_stiffness"),
-            ("min_decay_rate", "max_decay_rate"),
-        ):
-            if getattr(self, low) > getattr(self, high):
-                raise ValueError(
-                    f"{low} must not exceed {high}, got {getattr(self, low)} > {getattr(self, high)}"
-                )
+        check_fields(self)
+        for low, high in (("min_stiffness", "max_stiffness"), ("min_decay_rate", "max_decay_rate")):
+            least, largest = getattr(self, low), getattr(self, high)
+            if least > largest:
+                raise DataError(low, least, f"at most {high}, {largest:g}")
 
 
 GainSet = FixedGains | ScheduledGains
-
-
-def _check(gains: GainSet) -> None:
-    """Refuse gains with which the loop cannot be stable.
-
-    Raises:
-        ValueError: Names the gain, its value and what is allowed.
-    """
-    for field in fields(gains):
-        value = getattr(gains, field.name)
-        if field.name == "funnel":
-            if value not in FUNNEL_SHAPES:
-                raise ValueError(f"funnel must be one of {', '.join(FUNNEL_SHAPES)}, got {value!r}")
-        elif field.name == "smoothing":
-            if not 0.0 <= value < np.inf:
-                raise ValueError(f"smoothing must be finite and not negative, got {value}")
-        elif not 0.0 < value < np.inf:
-            raise ValueError(f"{field.name} must be finite and positive, got {value}")
-    if gains.energy_factor < 1.0:
-        raise ValueError(
-            f"energy_factor below 1 lets no transition begin; expected 1 or more, got {gains.energy_factor}"
-        )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import cast
 
 import numpy as np
 
@@ -11,7 +10,6 @@ from coop_drake.laws.funnels import Funnel, funnel_walls
 from coop_drake.laws.gains import (
     FixedGains,
     FloatArray,
-    FunnelShape,
     GainSet,
     ScheduledGains,
     TransitionGains,
@@ -51,7 +49,7 @@ def transition_gains(
     _check_intervals(slice_lower, slice_upper, goal_lower, goal_upper)
     width = slice_upper - slice_lower
     inside = np.clip(resting, slice_lower + SATURATION * width, slice_upper - SATURATION * width)
-    shape = cast(FunnelShape, gain_set.funnel)
+    shape = gain_set.funnel
     if isinstance(gain_set, FixedGains):
         stiffness, damping, governor_gain = gain_set.stiffness, gain_set.damping, gain_set.governor_gain
         decay_rate = np.full(width.shape, gain_set.joint_decay_rate)

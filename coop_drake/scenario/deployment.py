@@ -1,8 +1,16 @@
 """What keeps a real team from the ideal one: sampling, noise, delays, limits, errors, lost messages."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
-# No `from __future__ import annotations` here: Drake's YAML loader reads the types of the fields.
+from coop_drake.typed_data import Limits, NotNegative, Positive
+
+# No `from __future__ import annotations` here: `typed_data` reads the types of the fields.
+
+Delay = Annotated[float, Limits(at_least=0.0, at_most=10.0)]
+"""A delay [s]; after ten seconds without news no controller of this kind could hold anything."""
+
+Probability = Annotated[float, Limits(at_least=0.0, at_most=1.0)]
 
 
 @dataclass(frozen=True)
@@ -16,10 +24,10 @@ class Measurements:
         delay: Age of what is measured, rounded up to whole control periods [s].
     """
 
-    position_noise: float = 0.0
-    angle_noise: float = 0.0
-    rate_noise: float = 0.0
-    delay: float = 0.0
+    position_noise: NotNegative = 0.0
+    angle_noise: NotNegative = 0.0
+    rate_noise: NotNegative = 0.0
+    delay: Delay = 0.0
 
 
 @dataclass(frozen=True)
@@ -32,9 +40,9 @@ class ActuatorLimits:
         joint_effort: At every joint [N m or N].
     """
 
-    base_force: float | None = None
-    base_torque: float | None = None
-    joint_effort: float | None = None
+    base_force: Positive | None = None
+    base_torque: Positive | None = None
+    joint_effort: Positive | None = None
 
 
 @dataclass(frozen=True)
@@ -47,9 +55,9 @@ class Messages:
         delay: Time that a report travels, rounded up to whole control periods [s].
     """
 
-    loss: float = 0.0
-    repeat: float = 0.0
-    delay: float = 0.0
+    loss: Probability = 0.0
+    repeat: Probability = 0.0
+    delay: Delay = 0.0
 
 
 @dataclass(frozen=True)
@@ -65,12 +73,12 @@ class Deployment:
         seed: Of noise and losses.
     """
 
-    control_rate: float | None = None
-    mass_error: float = 0.0
+    control_rate: Annotated[float, Limits(at_least=1.0, at_most=1e4)] | None = None
+    mass_error: Annotated[float, Limits(at_least=-0.9, at_most=10.0)] = 0.0
     measurements: Measurements = field(default_factory=Measurements)
     actuators: ActuatorLimits = field(default_factory=ActuatorLimits)
     messages: Messages = field(default_factory=Messages)
-    seed: int = 0
+    seed: Annotated[int, Limits(at_least=0)] = 0
 
     @property
     def ideal(self) -> bool:

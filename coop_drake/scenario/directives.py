@@ -11,10 +11,11 @@ from pydrake.common.schema import Transform
 from pydrake.multibody.parsing import AddModel, AddWeld, ModelDirective, PackageMap
 
 from coop_drake.errors import ScenarioError
+from coop_drake.scenario.drake_types import Directive
 from coop_drake.scenario.packages import resolve
 from coop_drake.scenario.reading import read_file
 
-# No `from __future__ import annotations` here: Drake's YAML loader reads the types of the fields.
+# No `from __future__ import annotations` here: `typed_data` reads the types of the fields.
 
 REQUIRED = {
     "add_model": ("name", "file"),
@@ -34,7 +35,7 @@ class DirectivesFile:
         directives: In order.
     """
 
-    directives: tuple[ModelDirective, ...]
+    directives: tuple[Directive, ...]
 
 
 def check_directive(file: str, key: str, directive: ModelDirective) -> None:

@@ -1,146 +1,130 @@
-"""YAML text to plain data, with the places where the text itself is wrong."""
+"""Parses and writes YAML text; refuses text that Drake would misread or that would fill the memory."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import yaml
 
+from coop_drake.typed_data import DataError
+
 _DEEPEST = 50
-"""Lists and mappings in each other; a scenario needs ten."""
+"""Levels of lists and mappings inside each other; a scenario needs ten."""
+
 _LARGEST = 1_000_000
-"""Values of a file, repetitions by alias counted as often as they are repeated."""
+"""Values of a file; what an alias repeats counts as often as it is repeated."""
 
 _Parser = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
-class DocumentError(ValueError):
-    """The text is no YAML, or it says one thing twice.
-
-    Args:
-        place: Line and column, both counted from 1.
-        problem: What stands there.
-        allowed: What may stand there.
-    """
-
-    def __init__(self, place: str, problem: str, allowed: str) -> None:
-        self.place, self.problem, self.allowed = place, problem, allowed
-        super().__init__(f"{place}: {problem}; expected {allowed}")
-
-
 class _Loader(_Parser):  # type: ignore[valid-type,misc]
-    """Plain data as Drake's loader has it, parsed by compiled code where there is some."""
+    """Loads what Drake's own loader loads, with compiled code where PyYAML has it."""
 
     def tagged(self, tag: str, node: yaml.Node) -> dict[Any, Any]:
-        """A mapping with its tag under ``_tag``; nothing else may have one."""
+        """Return a mapping with its tag under ``_tag``; no other value may have a tag."""
         return {**self.construct_mapping(node, deep=True), "_tag": tag}
 
 
 _Loader.add_multi_constructor("", _Loader.tagged)
 
 
+class _Dumper(yaml.SafeDumper):
+    """Writes plain data as Drake's own writer does: mappings in their order, one line for each entry."""
+
+    def mapping(self, data: dict[str, Any]) -> yaml.Node:
+        """Return a mapping as a node; the entry ``_tag`` becomes its tag."""
+        pairs = [pair for pair in data.items() if pair[0] != "_tag"]
+        node = self.represent_mapping(data.get("_tag", "tag:yaml.org,2002:map"), pairs)
+        node.flow_style = not pairs
+        return node
+
+
+_Dumper.add_representer(dict, _Dumper.mapping)
+
+
+def write(data: object) -> str:
+    """Write plain data as YAML text that :func:`parse` reads back."""
+    return str(yaml.dump(data, Dumper=_Dumper, default_flow_style=None))
+
+
 def parse(text: str) -> object:
     """Parse YAML text into plain data as Drake does, tags kept under ``_tag``.
 
-    Like there, keys of the whole file that begin with an underscore are left out: they hold templates.
+    As in Drake, keys of the whole file that begin with an underscore are left out: they hold templates.
 
     Raises:
-        DocumentError: Where the text does not parse, a mapping has one key twice, or the text is made to be
-            larger than it looks.
+        DataError: The text does not parse, a mapping has one key twice, or aliases repeat too much. The key
+            is the line and the column, counted from 1, where they are known.
     """
     try:
-        _refuse_deep(text)
-        loader = _Loader(text)
-        root = loader.get_single_node()
-        if root is None:
-            return None
-        _Expansion().size(root)
-        _refuse_numbered(root)
-        data = loader.construct_document(root)
-    except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark
-        raise DocumentError(_place(mark), error.problem or "unreadable text", "valid YAML") from error
-    except DocumentError:
+        _check_events(yaml.parse(text, Loader=_Parser))
+        data = yaml.load(text, Loader=_Loader)
+    except DataError:
         raise
-    except yaml.reader.ReaderError as error:
-        character = f"character {error.character!r} at {error.position}"
-        raise DocumentError("the file", character, "text without control characters") from error
-    except (
-        yaml.YAMLError,
-        AttributeError,
-        TypeError,
-        ValueError,
-    ) as error:  # no number, no day of a calendar
-        raise DocumentError("the file", str(error), "valid YAML") from error
+    except yaml.MarkedYAMLError as error:
+        place = _place(error.problem_mark) if error.problem_mark else "the file"
+        raise DataError(place, error.problem or "unreadable text", "valid YAML") from error
+    except (yaml.YAMLError, AttributeError, TypeError, ValueError) as error:
+        # PyYAML also lets through what int(), float() and date() raise.
+        raise DataError("the file", " ".join(str(error).split()), "valid YAML") from error
     if isinstance(data, dict):
         return {key: value for key, value in data.items() if not str(key).startswith("_")}
     return data
 
 
-def _place(mark: yaml.Mark | None) -> str:
-    return f"line {mark.line + 1}, column {mark.column + 1}" if mark else "the file"
+def _place(mark: yaml.Mark) -> str:
+    return f"line {mark.line + 1}, column {mark.column + 1}"
 
 
-def _refuse_deep(text: str) -> None:
-    """Stop before nesting that would take all time, or the stack, to read."""
-    depth = 0
-    for event in yaml.parse(text, Loader=_Parser):
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > _DEEPEST:
-            place = _place(event.start_mark)
-            raise DocumentError(
-                place, "endless nesting", f"at most {_DEEPEST} lists and mappings in each other"
-            )
+class _Collection:
+    """A list or mapping of the text, from its start event to its end event.
+
+    Attributes:
+        size: Values in it so far, itself included, every alias counted as what it repeats.
+        height: Levels of collections in it so far, itself included.
+        closed: Whether its end event has come.
+    """
+
+    def __init__(self, event: yaml.CollectionStartEvent) -> None:
+        self.place, self.size, self.height, self.closed = _place(event.start_mark), 1, 1, False
+        self._keys: set[str] | None = set() if isinstance(event, yaml.MappingStartEvent) else None
+        self._entries = 0
+
+    def add(self, event: yaml.Event, size: int, height: int) -> None:
+        """Count an entry, and refuse a key that the mapping has already: PyYAML would keep the last."""
+        if self._keys is not None and self._entries % 2 == 0 and isinstance(event, yaml.ScalarEvent):
+            if event.value in self._keys and event.value != "<<":
+                raise DataError(_place(event.start_mark), event.value, "every key once")
+            self._keys.add(event.value)
+        self._entries += 1
+        self.size += size
+        self.height = max(self.height, height + 1)
+        if self.size > _LARGEST:
+            raise DataError(self.place, f"{self.size} values by repetition", f"at most {_LARGEST} values")
 
 
-class _Expansion:
-    """How much a document holds once every alias stands for its value; walks each node once."""
+def _check_events(events: Iterator[yaml.Event]) -> None:
+    """Refuse repeated keys, and nesting or repetition that would take all memory, before anything is built.
 
-    def __init__(self) -> None:
-        self._sizes: dict[int, int | None] = {}
-
-    def size(self, node: yaml.Node, depth: int = 0) -> int:
-        """Values in a node, and a refusal of what is too much, endless, or said twice.
-
-        Raises:
-            DocumentError: With the place.
-        """
-        if isinstance(node, yaml.ScalarNode):
-            return 1
-        if id(node) not in self._sizes:
-            self._sizes[id(node)] = None
-            self._sizes[id(node)] = self._measure(node, depth)
-        size = self._sizes[id(node)]
-        if size is None:
-            raise DocumentError(_place(node.start_mark), "endless nesting", "nothing that holds itself")
-        return size
-
-    def _measure(self, node: yaml.Node, depth: int) -> int:
-        if depth > _DEEPEST:
+    Raises:
+        DataError: With the place.
+    """
+    around: list[_Collection] = []
+    anchors: dict[str | None, _Collection] = {}
+    for event in events:
+        size, height = 1, 0
+        if isinstance(event, yaml.CollectionStartEvent):
+            around.append(_Collection(event))
+            anchors[event.anchor] = around[-1]
+        elif isinstance(event, yaml.CollectionEndEvent):
+            done = around.pop()
+            done.closed, size, height = True, done.size, done.height
+        elif isinstance(event, yaml.AliasEvent) and event.anchor in anchors:
+            repeated = anchors[event.anchor]
+            if not repeated.closed:
+                raise DataError(repeated.place, "endless nesting", "nothing that holds itself")
+            size, height = repeated.size, repeated.height
+        if len(around) + height > _DEEPEST:
             allowed = f"at most {_DEEPEST} lists and mappings in each other"
-            raise DocumentError(_place(node.start_mark), "endless nesting", allowed)
-        if isinstance(node, yaml.MappingNode):
-            _refuse_duplicates(node)
-            inner = [part for pair in node.value for part in pair]
-        else:
-            inner = node.value
-        total = 1 + sum(self.size(part, depth + 1) for part in inner)
-        if total > _LARGEST:
-            place = _place(node.start_mark)
-            raise DocumentError(place, f"{total} values by repetition", f"at most {_LARGEST} values")
-        return total
-
-
-def _refuse_duplicates(node: yaml.MappingNode) -> None:
-    """PyYAML keeps the last of two equal keys without a word."""
-    seen: set[str] = set()
-    for key, _ in node.value:
-        if key.value != "<<" and str(key.value) in seen:
-            raise DocumentError(_place(key.start_mark), str(key.value), "every key once")
-        seen.add(str(key.value))
-
-
-def _refuse_numbered(root: yaml.Node) -> None:
-    """Drake takes nothing but texts for the keys of a whole file."""
-    for key, _ in root.value if isinstance(root, yaml.MappingNode) else ():
-        if key.tag not in ("tag:yaml.org,2002:str", "tag:yaml.org,2002:merge"):
-            shown = key.value if isinstance(key, yaml.ScalarNode) else "a list or a mapping"
-            raise DocumentError(_place(key.start_mark), shown, "a text as the key")
+            raise DataError(_place(event.start_mark), "endless nesting", allowed)
+        if around and not isinstance(event, yaml.CollectionStartEvent):
+            around[-1].add(event, size, height)

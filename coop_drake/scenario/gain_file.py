@@ -3,13 +3,12 @@
 from dataclasses import replace
 from pathlib import Path
 
-from pydrake.common.yaml import yaml_dump_typed
-
 from coop_drake.errors import ScenarioError
 from coop_drake.laws.gains import GainSet
+from coop_drake.scenario.document import write
 from coop_drake.scenario.model import Gains, Scenario
 from coop_drake.scenario.reading import read_file
-from coop_drake.scenario.schema import draft, thaw
+from coop_drake.typed_data import to_plain
 
 __all__ = ["dump_gains", "with_gains"]
 
@@ -39,5 +38,4 @@ def with_gains(scenario: Scenario, choice: str | None) -> Scenario:
 
 def dump_gains(name: str, gain_set: GainSet) -> str:
     """Write a gain set as YAML text that ``--gains`` reads, and that fits a scenario under ``gains``."""
-    text: str = yaml_dump_typed(thaw(Gains(name, {name: gain_set})), schema=draft(Gains))
-    return text
+    return write({"selected": name, "sets": {name: to_plain(gain_set, GainSet)}})

@@ -3,13 +3,10 @@
 import dataclasses
 from pathlib import Path
 
-from pydrake.common.yaml import yaml_dump_typed
-
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.floor import with_floor
 from coop_drake.scenario.model import Scenario
-from coop_drake.scenario.reading import read_file
-from coop_drake.scenario.schema import draft, thaw
+from coop_drake.scenario.reading import read_file, write_text
 from coop_drake.scenario.validation import validate
 from coop_drake.shipped import scenario_file, shipped_scenarios
 
@@ -44,4 +41,4 @@ def load_scenario(path: Path | str) -> Scenario:
 
 def dump_scenario(scenario: Scenario) -> str:
     """Write a scenario as YAML text that :func:`load_scenario` reads back to the same values."""
-    return str(yaml_dump_typed(thaw(scenario), schema=draft(Scenario)))
+    return write_text(scenario)

@@ -2,18 +2,19 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydrake.multibody.parsing import ModelDirective
 from shapely import Polygon
 
 from coop_drake.answers.problem import PlannerSettings
 from coop_drake.fields.tolerance import TOLERANCE
 from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains
 from coop_drake.scenario.deployment import Deployment
+from coop_drake.scenario.drake_types import Directive
 from coop_drake.tree.pose import PlanarPose
+from coop_drake.typed_data import Limits, Positive
 
-# No `from __future__ import annotations` here: Drake's YAML loader reads the types of the fields.
+# No `from __future__ import annotations` here: `typed_data` reads the types of the fields.
 
 
 @dataclass(frozen=True)
@@ -95,9 +96,9 @@ class Tolerances:
         joint: Error of every joint that has a goal [rad or m].
     """
 
-    position: float = 0.01
-    angle: float = 0.02
-    joint: float = 0.02
+    position: Positive = 0.01
+    angle: Positive = 0.02
+    joint: Positive = 0.02
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,11 @@ class Gains:
     """
 
     selected: str = "scheduled"
-    sets: dict[str, FixedGains | ScheduledGains] = field(default_factory=_shipped_gain_sets)
+    sets: dict[str, FixedGains | ScheduledGains] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Add the sets that are always there."""
+        object.__setattr__(self, "sets", _shipped_gain_sets() | self.sets)
 
 
 @dataclass(frozen=True)
@@ -141,7 +146,7 @@ class MapSettings:
             as well as that are refused. The disk they are mapped to has radius 1 [-].
     """
 
-    tolerance: float = TOLERANCE
+    tolerance: Annotated[float, Limits(above=0.0, below=0.01)] = TOLERANCE
 
 
 @dataclass(frozen=True)
@@ -155,7 +160,7 @@ class PlantSettings:
     """
 
     grasps: Literal["joints", "constraints"] = "joints"
-    time_step: float = 0.001
+    time_step: Annotated[float, Limits(above=0.0, at_most=0.01)] = 0.001
 
     @property
     def ideal(self) -> bool:
@@ -176,12 +181,12 @@ class SimulatorSettings:
             nearer to the truth, at its worst, than ``runge_kutta5`` with 1e-4: the laws have corners.
     """
 
-    max_time: float = 300.0
+    max_time: Positive = 300.0
     integration_scheme: Literal[
         "runge_kutta3", "runge_kutta5", "runge_kutta2", "bogacki_shampine3", "explicit_euler"
     ] = "runge_kutta3"
-    max_step_size: float = 0.02
-    accuracy: float = 1e-3
+    max_step_size: Positive = 0.02
+    accuracy: Annotated[float, Limits(above=0.0, below=1.0)] = 1e-3
 
 
 @dataclass(frozen=True)
@@ -194,8 +199,8 @@ class VisualizationSettings:
         show_collision: Whether collision geometry is shown over the pictures of the bodies.
     """
 
-    frames_per_second: float = 25.0
-    wall_height: float = 0.5
+    frames_per_second: Positive = 25.0
+    wall_height: Positive = 0.5
     show_collision: bool = False
 
 
@@ -224,12 +229,12 @@ class Scenario:
     """
 
     workspace: Workspace
-    directives: tuple[ModelDirective, ...]
+    directives: tuple[Directive, ...]
     start: Start
     goal: Goal
     object: str = "object"
     fixed_joints: dict[str, dict[str, float | None]] = field(default_factory=dict)
-    load_shares: dict[str, float] = field(default_factory=dict)
+    load_shares: dict[str, Annotated[float, Limits(at_least=0.0, at_most=1.0)]] = field(default_factory=dict)
     planner: PlannerSettings = field(default_factory=PlannerSettings)
     gains: Gains = field(default_factory=Gains)
     maps: MapSettings = field(default_factory=MapSettings)

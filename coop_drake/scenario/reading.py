@@ -1,12 +1,11 @@
-"""Reads one YAML file into one frozen dataclass, or says where the file departs from it."""
+"""Reads one YAML file into one frozen dataclass, and writes one."""
 
 from pathlib import Path
 from typing import TypeVar
 
 from coop_drake.errors import ScenarioError
-from coop_drake.scenario.document import DocumentError
-from coop_drake.scenario.scalars import SchemaError
-from coop_drake.scenario.schema import departures, read
+from coop_drake.scenario.document import parse, write
+from coop_drake.typed_data import DataError, convert_class, to_plain
 
 T = TypeVar("T")
 
@@ -15,22 +14,20 @@ def read_file(cls: type[T], path: Path) -> T:
     """Read a file.
 
     Args:
-        cls: A frozen dataclass.
+        cls: A frozen dataclass of the types that :mod:`coop_drake.typed_data` knows.
         path: The file.
 
     Raises:
-        ScenarioError: The file cannot be read, is no YAML, or departs from the schema; with key and value.
+        ScenarioError: The file cannot be read, is no YAML, or departs from the dataclass; with key and value.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        return convert_class(parse(path.read_text(encoding="utf-8")), cls)
+    except DataError as error:
+        raise ScenarioError(str(path), error.key or "the file", error.value, error.allowed) from error
     except (OSError, UnicodeDecodeError) as error:
         raise ScenarioError(str(path), "the file", str(error), "a readable file") from error
-    try:
-        for departure in departures(cls, text):
-            raise departure
-        value: T = read(cls, text)
-    except SchemaError as error:
-        raise ScenarioError(str(path), error.key, error.value, error.allowed) from error
-    except DocumentError as error:
-        raise ScenarioError(str(path), error.place, error.problem, error.allowed) from error
-    return value
+
+
+def write_text(value: object) -> str:
+    """Write a frozen dataclass as YAML text that :func:`read_file` reads back to the same values."""
+    return write(to_plain(value, type(value)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from coop_drake.scenario import load_scenario
 from docs.generate.scenario_keys import Section, sections
 
 __all__ = ["scenario_page"]
@@ -10,18 +9,17 @@ __all__ = ["scenario_page"]
 _TOP = """# Scenario files
 
 A scenario is one YAML file that ends in `.scenario.yaml`. Every key is listed here with its unit, its default
-and what may stand there; a key that is not listed is refused, with the nearest that is. Lengths are metres,
+and what may stand there; a key that is not listed is refused, with those that are. Lengths are metres,
 angles radians, frames those of the [conventions](../conventions.md).
 [How to write one](../how_to/own_scenario.md) shows a small one.
 
-This page is made by `make docs` from the classes that hold the values and the checks that refuse them.
+`make docs` makes this page from the classes that hold the values; loading checks the same limits.
 """
 
 
 def scenario_page() -> str:
     """All sections, one table each."""
-    scenario = load_scenario("base")
-    return "\n".join([_TOP, *map(_section, sections(scenario))])
+    return "\n".join([_TOP, *map(_section, sections())])
 
 
 def _section(section: Section) -> str:
@@ -35,10 +33,9 @@ def _section(section: Section) -> str:
     ]
     for key in section.keys:
         kind = f"{key.kind} [{key.unit}]" if key.unit else key.kind
-        value = f"{kind}; {key.allowed}" if key.allowed else kind
         default = (
             f"`{key.default}`" if key.default not in ("", "see below") else key.default or "**required**"
         )
-        cells = (f"`{key.name}`", value, default, key.meaning)
+        cells = (f"`{key.name}`", kind, default, key.meaning)
         lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
     return "\n".join([*lines, ""])

@@ -1,5 +1,3 @@
-from dataclasses import fields
-
 import numpy as np
 import pytest
 
@@ -23,20 +21,15 @@ def test_defaults_of_the_fixed_set_are_table_2():
 
 
 @pytest.mark.parametrize("gain_set", [FixedGains, ScheduledGains])
-def test_a_file_reader_sees_plain_types(gain_set):
-    assert {field.type for field in fields(gain_set)} == {float, str}
-
-
-@pytest.mark.parametrize("gain_set", [FixedGains, ScheduledGains])
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("rate_gain", 0.0, "rate_gain must be finite and positive, got 0.0"),
-        ("rate_gain", float("nan"), "rate_gain must be finite and positive, got nan"),
-        ("energy_allowance", -0.5, "energy_allowance must be finite and positive, got -0.5"),
-        ("smoothing", -0.001, "smoothing must be finite and not negative, got -0.001"),
-        ("funnel", "cubic", "funnel must be one of exponential, smooth, got 'cubic'"),
-        ("energy_factor", 0.9, "energy_factor below 1 lets no transition begin; expected 1 or more, got 0.9"),
+        ("rate_gain", 0.0, "rate_gain: 0.0 is not allowed; expected a positive number"),
+        ("rate_gain", float("nan"), "rate_gain: nan is not allowed; expected a finite number"),
+        ("energy_allowance", -0.5, "energy_allowance: -0.5 is not allowed; expected a positive number"),
+        ("smoothing", -0.001, "smoothing: -0.001 is not allowed; expected zero or a positive number"),
+        ("funnel", "cubic", "funnel: 'cubic' is not allowed; expected one of exponential, smooth"),
+        ("energy_factor", 0.9, "energy_factor: 0.9 is not allowed; expected a number of at least 1"),
     ],
 )
 def test_bad_gains_are_refused_by_name(gain_set, name, value, message):
@@ -48,7 +41,7 @@ def test_bad_gains_are_refused_by_name(gain_set, name, value, message):
     ("low", "high"), [("min_stiffness", "max_stiffness"), ("min_decay_rate", "max_decay_rate")]
 )
 def test_bounds_in_the_wrong_order_are_refused(low, high):
-    with pytest.raises(ValueError, match=f"^{low} must not exceed {high}, got 9.0 > 3.0$"):
+    with pytest.raises(ValueError, match=f"^{low}: 9.0 is not allowed; expected at most {high}, 3$"):
         ScheduledGains(**{low: 9.0, high: 3.0})
 
 
