@@ -48,7 +48,7 @@ def _show(scenario: Path, plan: Path | None, out: Path | None, reporter: Reporte
     # Here and not above: no other command should wait for the pictures' library.
     from coop_drake.cli.planning import read_plan
     from coop_drake.drawing import house_style, save_figure
-    from coop_drake.viz.overview_figure import overview_figure
+    from coop_drake.viz.floor_figures import overview_figure
 
     found = None if plan is None else read_plan(question, plan, reporter, gains_given=False)
     caption = f"{question.name}: start and goal"

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
+from matplotlib.colors import to_rgba_array
 from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path as Outline
-from shapely import Polygon, box
+from shapely import Polygon, box, get_coordinates
 from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
@@ -17,33 +19,39 @@ from coop_drake.drawing.footprints import team_footprints
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["draw_polygon", "draw_team", "draw_workspace", "team_legend"]
+__all__ = ["draw_polygon", "draw_team", "draw_workspace", "frame_of", "outline_of", "team_legend"]
 
-_RIM = 0.3  # Wall drawn around the floor [m].
+_RIM = 0.3
+"""Width of the wall drawn around the floor [m]."""
+
+
+def outline_of(rings: Iterable[FloatArray]) -> Outline:
+    """Return one path of several closed rings, each of shape (n, 2) with its first point repeated at the end.
+
+    Matplotlib leaves out what a ring encloses that runs the other way round.
+    """
+    return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
 
 
 def draw_polygon(ax: Axes, polygon: BaseGeometry, **style: Any) -> None:
-    """Add a polygon with its holes to ``ax``; polygons of several parts are drawn part by part."""
-    for part in getattr(polygon, "geoms", [polygon]):
-        oriented = orient(part)  # Matplotlib leaves out what a ring the other way round encloses.
-        rings = [oriented.exterior, *oriented.interiors]
-        outline = Outline.make_compound_path(
-            *(Outline(np.asarray(ring.coords), closed=True) for ring in rings)
-        )
-        ax.add_patch(PathPatch(outline, **style))
+    """Add a polygon, or a shape of several polygons, with its holes to ``ax``."""
+    parts = getattr(polygon, "geoms", [polygon])
+    if not polygon.is_empty:
+        ax.add_patch(PathPatch(outline_of(ring for part in parts for ring in _rings(part)), **style))
 
 
 def draw_workspace(ax: Axes, workspace: Polygon) -> None:
     """Draw the floor white, everything else as wall, and set equal axes in metres."""
-    x_min, y_min, x_max, y_max = workspace.bounds
-    frame = box(x_min - _RIM, y_min - _RIM, x_max + _RIM, y_max + _RIM)
-    draw_polygon(ax, frame, facecolor=WALL, edgecolor="none", zorder=0)
+    frame = frame_of(workspace)
+    draw_polygon(ax, box(*frame), facecolor=WALL, edgecolor="none", zorder=0)
     draw_polygon(ax, workspace, facecolor=FLOOR, edgecolor=INK, linewidth=1.0, zorder=1)
-    ax.set_xlim(frame.bounds[0], frame.bounds[2])
-    ax.set_ylim(frame.bounds[1], frame.bounds[3])
-    ax.set_aspect("equal")
-    ax.set_xlabel("x [m]")
-    ax.set_ylabel("y [m]")
+    ax.set(xlim=frame[::2], ylim=frame[1::2], aspect="equal", xlabel="x [m]", ylabel="y [m]")
+
+
+def frame_of(workspace: Polygon) -> tuple[float, float, float, float]:
+    """Return the limits (x_min, y_min, x_max, y_max) of a picture of the floor with a rim of wall [m]."""
+    x_min, y_min, x_max, y_max = workspace.bounds
+    return x_min - _RIM, y_min - _RIM, x_max + _RIM, y_max + _RIM
 
 
 def draw_team(
@@ -65,13 +73,20 @@ def draw_team(
         alpha: Opacity of the filling.
         zorder: Drawing order.
     """
-    for footprint in team_footprints(tree, configuration):
-        own = OBJECT if footprint.robot is None else robot_colour(footprint.robot)
-        fill = own if colour is None else colour
-        draw_polygon(ax, footprint.shape, facecolor=fill, edgecolor="none", alpha=alpha, zorder=zorder)
-        draw_polygon(
-            ax, footprint.shape, facecolor="none", edgecolor=fill, linewidth=0.9, zorder=zorder + 0.1
-        )
+    footprints = team_footprints(tree, configuration)
+    own = [OBJECT if body.robot is None else robot_colour(body.robot) for body in footprints]
+    edges = own if colour is None else [colour] * len(footprints)
+    outlines = [outline_of(_rings(body.shape)) for body in footprints]
+    bodies = PathCollection(
+        outlines, facecolors=to_rgba_array(edges, alpha), edgecolors=edges, linewidths=0.9, zorder=zorder
+    )
+    ax.add_collection(bodies)
+
+
+def _rings(polygon: Polygon) -> list[FloatArray]:
+    """Return the outer ring of a polygon anticlockwise and its holes clockwise, each of shape (n, 2) [m]."""
+    oriented = orient(polygon)
+    return [get_coordinates(ring) for ring in (oriented.exterior, *oriented.interiors)]
 
 
 def team_legend(tree: ComponentTree) -> list[Patch]:

@@ -1,11 +1,10 @@
 from .block_diagram import block_diagram_figure
-from .effort_figures import summary_figure
 from .figures import write_figures
+from .floor_figures import path_figure
 from .live import LiveView
-from .place_figures import path_figure
 from .recording import inline_frame, recording_html, write_recording
 from .scene import TransportScene
-from .state_figures import angle_figure
+from .time_figures import angle_figure, summary_figure
 
 __all__ = [
     "LiveView",

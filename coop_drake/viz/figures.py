@@ -12,7 +12,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.drawing.canvas import house_style, save_figure
 from coop_drake.simulation import SimulationLog
 from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.viz import effort_figures, place_figures, state_figures
+from coop_drake.viz import floor_figures, time_figures
 
 __all__ = ["write_figures"]
 
@@ -45,16 +45,16 @@ def write_figures(
 def _figures(
     workspace: Polygon, tree: ComponentTree, plan: Plan, log: SimulationLog
 ) -> Iterator[tuple[str, Figure]]:
-    yield "fig04_start_and_goal", place_figures.start_and_goal_figure(workspace, tree, plan)
-    yield "fig05_path", place_figures.path_figure(workspace, tree, log)
-    yield "fig06_position", state_figures.position_figure(log)
-    yield "fig07_angle", state_figures.angle_figure(log)
-    yield "fig08_velocity", state_figures.velocity_figure(log)
-    yield "fig09_angular_velocity", state_figures.angular_velocity_figure(log)
+    yield "fig04_start_and_goal", floor_figures.start_and_goal_figure(workspace, tree, plan)
+    yield "fig05_path", floor_figures.path_figure(workspace, tree, log)
+    yield "fig06_position", time_figures.position_figure(log)
+    yield "fig07_angle", time_figures.angle_figure(log)
+    yield "fig08_velocity", time_figures.velocity_figure(log)
+    yield "fig09_angular_velocity", time_figures.angular_velocity_figure(log)
     for robot, name in enumerate(log.robot_names):
-        figure = state_figures.joints_figure(tree, log, robot)
+        figure = time_figures.joints_figure(tree, log, robot)
         if figure is not None:
             yield f"fig{min(10 + robot, 11)}_joints_{name}", figure
-    yield "fig12_force", effort_figures.force_figure(log)
-    yield "fig13_torque", effort_figures.torque_figure(log)
-    yield "summary", effort_figures.summary_figure(log)
+    yield "fig12_force", time_figures.force_figure(log)
+    yield "fig13_torque", time_figures.torque_figure(log)
+    yield "summary", time_figures.summary_figure(log)

@@ -1,4 +1,4 @@
-"""Axes over time: stacked ones, marks at the switches to the next cell, lines that break there."""
+"""Axes over the time of a run: stacked panels, marks where the next cell is entered, lines broken there."""
 
 from __future__ import annotations
 
@@ -8,49 +8,65 @@ from matplotlib.figure import Figure
 
 from coop_drake.drawing.canvas import new_figure
 from coop_drake.drawing.colours import GREY
-from coop_drake.simulation.log import IntArray
+from coop_drake.simulation import SimulationLog
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["SWITCHES", "break_at", "mark_switches", "switch_times", "time_axes"]
+__all__ = ["break_at_switches", "time_axes"]
 
-SWITCHES = "Dashed lines mark the switches from cell to cell."
-"""What a caption says of `mark_switches`."""
+_WIDTH = 7.5
+"""Width of a figure [in]: that of a page of text."""
+
+_MARGINS = (0.82, 0.15, 0.32)
+"""Space at the left for tick labels and an axis label, at the right, and at the top for a legend [in]."""
+
+_GAP = 0.28
+"""Space between two panels [in]: a legend fits."""
 
 
-def time_axes(caption: str, labels: list[str], *, height: float = 2.1) -> tuple[Figure, list[Axes]]:
-    """Return a figure with one axes per label, stacked over a common time axis in seconds."""
-    figure = new_figure(7.5, 0.9 + height * len(labels), caption)
-    axes = figure.subplots(len(labels), 1, sharex=True, squeeze=False)[:, 0]
+def time_axes(
+    log: SimulationLog, caption: str, labels: list[str], *, height: float = 1.8
+) -> tuple[Figure, list[Axes]]:
+    """Return a figure with one panel per label, stacked over a common axis of time.
+
+    A dashed vertical line marks every switch to the next cell, and the caption says so.
+
+    Args:
+        log: The run.
+        caption: Text under the figure.
+        labels: Label of the vertical axis of every panel.
+        height: Of every panel [in].
+    """
+    count = len(labels)
+    caption = f"{caption} Dashed lines mark the switches from cell to cell."
+    figure = new_figure(_WIDTH, count * (height + _GAP) + 1.0, caption, margins=_MARGINS)
+    axes = figure.subplots(count, 1, sharex=True, squeeze=False, gridspec_kw={"hspace": _GAP / height})[:, 0]
+    switches = log.times[1:][np.diff(log.cell_index) != 0]
     for ax, label in zip(axes, labels, strict=True):
         ax.set_ylabel(label)
-        ax.ticklabel_format(useOffset=False)
+        ax.vlines(
+            switches,
+            0.0,
+            1.0,
+            transform=ax.get_xaxis_transform(),
+            colors=GREY,
+            linewidths=0.5,
+            linestyles=[(0, (4, 3))],
+            zorder=0.5,
+        )
+    axes[0].set_xlim(0.0, max(float(log.times[-1]), 1e-9))
     axes[-1].set_xlabel("time [s]")
     return figure, list(axes)
 
 
-def switch_times(times: FloatArray, cell_index: IntArray) -> FloatArray:
-    """Return the times [s] at which the team enters the next cell."""
-    switches: FloatArray = times[1:][np.diff(cell_index) != 0]
-    return switches
-
-
-def mark_switches(axes: list[Axes], switches: FloatArray) -> None:
-    """Draw a thin dashed vertical line at every switch to the next cell."""
-    for ax in axes:
-        for time in switches:
-            ax.axvline(float(time), color=GREY, linewidth=0.5, linestyle=(0, (4, 3)), zorder=0.5)
-
-
-def break_at(times: FloatArray, values: FloatArray, cell_index: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Break a line at every switch, so that a jump is not drawn as a slope.
+def break_at_switches(log: SimulationLog, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a line that is broken at every switch, so that a jump is not drawn as a slope.
 
     Args:
-        times: Sample times [s], shape (T,).
-        values: Values, shape (T,).
-        cell_index: Cell of each sample, shape (T,).
+        log: The run, with T samples.
+        values: One value per sample, shape (T,).
 
     Returns:
-        Times and values with a NaN inserted before the first sample of each new cell.
+        Times [s] and values, with one more entry at every switch: a NaN before the new cell's first value.
     """
-    places = np.flatnonzero(np.diff(cell_index)) + 1
-    return np.insert(times, places, times[places]), np.insert(values.astype(float), places, np.nan)
+    places = np.flatnonzero(np.diff(log.cell_index)) + 1
+    return np.insert(log.times, places, log.times[places]), np.insert(values.astype(float), places, np.nan)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from matplotlib.collections import LineCollection
 from PIL import Image
 
 from coop_drake.viz import write_figures
-from coop_drake.viz.place_figures import path_figure, start_and_goal_figure
-from coop_drake.viz.state_figures import angle_figure, joints_figure
-from coop_drake.viz.time_axes import break_at, switch_times
+from coop_drake.viz.floor_figures import path_figure, start_and_goal_figure
+from coop_drake.viz.time_axes import break_at_switches
+from coop_drake.viz.time_figures import angle_figure, joints_figure
 from tests.support.cases import case
 from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
 from tests.support.sliding import with_sliding_joint
@@ -73,14 +76,14 @@ def test_figure_7_shows_the_angle_its_funnel_and_a_dashed_line_at_every_switch()
     log = synthetic_log(problem)
     axes, from_middle = angle_figure(log).axes
     drawn = [np.asarray(line.get_ydata(), dtype=float) for line in axes.lines]
-    _, theta = break_at(log.times, log.object_pose[:, 2], log.cell_index)
+    _, theta = break_at_switches(log, log.object_pose[:, 2])
     assert any(np.array_equal(values, theta, equal_nan=True) for values in drawn)
     lower, upper = (np.asarray(line.get_ydata(), dtype=float) for line in from_middle.lines[:2])
     np.testing.assert_allclose(lower, -upper, rtol=0, atol=1e-12)
-    switches = switch_times(log.times, log.cell_index)
+    switches = log.times[1:][np.diff(log.cell_index) != 0]
     assert len(switches) == log.cell_index.max()
-    vertical = {float(line.get_xdata()[0]) for line in axes.lines if len(set(line.get_xdata())) == 1}
-    assert vertical == set(switches.tolist())
+    dashed = next(lines for lines in axes.collections if isinstance(lines, LineCollection))
+    assert [segment[:, 0].tolist() for segment in dashed.get_segments()] == [[t, t] for t in switches]
 
 
 def test_every_joint_of_a_robot_has_its_own_axes():
@@ -98,6 +101,7 @@ def test_a_sliding_joint_is_labelled_in_metres():
 
 
 def test_a_jump_at_a_switch_is_broken_not_sloped():
-    times, values = break_at(np.array([0.0, 1.0, 2.0]), np.array([1.0, 1.0, 5.0]), np.array([0, 0, 1]))
+    log = replace(synthetic_log(case("base")), times=np.arange(3.0), cell_index=np.array([0, 0, 1]))
+    times, values = break_at_switches(log, np.array([1.0, 1.0, 5.0]))
     np.testing.assert_array_equal(times, [0.0, 1.0, 2.0, 2.0])
     np.testing.assert_array_equal(values, [1.0, 1.0, np.nan, 5.0])

@@ -1,0 +1,146 @@
+"""Figures of a run over time: the paper's Figures 6 to 13, and a summary of the margins."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter, StrMethodFormatter
+
+from coop_drake.drawing.canvas import legend_above
+from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, OBJECT, ORANGE, SKY, robot_colour
+from coop_drake.simulation import SimulationLog
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
+from coop_drake.viz.time_axes import break_at_switches, time_axes
+
+__all__ = [
+    "angle_figure",
+    "angular_velocity_figure",
+    "force_figure",
+    "joints_figure",
+    "position_figure",
+    "summary_figure",
+    "torque_figure",
+    "velocity_figure",
+]
+
+_SINGLE = 2.7
+"""Height of the panel of a figure that has only one [in]."""
+
+
+def position_figure(log: SimulationLog) -> Figure:
+    """Draw the object's position and the reference governor's over time."""
+    caption = "Figure 6. Position of the object, and of the reference governor that leads it."
+    figure, axes = time_axes(log, caption, ["x [m]", "y [m]"])
+    for axis, ax in enumerate(axes):
+        ax.plot(log.times, log.governor_position[:, axis], color=GREY, linewidth=0.9, label="governor")
+        ax.plot(log.times, log.object_pose[:, axis], color=OBJECT, label="object")
+    legend_above(axes[0])
+    return figure
+
+
+def angle_figure(log: SimulationLog) -> Figure:
+    """Draw the object's angle inside its funnel over time, and both measured from the funnel's middle."""
+    caption = (
+        "Figure 7. Angle of the object between the bounds of its funnel; below, both measured from the "
+        "funnel's middle."
+    )
+    labels = ["θ [rad]", "θ, from the middle [rad]"]
+    figure, axes = time_axes(log, caption, labels, height=2.3)
+    middle = 0.5 * (log.funnel_lower[:, 0] + log.funnel_upper[:, 0])
+    for ax, origin in zip(axes, (np.zeros_like(middle), middle), strict=True):
+        _draw_funnel(ax, log, 0, origin)
+        ax.plot(*break_at_switches(log, log.object_pose[:, 2] - origin), color=OBJECT, label="θ")
+    legend_above(axes[0])
+    return figure
+
+
+def velocity_figure(log: SimulationLog) -> Figure:
+    """Draw the object's linear velocity over time."""
+    caption = "Figure 8. Linear velocity of the object."
+    return _curves(log, caption, log.object_twist[:, :2], ["x velocity [m/s]", "y velocity [m/s]"])
+
+
+def angular_velocity_figure(log: SimulationLog) -> Figure:
+    """Draw the object's angular velocity over time."""
+    caption = "Figure 9. Angular velocity of the object."
+    return _curves(log, caption, log.object_twist[:, 2:], ["angular velocity [rad/s]"], height=_SINGLE)
+
+
+def joints_figure(tree: ComponentTree, log: SimulationLog, robot: int) -> Figure | None:
+    """Draw the joints of one robot inside their funnels over time; None for a robot without joints."""
+    joints = [joint for joint in tree.joints if joint.robot == robot]
+    if not joints:
+        return None
+    name = log.robot_names[robot]
+    caption = f"Figure {min(10 + robot, 11)}. Joints of {name} between the bounds of their funnels."
+    labels = [f"{joint.name.split('::')[-1]} [{joint.unit}]" for joint in joints]
+    figure, axes = time_axes(log, caption, labels, height=_SINGLE if len(joints) == 1 else 1.8)
+    for joint, ax in zip(joints, axes, strict=True):
+        _draw_funnel(ax, log, 1 + joint.index, np.zeros_like(log.times))
+        ax.plot(log.times, log.joints[:, joint.index], color=robot_colour(robot), label="joint")
+    legend_above(axes[0])
+    return figure
+
+
+def force_figure(log: SimulationLog) -> Figure:
+    """Draw the total force that the robots apply to the object over time."""
+    caption = "Figure 12. Total force that the robots apply to the object."
+    return _curves(log, caption, log.object_wrench[:, :2], ["x force [N]", "y force [N]"])
+
+
+def torque_figure(log: SimulationLog) -> Figure:
+    """Draw the total torque that the robots apply to the object over time."""
+    caption = "Figure 13. Total torque that the robots apply to the object, about its centre of mass."
+    return _curves(log, caption, log.object_wrench[:, 2:], ["torque [N m]"], height=_SINGLE)
+
+
+def summary_figure(log: SimulationLog) -> Figure:
+    """Draw the invariants' margins, which must stay above zero, and the bases' forces over time."""
+    caption = (
+        "Summary. Distance of the team to the walls, between bodies, and of the object to its cell's "
+        "boundary; energy margin of the governor; force of every base. Margins must stay above zero."
+    )
+    labels = ["clearance [m]", "energy margin ΔE [m²/s²]", "base force [N]"]
+    figure, (clearances, energy, forces) = time_axes(log, caption, labels)
+    for clearance, colour, label in (
+        (log.workspace_clearance, BLUE, "team to walls"),
+        (log.body_clearance, GREEN, "between bodies"),
+        (log.cell_clearance, ORANGE, "object to its cell's boundary"),
+    ):
+        clearances.plot(log.times, clearance, color=colour, linewidth=1.0, label=label)
+    clearances.axhline(0.0, color=INK, linewidth=0.8)
+    legend_above(clearances)
+    energy.plot(log.times, log.energy_margin, color=OBJECT, linewidth=1.0)
+    if log.energy_margin.min() > 0.0:
+        energy.set_yscale("log")
+        energy.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        energy.yaxis.set_minor_formatter(NullFormatter())
+    else:
+        energy.set_yscale("symlog", linthresh=1e-3)
+        energy.axhline(0.0, color=INK, linewidth=0.8)
+    for robot, name in enumerate(log.robot_names):
+        force = np.hypot(log.base_wrenches[:, robot, 0], log.base_wrenches[:, robot, 1])
+        forces.plot(log.times, force, color=robot_colour(robot), linewidth=1.0, label=name)
+    legend_above(forces)
+    return figure
+
+
+def _curves(
+    log: SimulationLog, caption: str, values: FloatArray, labels: list[str], *, height: float = 1.8
+) -> Figure:
+    """Draw one curve of the object in every panel; values of shape (T, panels)."""
+    figure, axes = time_axes(log, caption, labels, height=height)
+    for ax, curve in zip(axes, values.T, strict=True):
+        ax.plot(log.times, curve, color=OBJECT)
+    return figure
+
+
+def _draw_funnel(ax: Axes, log: SimulationLog, axis: int, origin: FloatArray) -> None:
+    """Draw both bounds of one axis' funnel, measured from an origin that may move, shape (T,)."""
+    times, lower = break_at_switches(log, log.funnel_lower[:, axis] - origin)
+    _, upper = break_at_switches(log, log.funnel_upper[:, axis] - origin)
+    ax.fill_between(times, lower, upper, color=SKY, alpha=0.25, linewidth=0, label="funnel")
+    for bound in (lower, upper):
+        ax.plot(times, bound, color=INK, linewidth=0.7)
