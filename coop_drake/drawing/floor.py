@@ -35,9 +35,8 @@ def outline_of(rings: Iterable[FloatArray]) -> Outline:
 
 def draw_polygon(ax: Axes, polygon: BaseGeometry, **style: Any) -> None:
     """Add a polygon, or a shape of several polygons, with its holes to ``ax``."""
-    parts = getattr(polygon, "geoms", [polygon])
     if not polygon.is_empty:
-        ax.add_patch(PathPatch(outline_of(ring for part in parts for ring in _rings(part)), **style))
+        ax.add_patch(PathPatch(outline_of(_rings(polygon)), **style))
 
 
 def draw_workspace(ax: Axes, workspace: Polygon) -> None:
@@ -83,10 +82,10 @@ def draw_team(
     ax.add_collection(bodies)
 
 
-def _rings(polygon: Polygon) -> list[FloatArray]:
-    """Return the outer ring of a polygon anticlockwise and its holes clockwise, each of shape (n, 2) [m]."""
-    oriented = orient(polygon)
-    return [get_coordinates(ring) for ring in (oriented.exterior, *oriented.interiors)]
+def _rings(shape: BaseGeometry) -> list[FloatArray]:
+    """Return outer rings of polygons anticlockwise and their holes clockwise, each of shape (n, 2) [m]."""
+    parts = [orient(part) for part in getattr(shape, "geoms", [shape])]
+    return [get_coordinates(ring) for part in parts for ring in (part.exterior, *part.interiors)]
 
 
 def team_legend(tree: ComponentTree) -> list[Patch]:
