@@ -41,8 +41,14 @@ def compiled(function: F | None = None, *, reassociate: bool = False) -> F | Cal
 
     def decorate(function: F) -> F:
         flags = _REASSOCIATED if reassociate else False
-        dispatcher = numba.njit(nogil=True, error_model="numpy", fastmath=flags)(function)
-        dispatcher._cache = _KernelCache(function)
+        options = {"nogil": True, "error_model": "numpy", "fastmath": flags, "no_cfunc_wrapper": True}
+        dispatcher = numba.njit(**options)(function)
+        dispatcher._cache = _KernelCache(function, "called from Python")
+        # Most functions are called from compiled ones only. Then the wrapper that unpacks Python's arguments,
+        # a sixth of the time to compile, is left out.
+        inner = numba.njit(no_cpython_wrapper=True, **options)(function)
+        inner._cache = _KernelCache(function, "called from compiled functions")
+        dispatcher.get_call_template, dispatcher.get_overload = inner.get_call_template, inner.get_overload
         return cast(F, dispatcher)
 
     return decorate if function is None else decorate(function)
@@ -74,11 +80,19 @@ def _file_digest(path: str) -> str:
 
 
 class _KernelCache(FunctionCache):  # type: ignore[misc]
-    """Numba's cache on disk with ``kernel_stamp`` in place of the digest of one file."""
+    """Numba's cache on disk with ``kernel_stamp`` in place of the digest of one file.
 
-    def __init__(self, function: Any) -> None:
+    Args:
+        function: The function.
+        use: From where it is called; the machine code of each use is kept apart.
+    """
+
+    def __init__(self, function: Any, use: str) -> None:
         super().__init__(function)
-        self.stamp = kernel_stamp(function)
+        self.stamp, self._use = kernel_stamp(function), use
         self._cache_file = IndexDataCacheFile(
             cache_path=self._cache_path, filename_base=self._impl.filename_base, source_stamp=self.stamp
         )
+
+    def _index_key(self, sig: Any, codegen: Any) -> tuple[object, ...]:
+        return (*super()._index_key(sig, codegen), self._use)
