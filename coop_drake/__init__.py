@@ -1,1 +1,13 @@
-"""Cooperative transport by mobile manipulators: certified plans, harmonic fields, decentralised control."""
+"""Plan, verify and simulate the transport of one object by several mobile manipulators.
+
+The names below are imported when they are first used, so that ``import coop_drake`` takes no time:
+
+    scenario = coop_drake.load_scenario("base")
+    answer = coop_drake.plan(scenario)
+    maps = coop_drake.build_maps(answer.plan)
+    log = coop_drake.simulate(scenario, answer.plan, maps)
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from coop_drake import simulation
 from coop_drake.answers import load_plan
-from coop_drake.cli import app, simulating
+from coop_drake.cli import app, run
 from coop_drake.cli.reporter import Reporter
 from coop_drake.errors import PlanError
 from coop_drake.simulation import SimulationLog
@@ -98,7 +100,18 @@ def test_people_see_bars_and_a_table_and_quiet_shows_nothing(room, tmp_path):
 def drawn(monkeypatch):
     """Runs of which figures were to be drawn; drawing itself is slow, and looked at after the first run."""
     runs = []
-    monkeypatch.setattr(simulating, "write_figures", lambda *asked: runs.append(asked))
+
+    class NoFigures(nullcontext):
+        def __enter__(self):
+            return self
+
+        def draw(self, *asked):
+            runs.append(asked)
+
+        def wait(self):
+            pass
+
+    monkeypatch.setattr(run, "FigureProcess", NoFigures)
     return runs
 
 
@@ -164,7 +177,7 @@ def test_a_violation_ends_in_exit_code_1_and_says_which(finished, room, tmp_path
     out, _ = finished
     log = SimulationLog.load(out / "log.npz")
     broken = replace(log, reached=False, violation="robot_0::base left the workspace at t = 1.5 s by 2 mm")
-    monkeypatch.setattr(simulating, "simulate", lambda *_, **__: broken)
+    monkeypatch.setattr(simulation, "simulate", lambda *_, **__: broken)
     result = invoke("simulate", room, "--plan", out / "plan.json", "--out", tmp_path, "--json")
     assert result.exit_code == 1
     facts = json.loads(result.stdout)
@@ -184,7 +197,7 @@ def test_a_live_run_is_looked_at_and_says_where_without_waiting_for_anybody(
         looking.append(onlooker)
         raise PlanError("far enough")
 
-    monkeypatch.setattr(simulating, "simulate", simulated)
+    monkeypatch.setattr(simulation, "simulate", simulated)
     plan = finished[0] / "plan.json"
     result = invoke("simulate", room, "--plan", plan, "--out", tmp_path / "live", "--live", "--json")
     assert isinstance(looking[0], LiveView)

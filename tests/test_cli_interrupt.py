@@ -12,9 +12,7 @@ import pytest
 import typer
 
 from coop_drake.answers import load_plan
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.guard import reporting
 from tests.support.scenarios import MODELS
 
 # A shell that starts tests in the background has its children ignore Ctrl-C.
@@ -43,12 +41,8 @@ def test_ctrl_c_after_planning_leaves_the_plan_whole_and_nothing_half_written(tm
 
 def _ended(error: BaseException) -> int:
     """Exit code of a command that raises an error."""
-
-    def command() -> ExitCode:
+    with pytest.raises(typer.Exit) as left, reporting(quiet=True):
         raise error
-
-    with pytest.raises(typer.Exit) as left:
-        run_guarded(Reporter(machine=False, quiet=True), command)
     return left.value.exit_code
 
 

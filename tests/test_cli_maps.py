@@ -8,11 +8,10 @@ import pytest
 from typer.testing import CliRunner
 
 from coop_drake.cli import app
-from coop_drake.cli.map_cache import map_cache
-from coop_drake.cli.mapping import map_cells, save_certificates
-from coop_drake.cli.reading import read_task
+from coop_drake.cli.maps import map_cache, map_cells, write_certificates
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.task import read_task
 from coop_drake.errors import FieldError
 from tests.support.scenarios import write_scenario
 from tests.support.small_plan import small_plan
@@ -43,8 +42,8 @@ def test_certificates_of_all_cells_are_written_and_summed_up(tmp_path):
         ResultFolder(tmp_path),
     )
     maps = map_cells(task, PLAN, reporter, fresh=True)
-    save_certificates(task, maps, folder)
-    document = json.loads(folder.maps.read_text())
+    write_certificates(task, maps, folder)
+    document = json.loads((folder.path / "maps.json").read_text())
     assert document["tolerance"] == 1e-9
     rows = document["maps"]
     assert [row["cell"] for row in rows] == list(range(len(PLAN.cells)))

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from coop_drake.answers import Found
 from coop_drake.cli import app, new
-from coop_drake.cli.reading import read_task
+from coop_drake.cli.task import read_task
 from coop_drake.planning.planner import plan
 from coop_drake.scenario import load_scenario
 from coop_drake.tree.pose import PlanarPose
@@ -29,9 +29,9 @@ def test_a_new_scenario_has_a_plan(tmp_path, flags):
     done = call("mine", *flags, "--out", tmp_path / "mine", "--json")
     assert done.exit_code == 0, done.output
     scenario = json.loads(done.stdout)["scenario"]
-    question = read_task(tmp_path / "mine" / "mine.scenario.yaml", None).question
-    assert scenario == str(question.path)
-    found = plan(question.problem, question.gain_sets[question.gains], gain_set_name=question.gains)
+    task = read_task(tmp_path / "mine" / "mine.scenario.yaml")
+    assert scenario == str(task.scenario.path)
+    found = plan(task.problem, task.scenario.gain_sets["scheduled"], gain_set_name="scheduled")
     assert isinstance(found, Found)
     assert sorted(path.name for path in (tmp_path / "mine").iterdir()) == [
         "mine.scenario.yaml",
@@ -44,7 +44,7 @@ def test_a_new_scenario_has_a_plan(tmp_path, flags):
 def test_the_models_have_the_sizes_that_were_asked_for(tmp_path):
     sizes = ["--arm", "0.3,0.25,0.2", "--base-radius", 0.22, "--length", 1.2, "--width", 0.4]
     call("mine", *sizes, "--out", tmp_path)
-    tree = read_task(tmp_path / "mine.scenario.yaml", None).question.problem.tree
+    tree = read_task(tmp_path / "mine.scenario.yaml", None).problem.tree
     bodies = {body.name: body for component in tree.components for body in component.bodies}
     assert bodies["object::body"].shapes[0].vertices.max(axis=0) == pytest.approx((0.6, 0.2))
     assert bodies["robot_0::base"].shapes[0].radius == pytest.approx(0.22)

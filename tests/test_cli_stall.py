@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from coop_drake.answers import load_plan, save_plan
-from coop_drake.cli import app, simulating
+from coop_drake.cli import app, run
 from coop_drake.simulation import SimulationLog, stall
 from tests.support.scenarios import write_scenario
 
@@ -34,7 +34,7 @@ def planned(tmp_path_factory):
 def impatient(monkeypatch):
     monkeypatch.setattr(stall, "PATIENCE_FACTOR", 1.0)
     monkeypatch.setattr(stall, "PATIENCE_ALLOWANCE", 0.5)
-    monkeypatch.setattr(simulating, "_draw", lambda *_: None)
+    monkeypatch.setattr(run, "_draw", lambda *_: None)
 
 
 def assert_stalled(result, out, complaint):

@@ -20,10 +20,10 @@ from typer.testing import CliRunner
 import coop_drake
 from coop_drake.answers import save_plan
 from coop_drake.answers.digest import problem_digest
-from coop_drake.cli import app, health, show
-from coop_drake.cli.completion import complete_gains, complete_scenario
+from coop_drake.cli import app, doctor, show
 from coop_drake.cli.examples import EXAMPLES
-from coop_drake.cli.question import Question
+from coop_drake.cli.options import complete_gains, complete_scenario
+from coop_drake.cli.task import Task
 from coop_drake.scenario import dump_scenario, load_scenario
 from coop_drake.scenario.document import parse
 from coop_drake.scenario.json_schema import scenario_schema
@@ -150,8 +150,8 @@ def test_the_doctor_says_what_is_wrong_and_what_to_do(monkeypatch):
     def broken():
         raise ImportError("libdrake.so is not there")
 
-    monkeypatch.setattr(health, "_LOOKS", (("Drake", broken, "install drake anew"),))
-    monkeypatch.setattr(health, "_PACKAGES", ("no-such-package",))
+    monkeypatch.setattr(doctor, "_CHECKS", (("Drake", broken, "install drake anew"),))
+    monkeypatch.setattr(doctor, "_PACKAGES", ("no-such-package",))
     result = invoke("doctor", "--json")
     assert result.exit_code == 1
     facts = json.loads(result.stdout)
@@ -167,8 +167,8 @@ def test_scenarios_and_plans_are_shown(ending, tmp_path, monkeypatch):
     names = tuple(joint.name for joint in problem.tree.joints)
     plan = replace(small_plan(names), problem=problem_digest(problem))
     file = save_plan(plan, tmp_path / "plan.json")
-    question = Question("room", Path("room.scenario.yaml"), problem, {}, "scheduled")
-    monkeypatch.setattr(show, "read_apart", lambda _: question)
+    task = Task(load_scenario("base"), problem)
+    monkeypatch.setattr(show, "read_task", lambda _: task)
     target = tmp_path / "pictures" / f"room.{ending}"
     assert invoke("show", "room.scenario.yaml", "--out", target).exit_code == 0
     bare = target.read_bytes()

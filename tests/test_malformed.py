@@ -18,9 +18,8 @@ from pydrake.systems.framework import DiagramBuilder
 from coop_drake.answers import load_plan, save_plan
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.proof_file import save_proof
-from coop_drake.cli import simulating, verify
-from coop_drake.cli.question import Question
-from coop_drake.cli.reading import Task, read_task
+from coop_drake.cli import simulate, verify
+from coop_drake.cli.task import Task, read_task
 from coop_drake.errors import PlanError
 from coop_drake.floor_plans import read_floor_plan
 from coop_drake.planning import find_channel
@@ -75,7 +74,7 @@ def planned():
     problem = planning_problem(scenario, build_team_plant(scenario, DiagramBuilder()))
     names = tuple(joint.name for joint in problem.tree.joints)
     plan = replace(small_plan(names), problem=problem_digest(problem))
-    return plan, Task(scenario, Question("small", scenario.path, problem, scenario.gain_sets, "scheduled"))
+    return plan, Task(scenario, problem)
 
 
 def document_of(save: Callable[[Path], object], path: Path):
@@ -233,7 +232,7 @@ def plan_mutants(folder: Path) -> list[Mutant]:
 
 def test_malformed_plans_are_refused(bench, monkeypatch):
     plan, task = planned()
-    monkeypatch.setattr(simulating, "read_task", lambda *_: task)
+    monkeypatch.setattr(simulate, "read_task", lambda *_: task)
     file = save_plan(plan, bench.folder / "mutant.json")
     assert load_plan(file).joint_names == plan.joint_names
     bench.judge(
@@ -261,8 +260,8 @@ def proof_mutants(index: int, folder: Path) -> list[Mutant]:
 @pytest.mark.parametrize("index", range(len(CORRIDORS)))
 def test_malformed_proofs_are_refused(index, bench, monkeypatch):
     problem = CORRIDORS[index]
-    question = Question("corridor", Path("corridor.scenario.yaml"), problem, GAINS, "scheduled")
-    monkeypatch.setattr(verify, "read_apart", lambda *_: question)
+    task = Task(load_scenario("base"), problem)
+    monkeypatch.setattr(verify, "read_task", lambda *_: task)
     file = bench.folder / "mutant.json"
     save_proof(proved(index), problem, file)
     assert verify_file(file, problem, GAINS).answer == "infeasible"

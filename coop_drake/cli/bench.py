@@ -9,8 +9,7 @@ import typer
 
 from coop_drake.cli.clone import root_of_clone
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.guard import reporting
 
 __all__ = ["bench_command"]
 
@@ -20,8 +19,8 @@ def bench_command(context: typer.Context) -> None:
 
     Arguments go to the benchmarks; `coop-drake bench -- --help` lists them.
     """
-    reporter = Reporter(machine=False, quiet=False)
-    run_guarded(reporter, lambda: _bench(context.args))
+    with reporting() as reporter:
+        reporter.code = _bench(context.args)
 
 
 def _bench(arguments: list[str]) -> ExitCode:

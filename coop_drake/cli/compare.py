@@ -12,14 +12,17 @@ import typer
 from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
+from coop_drake.cli.maps import map_cells
 from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath
+from coop_drake.cli.plan import report_no_plan, search_and_write
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.summary import simulation_facts
+from coop_drake.cli.task import Task, read_task
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
-    from coop_drake.cli.reading import Task
     from coop_drake.fields import HarmonicMap
 
 __all__ = ["compare_command"]
@@ -61,30 +64,26 @@ def compare_command(
     quiet: Quiet = False,
 ) -> None:
     """Carry a plan out with exactly rigid grasps and with constraints as grasps; compare the margins."""
-    reporter = Reporter(machine=machine, quiet=quiet)
-    run_guarded(reporter, lambda: _compare(scenario, gains, out, reporter))
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        reporter.code = _compare(scenario, gains, out, reporter)
 
 
 def _compare(scenario: Path, gains: str | None, out: Path | None, reporter: Reporter) -> ExitCode:
-    # Here and not above: no other command should wait for Drake.
     from coop_drake.answers import Found
-    from coop_drake.cli.mapping import map_cells
-    from coop_drake.cli.planning import plan_question, without_plan
-    from coop_drake.cli.reading import read_task
     from coop_drake.files import write_atomically
 
     task = read_task(scenario, gains)
-    folder = ResultFolder(out if out is not None else Path("out") / task.scenario.name / "compare")
-    result = plan_question(task.question, folder, reporter)
+    folder = ResultFolder.of(task.name, out, "compare")
+    result = search_and_write(task, folder, reporter)
     if not isinstance(result, Found):
-        return without_plan(task.question, result, folder, reporter)
-    maps = map_cells(task, result.plan, reporter, fresh=False)
+        return report_no_plan(task, result, folder, reporter)
+    maps = map_cells(task, result.plan, reporter)
     measures = [_measures(task, result.plan, maps, grasps, reporter) for grasps, _ in _PLANTS]
     compared: dict[str, Any] = {grasps: facts for (grasps, _), facts in zip(_PLANTS, measures, strict=True)}
     write_atomically(folder.path / "compare.json", json.dumps(compared, indent=1).encode() + b"\n")
     reporter.facts.update(compared)
     rows = [(label, *(_text(facts[key], form) for facts in measures)) for label, key, form in _ROWS]
-    reporter.table(task.scenario.name, rows, [heading for _, heading in _PLANTS])
+    reporter.table(task.name, rows, [heading for _, heading in _PLANTS])
     reporter.say(f"The same as JSON is in {escape(str(folder.path / 'compare.json'))}")
     for (_, heading), facts in zip(_PLANTS, measures, strict=True):
         if facts["violation"]:
@@ -99,13 +98,12 @@ def _measures(
     grasps: Literal["joints", "constraints"],
     reporter: Reporter,
 ) -> dict[str, Any]:
-    from coop_drake.cli.measures import simulation_measures
     from coop_drake.simulation import simulate
 
     plant = replace(task.scenario.plant, grasps=grasps)
     with reporter.stage("simulating") as progress:
         log = simulate(replace(task.scenario, plant=plant), plan, maps, progress=progress)
-    measures = simulation_measures(plan, log)
+    measures = simulation_facts(plan, log)
     # JSON has no infinities: where nothing can touch, there is no smallest clearance.
     return {
         key: None if isinstance(value, float) and not isfinite(value) else value

@@ -9,10 +9,13 @@ import typer
 from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
+from coop_drake.cli.maps import map_cells
 from coop_drake.cli.options import PictureFolder, Quiet, ScenarioPath
+from coop_drake.cli.plan import report_no_plan, search
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.task import read_task
 
 __all__ = ["diagram_command"]
 
@@ -26,16 +29,12 @@ def diagram_command(
     quiet: Quiet = False,
 ) -> None:
     """Draw the blocks of the closed loop and of one robot's controller, as they are wired in Drake."""
-    reporter = Reporter(machine=False, quiet=quiet)
-    run_guarded(reporter, lambda: _draw(scenario, robot, out, reporter))
+    with reporting(quiet=quiet) as reporter:
+        reporter.code = _draw(scenario, robot, out, reporter)
 
 
 def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> ExitCode:
-    # Here and not above: no other command should wait for Drake or for the pictures' library.
     from coop_drake.answers import Found
-    from coop_drake.cli.mapping import map_cells
-    from coop_drake.cli.planning import search_plan, without_plan
-    from coop_drake.cli.reading import read_task
     from coop_drake.diagram import build_closed_loop
     from coop_drake.drawing import save_figure
     from coop_drake.errors import ScenarioError
@@ -47,11 +46,11 @@ def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> E
     if robot >= len(robots):
         raise ScenarioError(str(scenario), "--robot", robot, f"a number from 0 to {len(robots) - 1}")
     # An earlier run's results stay as they are: only the picture is written.
-    result = search_plan(task.question, reporter)
+    result = search(task, reporter)
     if not isinstance(result, Found):
-        return without_plan(task.question, result, None, reporter)
-    loop = build_closed_loop(task.scenario, result.plan, map_cells(task, result.plan, reporter, fresh=False))
-    picture = ResultFolder.of(task.scenario.name, out).diagram
+        return report_no_plan(task, result, None, reporter)
+    loop = build_closed_loop(task.scenario, result.plan, map_cells(task, result.plan, reporter))
+    picture = ResultFolder.of(task.name, out).path / "diagram.svg"
     with reporter.stage("drawing"):
         save_figure(block_diagram_figure(loop, robot), picture)
     reporter.say(f"The picture is {escape(str(picture))}")

@@ -1,21 +1,59 @@
-"""The command doctor: whether everything that the other commands need is there and works."""
+"""The command doctor: checks that everything that the other commands need is there and works."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+import os
+import platform
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
+from coop_drake.cli.maps import map_cache
 from coop_drake.cli.options import Machine
-from coop_drake.cli.reporter import Reporter
 
-__all__ = ["doctor_command"]
+__all__ = ["Finding", "doctor_command", "examine"]
 
+_LEAST_MEMORY = 1.0
+"""Memory that a run needs, with a reserve: it peaks at about 0.6 [GB]."""
+
+_PACKAGES = (
+    "drake",
+    "numpy",
+    "scipy",
+    "shapely",
+    "numba",
+    "manifold3d",
+    "matplotlib",
+    "meshcat",
+    "typer",
+    "rich",
+)
 _MARKS = {True: "[green]ok[/]", False: "[red]wrong[/]", None: "[yellow]note[/]"}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The result of one check.
+
+    Attributes:
+        what: What was checked.
+        state: What was found.
+        fine: Whether it is as it should be; None where it works but could be better.
+        remedy: What to do where it is not fine.
+    """
+
+    what: str
+    state: str
+    fine: bool | None = True
+    remedy: str = ""
 
 
 def doctor_command(
@@ -23,25 +61,131 @@ def doctor_command(
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show what is wrong only.")] = False,
 ) -> None:
     """Check the installation: versions, Drake, Meshcat, fonts, compiled parts, memory, caches."""
-    reporter = Reporter(machine=machine, quiet=quiet)
-
-    def command() -> ExitCode:
-        from coop_drake.cli.health import examine
-
+    with reporting(machine=machine, quiet=quiet) as reporter:
         findings = examine()
-        reporter.facts.update(
-            healthy=all(finding.fine is not False for finding in findings),
-            findings=[asdict(finding) for finding in findings],
-        )
+        wrong = [finding for finding in findings if finding.fine is False]
+        reporter.facts.update(healthy=not wrong, findings=[asdict(finding) for finding in findings])
         rows = [(finding.what, f"{escape(finding.state)}  {_MARKS[finding.fine]}") for finding in findings]
         reporter.table("coop-drake doctor", rows)
-        wrong = [finding for finding in findings if finding.fine is False]
-        if wrong:
-            remedies = "; ".join(f"{finding.what}: {finding.state}: {finding.remedy}" for finding in wrong)
-            reporter.complain(remedies)
         for finding in findings:
             if finding.fine is None:
                 reporter.say(f"{finding.what}: {escape(finding.remedy)}")
-        return ExitCode.FAILED_RUN if wrong else ExitCode.DONE
+        if wrong:
+            reporter.complain("; ".join(f"{one.what}: {one.state}: {one.remedy}" for one in wrong))
+            reporter.code = ExitCode.FAILED_RUN
 
-    run_guarded(reporter, command)
+
+def examine() -> list[Finding]:
+    """Make every check; one that raises an error has found something wrong."""
+    enough = sys.version_info >= (3, 11)
+    findings = [Finding("Python", platform.python_version(), enough, "install 3.11 or newer"), *_versions()]
+    for what, check, remedy in _CHECKS:
+        try:
+            findings.append(check())
+        except Exception as error:  # Whatever it is, the other findings help to understand it.
+            findings.append(Finding(what, f"{type(error).__name__}: {error}", False, remedy))
+    return findings
+
+
+def _versions() -> Iterator[Finding]:
+    from importlib.metadata import PackageNotFoundError, requires, version
+
+    yield Finding("coop-drake", version("coop-drake"))
+    core = [line.partition(";")[0] for line in requires("coop-drake") or [] if "extra ==" not in line]
+    least = {name: numbers.split(",")[0] for name, _, numbers in (line.partition(">=") for line in core)}
+    for name in _PACKAGES:
+        needed = least.get(name, "")
+        remedy = f"pip install '{name}>={needed}'" if needed else f"pip install {name}"
+        try:
+            found = version(name)
+        except PackageNotFoundError:
+            yield Finding(name, "missing", False, remedy)
+        else:
+            yield Finding(name, found, _numbers(found) >= _numbers(needed), remedy)
+
+
+def _numbers(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split(".") if part.isdigit())
+
+
+def _drake() -> Finding:
+    from pydrake.multibody.plant import MultibodyPlant
+
+    plant = MultibodyPlant(0.0)
+    plant.Finalize()
+    return Finding("Drake", f"imports, {plant.num_bodies()} body in an empty plant")
+
+
+def _scenarios() -> Finding:
+    from coop_drake.scenario import load_scenario
+    from coop_drake.shipped import shipped_scenarios
+
+    names = [load_scenario(path).name for path in shipped_scenarios().values()]
+    return Finding("shipped scenarios", ", ".join(names) or "none", bool(names), "install coop-drake anew")
+
+
+def _meshcat() -> Finding:
+    from pydrake.geometry import MeshcatParams
+
+    from coop_drake.viz.server import silent_meshcat
+
+    return Finding("Meshcat", f"opens port {silent_meshcat(MeshcatParams(host='localhost')).port()}")
+
+
+def _fonts() -> Finding:
+    from matplotlib import rcParams
+    from matplotlib.font_manager import FontProperties, findfont
+
+    path = findfont(FontProperties(family=rcParams["font.family"]), fallback_to_default=False)
+    return Finding("fonts", Path(path).stem)
+
+
+def _kernels() -> Finding:
+    from numba import config
+
+    home = Path(__file__).parents[1]
+    compiled = sum(1 for _ in (Path(config.CACHE_DIR) if config.CACHE_DIR else home).rglob("*.nbi"))
+    remedy = "`coop-drake warm` with any scenario compiles them ahead; else the first run does, for a minute"
+    return Finding("compiled kernels", f"{compiled} in the cache", True if compiled else None, remedy)
+
+
+def _memory() -> Finding:
+    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9
+    remedy = f"a run needs up to {_LEAST_MEMORY:g} GB"
+    return Finding("memory", f"{total:.1f} GB", total >= _LEAST_MEMORY, remedy)
+
+
+def _cores() -> Finding:
+    return Finding("cores", str(os.cpu_count() or 1))
+
+
+def _cache() -> Finding:
+    store = map_cache()
+    store.folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=store.folder):
+        pass
+    return Finding("cache of maps", f"{len(store.files())} maps in {store.folder}, writable")
+
+
+def _results() -> Finding:
+    with tempfile.TemporaryFile(dir=Path.cwd()):
+        pass
+    return Finding("folder for results", f"{Path.cwd()}, writable")
+
+
+_CHECKS: tuple[tuple[str, Callable[[], Finding], str], ...] = (
+    (
+        "Drake",
+        _drake,
+        "reinstall with pip install --force-reinstall drake; it needs a 64-bit glibc Linux or macOS",
+    ),
+    ("shipped scenarios", _scenarios, "install coop-drake anew"),
+    ("Meshcat", _meshcat, "free a port from 7000 on; without one there are recordings but no live view"),
+    ("fonts", _fonts, "install matplotlib anew"),
+    ("compiled kernels", _kernels, "let numba write beside the package, or set NUMBA_CACHE_DIR"),
+    ("memory", _memory, ""),
+    ("cores", _cores, ""),
+    ("cache of maps", _cache, "let COOP_DRAKE_CACHE name a folder that can be written"),
+    ("folder for results", _results, "change to a folder that can be written, or use --out"),
+)
+"""What is checked, by which function, and what to do if that raises an error."""

@@ -1,4 +1,4 @@
-"""What the exit code says."""
+"""The exit codes of every command."""
 
 from enum import IntEnum
 
@@ -6,7 +6,7 @@ __all__ = ["ExitCode"]
 
 
 class ExitCode(IntEnum):
-    """Exit codes of every command."""
+    """What a command tells the shell that called it."""
 
     DONE = 0
     FAILED_RUN = 1

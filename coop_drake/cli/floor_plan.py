@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Machine, Quiet
 from coop_drake.cli.reporter import Reporter
 
@@ -71,9 +70,7 @@ def floor_plan_command(
             raise typer.BadParameter(f"{target} ends neither in .yaml nor in .png or .svg.")
         if target.resolve() == file.resolve():
             raise typer.BadParameter(f"{target} is the floor plan itself.")
-    reporter = Reporter(machine=machine, quiet=quiet)
-
-    def command() -> ExitCode:
+    with reporting(machine=machine, quiet=quiet) as reporter:
         from coop_drake.floor_plans import FloorPlanSettings, Inside, read_floor_plan
 
         settings = FloorPlanSettings(unit, scale, tuple(layer or ()), tolerance, gap, unknown_is_free)
@@ -83,9 +80,6 @@ def floor_plan_command(
         for target in targets:
             _write(plan, file, target, inside)
             reporter.say(f"Written: {escape(str(target))}")
-        return ExitCode.DONE
-
-    run_guarded(reporter, command)
 
 
 def _tell(plan: FloorPlan, file: Path, reporter: Reporter) -> None:

@@ -1,8 +1,9 @@
-"""Turns what can go wrong into a sentence and an exit code; no traceback for a user's mistake."""
+"""Turns errors into a sentence and an exit code; only bugs show a traceback."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import typer
 
@@ -10,63 +11,57 @@ from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.reporter import Reporter
 from coop_drake.errors import CoopDrakeError, FieldError, FloorPlanError, ScenarioError, StallError
 
-__all__ = ["run_guarded"]
+__all__ = ["reporting"]
 
 
-def run_guarded(reporter: Reporter, command: Callable[[], ExitCode]) -> None:
-    """Run a command to its end and leave with its exit code.
+@contextmanager
+def reporting(*, machine: bool = False, quiet: bool = False) -> Iterator[Reporter]:
+    """Run the body of a command, which sets ``reporter.code``, and leave with that exit code.
 
     Args:
-        reporter: Where errors go; it is closed in any case.
-        command: The command; returns its exit code.
+        machine: Whether standard output is for one JSON object.
+        quiet: Whether only errors are shown.
 
     Raises:
-        typer.Exit: Always, with the exit code.
+        typer.Exit: Always, with the exit code, unless the body raises an error that is a bug.
     """
+    reporter = Reporter(machine=machine, quiet=quiet)
     try:
-        code = _attempt(reporter, command)
+        try:
+            yield reporter
+        except BaseException as error:
+            if not _explain(error, reporter):
+                raise
     finally:
         reporter.close()
-    raise typer.Exit(int(code))
+    raise typer.Exit(int(reporter.code))
 
 
-def _attempt(reporter: Reporter, command: Callable[[], ExitCode]) -> ExitCode:
-    try:
-        return command()
-    except KeyboardInterrupt:
-        return _interrupted(reporter)
-    except ScenarioError as error:
+def _explain(error: BaseException, reporter: Reporter) -> bool:
+    """Report an error and its exit code; False for a bug, and for what is no error of the body."""
+    details: dict[str, object] = {}
+    text, code = str(error), ExitCode.BAD_INPUT
+    if _is_interrupt(error):
+        text, code = "interrupted; files already written are whole", ExitCode.INTERRUPTED
+    elif isinstance(error, ScenarioError):
         details = {"file": error.file, "key": error.key, "value": error.shown, "allowed": error.allowed}
-        reporter.complain(str(error), **details)
-        return ExitCode.BAD_INPUT
-    except FloorPlanError as error:
-        details = {"file": error.file, "place": error.place, "remedy": error.remedy}
-        reporter.complain(str(error), finding=error.finding, **details)
-        return ExitCode.BAD_INPUT
-    except (FieldError, StallError) as error:
-        reporter.complain(str(error))
-        return ExitCode.FAILED_RUN
-    except CoopDrakeError as error:
-        reporter.complain(str(error))
-        return ExitCode.BAD_INPUT
-    except OSError as error:
-        reporter.complain(_of_the_system(error))
-        return ExitCode.BAD_INPUT
-    except Exception as error:
-        if _came_of_ctrl_c(error):
-            return _interrupted(reporter)
-        # A bug, not a mistake of the user's: machines get their object, people the traceback.
-        reporter.complain(f"{type(error).__name__}: {error}")
-        raise
+    elif isinstance(error, FloorPlanError):
+        details = {"file": error.file, "place": error.place, "remedy": error.remedy, "finding": error.finding}
+    elif isinstance(error, FieldError | StallError):
+        code = ExitCode.FAILED_RUN
+    elif isinstance(error, OSError):
+        text = _system_error(error)
+    elif not isinstance(error, CoopDrakeError):
+        if isinstance(error, Exception):
+            reporter.complain(f"{type(error).__name__}: {error}")
+        return False
+    reporter.complain(text, **details)
+    reporter.code = code
+    return True
 
 
-def _interrupted(reporter: Reporter) -> ExitCode:
-    reporter.complain("interrupted; files already written are whole")
-    return ExitCode.INTERRUPTED
-
-
-def _came_of_ctrl_c(error: BaseException | None) -> bool:
-    """Whether Ctrl-C is behind an error: compiled code and imports that it ends raise errors of their own."""
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Whether Ctrl-C caused an error: compiled code and imports that it ends raise errors of their own."""
     while error is not None:
         if isinstance(error, KeyboardInterrupt):
             return True
@@ -74,8 +69,8 @@ def _came_of_ctrl_c(error: BaseException | None) -> bool:
     return False
 
 
-def _of_the_system(error: OSError) -> str:
-    """What the system would not do, as a sentence that names the file and what would help."""
+def _system_error(error: OSError) -> str:
+    """What the operating system refused, as a sentence that names the file and what would help."""
     if error.filename is None or error.strerror is None:
         return str(error)
     if isinstance(error, FileExistsError | NotADirectoryError):

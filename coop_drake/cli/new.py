@@ -12,7 +12,7 @@ import typer
 from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Machine, Quiet
 from coop_drake.cli.reporter import Reporter
 
@@ -100,16 +100,12 @@ def new_command(
         if given and floor_plan is None:
             raise typer.BadParameter(f"{flag} is for a floor plan; name it with --floor-plan.")
     folder = out if out is not None else Path(name)
-    reporter = Reporter(machine=machine, quiet=quiet)
-
-    def command() -> ExitCode:
+    with reporting(machine=machine, quiet=quiet) as reporter:
         from coop_drake.scenario.starter import Starter
 
         workspace = None if floor_plan is None else _section(floor_plan, unit, layer, folder)
         starter = Starter(name, **said, door=door, workspace=workspace, start=start, goal=goal)
-        return _write(starter, folder, reporter, force=force)
-
-    run_guarded(reporter, command)
+        reporter.code = _write(starter, folder, reporter, force=force)
 
 
 def _asked(flags: dict[str, Any]) -> dict[str, Any]:
@@ -136,8 +132,7 @@ def _section(floor_plan: Path, unit: str | None, layers: list[str] | None, folde
 
 def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -> ExitCode:
     """Write the files beside their place, read them as a user would, and only then move them there."""
-    # Here and not above: no other command should wait for Drake.
-    from coop_drake.cli.reading import read_task
+    from coop_drake.cli.task import read_task
     from coop_drake.errors import ScenarioError
     from coop_drake.plant.starter_models import object_model, robot_model
     from coop_drake.scenario.starter import starter_text

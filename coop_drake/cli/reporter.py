@@ -1,4 +1,4 @@
-"""Talks to people through rich and to machines through one JSON object."""
+"""Shows people what a command does, by rich, and gives machines its facts as one JSON object."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from time import perf_counter, process_time
 from typing import Any
 
@@ -15,12 +16,17 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.kernel_clock import kernel_clock
+
 __all__ = ["ProgressCallback", "Reporter"]
 
 ProgressCallback = Callable[[str, float], None]
 
-_SMALLEST_STEP = 0.002  # Progress that is worth drawing.
+_SMALLEST_STEP = 0.002
+"""Fraction by which a bar moves on; smaller steps cannot be seen on a terminal [-]."""
 _NEARLY = 0.999
+"""Where a bar stops until its stage returns: only then it is over [-]."""
 
 
 class Reporter:
@@ -28,12 +34,18 @@ class Reporter:
 
     Args:
         machine: Whether standard output is for one JSON object, and everything else goes to standard error.
-        quiet: Whether people want to see errors only.
+        quiet: Whether only errors are shown.
+
+    Attributes:
+        facts: What ``--json`` writes, by name.
+        code: The exit code of the command.
     """
 
     def __init__(self, *, machine: bool, quiet: bool) -> None:
         self.facts: dict[str, Any] = {}
+        self.code = ExitCode.DONE
         self._machine = machine
+        self._compiles = False
         self._console = Console(stderr=machine, quiet=quiet, highlight=False)
         self._errors = Console(stderr=True, highlight=False)
         # Colours may be forced on a file, bars that are drawn over and over may not.
@@ -41,8 +53,44 @@ class Reporter:
         self._moving = not quiet and stream.isatty() and not self._console.is_dumb_terminal
 
     @contextmanager
-    def stage(self, name: str) -> Iterator[ProgressCallback]:
-        """Show a progress bar while a stage runs, on a terminal only; yields the callback that moves it."""
+    def stage(self, name: str, facts: str = "", *, cpu: bool = False) -> Iterator[ProgressCallback]:
+        """Show a progress bar while a stage runs, on a terminal only.
+
+        Args:
+            name: What is shown.
+            facts: Name under which the seconds of the stage are noted, even if it fails. Seconds that pass
+                while kernels are loaded or compiled are noted as ``loading``: they depend on the cache.
+            cpu: Whether the seconds of the processor are noted, too.
+
+        Yields:
+            The callback that moves the bar.
+        """
+        wall, processor = perf_counter(), process_time()
+        with (
+            self._bar(name) as advance,
+            kernel_clock(partial(self._compiling, advance)) as kernels,
+        ):
+            try:
+                yield advance
+            finally:
+                if facts:
+                    self._add("loading_cpu_seconds", kernels.cpu_seconds)
+                    self._add(f"{facts}_wall_seconds", perf_counter() - wall - kernels.wall_seconds)
+                    if cpu:
+                        self._add(f"{facts}_cpu_seconds", process_time() - processor - kernels.cpu_seconds)
+
+    def _add(self, fact: str, seconds: float) -> None:
+        self.facts[fact] = round(self.facts.get(fact, 0.0) + seconds, 4)
+
+    def _compiling(self, advance: ProgressCallback, kernel: str) -> None:
+        if self._moving:
+            advance(f"compiling {kernel} (first run only)", 0.0)
+        elif not self._compiles:
+            self.say("Compiling kernels; later runs load them from the cache")
+        self._compiles = True
+
+    @contextmanager
+    def _bar(self, name: str) -> Iterator[ProgressCallback]:
         columns = (
             TextColumn("{task.description:<11}"),
             BarColumn(),
@@ -57,23 +105,11 @@ class Reporter:
             def advance(doing: str, fraction: float) -> None:
                 nonlocal drawn
                 if doing != drawn[0] or fraction - drawn[1] >= _SMALLEST_STEP:
-                    drawn = (doing, fraction)
-                    # A stage is over when it returns, whatever share of it is done.
-                    bars.update(bar, completed=min(fraction, _NEARLY), doing=escape(doing))
+                    drawn = (doing, max(fraction, drawn[1]))
+                    bars.update(bar, completed=min(drawn[1], _NEARLY), doing=escape(doing))
 
             yield advance
             bars.update(bar, completed=1.0, doing="")
-
-    @contextmanager
-    def stopwatch(self, name: str, *, cpu: bool = False) -> Iterator[None]:
-        """Note how long a stage took, even if it fails [s]."""
-        wall, processor = perf_counter(), process_time()
-        try:
-            yield
-        finally:
-            self.facts[f"{name}_wall_seconds"] = round(perf_counter() - wall, 4)
-            if cpu:
-                self.facts[f"{name}_cpu_seconds"] = round(process_time() - processor, 4)
 
     def say(self, text: str) -> None:
         """Show a line of text, with rich's markup."""

@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from coop_drake.cli.clone import root_of_clone
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Machine, Quiet
 from coop_drake.cli.reporter import Reporter
 
@@ -31,14 +31,14 @@ def reproduce_command(
     quiet: Quiet = False,
 ) -> None:
     """Make the paper's Tables 1-2 and Figures 3-13 from our runs, beside what the paper states."""
-    reporter = Reporter(machine=machine, quiet=quiet)
-    run_guarded(reporter, lambda: _reproduce(scenario, out, reporter))
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        reporter.code = _reproduce(scenario, out, reporter)
 
 
 def _reproduce(scenario: Path | None, out: Path, reporter: Reporter) -> ExitCode:
     root_of_clone("paper")
     # Here and not above: no other command should wait for Drake, and only a clone has the package `paper`.
-    from coop_drake.cli.map_cache import map_cache
+    from coop_drake.cli.maps import map_cache
     from coop_drake.scenario import load_scenario
     from paper import Verdict, gather, write_report
 

@@ -9,7 +9,7 @@ import typer
 from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Machine, Quiet
 from coop_drake.cli.reporter import Reporter
 
@@ -39,12 +39,8 @@ def robot_command(
     """Make a robot model from elsewhere ready: meshes as hulls, all in one folder, joints judged."""
     packages = {name: Path(folder) for name, folder in _pairs(package, "--package")}
     values = {name: _number(value) for name, value in _pairs(fix, "--fix")}
-    reporter = Reporter(machine=machine, quiet=quiet)
-
-    def command() -> ExitCode:
-        return _import(model, out, packages, values, reporter, force=force)
-
-    run_guarded(reporter, command)
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        reporter.code = _import(model, out, packages, values, reporter, force=force)
 
 
 def _pairs(words: list[str] | None, option: str) -> list[tuple[str, str]]:
@@ -73,7 +69,6 @@ def _import(
     *,
     force: bool,
 ) -> ExitCode:
-    # Here and not above: no other command should wait for Drake.
     from coop_drake.errors import ScenarioError
     from coop_drake.files import write_atomically
     from coop_drake.plant.importing import import_robot

@@ -9,10 +9,8 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Quiet
-from coop_drake.cli.reporter import Reporter
 
 __all__ = ["schema_command"]
 
@@ -27,19 +25,14 @@ def schema_command(
     quiet: Quiet = False,
 ) -> None:
     """Write the JSON Schema of scenario files, so that editors complete and check them."""
-    reporter = Reporter(machine=False, quiet=quiet)
-
-    def command() -> ExitCode:
+    with reporting(quiet=quiet) as reporter:
         from coop_drake.files import write_atomically
         from coop_drake.scenario.json_schema import scenario_schema
 
         text = json.dumps(scenario_schema(), indent=1) + "\n"
         if out is None:
             typer.echo(text, nl=False)
-            return ExitCode.DONE
-        write_atomically(out, text.encode())
-        reporter.say(f"The schema is in {escape(str(out))}. Begin scenarios with")
-        reporter.say(f"# yaml-language-server: $schema={escape(str(out))}")
-        return ExitCode.DONE
-
-    run_guarded(reporter, command)
+        else:
+            write_atomically(out, text.encode())
+            reporter.say(f"The schema is in {escape(str(out))}. Begin scenarios with")
+            reporter.say(f"# yaml-language-server: $schema={escape(str(out))}")

@@ -1,4 +1,4 @@
-"""The command show: a picture of a scenario, or of a plan in it; nothing is searched or simulated."""
+"""The command show: a picture of a scenario, or of a plan for it; nothing is searched or simulated."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Quiet, ScenarioPath
-from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.simulate import read_plan
+from coop_drake.cli.task import Task, read_task
 
 __all__ = ["show_command"]
 
@@ -23,7 +23,7 @@ _PICTURES = (".png", ".svg")
 def show_command(
     scenario: ScenarioPath,
     plan: Annotated[
-        Path | None, typer.Option("--plan", metavar="FILE", help="A plan for it; its channel is drawn too.")
+        Path | None, typer.Option("--plan", metavar="FILE", help="A plan for it; its cells are drawn too.")
     ] = None,
     out: Annotated[
         Path | None,
@@ -36,26 +36,22 @@ def show_command(
     ] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Draw the floor, the team at start and goal, and the channel of a plan."""
+    """Draw the floor, the team at start and goal, and the cells of a plan."""
     if out is not None and out.suffix.lower() not in _PICTURES:
         raise typer.BadParameter(f"{out} ends neither in .png nor in .svg.")
-    reporter = Reporter(machine=False, quiet=quiet)
-    run_guarded(reporter, lambda: _show(scenario, plan, out, reporter))
+    with reporting(quiet=quiet) as reporter:
+        _show(read_task(scenario), plan, out, reporter)
 
 
-def _show(scenario: Path, plan: Path | None, out: Path | None, reporter: Reporter) -> ExitCode:
-    question = read_apart(scenario)
-    # Here and not above: no other command should wait for the pictures' library.
-    from coop_drake.cli.planning import read_plan
+def _show(task: Task, plan: Path | None, out: Path | None, reporter: Reporter) -> None:
     from coop_drake.drawing import house_style, save_figure
     from coop_drake.viz.floor_figures import overview_figure
 
-    found = None if plan is None else read_plan(question, plan, reporter, gains_given=False)
-    caption = f"{question.name}: start and goal"
+    found = None if plan is None else read_plan(task, plan, reporter)
+    caption = f"{task.name}: start and goal"
     if found is not None:
-        caption += f", and a channel of {len(found.cells)} cells for the object's position"
-    path = out or ResultFolder.of(question.name, None).path / "show.png"
+        caption += f", and the plan's {len(found.cells)} cells for the object's position"
+    path = out or ResultFolder.of(task.name, None).path / "show.png"
     with house_style():
-        save_figure(overview_figure(question.problem, found, f"{caption}."), path)
+        save_figure(overview_figure(task.problem, found, f"{caption}."), path)
     reporter.say(f"The picture is {escape(str(path))}")
-    return ExitCode.DONE

@@ -1,11 +1,20 @@
-"""The closing table."""
+"""The closing table of a command, and the facts about a plan, its maps and its run that it shows.
+
+``--json`` gives machines all facts; the table shows people those that `_ROWS` lists.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from math import pi, remainder
+from typing import TYPE_CHECKING, Any
 
-__all__ = ["summary_rows"]
+if TYPE_CHECKING:
+    from coop_drake.answers import Plan, PlanningResult
+    from coop_drake.fields import HarmonicMap
+    from coop_drake.simulation import SimulationLog
+
+__all__ = ["answer_of", "map_facts", "plan_facts", "planning_facts", "simulation_facts", "summary_rows"]
 
 _ROWS: tuple[tuple[str, str, str], ...] = (
     ("answer", "answer", "{}"),
@@ -36,8 +45,86 @@ _ROWS: tuple[tuple[str, str, str], ...] = (
     ("final angle error", "final_angle_error_rad", "{:.4f} rad"),
     ("peak memory", "peak_memory_mb", "{:.0f} MB"),
 )
+"""Label, fact and format of every row of the closing table, in its order; unknown facts have no row."""
 
 
 def summary_rows(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return label and value of every fact that is known, in the table's order."""
+    """Return label and value of every row whose fact is known."""
     return [(label, form.format(facts[key])) for label, key, form in _ROWS if facts.get(key) is not None]
+
+
+def answer_of(result: PlanningResult) -> str:
+    """Return ``found``, ``infeasible`` or ``undecided``."""
+    return type(result).__name__.lower()
+
+
+def planning_facts(result: PlanningResult) -> dict[str, Any]:
+    """Return what the planner answered and what it took."""
+    from coop_drake.answers import Found
+
+    report = result.report
+    facts: dict[str, Any] = {"answer": answer_of(result), "cells": 0, "slices": report.slices}
+    first = report.first_plan_cpu_seconds
+    facts["first_plan_cpu_seconds"] = None if first is None else round(first, 4)
+    facts.update(plan_facts(result.plan) if isinstance(result, Found) else {"reason": result.reason})
+    return facts
+
+
+def plan_facts(plan: Plan) -> dict[str, Any]:
+    """Return the size of a plan and what it promises."""
+    return {
+        "cells": len(plan.cells),
+        "margin_m": plan.margin,
+        "narrowest_neck_m": min(transition.neck for transition in plan.transitions),
+        "estimated_seconds": sum(transition.estimated_time for transition in plan.transitions),
+        "gains": plan.gain_set,
+    }
+
+
+def map_facts(maps: Sequence[HarmonicMap]) -> dict[str, Any]:
+    """Return how well the maps are certified."""
+    certificates = [harmonic_map.certificate for harmonic_map in maps]
+    return {
+        "maps": len(maps),
+        "max_map_residual": max(certificate.residual for certificate in certificates),
+        "max_map_error_bound": max(certificate.error_bound for certificate in certificates),
+        "max_map_unknowns": max(certificate.unknowns for certificate in certificates),
+        "max_map_condition": max(certificate.condition for certificate in certificates),
+    }
+
+
+def simulation_facts(plan: Plan, log: SimulationLog) -> dict[str, Any]:
+    """Return how the run went: errors at its end, smallest margins and peaks over all accepted steps."""
+    import numpy as np
+
+    from coop_drake.simulation import communication
+
+    x, y, theta = log.object_pose[-1] - plan.goal_pose
+    messages = communication(log)
+    base_forces = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1])
+    return {
+        "reached": log.reached,
+        "violations": int(bool(log.violation)),
+        "violation": log.violation,
+        "simulated_seconds": float(log.times[-1]),
+        "accepted_steps": len(log.times),
+        "final_position_error_m": float(np.hypot(x, y)),
+        "final_angle_error_rad": abs(remainder(float(theta), 2 * pi)),
+        "min_clearance_m": float(min(log.workspace_clearance.min(), log.body_clearance.min())),
+        "min_workspace_clearance_m": float(log.workspace_clearance.min()),
+        "min_body_clearance_m": float(log.body_clearance.min()),
+        "min_cell_clearance_m": float(log.cell_clearance.min()),
+        "min_funnel_margin": float(log.funnel_margin.min()),
+        "min_slice_margin": float(log.slice_margin.min()),
+        "min_delta_e": float(log.energy_margin.min()),
+        "max_acceleration_error": float(log.acceleration_error.max()),
+        "max_wrench_error_n": float(log.wrench_error.max()),
+        "max_grasp_error_m": float(log.grasp_error.max()),
+        "max_governor_spread_m": float(log.governor_spread.max()),
+        "messages": messages.messages,
+        "message_bytes": messages.message_bytes,
+        "peak_base_wrench_n": float(base_forces.max()),
+        "peak_base_torque_nm": float(np.abs(log.base_wrenches[..., 2]).max()),
+        "peak_joint_torque_nm": float(np.abs(log.joint_torques).max(initial=0.0)),
+        "peak_speed_m_s": float(np.hypot(log.object_twist[:, 0], log.object_twist[:, 1]).max()),
+    }

@@ -7,10 +7,8 @@ from typing import Annotated
 
 import typer
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath
-from coop_drake.cli.reporter import Reporter
 
 __all__ = ["tune_command"]
 
@@ -39,7 +37,8 @@ def tune_command(
     ] = None,
     gains: GainsName = None,
     vary: Annotated[
-        list[str] | None, typer.Option("--vary", metavar="GAIN", help="Gains to turn; all by default.")
+        list[str] | None,
+        typer.Option("--vary", metavar="GAIN", help="Gains that may change; all by default."),
     ] = None,
     budget: Annotated[int, typer.Option("--budget", metavar="N", min=1, help="Runs to try.")] = 120,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the search.")] = 0,
@@ -60,12 +59,10 @@ def tune_command(
     The best gain set is written as gains.yaml, which run, plan and simulate take with --gains. Ctrl-C ends
     the search with the best so far.
     """
-    reporter = Reporter(machine=machine, quiet=quiet)
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        from coop_drake.cli.gain_search import Request, tune
 
-    def command() -> ExitCode:
-        from coop_drake.cli.advice import Wishes, advise
-
-        wishes = Wishes(
+        request = Request(
             tuple(criteria or ("peak_force",)),
             tuple(limits if limits is not None else ("time<=1x",)),
             tuple(vary or ()),
@@ -73,6 +70,4 @@ def tune_command(
             seed,
             workers,
         )
-        return advise(scenario, gains, wishes, out, reporter)
-
-    run_guarded(reporter, command)
+        reporter.code = tune(scenario, gains, request, out, reporter)

@@ -1,4 +1,4 @@
-"""Verify a plan or a proof of infeasibility by an independent checker."""
+"""The command verify: checks a plan or a proof of infeasibility by code of its own."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import typer
 from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Machine, Quiet, ScenarioPath
-from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.task import Task, read_task
 from coop_drake.errors import RefusalError
 
 if TYPE_CHECKING:
@@ -30,33 +30,32 @@ def verify_command(
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Check a plan, or a proof that there is none, without anything of the search."""
-    reporter = Reporter(machine=machine, quiet=quiet)
+    """Check a plan, or a proof that there is none, by code that shares nothing with the search."""
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        reporter.code = _verify(certificate, read_task(scenario), reporter)
 
-    def command() -> ExitCode:
-        question = read_apart(scenario)
-        from coop_drake.verification import verify_file  # Here: no other command should wait for it.
 
-        begun = process_time()
-        try:
-            with reporter.stage("verifying") as progress:
-                verified = verify_file(certificate, question.problem, question.gain_sets, progress)
-        except RefusalError as error:
-            reporter.facts["valid"] = False
-            reporter.complain(f"{certificate}: {error}", where=error.where, finding=error.finding)
-            return ExitCode.FAILED_RUN
-        reporter.facts.update(
-            valid=True,
-            verifying_cpu_seconds=round(process_time() - begun, 4),
-            answer=verified.answer,
-            subject=verified.subject,
-            checks=[vars(check) for check in verified.checks],
-        )
-        reporter.table(question.name, [_row(check) for check in verified.checks])
-        reporter.say(f"[bold]valid, {verified.answer}[/]: {escape(verified.subject)}")
-        return ExitCode.DONE
+def _verify(certificate: Path, task: Task, reporter: Reporter) -> ExitCode:
+    from coop_drake.verification import verify_file
 
-    run_guarded(reporter, command)
+    begun = process_time()
+    try:
+        with reporter.stage("verifying") as progress:
+            verified = verify_file(certificate, task.problem, task.scenario.gain_sets, progress)
+    except RefusalError as error:
+        reporter.facts["valid"] = False
+        reporter.complain(f"{certificate}: {error}", where=error.where, finding=error.finding)
+        return ExitCode.FAILED_RUN
+    reporter.facts.update(
+        valid=True,
+        verifying_cpu_seconds=round(process_time() - begun, 4),
+        answer=verified.answer,
+        subject=verified.subject,
+        checks=[vars(check) for check in verified.checks],
+    )
+    reporter.table(task.name, [_row(check) for check in verified.checks])
+    reporter.say(f"[bold]valid, {verified.answer}[/]: {escape(verified.subject)}")
+    return ExitCode.DONE
 
 
 def _row(check: Check) -> tuple[str, str]:

@@ -10,10 +10,11 @@ import typer
 from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Machine, Quiet, ScenarioPath
-from coop_drake.cli.question import read_apart
 from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.task import read_task
 
 if TYPE_CHECKING:
     from coop_drake.answers import PlanningProblem
@@ -66,14 +67,10 @@ def watch_command(
     quiet: Quiet = False,
 ) -> None:
     """Watch the planner think: pictures, a moving picture and a page to turn in space."""
-    reporter = Reporter(machine=machine, quiet=quiet)
-
-    def command() -> ExitCode:
-        question = read_apart(scenario)
-        directory = output if output is not None else Path("out") / question.name / "think"
-        return _watch(question.problem, directory, frames, strategy, margin, reporter)
-
-    run_guarded(reporter, command)
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        task = read_task(scenario)
+        directory = ResultFolder.of(task.name, output, "think").path
+        reporter.code = _watch(task.problem, directory, frames, strategy, margin, reporter)
 
 
 def _watch(
@@ -85,7 +82,6 @@ def _watch(
     reporter: Reporter,
 ) -> ExitCode:
     """Record, then draw."""
-    # Here and not above: it brings in the pictures' libraries, which no other command should wait for.
     from coop_drake import watching
 
     chosen = watching.Strategy(strategy)

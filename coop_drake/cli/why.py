@@ -1,4 +1,4 @@
-"""The command why: says what keeps a scenario from having a plan."""
+"""The command why: explains what keeps a scenario from having a plan."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from time import process_time
 from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import run_guarded
+from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Machine, PictureFolder, Quiet, ScenarioPath
-from coop_drake.cli.question import Question, read_apart
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.task import Task, read_task
 
 __all__ = ["why_command"]
 
@@ -29,34 +29,29 @@ def why_command(
     quiet: Quiet = False,
 ) -> None:
     """Say why there is no plan: what blocks, where, how much is missing, and what would help."""
-    reporter = Reporter(machine=machine, quiet=quiet)
-
-    def command() -> ExitCode:
-        question = read_apart(scenario)
-        return _explain(question, ResultFolder.of(question.name, out), reporter)
-
-    run_guarded(reporter, command)
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        task = read_task(scenario)
+        reporter.code = _explain(task, ResultFolder.of(task.name, out), reporter)
 
 
-def _explain(question: Question, folder: ResultFolder, reporter: Reporter) -> ExitCode:
+def _explain(task: Task, folder: ResultFolder, reporter: Reporter) -> ExitCode:
     """Diagnose, show a table and sentences, and draw the picture if there is anything to see."""
-    # Here and not above: it brings in the pictures' libraries, which no other command should wait for.
     from coop_drake.diagnosis import diagnose, diagnosis_figure, facts_of, rows_of, sentences_of
     from coop_drake.drawing import house_style, save_figure
 
     before = process_time()
     with reporter.stage("diagnosing") as progress:
-        diagnosis = diagnose(question.problem, progress)
+        diagnosis = diagnose(task.problem, progress)
     reporter.facts.update(facts_of(diagnosis), diagnosis_cpu_seconds=round(process_time() - before, 4))
     folder.forget_diagnosis()
     with house_style():
-        figure = diagnosis_figure(question.problem, diagnosis)
+        figure = diagnosis_figure(task.problem, diagnosis)
         if figure is not None:
-            for path in folder.diagnosis:
-                save_figure(figure, path)
-    reporter.table(question.name, rows_of(diagnosis))
+            for name in ("why.png", "why.svg"):
+                save_figure(figure, folder.path / name)
+    reporter.table(task.name, rows_of(diagnosis))
     for sentence in sentences_of(diagnosis):
         reporter.say(escape(sentence))
     if figure is not None:
-        reporter.say(f"The picture is {escape(str(folder.diagnosis[0]))}")
+        reporter.say(f"The picture is {escape(str(folder.path / 'why.png'))}")
     return _EXIT_CODES[diagnosis.answer.value]

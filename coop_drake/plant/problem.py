@@ -1,26 +1,29 @@
 """From scenario and plant to the question that the planner answers."""
 
 import numpy as np
+from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.plant.component_tree import read_component_tree
-from coop_drake.plant.team import TeamPlant
+from coop_drake.plant.team import TeamPlant, build_team_plant
 from coop_drake.plant.validation import check_joints, check_places
 from coop_drake.scenario import Scenario
 from coop_drake.tree.pose import FloatArray
 
 
-def planning_problem(scenario: Scenario, team: TeamPlant) -> PlanningProblem:
+def planning_problem(scenario: Scenario, team: TeamPlant | None = None) -> PlanningProblem:
     """Put start, goal, walls and bodies together, and refuse what cannot be meant.
 
     Args:
         scenario: The scenario.
-        team: The plant that was built from it.
+        team: The plant that was built from it; None to build it here.
 
     Raises:
-        ScenarioError: Joints that do not fit the robots or their limits, a start in collision, a goal where
-            the object leaves the floor, or bodies whose footprint cannot be read.
+        ScenarioError: Models that make no team, joints that do not fit the robots or their limits, a start in
+            collision, a goal where the object leaves the floor, or bodies whose footprint cannot be read.
     """
+    if team is None:
+        team = build_team_plant(scenario, DiagramBuilder())
     check_joints(scenario, team)
     problem = PlanningProblem(
         workspace=scenario.workspace.polygon,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coop_drake.cli.reading import read_task
+from coop_drake.cli.task import read_task
 from coop_drake.errors import ScenarioError
 from coop_drake.plant import build_robot_plant
 from coop_drake.scenario import load_scenario
@@ -85,7 +85,7 @@ def test_footprints_are_those_of_the_fixed_place(tmp_path):
     frame = f"- add_frame: {{name: level, X_PF: {level}}}"
     text = exchanged(path.read_text(), (weld, f"{frame}\n{upright}"))
     path.write_text(text)
-    problem = read_task(path, None).question.problem
+    problem = read_task(path, None).problem
     (link,) = [b for c in problem.tree.components for b in c.bodies if b.name == "robot_0::link_2"]
     width = np.ptp(np.vstack([shape.vertices for shape in link.shapes]), axis=0).max()
     assert width == pytest.approx(0.4 * 0.5 + 0.1 * np.sin(np.pi / 3), abs=1e-3)

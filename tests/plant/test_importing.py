@@ -9,7 +9,7 @@ from shapely import Point, Polygon
 from typer.testing import CliRunner
 
 from coop_drake.cli import app
-from coop_drake.cli.reading import read_task
+from coop_drake.cli.task import read_task
 from coop_drake.errors import ScenarioError
 from coop_drake.plant.importing import import_robot
 from coop_drake.plant.joint_survey import survey_joints
@@ -73,7 +73,7 @@ def test_it_becomes_one_folder_that_a_team_can_be_built_of(maker, tmp_path):
         ("robot_0: [0.0]", "robot_0: [0.1]"),
     )
     path.write_text(path.read_text() + '\nfixed_joints: {robot_0: {"*": 0, arm: null}}\n')
-    tree = read_task(path, None).question.problem.tree
+    tree = read_task(path, None).problem.tree
     base = next(b for c in tree.components for b in c.bodies if b.name == "robot_0::base")
     (shape,) = base.shapes
     outline = Polygon(shape.vertices)

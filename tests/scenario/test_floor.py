@@ -7,7 +7,7 @@ import yaml
 from shapely import box
 
 from coop_drake.answers.digest import problem_digest
-from coop_drake.cli.reading import read_task
+from coop_drake.cli.task import read_task
 from coop_drake.errors import FloorPlanError, ScenarioError
 from coop_drake.scenario import dump_scenario, load_scenario
 from tests.support.floor_plan_files import room_shades, write_map, write_svg
@@ -26,12 +26,12 @@ def test_a_drawing_asks_the_same_question_as_its_rings(tmp_path):
         "outer": [[0, 0], [6, 0], [6, 4], [0, 4]],
         "holes": [[[0.5, 3], [1, 3], [1, 3.5], [0.5, 3.5]]],
     }
-    drawn = read_task(named(tmp_path), None).question
-    written = read_task(write_scenario(tmp_path / "rings.scenario.yaml", workspace=rings), None).question
+    drawn = read_task(named(tmp_path), None)
+    written = read_task(write_scenario(tmp_path / "rings.scenario.yaml", workspace=rings), None)
     assert drawn.problem.workspace.equals(written.problem.workspace)
     again = tmp_path / "again.scenario.yaml"
     again.write_text(dump_scenario(load_scenario(tmp_path / "room.scenario.yaml")))
-    assert problem_digest(read_task(again, None).question.problem) == problem_digest(drawn.problem)
+    assert problem_digest(read_task(again, None).problem) == problem_digest(drawn.problem)
 
 
 def test_a_map_is_read_round_the_start(tmp_path):

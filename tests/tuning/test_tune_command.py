@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from coop_drake.cli import app
-from coop_drake.cli.advice import Workers
+from coop_drake.cli.gain_search import Workers
 from coop_drake.laws import ScheduledGains
 from coop_drake.scenario import load_scenario, with_gains
 from tests.support.scenarios import write_scenario

@@ -1,4 +1,4 @@
-"""Gain advice from a scenario file to a gain set: plan once, search, verify the best, write it."""
+"""What the command tune does: plan once, search better gains by simulating, verify the best, write them."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from rich.markup import escape
 
 from coop_drake.answers import Found
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.mapping import map_cells
-from coop_drake.cli.planning import plan_question, without_plan
-from coop_drake.cli.reading import Task, read_task
+from coop_drake.cli.maps import map_cells
+from coop_drake.cli.plan import report_no_plan, search_and_write
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.task import Task, read_task
 from coop_drake.tuning import (
     CRITERIA,
     TUNED,
@@ -34,20 +34,20 @@ from coop_drake.tuning import (
 )
 from coop_drake.viz.tuning_figure import write_tuning_figure
 
-__all__ = ["Wishes", "advise"]
+__all__ = ["Request", "tune"]
 
 _PATIENCE = 2.0
-"""Runs that last so many times longer than before, or than a limit allows, are given up [-]."""
+"""A trial is ended when it takes this many times as long as before, or as a limit allows [-]."""
 
 
 @dataclass(frozen=True)
-class Wishes:
-    """What the search is asked for, as typed.
+class Request:
+    """What the search is asked for, as typed on the command line.
 
     Attributes:
         criteria: NAME or NAME=WEIGHT.
         limits: Such as time<=16.
-        vary: Names of gains that may be turned; empty for all.
+        vary: Names of gains that may change; empty for all.
         budget: Runs to try.
         seed: Seed of the search.
         workers: Processes; None for one a core.
@@ -61,28 +61,28 @@ class Wishes:
     workers: int | None
 
 
-def advise(
-    scenario: Path, gains: str | None, wishes: Wishes, out: Path | None, reporter: Reporter
+def tune(
+    scenario: Path, gains: str | None, request: Request, out: Path | None, reporter: Reporter
 ) -> ExitCode:
-    """Search better gains for a scenario's plan, verify them, and write them."""
-    weights, limits = read_weights(wishes.criteria), tuple(map(Limit.parse, wishes.limits))
+    """Search better gains for a scenario's plan, verify them by simulation, and write them."""
+    weights, limits = read_weights(request.criteria), tuple(map(Limit.parse, request.limits))
     task = read_task(scenario, gains)
-    start = task.scenario.gain_sets[task.question.gains]
-    knobs = knobs_of(start, wishes.vary)
-    folder = ResultFolder(out if out is not None else Path("out") / task.scenario.name / TUNED)
-    result = plan_question(task.question, folder, reporter)
+    start = task.scenario.gain_sets[task.scenario.selected_gains]
+    knobs = knobs_of(start, request.vary)
+    folder = ResultFolder.of(task.name, out, TUNED)
+    result = search_and_write(task, folder, reporter)
     if not isinstance(result, Found):
-        return without_plan(task.question, result, folder, reporter)
-    bench = Workbench(task.scenario, result.plan, map_cells(task, result.plan, reporter, fresh=False))
+        return report_no_plan(task, result, folder, reporter)
+    bench = Workbench(task.scenario, result.plan, map_cells(task, result.plan, reporter))
     with reporter.stage("before"):
         before = bench.try_gains(start)
     objective = Objective(weights, limits, before.outcome.values)
-    found = _search(task, bench, before, knobs, objective, wishes, reporter)
+    found = _search(task, bench, before, knobs, objective, request, reporter)
     write_trials(found, folder.path / "trials.json")
     write_tuning_figure(found, folder.path / "tuning.png")
     if found.interrupted:
-        return _interrupted(found, wishes, folder.path, reporter)
-    return _verified(task, bench, found, wishes, folder.path, reporter)
+        return _interrupted(found, request, folder.path, reporter)
+    return _verified(task, bench, found, request, folder.path, reporter)
 
 
 def _search(
@@ -91,16 +91,15 @@ def _search(
     before: Trial,
     knobs: tuple[Knob, ...],
     objective: Objective,
-    wishes: Wishes,
+    request: Request,
     reporter: Reporter,
 ) -> Search:
-    """Search with a bar, in processes of their own."""
+    """Search in worker processes, and show how far the search has come."""
     allowed = [limit.bound(objective.before) for limit in objective.limits if limit.criterion == "time"]
     longest = _PATIENCE * max([objective.before["time"], *allowed])
-    count = min(wishes.workers or os.cpu_count() or 1, wishes.budget)
+    count = min(request.workers or os.cpu_count() or 1, request.budget)
     with (
-        reporter.stage("searching") as progress,
-        reporter.stopwatch("search"),
+        reporter.stage("searching", "search") as progress,
         Workers(task.scenario.path, bench.plan, bench.maps, longest=longest, count=count) as workers,
     ):
         return search(
@@ -108,16 +107,16 @@ def _search(
             knobs,
             objective,
             workers.try_all,
-            budget=wishes.budget,
-            seed=wishes.seed,
+            budget=request.budget,
+            seed=request.seed,
             progress=progress,
         )
 
 
-def _interrupted(found: Search, wishes: Wishes, folder: Path, reporter: Reporter) -> ExitCode:
-    """Write the best so far, and say that nobody has verified it."""
+def _interrupted(found: Search, request: Request, folder: Path, reporter: Reporter) -> ExitCode:
+    """Write the best gains so far, and say that they are not verified."""
     _write(
-        found, wishes, folder, reporter, f"Not verified: interrupted after {len(found.trials) - 1} trials."
+        found, request, folder, reporter, f"Not verified: interrupted after {len(found.trials) - 1} trials."
     )
     _show(reporter, "Best so far", found, found.best.outcome, None)
     reporter.complain("interrupted; the best so far is written")
@@ -125,33 +124,33 @@ def _interrupted(found: Search, wishes: Wishes, folder: Path, reporter: Reporter
 
 
 def _verified(
-    task: Task, bench: Workbench, found: Search, wishes: Wishes, folder: Path, reporter: Reporter
+    task: Task, bench: Workbench, found: Search, request: Request, folder: Path, reporter: Reporter
 ) -> ExitCode:
-    """Carry the whole plan out with the best gains, and the scenario planned anew with them."""
+    """Simulate the whole plan with the best gains, and a plan that is made anew with them."""
     best = found.best.gains
     with reporter.stage("verifying"):
         after = bench.try_gains(best).outcome
-        anew = bench.planned_anew(task.question.problem, best)
+        anew = bench.planned_anew(task.problem, best)
     kept = found.objective.kept(after)
     state = (
         "Verified: arrives, keeps all limits." if kept else "Not good: a limit is broken or the run failed."
     )
-    _write(found, wishes, folder, reporter, state)
-    _show(reporter, f"{task.scenario.name}, gains tuned", found, after, anew)
+    _write(found, request, folder, reporter, state)
+    _show(reporter, f"{task.name}, gains tuned", found, after, anew)
     if found.best is found.trials[0]:
         reporter.say(
             f"None of {len(found.trials) - 1} runs was better: these are the gains there were before."
         )
     if not kept:
-        reporter.complain(f"no gains were found that keep every limit: {after.violation or wishes.limits}")
+        reporter.complain(f"no gains were found that keep every limit: {after.violation or request.limits}")
     return ExitCode.DONE if kept else ExitCode.FAILED_RUN
 
 
-def _write(found: Search, wishes: Wishes, folder: Path, reporter: Reporter, state: str) -> None:
+def _write(found: Search, request: Request, folder: Path, reporter: Reporter, state: str) -> None:
     remarks = (
         "Gains chosen by coop-drake tune; use them with --gains and this file.",
-        f"Better: {', '.join(wishes.criteria)}; kept: {', '.join(wishes.limits) or 'no limit'}.",
-        f"{len(found.trials) - 1} runs tried, seed {wishes.seed}. {state}",
+        f"Better: {', '.join(request.criteria)}; kept: {', '.join(request.limits) or 'no limit'}.",
+        f"{len(found.trials) - 1} runs tried, seed {request.seed}. {state}",
     )
     path = write_gains(found.best.gains, remarks, folder / "gains.yaml")
     reporter.facts["gains_file"] = str(path)
@@ -159,7 +158,7 @@ def _write(found: Search, wishes: Wishes, folder: Path, reporter: Reporter, stat
 
 
 def _show(reporter: Reporter, title: str, found: Search, after: Outcome, anew: Outcome | None) -> None:
-    """Print every criterion before and after, and note them."""
+    """Show every criterion before and after, and note the values."""
     before = found.objective.before
     rows = []
     for name, criterion in CRITERIA.items():

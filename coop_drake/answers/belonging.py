@@ -1,0 +1,61 @@
+"""Whether a plan was made for a planning problem."""
+
+from __future__ import annotations
+
+from math import remainder, tau
+from pathlib import Path
+
+import numpy as np
+
+from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.errors import PlanError
+
+__all__ = ["check_plan_belongs"]
+
+_SAME_GOAL = 1e-9
+"""Difference of goals that rounding explains: an unwrapped angle may be turned by whole turns [m, rad]."""
+
+
+def check_plan_belongs(plan: Plan, problem: PlanningProblem, path: Path) -> None:
+    """Refuse a plan that was made for another problem.
+
+    Args:
+        plan: The plan.
+        problem: The problem that it should answer.
+        path: The plan's file, for the message.
+
+    Raises:
+        PlanError: Names the first key in which they differ, its value, and the scenario's.
+    """
+    away = plan.goal_pose - problem.goal_pose
+    away[2] = remainder(away[2], tau)
+    same_goal = plan.goal_joints == problem.goal_joints and np.abs(away).max() <= _SAME_GOAL
+    names = tuple(joint.name for joint in problem.tree.joints)
+    digest = problem_digest(problem)
+    checks = (
+        ("joint_names", plan.joint_names == names, _listed(plan.joint_names), _listed(names), ""),
+        ("start", np.array_equal(plan.start, problem.start), plan.start.tolist(), problem.start.tolist(), ""),
+        ("goal_pose", same_goal, *(_goal(question) for question in (plan, problem)), ""),
+        (
+            "problem",
+            plan.problem == digest,
+            repr(plan.problem),
+            repr(digest),
+            ": the plan was made for another floor, team or tolerance",
+        ),
+    )
+    for key, same, found, expected, reason in checks:
+        if not same:
+            raise PlanError(
+                f"{path}: {key}: {found} is not allowed; expected the scenario's, {expected}{reason}"
+            )
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    return ", ".join(names) or "no joint"
+
+
+def _goal(question: Plan | PlanningProblem) -> str:
+    return f"{question.goal_pose.tolist()} with goal_joints {list(question.goal_joints)}"

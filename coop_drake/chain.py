@@ -1,0 +1,134 @@
+"""The chain for Python: plan, verify, explain and show a scenario, each with one call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from coop_drake.answers.plan import Found, Infeasible, Plan, PlanningResult, Undecided
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.proof import InfeasibilityProof
+from coop_drake.errors import PlanError
+from coop_drake.laws.gains import GainSet, ScheduledGains
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from coop_drake.diagnosis import Diagnosis
+    from coop_drake.scenario import Scenario
+    from coop_drake.verification import Verified
+
+__all__ = ["plan", "show", "verify", "why"]
+
+Progress = Callable[[str, float], None]
+"""Called with the name of a stage and the fraction of it that is done."""
+
+_SCHEDULED = "scheduled"
+"""Name of the gain set of a problem that comes without a scenario."""
+
+
+def plan(
+    question: Scenario | PlanningProblem, gains: str | None = None, *, progress: Progress | None = None
+) -> PlanningResult:
+    """Find a plan, or prove that none exists.
+
+    Args:
+        question: A scenario, or a planning problem, which is planned with scheduled gains.
+        gains: Name of one of the scenario's gain sets, or a file that holds one; None for the one that the
+            scenario selects.
+        progress: Called with a stage and the fraction of it that is done.
+
+    Returns:
+        `Found` with the plan in ``plan``, `Infeasible` with the reason and a proof, or `Undecided` with what
+        stood in the way.
+
+    Raises:
+        ScenarioError: The scenario's models make no team, or there is no gain set of that name.
+    """
+    from coop_drake.planning.planner import plan as plan_problem
+
+    if isinstance(question, PlanningProblem):
+        return plan_problem(question, ScheduledGains(), gain_set_name=_SCHEDULED, progress=progress)
+    from coop_drake.plant import planning_problem
+    from coop_drake.scenario import with_gains
+
+    scenario = with_gains(question, gains)
+    name = scenario.selected_gains
+    problem = planning_problem(scenario)
+    return plan_problem(problem, scenario.gain_sets[name], gain_set_name=name, progress=progress)
+
+
+def verify(
+    answer: PlanningResult | Plan | InfeasibilityProof | Path | str,
+    question: Scenario | PlanningProblem,
+    *,
+    progress: Progress | None = None,
+) -> Verified:
+    """Check a plan or a proof of infeasibility by code that shares nothing with the search.
+
+    Args:
+        answer: What `plan` returned, its plan or its proof, or a file that holds one.
+        question: The scenario or the planning problem that it answers.
+        progress: Called with a stage and the fraction of it that is done.
+
+    Returns:
+        What was checked, and how close it came to being refused.
+
+    Raises:
+        PlanError: The answer is undecided, or the file holds neither a plan nor a proof.
+        RefusalError: Names the first claim that does not hold.
+    """
+    from coop_drake.verification import verify_file, verify_plan, verify_proof
+
+    problem, gain_sets = _problem_and_gains(question)
+    if isinstance(answer, Path | str):
+        return verify_file(answer, problem, gain_sets, progress)
+    if isinstance(answer, Found):
+        answer = answer.plan
+    if isinstance(answer, Plan):
+        return verify_plan(answer, problem, gain_sets, progress)
+    proof = answer.proof if isinstance(answer, Infeasible) else answer
+    if proof is None or isinstance(proof, Undecided):
+        raise PlanError("an undecided answer proves nothing; expected a plan or a proof of infeasibility")
+    return verify_proof(proof, problem, progress)
+
+
+def why(question: Scenario | PlanningProblem, *, progress: Progress | None = None) -> Diagnosis:
+    """Explain why no plan exists or none was found, and what would help.
+
+    Args:
+        question: The scenario or the planning problem.
+        progress: Called with a stage and the fraction of the work's budget that is spent.
+
+    Returns:
+        The diagnosis; `sentences_of` and `diagnosis_figure` put it into words and into a picture.
+    """
+    from coop_drake.diagnosis import diagnose
+
+    return diagnose(_problem_and_gains(question)[0], progress)
+
+
+def show(question: Scenario | PlanningProblem, plan: Plan | None = None, caption: str = "") -> Figure:
+    """Draw the floor, the team at start and goal, and the cells of a plan.
+
+    Args:
+        question: The scenario or the planning problem.
+        plan: A plan for it.
+        caption: Text under the picture.
+    """
+    from coop_drake.drawing import house_style
+    from coop_drake.viz.floor_figures import overview_figure
+
+    with house_style():
+        return overview_figure(_problem_and_gains(question)[0], plan, caption)
+
+
+def _problem_and_gains(
+    question: Scenario | PlanningProblem,
+) -> tuple[PlanningProblem, dict[str, GainSet]]:
+    if isinstance(question, PlanningProblem):
+        return question, {_SCHEDULED: ScheduledGains()}
+    from coop_drake.plant import planning_problem
+
+    return planning_problem(question), dict(question.gain_sets)

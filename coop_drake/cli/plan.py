@@ -1,0 +1,87 @@
+"""The command plan, and what every command does that plans: search, write the answer, report it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.markup import escape
+
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.guard import reporting
+from coop_drake.cli.options import GainsName, Machine, Quiet, ResultsFolder, ScenarioPath
+from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.summary import answer_of, planning_facts, summary_rows
+from coop_drake.cli.task import Task, read_task
+
+if TYPE_CHECKING:
+    from coop_drake.answers import Infeasible, PlanningResult, Undecided
+
+__all__ = ["plan_command", "report_no_plan", "search", "search_and_write"]
+
+
+def plan_command(
+    scenario: ScenarioPath,
+    out: ResultsFolder = None,
+    gains: GainsName = None,
+    machine: Machine = False,
+    quiet: Quiet = False,
+) -> None:
+    """Plan only: write the plan, or the proof that there is none."""
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        reporter.code = _plan(read_task(scenario, gains), out, reporter)
+
+
+def _plan(task: Task, out: Path | None, reporter: Reporter) -> ExitCode:
+    from coop_drake.answers import Found
+
+    folder = ResultFolder.of(task.name, out)
+    result = search_and_write(task, folder, reporter)
+    if not isinstance(result, Found):
+        return report_no_plan(task, result, folder, reporter)
+    reporter.table(task.name, summary_rows(reporter.facts))
+    reporter.say(f"The plan is in {escape(str(folder.plan))}")
+    return ExitCode.DONE
+
+
+def report_no_plan(
+    task: Task, result: Infeasible | Undecided, folder: ResultFolder | None, reporter: Reporter
+) -> ExitCode:
+    """Say that there is no plan, or that none is known, and where the proof is if a folder was written."""
+    answer = answer_of(result)
+    reporter.table(task.name, summary_rows(reporter.facts))
+    reporter.say(f"[bold]{answer}[/]: {escape(result.reason)}")
+    if folder is not None and folder.certificate.exists():
+        reporter.say(f"The proof is in {escape(str(folder.certificate))}")
+    reporter.say(f"What blocks, and what would help: coop-drake why {escape(str(task.scenario.path))}")
+    return ExitCode.INFEASIBLE if answer == "infeasible" else ExitCode.UNDECIDED
+
+
+def search_and_write(task: Task, folder: ResultFolder, reporter: Reporter) -> PlanningResult:
+    """Plan, note the facts, and write the plan with its table of cells, or the proof that there is none."""
+    from coop_drake.answers import Found, Infeasible, save_plan, table_1
+    from coop_drake.answers.proof_file import save_proof
+    from coop_drake.files import write_atomically
+
+    result = search(task, reporter)
+    folder.make()
+    folder.forget_plan()
+    if isinstance(result, Found):
+        save_plan(result.plan, folder.plan)
+        write_atomically(folder.path / "table_1.md", table_1(result.plan).encode())
+    elif isinstance(result, Infeasible) and result.proof is not None:
+        save_proof(result.proof, task.problem, folder.certificate)
+    return result
+
+
+def search(task: Task, reporter: Reporter) -> PlanningResult:
+    """Plan and note the facts; nothing is written."""
+    from coop_drake.memory import peak_memory_mb
+    from coop_drake.planning.planner import plan
+
+    name = task.scenario.selected_gains
+    with reporter.stage("planning", "planning", cpu=True) as progress:
+        result = plan(task.problem, task.scenario.gain_sets[name], gain_set_name=name, progress=progress)
+    reporter.facts.update(planning_facts(result), peak_memory_mb=peak_memory_mb())
+    return result

@@ -1,0 +1,157 @@
+"""The command run, and what carries a plan out: maps, simulation, figures and recording."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from rich.markup import escape
+
+from coop_drake.cli.exit_code import ExitCode
+from coop_drake.cli.figure_process import FigureProcess
+from coop_drake.cli.guard import reporting
+from coop_drake.cli.maps import map_cells, write_certificates
+from coop_drake.cli.options import (
+    BlocksName,
+    FreshMaps,
+    GainsName,
+    Live,
+    Machine,
+    Quiet,
+    ResultsFolder,
+    ScenarioPath,
+)
+from coop_drake.cli.plan import report_no_plan, search_and_write
+from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.summary import simulation_facts, summary_rows
+from coop_drake.cli.task import Task, read_task
+
+if TYPE_CHECKING:
+    from coop_drake.answers import Plan
+    from coop_drake.diagram import Blocks
+    from coop_drake.fields import HarmonicMap
+    from coop_drake.simulation import SimulationLog
+
+__all__ = ["carry_out", "run_command"]
+
+_WAIT_FOR_VIEWER = 30.0
+"""How long a live run waits for somebody to open its address [s]; a person needs a few seconds."""
+
+
+def run_command(
+    scenario: ScenarioPath,
+    out: ResultsFolder = None,
+    gains: GainsName = None,
+    fresh_maps: FreshMaps = False,
+    live: Live = False,
+    blocks: BlocksName = "named",
+    machine: Machine = False,
+    quiet: Quiet = False,
+) -> None:
+    """Plan, map, simulate and record a transport."""
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        from coop_drake.answers import Found
+
+        task = read_task(scenario, gains)
+        folder = ResultFolder.of(task.name, out)
+        result = search_and_write(task, folder, reporter)
+        if isinstance(result, Found):
+            options: dict[str, Any] = {"fresh_maps": fresh_maps, "live": live, "blocks": blocks}
+            reporter.code = carry_out(task, result.plan, folder, reporter, **options)
+        else:
+            reporter.code = report_no_plan(task, result, folder, reporter)
+
+
+def carry_out(
+    task: Task,
+    plan: Plan,
+    folder: ResultFolder,
+    reporter: Reporter,
+    *,
+    fresh_maps: bool = False,
+    live: bool = False,
+    blocks: Blocks = "named",
+) -> ExitCode:
+    """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run.
+
+    Args:
+        task: The scenario.
+        plan: A plan for it.
+        folder: Where log, certificates of maps, recording and figures go.
+        reporter: Takes note of the facts and shows them.
+        fresh_maps: Whether all maps are solved anew.
+        live: Whether the run is shown in a browser.
+        blocks: Blocks of every robot, or one block for the team.
+    """
+    maps = map_cells(task, plan, reporter, fresh=fresh_maps)
+    onlooker = _open_live_view(task, plan, reporter) if live else None
+    with FigureProcess() as figures:  # It imports matplotlib while this process simulates.
+        log = _simulate(task, plan, maps, folder, reporter, blocks, onlooker)
+        _draw(task, plan, log, folder, reporter, figures)
+    reporter.table(task.name, summary_rows(reporter.facts))
+    reporter.say(
+        f"Results are in {escape(str(folder.path))}; open {escape(str(folder.recording))} in a browser"
+    )
+    if log.violation:
+        reporter.complain(log.violation)
+    elif not log.reached:
+        reporter.complain(f"the goal was not reached within {log.times[-1]:.1f} s of simulated time")
+    return ExitCode.DONE if log.reached and not log.violation else ExitCode.FAILED_RUN
+
+
+def _simulate(
+    task: Task,
+    plan: Plan,
+    maps: tuple[HarmonicMap, ...],
+    folder: ResultFolder,
+    reporter: Reporter,
+    blocks: Blocks,
+    onlooker: Callable[..., None] | None,
+) -> SimulationLog:
+    """Run the closed loop, note the facts, and write the log and the maps' certificates."""
+    from coop_drake.memory import peak_memory_mb
+    from coop_drake.simulation import simulate
+
+    with reporter.stage("simulating", "simulation") as progress:
+        log = simulate(task.scenario, plan, maps, blocks=blocks, progress=progress, onlooker=onlooker)
+    reporter.facts.update(simulation_facts(plan, log), peak_memory_mb=peak_memory_mb())
+    folder.make()
+    folder.forget_simulation()
+    write_certificates(task, maps, folder)
+    log.save(folder.path / "log.npz")
+    return log
+
+
+def _draw(
+    task: Task,
+    plan: Plan,
+    log: SimulationLog,
+    folder: ResultFolder,
+    reporter: Reporter,
+    figures: FigureProcess,
+) -> None:
+    """Write the recording here while the other process draws the figures."""
+    from coop_drake.viz import write_recording
+
+    figures.draw(task.problem.workspace, task.problem.tree, plan, log, folder.path)
+    with reporter.stage("recording", "recording") as progress:
+        write_recording(task.scenario, plan, log, folder.recording, progress=progress)
+    with reporter.stage("drawing", "drawing"):
+        figures.wait()
+
+
+def _open_live_view(task: Task, plan: Plan, reporter: Reporter) -> Callable[..., None]:
+    """Serve the scene and show its address; on a terminal, wait a little for a browser to open it."""
+    from coop_drake.viz import LiveView
+    from coop_drake.viz.server import silent_meshcat
+
+    meshcat = silent_meshcat()
+    view = LiveView(task.scenario, plan, meshcat)
+    reporter.facts["live_url"] = meshcat.web_url()
+    reporter.say(f"[bold]Live view: open {meshcat.web_url()} in a browser[/]")
+    if sys.stdout.isatty():
+        with reporter.stage("waiting"):
+            view.wait_for_viewer(_WAIT_FOR_VIEWER)
+    return view

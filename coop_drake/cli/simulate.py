@@ -1,0 +1,77 @@
+"""The command simulate: carries out a plan that was made before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from coop_drake.cli.guard import reporting
+from coop_drake.cli.options import BlocksName, FreshMaps, Live, Machine, Quiet, ResultsFolder, ScenarioPath
+from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.run import carry_out
+from coop_drake.cli.summary import plan_facts
+from coop_drake.cli.task import Task, read_task
+
+if TYPE_CHECKING:
+    from coop_drake.answers import Plan
+
+__all__ = ["read_plan", "simulate_command"]
+
+
+def simulate_command(
+    scenario: ScenarioPath,
+    plan: Annotated[
+        Path | None,
+        typer.Option(
+            "--plan", metavar="FILE", help="Plan to carry out; plan.json in the results by default."
+        ),
+    ] = None,
+    out: ResultsFolder = None,
+    gains: Annotated[
+        str | None,
+        typer.Option("--gains", metavar="NAME|FILE", help="Gain set or its file; the plan's own by default."),
+    ] = None,
+    fresh_maps: FreshMaps = False,
+    live: Live = False,
+    blocks: BlocksName = "named",
+    machine: Machine = False,
+    quiet: Quiet = False,
+) -> None:
+    """Map, simulate and record a plan that was made before."""
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        task = read_task(scenario, gains)
+        folder = ResultFolder.of(task.name, out)
+        found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)
+        reporter.code = carry_out(
+            task, found, folder, reporter, fresh_maps=fresh_maps, live=live, blocks=blocks
+        )
+
+
+def read_plan(task: Task, path: Path, reporter: Reporter, *, new_gains: bool = False) -> Plan:
+    """Read a plan that was made for this scenario.
+
+    Args:
+        task: The scenario.
+        path: The plan file.
+        reporter: Takes note of the plan's size.
+        new_gains: Whether the scenario's selected gains replace the plan's own.
+
+    Raises:
+        PlanError: The file is no plan, or belongs to another scenario.
+    """
+    from coop_drake.answers import load_plan
+    from coop_drake.answers.belonging import check_plan_belongs
+    from coop_drake.planning import reschedule
+
+    found = load_plan(path)
+    check_plan_belongs(found, task.problem, path)
+    if new_gains:  # Also under the same name: a file may hold other gains than those of the plan.
+        name = task.scenario.selected_gains
+        found = reschedule(found, task.scenario.gain_sets[name], name)
+    reporter.facts.update(
+        answer="found", slices=0, first_plan_cpu_seconds=0.0, planning_cpu_seconds=0.0, **plan_facts(found)
+    )
+    return found

@@ -1,0 +1,49 @@
+"""What most commands begin with: a scenario, read and checked, and the planning problem that it states."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from coop_drake.answers import PlanningProblem
+    from coop_drake.scenario import Scenario
+
+__all__ = ["Task", "read_task"]
+
+
+@dataclass(frozen=True)
+class Task:
+    """A scenario without mistakes.
+
+    Attributes:
+        scenario: As in the file, with the chosen gain set selected.
+        problem: Floor, bodies, start and goal, as the planner needs them.
+    """
+
+    scenario: Scenario
+    problem: PlanningProblem
+
+    @property
+    def name(self) -> str:
+        """The scenario's name."""
+        return self.scenario.name
+
+
+def read_task(path: Path, gains: str | None = None) -> Task:
+    """Read a scenario and its models.
+
+    Args:
+        path: The scenario file.
+        gains: Name of the gain set to use, or a file that holds one; None for the one the scenario selects.
+
+    Raises:
+        ScenarioError: The file, a model or the gain set is wrong.
+    """
+    from coop_drake.plant import planning_problem
+    from coop_drake.scenario import load_scenario, with_gains
+
+    scenario = with_gains(load_scenario(path), gains)
+    return Task(scenario, planning_problem(scenario))
