@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar, cast, overload
 
 import numba
+from numba import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
 
@@ -48,10 +49,24 @@ def compiled(function: F | None = None, *, reassociate: bool = False) -> F | Cal
         # a sixth of the time to compile, is left out.
         inner = numba.njit(no_cpython_wrapper=True, **options)(function)
         inner._cache = _KernelCache(function, "called from compiled functions")
-        dispatcher.get_call_template, dispatcher.get_overload = inner.get_call_template, inner.get_overload
+        dispatcher.get_call_template = _by_type_alone(inner.get_call_template)
+        dispatcher.get_overload = inner.get_overload
         return cast(F, dispatcher)
 
     return decorate if function is None else decorate(function)
+
+
+def _by_type_alone(get_call_template: Callable[..., object]) -> Callable[..., object]:
+    """Let calls from compiled code share one version of a function, whatever constants they pass.
+
+    Otherwise numba compiles a function anew for every constant: ``f(x, 1)`` and ``f(x, 2)`` would be two.
+    """
+
+    def get(args: Sequence[types.Type], kws: Mapping[str, types.Type]) -> object:
+        typed = {name: types.unliteral(value) for name, value in kws.items()}
+        return get_call_template(tuple(types.unliteral(value) for value in args), typed)
+
+    return get
 
 
 def kernel_stamp(function: FunctionType) -> str:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from coop_drake.fields.evaluation import evaluate_many
-from coop_drake.fields.flat_map import FlatMap, rounding_of, unflatten
+from coop_drake.fields.flat_map import FlatMap, rounding_of
 from coop_drake.fields.outline import ComplexArray, IntArray, Outline
 from coop_drake.fields.panels import Panels
 from coop_drake.fields.quadrature import FloatArray
@@ -76,6 +76,7 @@ def certify(
     panels: Panels,
     flat: FlatMap,
     hole_images: FloatArray,
+    unknowns: int,
     condition: float,
 ) -> MapCertificate:
     """Sample the residual on every panel and far down every corner.
@@ -85,7 +86,8 @@ def certify(
         panels: Where they are cut.
         flat: The map, evaluated as its users evaluate it.
         hole_images: c_k, shape (holes, 2).
-        condition: Condition estimate to report.
+        unknowns: Size of the linear system, to report.
+        condition: Estimate of its condition, to report.
     """
     position, expected, edge = _samples(outline, panels, hole_images)
     vertices = np.minimum(np.abs(position - outline.vertices[edge]), np.abs(position - outline.ends[edge]))
@@ -101,7 +103,7 @@ def certify(
         residual=float(residuals[worst]),
         error_bound=float((2 * outline.holes + 1) * residuals[worst]),
         samples=len(position),
-        unknowns=unflatten(flat).sources.shape[1] + outline.holes,
+        unknowns=unknowns,
         condition=condition,
         worst_place=np.array([place.real, place.imag]),
         worst_place_description=fault.description,

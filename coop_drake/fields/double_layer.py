@@ -151,34 +151,37 @@ def mark_near(
     return sources, targets
 
 
-@compiled(reassociate=True)
 def _near_pairs(
     target: ComplexArray, target_edge: IntArray, segments: ComplexArray, edge: IntArray
 ) -> tuple[IntArray, IntArray]:
-    """Targets near each regular panel, but those on its own edge: first of each panel, and all of them."""
-    start = np.zeros(len(segments) + 1, dtype=np.int64)
-    found = np.empty(64, dtype=np.int64)
-    for k in range(len(segments)):
-        while start[k] + len(target) > len(found):
-            found = np.concatenate((found, np.empty_like(found)))
-        start[k + 1] = _near_of(target, target_edge, segments[k], edge[k], found, start[k])
-    return start, found[: start[-1]].copy()
+    """Targets near each regular panel but not on its edge: where each panel's begin, and all of them."""
+    start, found = np.zeros(len(segments) + 1, dtype=np.int64), np.empty(8 * len(target), dtype=np.int64)
+    count = _find_near(target, target_edge, segments, edge, start, found)
+    if count > len(found):
+        found = np.empty(count, dtype=np.int64)
+        _find_near(target, target_edge, segments, edge, start, found)
+    return start, found[:count]
 
 
 @compiled(reassociate=True)
-def _near_of(
-    target: ComplexArray, target_edge: IntArray, segment: ComplexArray, edge: int, found: IntArray, end: int
-) -> int:
-    """Write the targets near one panel; the new end."""
-    centre, half = segment[0], segment[1]
-    reach = (0.5 * NEAR) ** 2 * (half.real**2 + half.imag**2)
-    for i in range(len(target)):
-        rx, ry = target[i].real - centre.real, target[i].imag - centre.imag
-        if rx * rx + ry * ry < reach and target_edge[i] != edge:
-            zeta = (target[i] - centre) / half
-            if abs(zeta - 1.0) + abs(zeta + 1.0) < NEAR:
-                found[end] = i
-                end += 1
+def _find_near(
+    target: ComplexArray, target_edge: IntArray, segments: ComplexArray, edge: IntArray,
+    start: IntArray, found: IntArray,
+) -> int:  # fmt: skip
+    """Write the near pairs as far as there is room in ``found``; return how many there are."""
+    end = 0
+    for k in range(len(segments)):
+        centre, half = segments[k, 0], segments[k, 1]
+        reach = (0.5 * NEAR) ** 2 * (half.real**2 + half.imag**2)
+        for i in range(len(target)):
+            rx, ry = target[i].real - centre.real, target[i].imag - centre.imag
+            if rx * rx + ry * ry < reach and target_edge[i] != edge[k]:
+                zeta = (target[i] - centre) / half
+                if abs(zeta - 1.0) + abs(zeta + 1.0) < NEAR:
+                    if end < len(found):
+                        found[end] = i
+                    end += 1
+        start[k + 1] = end
     return end
 
 
@@ -201,7 +204,8 @@ def _near_weights(
 @compiled(reassociate=True)
 def legendre_moments(zeta: complex, out: FloatArray) -> None:
     """1/pi times the imaginary part of the integral of P_k(x) / (x - zeta) over [-1, 1], k from 0."""
-    q0 = 0.5 * (np.log(zeta + 1.0) - np.log(zeta - 1.0))
+    turn = np.arctan2(zeta.imag, zeta.real + 1.0) - np.arctan2(zeta.imag, zeta.real - 1.0)
+    q0 = complex(0.5 * np.log(abs(zeta + 1.0) / abs(zeta - 1.0)), 0.5 * turn)
     q1 = zeta * q0 - 1.0
     out[0], out[1] = -2.0 / pi * q0.imag, -2.0 / pi * q1.imag
     for k in range(1, len(out) - 1):

@@ -1,4 +1,4 @@
-"""The map and its Jacobian at a point, in machine code: a series for what is far, panels for the rest."""
+"""The map and its Jacobian at a point, in compiled code: a series for what is far, panels for the rest."""
 
 from __future__ import annotations
 
@@ -8,74 +8,75 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.fields.far_field import far_field, leaf_at
-from coop_drake.fields.flat_map import FlatMap, centre_of, rounding_of, unflatten
-from coop_drake.fields.layers import INSIDE, MapArrays
-from coop_drake.fields.near_field import Sums, add, corner, is_at_vertex, regular, ring
+from coop_drake.fields.flat_map import (
+    CORNERS,
+    EDGES,
+    INSIDE,
+    LEAF_STATE,
+    NEAR,
+    NEAR_START,
+    FlatMap,
+    integer,
+    rounding_of,
+    row,
+    rows_of,
+)
+from coop_drake.fields.near_field import Sums, add, corner_sums, is_at_vertex, panel_sums
 from coop_drake.fields.quadrature import FloatArray
-from coop_drake.fields.walls import is_inside, nearest_on_edges
+from coop_drake.fields.walls import is_inside, nearest_on_walls
 
-__all__ = ["evaluate_at", "evaluate_many", "evaluate_one"]
+__all__ = ["evaluate_many", "evaluate_one"]
 
 
 @compiled(reassociate=True)
-def _sums(m: MapArrays, leaf: int, x: float, y: float, tolerance: float) -> tuple[Sums, complex, int]:
-    """Sum over the whole boundary; a step away from a junction of panels or 0; the vertex at hand or -1."""
-    total, step, vertex = far_field(m, leaf, x, y), 0j, -1
-    for item in range(m.near_start[leaf], m.near_start[leaf + 1]):
-        k, place, level = m.near[item, 0], m.near[item, 1], m.near[item, 2]
-        if k < 0:
-            part, away = regular(m, place, x, y, tolerance)
-        elif place < 0:
-            part, away = corner(m, k, level, x, y, tolerance)
-            vertex = k if is_at_vertex(m, k, x, y, tolerance) else vertex
+def _all_sums(m: FlatMap, x: float, y: float) -> tuple[Sums, int]:
+    """Sums over the whole boundary at a point of the square; and the vertex that it counts as, or -1."""
+    leaf, vertex, rounding = leaf_at(m, x, y), -1, rounding_of(m)
+    total = far_field(m, leaf, x, y)
+    for item in range(integer(m, NEAR_START, leaf, 1, 0), integer(m, NEAR_START, leaf + 1, 1, 0)):
+        k, place, level = (
+            integer(m, NEAR, item, 3, 0),
+            integer(m, NEAR, item, 3, 1),
+            integer(m, NEAR, item, 3, 2),
+        )
+        if place < 0:
+            part = corner_sums(m, k, level, x, y, rounding)
+            vertex = k if is_at_vertex(m, k, x, y, rounding) else vertex
         else:
-            rx, ry = x - m.corners[k, 0], y - m.corners[k, 1]
-            part, away = ring(m, k, level, place, x, y, rx, ry, tolerance)
-        step = away if away != 0j else step
+            corner = row(m, CORNERS, max(k, 0), 15)
+            part = panel_sums(m, k, place, level, x, y, x - m[corner], y - m[corner + 1], rounding)
         total = add(total, part)
-    return total, step, vertex
+    return total, vertex
 
 
 @compiled(reassociate=True)
-def evaluate_one(m: MapArrays, x: float, y: float, tolerance: float) -> Sums:
-    """u, v, u_x, u_y, v_x, v_y at a point relative to the map's centre; outside: at the nearest wall.
+def evaluate_one(m: FlatMap, x: float, y: float) -> tuple[float, float, float, float, float, float]:
+    """u, v, u_x, u_y, v_x, v_y at a point relative to the map's centre [-, 1/m].
 
-    Behind a wall by less than ``tolerance``, the rounding of the coordinates [m], counts as on it.
+    A point outside has the values of the nearest point of the walls.
+    A point that is behind a wall by less than the map's rounding counts as on the wall. At a vertex T is that
+    of the vertex and J that of a point just inside; where two panels meet, J is that of a point just off the
+    wall.
     """
-    leaf = leaf_at(m, x, y)
-    if m.leaf_state[leaf] != INSIDE and not is_inside(m.edges, x, y):
-        x, y = nearest_on_edges(m.edges, x, y)
-        leaf = leaf_at(m, x, y)
-    total, step, vertex = _sums(m, leaf, x, y, tolerance)
-    tu, tv, xu, yu, xv, yv = total
-    if step != 0j:
-        x, y = x + step.real, y + step.imag
-        _, _, xu, yu, xv, yv = _sums(m, leaf_at(m, x, y), x, y, tolerance)[0]
+    edges, count = row(m, EDGES, 0, 4), rows_of(m, EDGES)
+    if integer(m, LEAF_STATE, leaf_at(m, x, y), 1, 0) != INSIDE and not is_inside(m, edges, count, x, y):
+        x, y = nearest_on_walls(m, edges, count, x, y)
+    (tu, tv, xu, yu, xv, yv, step_x, step_y), vertex = _all_sums(m, x, y)
+    if step_x != 0.0 or step_y != 0.0:
+        (_, _, xu, yu, xv, yv, _, _), _ = _all_sums(m, x + step_x, y + step_y)
     c = 0.5 / pi
-    if vertex >= 0:  # a hair inside, T is as far away as that hair to the power of pi / angle
-        return m.corners[vertex, 13], m.corners[vertex, 14], c * xu, c * yu, c * xv, c * yv
+    if vertex >= 0:
+        image = row(m, CORNERS, vertex, 15) + 13
+        return m[image], m[image + 1], c * xu, c * yu, c * xv, c * yv
     return c * tu, c * tv, c * xu, c * yu, c * xv, c * yv
 
 
 @compiled(reassociate=True)
-def evaluate_at(flat: FlatMap, x: float, y: float) -> tuple[FloatArray, FloatArray]:
-    """Image (2,) and Jacobian (2, 2) of a point of W."""
-    centre = centre_of(flat)
-    values = evaluate_one(unflatten(flat), x - centre[0], y - centre[1], rounding_of(flat))
-    image, jacobian = np.empty(2), np.empty((2, 2))
-    for k in range(2):
-        image[k] = values[k]
-        jacobian[0, k], jacobian[1, k] = values[2 + k], values[4 + k]
-    return image, jacobian
-
-
-@compiled(reassociate=True)
-def evaluate_many(flat: FlatMap, points: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Images (n, 2) and Jacobians (n, 2, 2) of points (n, 2) relative to the map's centre."""
-    m, rounding = unflatten(flat), rounding_of(flat)
+def evaluate_many(m: FlatMap, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Images (n, 2) [-] and Jacobians (n, 2, 2) [1/m] of points (n, 2) relative to the map's centre [m]."""
     images, jacobians = np.empty((len(points), 2)), np.empty((len(points), 2, 2))
     for i in range(len(points)):
-        values = evaluate_one(m, points[i, 0], points[i, 1], rounding)
+        values = evaluate_one(m, points[i, 0], points[i, 1])
         for k in range(2):
             images[i, k] = values[k]
             jacobians[i, 0, k], jacobians[i, 1, k] = values[2 + k], values[4 + k]

@@ -15,10 +15,25 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.fields.layers import INSIDE, LEVELS, ON_BOUNDARY, OUTSIDE, REFINED_NODES, MapArrays
+from coop_drake.fields.flat_map import (
+    CORNER_INDEX,
+    CORNERS,
+    EDGES,
+    INSIDE,
+    LEVELS,
+    ON_BOUNDARY,
+    OUTSIDE,
+    REFINED_NODES,
+    FlatMap,
+    MapArrays,
+    flatten,
+    integer,
+    row,
+    rows_of,
+)
 from coop_drake.fields.outline import IntArray
 from coop_drake.fields.quadrature import FloatArray
-from coop_drake.fields.sources import FAR, gather, seen_from, size
+from coop_drake.fields.sources import FAR, gather, seen_from
 from coop_drake.fields.walls import is_inside
 
 __all__ = ["grown"]
@@ -67,43 +82,41 @@ class _Boxes(NamedTuple):
         return self.chosen(np.repeat(np.arange(len(self.square)), 4))._replace(square=square, series=series)
 
 
-def grown(m: MapArrays, opened: bool) -> MapArrays:
-    """The map with its leaves divided until little is near any of them.
+def grown(m: MapArrays, *, opened: bool) -> MapArrays:
+    """Divide the leaves of a map until few sources are near any of them.
 
     Args:
         m: A map with leaves that are valid, if large.
         opened: Whether corners may be opened into their rings, and panels have their refined densities.
     """
-    child, leaf_of = m.box_child.copy(), m.box_leaf.copy()
-    box = np.flatnonzero(child < 0)
-    box = box[np.argsort(leaf_of[box])]
-    boxes = _Boxes(m.leaf_square, m.leaf_state, m.local, m.near_start, m.near)
+    flat, scratch = flatten(m, np.zeros(2), 0.0), np.empty((6, _most_nodes(m)))
+    todo = np.empty((LEVELS * (2 * max(int(m.corner_index[:, 1].max()), 1) + 1) + 1, 3), dtype=np.int64)
+    boxes = m.boxes.copy()
+    box = np.flatnonzero(boxes < 0)
+    box = box[np.argsort(-boxes[box])]
+    current = _Boxes(m.leaf_square, m.leaf_state, m.local, m.near_start, m.near)
     finished: list[_Boxes] = []
     leaves = 0
     for depth in range(_DEPTH):
-        series, state = boxes.series.copy(), boxes.state.copy()
-        start, near, worth = _sort_out(m, opened, boxes.square, state, series, boxes.near_start, boxes.near)
-        boxes = _Boxes(boxes.square, state, series, start, near)
-        # Unopened, the boxes serve points of the boundary alone.
-        served = boxes.state != OUTSIDE if opened else boxes.state == ON_BOUNDARY
-        split = (worth > _MANY) & served & (depth + 1 < _DEPTH)
+        start, near, gain = _sort_out(flat, opened, *current, scratch, todo)
+        current = current._replace(near_start=start, near=near)
+        # Before corners are opened, the boxes serve points of the boundary alone.
+        served = current.state != OUTSIDE if opened else current.state == ON_BOUNDARY
+        split = (gain > _MANY) & served & (depth + 1 < _DEPTH)
         split &= 4 * np.count_nonzero(split) <= _BOXES
         leaf = np.flatnonzero(~split)
-        finished.append(boxes.chosen(leaf))
-        leaf_of[box[leaf]] = leaves + np.arange(len(leaf))
+        finished.append(current.chosen(leaf))
+        boxes[box[leaf]] = -1 - leaves - np.arange(len(leaf))
         leaves += len(leaf)
         if not split.any():
             break
-        boxes = boxes.chosen(np.flatnonzero(split)).quarters()
-        new = len(child) + np.arange(len(boxes.state))
-        child[box[split]], leaf_of[box[split]] = new[::4], -1
-        child = np.concatenate((child, np.full(len(new), -1)))
-        leaf_of = np.concatenate((leaf_of, np.full(len(new), -1)))
-        box = new
+        current = current.chosen(np.flatnonzero(split)).quarters()
+        new = len(boxes) + np.arange(len(current.state))
+        boxes[box[split]] = new[::4]
+        boxes, box = np.concatenate((boxes, new)), new
     counts = np.concatenate([np.diff(part.near_start) for part in finished])
     return m._replace(
-        box_child=child,
-        box_leaf=leaf_of,
+        boxes=boxes,
         leaf_square=np.concatenate([part.square for part in finished]),
         leaf_state=np.concatenate([part.state for part in finished]),
         local=np.concatenate([part.series for part in finished]),
@@ -112,20 +125,37 @@ def grown(m: MapArrays, opened: bool) -> MapArrays:
     )
 
 
+def _most_nodes(m: MapArrays) -> int:
+    """Most nodes that one source has."""
+    first = m.corner_index[:, 0]
+    per_panel = (m.sources.shape[1] - first[-1]) // max(len(m.panels), 1)
+    blocks = np.concatenate((np.diff(first), 2 * m.corner_index[:, 2]))
+    return int(max(REFINED_NODES, per_panel, blocks.max()))
+
+
 @compiled(reassociate=True)
 def _sort_out(
-    m: MapArrays, opened: bool, square: FloatArray, state: IntArray, series: FloatArray,
-    start: IntArray, near: IntArray,
+    m: FlatMap, opened: bool, square: FloatArray, state: IntArray, series: FloatArray,
+    start: IntArray, near: IntArray, nodes: FloatArray, todo: IntArray,
 ) -> tuple[IntArray, IntArray, IntArray]:  # fmt: skip
     """Add to each box's series what is far from it, and find its state.
 
+    Args:
+        m: The map.
+        opened: As for `grown`.
+        square: The boxes, as the next four: see `_Boxes`.
+        state: Is changed.
+        series: Are changed.
+        start: First candidate of each box.
+        near: Candidates: what was near the box that was divided.
+        nodes: Scratch for the nodes of one source, shape (6, .).
+        todo: Scratch for sources, shape (., 3).
+
     Returns:
-        Where the rows start that stay near each box, these rows, and how many are worth a division.
+        Where the rows start that stay near each box, these rows, and how many of them a division may remove.
     """
-    most, rings = _most(m)
-    nodes, todo = np.empty((6, most)), np.empty((LEVELS * (2 * rings + 1) + 1, 3), dtype=np.int64)
     kept, first = np.empty((2 * len(near) + 64, 3), dtype=np.int64), np.zeros(len(square) + 1, dtype=np.int64)
-    worth = np.zeros(len(square), dtype=np.int64)
+    gain = np.zeros(len(square), dtype=np.int64)
     end = 0
     for box in range(len(square)):
         x, y, radius = square[box, 0], square[box, 1], square[box, 2]
@@ -140,63 +170,54 @@ def _sort_out(
                 seen = seen_from(m, k, place, level, x, y)
                 if _is_far(place, opened, seen, radius):
                     count = gather(m, k, place, level, opened, seen, x, y, radius, nodes)
-                    _expand(nodes, count, radius, series[box])
+                    _expand(nodes, count, radius, series, box)
                 elif opened and place < 0 and seen[2] >= radius and level + 1 < LEVELS:
-                    waiting = _open(m, k, level, todo, waiting)
+                    # The panels of the corner's ring, and the corner within, are candidates in its place.
+                    panels = 2 * integer(m, CORNER_INDEX, k, 7, 1)
+                    for j in range(panels + 1):
+                        todo[waiting + j, 0] = k
+                        todo[waiting + j, 1] = j if j < panels else -1
+                        todo[waiting + j, 2] = level if j < panels else level + 1
+                    waiting += panels + 1
                 else:
                     if end == len(kept):
-                        kept = np.concatenate((kept, np.empty_like(kept)))
+                        grown_list = np.empty((2 * end, 3), dtype=np.int64)
+                        for i in range(end):
+                            for j in range(3):
+                                grown_list[i, j] = kept[i, j]
+                        kept = grown_list
                     kept[end, 0], kept[end, 1], kept[end, 2] = k, place, level
                     end += 1
                     nearest = min(nearest, seen[0])
-        worth[box] = _worth(m, kept[first[box] : end], x, y, radius)
+        gain[box] = _gain(m, kept, first[box], end, x, y, radius)
         if state[box] == ON_BOUNDARY and nearest > radius:
-            state[box] = INSIDE if is_inside(m.edges, x, y) else OUTSIDE
+            walls = rows_of(m, EDGES)
+            state[box] = INSIDE if is_inside(m, row(m, EDGES, 0, 4), walls, x, y) else OUTSIDE
         if state[box] == OUTSIDE:  # no point is ever looked for there
-            end, worth[box] = first[box], 0
+            end, gain[box] = first[box], 0
         first[box + 1] = end
-    return first, kept[:end], worth
+    return first, kept[:end], gain
 
 
 @compiled(reassociate=True)
-def _most(m: MapArrays) -> tuple[int, int]:
-    """Most nodes that a source has, most panels that a ring has on one leg."""
-    nodes, rings = max(REFINED_NODES, m.sources.shape[1] - m.corner_index[-1, 0]), 1
-    for k in range(len(m.corners)):
-        nodes = max(nodes, 2 * m.corner_index[k, 2], m.corner_index[k + 1, 0] - m.corner_index[k, 0])
-        rings = max(rings, m.corner_index[k, 1])
-    return nodes, rings
+def _gain(m: FlatMap, near: IntArray, first: int, last: int, x: float, y: float, radius: float) -> int:
+    """How many of the sources near a box a division may remove: those that are shorter than the box.
 
-
-@compiled(reassociate=True)
-def _open(m: MapArrays, k: int, level: int, todo: IntArray, waiting: int) -> int:
-    """Put the panels of a corner's ring, and the corner within, on the list of candidates."""
-    for place in range(2 * m.corner_index[k, 1]):
-        todo[waiting, 0], todo[waiting, 1], todo[waiting, 2] = k, place, level
-        waiting += 1
-    todo[waiting, 0], todo[waiting, 1], todo[waiting, 2] = k, -1, level + 1
-    return waiting + 1
-
-
-@compiled(reassociate=True)
-def _worth(m: MapArrays, near: IntArray, x: float, y: float, radius: float) -> int:
-    """How much of what is near a box is worth a division: panels and corners that are shorter than it.
-
-    What belongs to a vertex in it does not count: divisions would find the same again.
+    What belongs to a vertex in the box does not count: divisions would find the same again.
     """
-    own, nearest, worth = -1, 1.5 * radius, 0
-    for item in range(len(near)):
+    own, nearest, gain = -1, 1.5 * radius, 0
+    for item in range(first, last):
         k = near[item, 0]
         if k >= 0:
-            distance = np.sqrt((m.corners[k, 0] - x) ** 2 + (m.corners[k, 1] - y) ** 2)
+            corner = row(m, CORNERS, k, 15)
+            distance = np.sqrt((m[corner] - x) ** 2 + (m[corner + 1] - y) ** 2)
             if distance < nearest:
                 own, nearest = k, distance
-    for item in range(len(near)):
+    for item in range(first, last):
         k, place = near[item, 0], near[item, 1]
-        if k != own or k < 0:
-            cost = 1 if place >= 0 else _CORNER
-            worth += cost if size(m, k, place, near[item, 2]) < radius else 0
-    return worth
+        if (k != own or k < 0) and seen_from(m, k, place, near[item, 2], x, y)[2] < radius:
+            gain += 1 if place >= 0 else _CORNER
+    return gain
 
 
 @compiled(reassociate=True)
@@ -213,15 +234,18 @@ def _is_far(place: int, opened: bool, seen: tuple[float, float, float], radius: 
 
 
 @compiled(reassociate=True)
-def _expand(nodes: FloatArray, count: int, radius: float, series: FloatArray) -> None:
-    """Add the power series of sources in units of the radius, rows (u, v) as real and imaginary parts."""
+def _expand(nodes: FloatArray, count: int, radius: float, series: FloatArray, box: int) -> None:
+    """Add nodes to the series of a box, in units of its radius: real and imaginary parts for u, then for v.
+
+    A node at t adds mu dt / t^(k + 1) to the coefficient of degree k, t seen from the box's centre.
+    """
     for j in range(count):
         inverse = 1.0 / (nodes[0, j] * nodes[0, j] + nodes[1, j] * nodes[1, j])
         re, im = nodes[0, j] * inverse, -nodes[1, j] * inverse
         dx, dy = nodes[2, j], nodes[3, j]
         nodes[2, j], nodes[3, j] = dx * re - dy * im, dx * im + dy * re
         nodes[0, j], nodes[1, j] = radius * re, radius * im
-    for degree in range(len(series)):
+    for degree in range(series.shape[1]):
         a, b, c, d = 0.0, 0.0, 0.0, 0.0
         for j in range(count):
             re, im, u, v = nodes[2, j], nodes[3, j], nodes[4, j], nodes[5, j]
@@ -233,10 +257,10 @@ def _expand(nodes: FloatArray, count: int, radius: float, series: FloatArray) ->
                 re * nodes[0, j] - im * nodes[1, j],
                 re * nodes[1, j] + im * nodes[0, j],
             )
-        series[degree, 0] += a
-        series[degree, 1] += b
-        series[degree, 2] += c
-        series[degree, 3] += d
+        series[box, degree, 0] += a
+        series[box, degree, 1] += b
+        series[box, degree, 2] += c
+        series[box, degree, 3] += d
 
 
 @compiled(reassociate=True)

@@ -1,39 +1,40 @@
-"""What is far from a point: the power series of the leaf of the quadtree that holds it."""
+"""What is far from a point: the power series of the leaf of the quadtree that holds the point."""
 
 from __future__ import annotations
 
 from coop_drake.compiled import compiled
-from coop_drake.fields.layers import MapArrays
+from coop_drake.fields.flat_map import BOXES, LEAF_SQUARE, LOCAL, ORDER, ROOT, FlatMap, integer, row
 from coop_drake.fields.near_field import Sums
 
 __all__ = ["far_field", "leaf_at"]
 
 
 @compiled(reassociate=True)
-def leaf_at(m: MapArrays, x: float, y: float) -> int:
-    """Leaf that holds a point."""
-    cx, cy, half = m.root[0], m.root[1], m.root[2]
-    box = 0
-    while m.box_child[box] >= 0:
+def leaf_at(m: FlatMap, x: float, y: float) -> int:
+    """Index of the leaf that holds a point."""
+    root = row(m, ROOT, 0, 3)
+    cx, cy, half = m[root], m[root + 1], m[root + 2]
+    box = integer(m, BOXES, 0, 1, 0)
+    while box >= 0:
         half *= 0.5
-        box = m.box_child[box] + (1 if x > cx else 0) + (2 if y > cy else 0)
+        box = integer(m, BOXES, box + (1 if x > cx else 0) + (2 if y > cy else 0), 1, 0)
         cx += half if x > cx else -half
         cy += half if y > cy else -half
-    return int(m.box_leaf[box])
+    return -1 - box
 
 
 @compiled(reassociate=True)
-def far_field(m: MapArrays, leaf: int, x: float, y: float) -> Sums:
-    """Both sums and their derivatives."""
-    inverse = 1.0 / m.leaf_square[leaf, 2]
-    zx, zy = (x - m.leaf_square[leaf, 0]) * inverse, (y - m.leaf_square[leaf, 1]) * inverse
-    series = m.local[leaf]
-    n = len(series)
-    ur, ui, vr, vi = series[n - 1, 0], series[n - 1, 1], series[n - 1, 2], series[n - 1, 3]
+def far_field(m: FlatMap, leaf: int, x: float, y: float) -> Sums:
+    """The series of a leaf at a point: both sums and their derivatives, by Horner's rule."""
+    square, series = row(m, LEAF_SQUARE, leaf, 3), row(m, LOCAL, leaf, 4 * ORDER)
+    inverse = 1.0 / m[square + 2]
+    zx, zy = (x - m[square]) * inverse, (y - m[square + 1]) * inverse
+    ur, ui, vr, vi = 0.0, 0.0, 0.0, 0.0
     dur, dui, dvr, dvi = 0.0, 0.0, 0.0, 0.0
-    for k in range(n - 2, -1, -1):
+    for k in range(ORDER - 1, -1, -1):
+        c = series + 4 * k
         dur, dui = dur * zx - dui * zy + ur, dur * zy + dui * zx + ui
         dvr, dvi = dvr * zx - dvi * zy + vr, dvr * zy + dvi * zx + vi
-        ur, ui = ur * zx - ui * zy + series[k, 0], ur * zy + ui * zx + series[k, 1]
-        vr, vi = vr * zx - vi * zy + series[k, 2], vr * zy + vi * zx + series[k, 3]
-    return ui, vi, dui * inverse, dur * inverse, dvi * inverse, dvr * inverse
+        ur, ui = ur * zx - ui * zy + m[c], ur * zy + ui * zx + m[c + 1]
+        vr, vi = vr * zx - vi * zy + m[c + 2], vr * zy + vi * zx + m[c + 3]
+    return ui, vi, dui * inverse, dur * inverse, dvi * inverse, dvr * inverse, 0.0, 0.0

@@ -1,4 +1,4 @@
-"""The velocity field of a map at a point, in machine code that other compiled code may call."""
+"""The velocity field of a map at a point, as a compiled function that other compiled code may call."""
 
 from __future__ import annotations
 
@@ -6,13 +6,17 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.fields.evaluation import evaluate_one
-from coop_drake.fields.flat_map import FlatMap, centre_of, rounding_of, unflatten
+from coop_drake.fields.flat_map import FlatMap, centre_of
 from coop_drake.fields.quadrature import FloatArray
-from coop_drake.fields.walls import is_inside, nearest_on_edges
+from coop_drake.fields.walls import is_inside, nearest_on_walls
 
 __all__ = ["flat_field", "velocities_in_field", "velocity_in_field"]
 
-_STRAIGHT = 1e-6  # part of the slowdown radius within which the line to a point goal is straight
+_STRAIGHT = 1e-6
+"""Fraction of the slowdown radius within which the way to a point goal is taken as straight: closer still,
+the difference of the images is mostly rounding [-]."""
+_EDGES = 4
+"""Numbers in a flat field before the goal's edges: slowdown radius, largest speed, the goal's image."""
 
 
 def flat_field(edges: FloatArray, image: FloatArray, radius: float, max_speed: float) -> FloatArray:
@@ -30,7 +34,7 @@ def flat_field(edges: FloatArray, image: FloatArray, radius: float, max_speed: f
 
 @compiled(reassociate=True)
 def velocity_in_field(flat: FlatMap, field: FloatArray, x: float, y: float) -> tuple[float, float]:
-    """Velocity at a point of W [m/s].
+    """Velocity at a point of W, eq. (13) [m/s].
 
     Args:
         flat: The map, from `VelocityField.kernel_arguments` as is the next.
@@ -40,15 +44,15 @@ def velocity_in_field(flat: FlatMap, field: FloatArray, x: float, y: float) -> t
     """
     centre = centre_of(flat)
     x, y = x - centre[0], y - centre[1]
-    radius, max_speed, goal = field[0], field[1], field[4:].reshape(((len(field) - 4) // 4, 4))
-    gx, gy = nearest_on_edges(goal, x, y)
-    remaining = np.hypot(gx - x, gy - y)
-    if remaining == 0.0 or is_inside(goal, x, y):
+    radius, max_speed, edges = field[0], field[1], (len(field) - _EDGES) // 4
+    gx, gy = nearest_on_walls(field, _EDGES, edges, x, y)
+    remaining = np.sqrt((gx - x) ** 2 + (gy - y) ** 2)
+    if remaining == 0.0 or is_inside(field, _EDGES, edges, x, y):
         return 0.0, 0.0
-    if len(goal) == 1 and remaining < _STRAIGHT * radius:
+    if edges == 1 and remaining < _STRAIGHT * radius:
         dx, dy = gx - x, gy - y
     else:
-        u, v, u_x, u_y, v_x, v_y = evaluate_one(unflatten(flat), x, y, rounding_of(flat))
+        u, v, u_x, u_y, v_x, v_y = evaluate_one(flat, x, y)
         du, dv = field[2] - u, field[3] - v
         dx, dy = v_y * du - u_y * dv, u_x * dv - v_x * du
     norm = np.hypot(dx, dy)
@@ -60,7 +64,7 @@ def velocity_in_field(flat: FlatMap, field: FloatArray, x: float, y: float) -> t
 
 @compiled(reassociate=True)
 def velocities_in_field(flat: FlatMap, field: FloatArray, points: FloatArray) -> FloatArray:
-    """The same at many points (n, 2)."""
+    """Velocities at many points of W, shape (n, 2) [m] -> (n, 2) [m/s]."""
     velocities = np.empty((len(points), 2))
     for i in range(len(points)):
         velocities[i, 0], velocities[i, 1] = velocity_in_field(flat, field, points[i, 0], points[i, 1])

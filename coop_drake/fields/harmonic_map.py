@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from shapely import Point, Polygon
 
 from coop_drake.fields.certificate import MapCertificate
-from coop_drake.fields.evaluation import evaluate_at, evaluate_many
+from coop_drake.fields.evaluation import evaluate_many
 from coop_drake.fields.goals import region_to_map
 from coop_drake.fields.outline import outline_of
 from coop_drake.fields.points import as_points
@@ -78,8 +78,6 @@ class HarmonicMap:
             T, shape (..., 2), and J = dT/dp, shape (..., 2, 2) [1/m].
         """
         p = as_points(points)
-        if p.ndim == 1:
-            return evaluate_at(self._solution.flat, *p.tolist())
         T, J = evaluate_many(self._solution.flat, p.reshape(-1, 2) - self._solution.centre)
         return T.reshape(p.shape), J.reshape(*p.shape, 2)
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.compiled import compiled
 from coop_drake.fields.corners import corner_operator, leg_panels, panel_nodes
 from coop_drake.fields.density import Density
 from coop_drake.fields.expansions import grown
-from coop_drake.fields.layers import LEVELS, ON_BOUNDARY, ORDER, REFINED_NODES, MapArrays
+from coop_drake.fields.flat_map import LEVELS, ON_BOUNDARY, ORDER, REFINED_NODES, MapArrays
 from coop_drake.fields.nodes import Nodes
 from coop_drake.fields.outline import IntArray, Outline
 from coop_drake.fields.panels import Panels
@@ -27,15 +26,15 @@ def pack_layers(
     m = grown(_bare(outline, panels, angles, density), opened=False)
     refined, incoming = refine(outline, panels, angles, density, closeness, m)
     sources = density.nodes.corner_start
-    index, grid, breaks, rings, tails = _pack_corners(angles, sources, refined, incoming, closeness)
     regular = incoming[refined.corner_start[-1] :].reshape(-1, REFINED_NODES, 2)
+    index, grid, breaks, rings, tails = _pack_corners(angles, sources, refined, incoming, closeness)
+    index[:, 5] += len(regular)
     m = m._replace(
         corner_index=index,
         grid=grid,
         breaks=breaks,
-        rings=_with_coefficients(rings),
+        densities=_with_coefficients(np.concatenate((regular, rings))),
         tails=tails,
-        panel_density=_with_coefficients(regular),
     )
     return grown(m, opened=True)
 
@@ -71,13 +70,11 @@ def _bare(outline: Outline, panels: Panels, angles: FloatArray, density: Density
         corner_index=index,
         grid=np.empty((0, 2)),
         breaks=np.empty(0),
-        rings=np.empty((0, 2, REFINED_NODES, 2)),
+        densities=np.empty((0, 2, REFINED_NODES, 2)),
         tails=np.empty((0, 2)),
         panels=panel_ends,
-        panel_density=np.empty((0, 2, REFINED_NODES, 2)),
         root=root,
-        box_child=np.array([-1]),
-        box_leaf=np.array([0]),
+        boxes=np.array([-1]),
         leaf_square=np.array([[root[0], root[1], np.sqrt(2.0) * root[2]]]),
         leaf_state=np.array([ON_BOUNDARY]),
         local=np.zeros((1, ORDER, 4)),
@@ -157,42 +154,31 @@ def _descend(angle: float, closeness: float, incoming: FloatArray) -> tuple[Floa
     operator = corner_operator(angle, REFINED_NODES, closeness)
     n = len(incoming) // 2
     back, out = incoming[:n], incoming[n:]
-    fields = _fields(operator.inward, np.stack((0.5 * (out + back), 0.5 * (out - back))))
-    ring = _legs(_products(operator.ring, fields[:-1])).reshape(LEVELS, 2, -1, REFINED_NODES, 2)
+    fields = _descending(operator.inward, np.stack((0.5 * (out + back), 0.5 * (out - back))))
+    ring = _legs(operator.ring @ fields[..., : 2 * LEVELS]).reshape(LEVELS, 2, -1, REFINED_NODES, 2)
     ring[:, 0] = ring[:, 0, :, ::-1]  # the boundary runs towards the corner on the incoming leg
-    tail = _legs(_products(operator.compressed, fields))
+    tail = _legs(operator.compressed @ fields)
     return ring.reshape(-1, REFINED_NODES, 2), tail.reshape(-1, 2)
 
 
-@compiled(reassociate=True)
-def _fields(inward: FloatArray, field: FloatArray) -> FloatArray:
-    """The field that comes in at every level, shape (LEVELS + 1, 2, n, 2)."""
-    n = inward.shape[1]
-    fields = np.zeros((LEVELS + 1, 2, n, 2))
-    for parity in range(2):
-        for i in range(n):
-            fields[0, parity, i, 0], fields[0, parity, i, 1] = field[parity, i, 0], field[parity, i, 1]
-    for level in range(LEVELS):
-        for parity in range(2):
-            for i in range(n):
-                u, v = 0.0, 0.0
-                for j in range(n):
-                    u += inward[parity, i, j] * fields[level, parity, j, 0]
-                    v += inward[parity, i, j] * fields[level, parity, j, 1]
-                fields[level + 1, parity, i, 0], fields[level + 1, parity, i, 1] = u, v
-    return fields
+def _descending(inward: FloatArray, field: FloatArray) -> FloatArray:
+    """The field that comes in at every level, even and odd part: columns (u, v) level by level.
 
+    Args:
+        inward: From one level to the next, shape (2, n, n).
+        field: At the outermost level, shape (2, n, 2).
 
-def _products(operators: FloatArray, fields: FloatArray) -> FloatArray:
-    """Even and odd operators (2, m, n) on fields (levels, 2, n, 2) of all levels at once."""
-    levels, _, n, _ = fields.shape
-    columns = fields.transpose(1, 2, 0, 3).reshape(2, n, 2 * levels)
-    return (operators @ columns).reshape(2, -1, levels, 2).transpose(2, 0, 1, 3)
+    Returns:
+        Shape (2, n, 2 (LEVELS + 1)).
+    """
+    power = inward
+    while field.shape[-1] < 2 * (LEVELS + 1):
+        field = np.concatenate((field, power @ field), axis=-1)
+        power = power @ power
+    return field[..., : 2 * (LEVELS + 1)]
 
 
 def _legs(parts: FloatArray) -> FloatArray:
-    """Even and odd parts (levels, 2, k, 2) to the incoming and the outgoing leg."""
-    legs = np.empty(parts.shape)
-    np.subtract(parts[:, 0], parts[:, 1], out=legs[:, 0])
-    np.add(parts[:, 0], parts[:, 1], out=legs[:, 1])
-    return legs
+    """Even and odd parts (2, k, 2 levels) to the incoming and the outgoing leg, (levels, 2, k, 2)."""
+    legs = np.stack((parts[0] - parts[1], parts[0] + parts[1]))
+    return np.ascontiguousarray(legs.reshape(*parts.shape[:2], -1, 2).transpose(2, 0, 1, 3))

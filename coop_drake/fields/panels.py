@@ -9,12 +9,18 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.fields.outline import Outline
 from coop_drake.fields.quadrature import FloatArray
+from coop_drake.geometry.boundary import squared_distance
 
 __all__ = ["Panels", "lay_panels", "point_distance", "segment_distance"]
 
-_MAX_ANGLE = np.pi / 3  # span of the boundary angle that one panel resolves
-_SLIVER = 1e-3  # parts of a leg that are not worth a panel
-_MAX_PANELS = 100_000  # stop of a subdivision that cannot end
+_MAX_ANGLE = np.pi / 3
+"""Span of the boundary angle that one panel resolves with ten nodes to 1e-8 [rad]."""
+_SLIVER = 1e-3
+"""A rest of an edge shorter than this fraction of a leg is not worth a panel [-]."""
+_MAX_PANELS = 100_000
+"""Stop of a subdivision that cannot end; far fewer exceed the unknowns that are allowed."""
+_DEEPEST = 254
+"""Halvings of one edge at most: the size of the stack; 50 of them reach rounding."""
 
 
 @dataclass(frozen=True)
@@ -51,18 +57,15 @@ def lay_panels(outline: Outline, closeness: float) -> Panels:
     longest = np.where(spans > 0.0, _MAX_ANGLE * np.abs(ends - starts) / np.maximum(spans, 1e-300), total)
     legs = _corner_legs(edges, outline.preceding, longest, closeness)
     _close_slivers(np.abs(ends - starts), outline.following, legs)
-    pieces = _edge_panels(edges, outline.following, legs, longest, closeness)
+    rows = np.empty((_MAX_PANELS, 4))
+    pieces = rows[: _edge_panels(edges, outline.following, legs, longest, closeness, rows)]
     return Panels(legs, pieces[:, 0].astype(np.int64), pieces[:, 1], pieces[:, 2], pieces[:, 3])
 
 
 @compiled(reassociate=True)
 def point_distance(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
     """Distance of a point from a segment from a to b [m]."""
-    dx, dy = bx - ax, by - ay
-    t = ((px - ax) * dx + (py - ay) * dy) / (dx * dx + dy * dy)
-    t = min(1.0, max(0.0, t))
-    rx, ry = px - ax - t * dx, py - ay - t * dy
-    return float(np.sqrt(rx * rx + ry * ry))
+    return float(np.sqrt(squared_distance(px, py, ax, ay, bx, by)))
 
 
 @compiled(reassociate=True)
@@ -112,9 +115,8 @@ def _corner_legs(
     return legs
 
 
-@compiled(reassociate=True)
 def _close_slivers(lengths: FloatArray, following: np.ndarray, legs: FloatArray) -> None:
-    """Let two legs that almost fill an edge meet: a panel as short as rounding could not be evaluated.
+    """Make two legs that almost fill an edge meet: a panel as short as rounding could not be evaluated.
 
     Goes round each ring; where the last edge still has a sliver, the first corner makes room.
     """
@@ -130,22 +132,23 @@ def _close_slivers(lengths: FloatArray, following: np.ndarray, legs: FloatArray)
 
 @compiled(reassociate=True)
 def _edge_panels(
-    edges: FloatArray, following: np.ndarray, legs: FloatArray, longest: FloatArray, closeness: float
-) -> FloatArray:
-    """Rows (edge, start, end, gap) of the regular panels, in order along every edge."""
-    rows = [(0.0, 0.0, 0.0, 0.0) for _ in range(0)]
+    edges: FloatArray, following: np.ndarray, legs: FloatArray, longest: FloatArray, closeness: float,
+    rows: FloatArray,
+) -> int:  # fmt: skip
+    """Write rows (edge, start, end, gap) of the regular panels, in order along every edge; return how many.
+
+    A panel that is too long is halved; the stack holds the pieces of one edge that are still to be judged.
+    """
+    count = 0
     piece = np.empty(4)
-    stack = np.empty((256, 2))
+    stack = np.empty((_DEEPEST + 2, 2))
     for e in range(len(edges)):
         dx, dy = edges[e, 2] - edges[e, 0], edges[e, 3] - edges[e, 1]
-        length = np.hypot(dx, dy)
+        length = np.sqrt(dx * dx + dy * dy)
         dx, dy = dx / length, dy / length
-        first, last = legs[e], length - legs[following[e]]
-        if last - first <= 1e-12 * length:
-            continue
-        stack[0, 0], stack[0, 1] = first, last
-        depth = 1
-        while depth > 0 and len(rows) < _MAX_PANELS:
+        stack[0, 0], stack[0, 1] = legs[e], length - legs[following[e]]
+        depth = 1 if stack[0, 1] - stack[0, 0] > 1e-12 * length else 0
+        while depth > 0 and count < len(rows):
             depth -= 1
             a, b = stack[depth, 0], stack[depth, 1]
             piece[0], piece[1] = edges[e, 0] + a * dx, edges[e, 1] + a * dy
@@ -156,14 +159,13 @@ def _edge_panels(
                     gap = min(gap, segment_distance(piece, edges[other]))
                 x, y = edges[other, 0], edges[other, 1]
                 vertex = min(vertex, point_distance(x, y, piece[0], piece[1], piece[2], piece[3]))
-            if b - a <= min(closeness * max(gap, vertex), longest[e]) or depth > 250 or b - a < 1e-9 * length:
-                rows.append((float(e), a, b, gap))
+            short = b - a <= min(closeness * max(gap, vertex), longest[e])
+            if short or depth > _DEEPEST or b - a < 1e-9 * length:
+                rows[count, 0], rows[count, 1], rows[count, 2], rows[count, 3] = e, a, b, gap
+                count += 1
             else:
                 middle = 0.5 * (a + b)
                 stack[depth, 0], stack[depth, 1] = middle, b
                 stack[depth + 1, 0], stack[depth + 1, 1] = a, middle
                 depth += 2
-    out = np.empty((len(rows), 4))
-    for k in range(len(rows)):
-        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = rows[k]
-    return out
+    return count

@@ -11,9 +11,8 @@ from coop_drake.errors import UnmappableError
 from coop_drake.fields.certificate import MapCertificate, certify, find_fault
 from coop_drake.fields.corners import leg_panels
 from coop_drake.fields.density import solve_density
-from coop_drake.fields.evaluation import evaluate_at
-from coop_drake.fields.flat_map import FlatMap, centre_of, flatten, unflatten
-from coop_drake.fields.layers import MapArrays
+from coop_drake.fields.evaluation import evaluate_many
+from coop_drake.fields.flat_map import FlatMap, MapArrays, flatten, unflatten
 from coop_drake.fields.outline import Outline
 from coop_drake.fields.packing import pack_layers
 from coop_drake.fields.panels import Panels, lay_panels
@@ -55,13 +54,13 @@ class Solution(NamedTuple):
 
     @property
     def arrays(self) -> MapArrays:
-        """The layers one by one, as views."""
+        """The arrays of the map by their names."""
         return unflatten(self.flat)
 
     @property
     def centre(self) -> FloatArray:
         """Origin of their coordinates in W [m], shape (2,)."""
-        return centre_of(self.flat)
+        return self.flat[:2]
 
 
 def solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solution:
@@ -127,7 +126,8 @@ def _solve(outline: Outline, goal: Point | Polygon, panels: Panels, attempt: Att
     density = solve_density(outline, panels, angles, *attempt)
     arrays = pack_layers(outline, panels, angles, density, attempt.closeness)
     flat = flatten(arrays, centre, rounding)
-    certificate = certify(outline, panels, flat, density.hole_images, density.condition)
+    unknowns = len(density.weighted) + outline.holes
+    certificate = certify(outline, panels, flat, density.hole_images, unknowns, density.condition)
     return Solution(flat, _goal_image(outline, goal, density.hole_images, flat), certificate)
 
 
@@ -141,7 +141,8 @@ def _goal_image(
     if outline.goal_ring is not None:
         image = hole_images[outline.goal_ring - 1].copy()
     else:
-        image, _ = evaluate_at(flat, *goal.coords[0][:2])
+        images, _ = evaluate_many(flat, np.array(goal.coords)[:, :2] - flat[:2])
+        image = images[0]
     return image
 
 

@@ -6,8 +6,7 @@ from shapely import Point, box
 
 from coop_drake.fields import HarmonicMap
 from coop_drake.fields.evaluation import evaluate_many
-from coop_drake.fields.flat_map import flatten, rounding_of
-from coop_drake.fields.layers import INSIDE, ON_BOUNDARY, OUTSIDE
+from coop_drake.fields.flat_map import INSIDE, ON_BOUNDARY, OUTSIDE, flatten, rounding_of
 from tests.support import domains
 
 DOMAINS = {
@@ -30,8 +29,7 @@ def without_boxes(arrays):
     near[:panels, 0], near[:panels, 1] = -1, np.arange(panels)
     near[panels:, 0], near[panels:, 1] = np.arange(corners), -1
     return arrays._replace(
-        box_child=np.array([-1]),
-        box_leaf=np.array([0]),
+        boxes=np.array([-1]),
         leaf_square=np.array([[*arrays.root[:2], np.sqrt(2.0) * arrays.root[2]]]),
         leaf_state=np.array([ON_BOUNDARY]),
         local=np.zeros((1, *arrays.local.shape[1:])),
@@ -64,7 +62,7 @@ def test_leaves_share_out_the_square(mapped):
     arrays = mapped.solution.arrays
     area = 2.0 * arrays.leaf_square[:, 2] ** 2
     assert area.sum() == pytest.approx((2.0 * arrays.root[2]) ** 2)
-    assert sorted(arrays.box_leaf[arrays.box_child < 0]) == list(range(len(area)))
+    assert sorted(-1 - arrays.boxes[arrays.boxes < 0]) == list(range(len(area)))
 
 
 def test_sharp_corners_of_many_nodes_fit():
