@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from coop_drake.drawing.canvas import house_style, new_figure, save_figure
 from coop_drake.drawing.colours import BLUE, GREY, VERMILLION
 from coop_drake.laws import energy_margin, total_wrench, tracking_energy, wrench_share
-from coop_drake.laws.ready import EROSION, clearance_margin
+from coop_drake.laws.readiness import EROSION, clearance_margin
 from coop_drake.tree.pose import FloatArray
 from paper import printed
 from paper.funnel_errata_panels import (
@@ -142,11 +142,10 @@ def _draw_take_over(ax: Axes) -> None:
 
 def _certified(run: GovernorRun, index: int) -> bool:
     stiffness = _TABLE_2[0]
-    energy = tracking_energy(
-        run.position[index], run.velocity[index], run.governor[index], stiffness=stiffness
-    )
-    margin = energy_margin(energy, _NARROW(run.governor[index]), stiffness=stiffness)
-    return clearance_margin(margin, stiffness=stiffness, inradius=0.15) >= 0.0
+    (x, y), (vx, vy) = run.position[index] - run.governor[index], run.velocity[index]
+    energy = tracking_energy(x, y, vx, vy, stiffness)
+    margin = energy_margin(energy, _NARROW(run.governor[index]), stiffness)
+    return clearance_margin(margin, stiffness, 0.15) >= 0.0
 
 
 def _draw_torque(ax: Axes) -> None:
@@ -157,15 +156,8 @@ def _draw_torque(ax: Axes) -> None:
     for direction in directions:
         force = 5.0 * np.array([np.cos(direction), np.sin(direction)])
         wrong = [printed.wrench_share(force, 0.0, -offset, robots=2) for offset in offsets]
-        right = [
-            wrench_share(
-                np.array([*force, 0.0]), 0.0, offset, com_offset=np.zeros(2), mass=1.0, inertia=1.0, share=0.5
-            )
-            for offset in offsets
-        ]
-        torques.append(
-            [total_wrench(np.array(s), offsets, com_offset=np.zeros(2))[2] for s in (wrong, right)]
-        )
+        right = [wrench_share(-x, -y, force[0], force[1], 0.0, 1.0, 1.0, 0.5) for x, y in offsets]
+        torques.append([total_wrench(np.array(s), offsets, np.zeros(2), 0.0)[2] for s in (wrong, right)])
     for torque, colour in zip(np.transpose(torques), (VERMILLION, BLUE), strict=True):
         ax.plot(np.degrees(directions), torque, color=colour)
     ax.set(title="E21: unwanted torque", xlabel="direction of 5 N [°]", ylabel="torque [N m], 0 wanted")

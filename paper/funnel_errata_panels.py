@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from scipy.integrate import solve_ivp
 
 from coop_drake.drawing.colours import BLUE, GREY, VERMILLION
-from coop_drake.laws import Funnel, funnel_walls
+from coop_drake.laws import Funnel, funnel_bounds
 from coop_drake.tree.pose import FloatArray
 from paper import printed
 from paper.table_1 import CORRECTED, START
@@ -26,7 +26,7 @@ def _walls(time: float, goal: tuple[float, float] = (_GOAL_LOWER, _GOAL_UPPER)) 
         [[_LOWER], [_UPPER], [goal[0]], [goal[1]], [_DECAY]]
     )
     funnel = Funnel(lower, upper, goal_lower, goal_upper, decay, shape="exponential")
-    return [float(wall[0]) for wall in funnel_walls(funnel, time)]
+    return [float(wall[0]) for wall in funnel_bounds(funnel, time)]
 
 
 def draw_walls(ax: Axes) -> None:

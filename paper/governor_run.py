@@ -21,7 +21,7 @@ Clearance = Callable[[FloatArray], float]
 class Margin(Protocol):
     """Delta E from the energy, the clearance and the stiffness."""
 
-    def __call__(self, energy: float, clearance: float, /, *, stiffness: float) -> float:
+    def __call__(self, energy: float, clearance: float, stiffness: float, /) -> float:
         """Return Delta E [m^2/s^2]."""
         ...
 
@@ -92,20 +92,14 @@ def run_governor(
     stiffness, damping, governor_gain, smoothing = gains
 
     def margin_of(state: FloatArray) -> float:
-        energy = tracking_energy(state[:2], state[2:4], state[4:], stiffness=stiffness)
-        return margin(energy, clearance(state[4:]), stiffness=stiffness)
+        (x, y), (vx, vy) = state[:2] - state[4:], state[2:4]
+        energy = tracking_energy(x, y, vx, vy, stiffness)
+        return margin(energy, clearance(state[4:]), stiffness)
 
     def derivative(_: float, state: FloatArray) -> FloatArray:
-        acceleration = governed_acceleration(
-            state[:2], state[2:4], state[4:], stiffness=stiffness, damping=damping
-        )
-        rate = governor_velocity(
-            field(state[4:]),
-            margin_of(state),
-            stiffness=stiffness,
-            governor_gain=governor_gain,
-            smoothing=smoothing,
-        )
+        acceleration = governed_acceleration(state[:2], state[2:4], state[4:], stiffness, damping)
+        vx, vy = field(state[4:])
+        rate = governor_velocity(vx, vy, margin_of(state), stiffness, governor_gain, smoothing)
         return np.concatenate([state[2:4], acceleration, rate])
 
     start = np.concatenate([position, velocity, governor])

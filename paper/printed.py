@@ -11,7 +11,7 @@ from coop_drake.tree.pose import FloatArray
 __all__ = ["angle_walls", "axis_law", "energy_margin", "projector", "rate_term", "wrench_share"]
 
 
-def energy_margin(energy: float, distance: float, *, stiffness: float) -> float:
+def energy_margin(energy: float, distance: float, stiffness: float) -> float:
     """Return Delta E as printed in (15): erratum E15a."""
     return stiffness * distance - energy
 

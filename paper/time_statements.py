@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.planning.execution.transport_kernels import RATE_TOLERANCE, SPEED_TOLERANCE
+from coop_drake.laws.readiness import RATE_TOLERANCE, SPEED_TOLERANCE
 from coop_drake.simulation import WRENCH_TOLERANCE
 from coop_drake.tree.pose import FloatArray
 from paper.exhibits import Statement

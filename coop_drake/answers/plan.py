@@ -6,7 +6,7 @@ The fields of what is written to files stand in the order of the files; their ty
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
 from shapely import Polygon
@@ -16,6 +16,9 @@ from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.tree.pose import FloatArray
+
+if TYPE_CHECKING:
+    from coop_drake.laws.funnels import Funnel
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,14 @@ class Plan:
     goal_joints: tuple[float | None, ...]
     cells: Annotated[tuple[Cell, ...], msgspec.Meta(min_length=1)]
     transitions: tuple[Transition, ...]
+
+    def funnel(self, index: int) -> Funnel:
+        """Return the funnels of a transition, axes (theta, q...), from cell to goal intervals."""
+        from coop_drake.laws.funnels import Funnel  # here, so that reading a plan does not load numba
+
+        cell, transition = self.cells[index], self.transitions[index]
+        goal, gains = (transition.goal_lower, transition.goal_upper), transition.gains
+        return Funnel(cell.lower, cell.upper, *goal, gains.decay_rate, gains.funnel)
 
 
 @dataclass(frozen=True)

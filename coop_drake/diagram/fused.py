@@ -92,12 +92,15 @@ def build_team_controller(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) 
         knowledge: What every robot knows.
     """
     known = knowledge[0]
-    laws = axis_laws(known.plan, range(1 + len(team.joints)))
+    axes = [i for robot in team.robots for i in (0, *range(1 + robot.q_slice.start, 1 + robot.q_slice.stop))]
+    laws = axis_laws(known.plan, axes)
     cells = []
     for cell, law in zip(known.cells, laws, strict=True):
         if not isinstance(cell.field, VelocityField):
             raise TypeError("fused blocks need the velocity fields of harmonic maps")
-        cells.append(FusedCell(cell.gain_row, cell.clearance.edges, *cell.field.kernel_arguments, law.table))
+        cells.append(
+            FusedCell(cell.gains.governor_row, cell.clearance.edges, *cell.field.kernel_arguments, law.table)
+        )
     return TeamController(
         cells,
         _stacked(team, knowledge),
@@ -110,23 +113,23 @@ def build_team_controller(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) 
 
 def _stacked(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> FusedTeam:
     chains = [robot_chain(known.robot) for known in knowledge]
-    ways = [base_chain(team, robot) for robot in team.robots]
+    bases = [base_chain(team, robot) for robot in team.robots]
     counts = [
         [len(chain) for chain in chains],
-        [len(way.chain) for way in ways],
+        [len(base.chain) for base in bases],
         [robot.q_slice.stop - robot.q_slice.start for robot in team.robots],
     ]
     return FusedTeam(
         places=np.array([team.position_index, team.plant.num_positions() + team.velocity_index]),
         first=np.array([[0, *np.cumsum(row)] for row in counts]),
         chains=np.vstack(chains),
-        ways=np.vstack([way.chain for way in ways]),
-        yaws=np.array([way.yaw for way in ways]),
-        shares=np.array([_share(known) for known in knowledge]),
+        base_chains=np.vstack([base.chain for base in bases]),
+        yaws=np.array([base.yaw for base in bases]),
+        loads=np.array([_load(known) for known in knowledge]),
     )
 
 
-def _share(known: RobotKnowledge) -> FloatArray:
+def _load(known: RobotKnowledge) -> FloatArray:
     inertia = known.object_inertia
     p_LE = known.X_LE.x, known.X_LE.y
     return np.array([*p_LE, *inertia.p_LLcm, inertia.mass, inertia.inertia_about_com, known.load_share])

@@ -9,15 +9,12 @@ from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import PlanError
 from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.laws import slowdown_radius
+from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
 from coop_drake.plant import RobotPlant, TeamPlant, build_robot_plant
 from coop_drake.scenario import Scenario
 from coop_drake.systems import GovernedCell
 
 __all__ = ["robot_knowledge"]
-
-FIELD_SPEED = 1.0
-"""Largest magnitude of the velocity fields [m/s]; the governor scales it and bounds it by Delta E."""
 
 
 def robot_knowledge(
@@ -66,7 +63,7 @@ def _robot(scenario: Scenario, index: int, factor: float) -> RobotPlant:
 
 
 def _field(harmonic_map: HarmonicMap, governor_gain: float) -> VelocityField:
-    radius = slowdown_radius(FIELD_SPEED, governor_gain=governor_gain)
+    radius = slowdown_radius(FIELD_SPEED, governor_gain)
     return VelocityField(harmonic_map, FIELD_SPEED, slowdown_radius=radius)
 
 

@@ -1,4 +1,4 @@
-"""The control laws as pure functions: arrays in, arrays out."""
+"""The control laws, each written once as a small compiled function: numbers in, numbers out."""
 
 import lazy_loader
 

@@ -1,4 +1,6 @@
-from .funnels import Funnel, FunnelWalls, funnel_walls
+from .axis_table import axis_table
+from .funnels import Funnel, FunnelBounds, funnel_bounds
+from .gain_schedule import transition_gains
 from .gains import FixedGains, GainSet, ScheduledGains, TransitionGains
 from .governor import (
     energy_margin,
@@ -7,35 +9,29 @@ from .governor import (
     slowdown_radius,
     tracking_energy,
 )
-from .load_sharing import acceleration_at, grasp_matrix, object_twist, rotate, total_wrench, wrench_share
+from .load_sharing import acceleration_at, object_twist, total_wrench, wrench_share
 from .ppc import funnel_acceleration, prescribed_acceleration, prescribed_energy
-from .ready import arrival_margin, ready_margin
-from .robot_effort import consistent_projector, robot_acceleration, robot_torque
-from .schedule import transition_gains
+from .readiness import clearance_margin, interval_margin
 
 __all__ = [
     "FixedGains",
     "Funnel",
-    "FunnelWalls",
+    "FunnelBounds",
     "GainSet",
     "ScheduledGains",
     "TransitionGains",
     "acceleration_at",
-    "arrival_margin",
-    "consistent_projector",
+    "axis_table",
+    "clearance_margin",
     "energy_margin",
     "funnel_acceleration",
-    "funnel_walls",
+    "funnel_bounds",
     "governed_acceleration",
     "governor_velocity",
-    "grasp_matrix",
+    "interval_margin",
     "object_twist",
     "prescribed_acceleration",
     "prescribed_energy",
-    "ready_margin",
-    "robot_acceleration",
-    "robot_torque",
-    "rotate",
     "slowdown_radius",
     "total_wrench",
     "tracking_energy",

@@ -1,4 +1,4 @@
-"""Funnels: walls that shrink a slice to its goal interval, equations (17) and (39)."""
+"""Funnels: bounds of an angle or a joint that shrink from a slice to its goal interval, (17) and (39)."""
 
 from __future__ import annotations
 
@@ -8,19 +8,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coop_drake.laws import kernels
+from coop_drake.compiled import compiled
 from coop_drake.laws.gains import FloatArray, FunnelShape
+
+__all__ = ["Funnel", "FunnelBounds", "axis_bounds", "decay_factor", "funnel_bounds"]
 
 
 @dataclass(frozen=True)
 class Funnel:
-    """The funnels of one transition, one per axis.
+    """The funnels of one transition, one for each axis.
 
     Attributes:
-        slice_lower: Lower walls at time 0, shape (m,) [rad or m].
-        slice_upper: Upper walls at time 0, shape (m,).
-        goal_lower: Lower walls in the limit, shape (m,).
-        goal_upper: Upper walls in the limit, shape (m,).
+        slice_lower: Lower bounds at time 0, shape (m,) [rad or m].
+        slice_upper: Upper bounds at time 0, shape (m,) [rad or m].
+        goal_lower: Lower bounds in the limit, shape (m,) [rad or m].
+        goal_upper: Upper bounds in the limit, shape (m,) [rad or m].
         decay_rate: lambda, shape (m,) [1/s].
         shape: ``exponential``, e^(-lambda t) as printed, or ``smooth``, (1 + lambda t) e^(-lambda t).
     """
@@ -31,18 +33,6 @@ class Funnel:
     goal_upper: FloatArray
     decay_rate: FloatArray
     shape: FunnelShape = "smooth"
-
-    @property
-    def kernel_arguments(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, bool]:
-        """What the compiled kernels take, in their order."""
-        return (
-            self.slice_lower,
-            self.slice_upper,
-            self.goal_lower,
-            self.goal_upper,
-            self.decay_rate,
-            self.shape == "smooth",
-        )
 
     def select(self, axes: NDArray[np.intp]) -> Funnel:
         """Return the funnels of some axes only, for instance those that one robot controls."""
@@ -56,8 +46,8 @@ class Funnel:
         )
 
 
-class FunnelWalls(NamedTuple):
-    """Walls of m axes at one instant, each entry of shape (m,), in rad or m and seconds."""
+class FunnelBounds(NamedTuple):
+    """Bounds of m axes at one instant and their derivatives, each of shape (m,), in rad or m and seconds."""
 
     lower: FloatArray
     upper: FloatArray
@@ -67,17 +57,74 @@ class FunnelWalls(NamedTuple):
     upper_acceleration: FloatArray
 
 
-def funnel_walls(funnel: Funnel, time: float) -> FunnelWalls:
-    """Return the walls ``time`` after the transition began, with their derivatives.
+@compiled
+def decay_factor(time: float, decay_rate: float, smooth: bool) -> tuple[float, float, float]:
+    """Return f(t) of a funnel, which decays from 1 to 0, with its first and second derivative.
 
-    rho(t) = rho_G + (rho_0 - rho_G) f(t) for the lower and the upper wall, each from its own end of the
-    slice: (17) and (39), errata E17a and E39.
+    f(t) = (1 + lambda t) e^(-lambda t) where the funnel is smooth, otherwise e^(-lambda t) as printed.
 
     Args:
-        funnel: Funnels of m axes.
         time: t >= 0 since the transition began [s].
+        decay_rate: lambda [1/s].
+        smooth: Which of the two shapes.
+    """
+    exponential = np.exp(-decay_rate * time)
+    if not smooth:
+        return exponential, -decay_rate * exponential, decay_rate * decay_rate * exponential
+    return (
+        (1.0 + decay_rate * time) * exponential,
+        -decay_rate * decay_rate * time * exponential,
+        decay_rate * decay_rate * (decay_rate * time - 1.0) * exponential,
+    )
+
+
+@compiled
+def axis_bounds(
+    time: float,
+    slice_lower: float,
+    slice_upper: float,
+    goal_lower: float,
+    goal_upper: float,
+    decay_rate: float,
+    smooth: bool,
+) -> tuple[float, float, float, float, float, float]:
+    """Return the bounds of one axis, (17) and (39) with errata E17a and E39, and their derivatives.
+
+    rho(t) = rho_G + (rho_0 - rho_G) f(t), for the lower and for the upper bound, each from its own end of the
+    slice.
+
+    Args:
+        time: t >= 0 since the transition began [s].
+        slice_lower: rho_0 of the lower bound [rad or m].
+        slice_upper: rho_0 of the upper bound [rad or m].
+        goal_lower: rho_G of the lower bound [rad or m].
+        goal_upper: rho_G of the upper bound [rad or m].
+        decay_rate: lambda [1/s].
+        smooth: Whether f is that of the smooth funnel, see ``decay_factor``.
 
     Returns:
-        Walls of every axis.
+        Lower and upper bound [rad or m], their rates [per s] and their accelerations [per s^2].
     """
-    return FunnelWalls(*kernels.funnel_walls(float(time), *funnel.kernel_arguments))
+    value, first, second = decay_factor(time, decay_rate, smooth)
+    below, above = slice_lower - goal_lower, slice_upper - goal_upper
+    return (
+        goal_lower + below * value,
+        goal_upper + above * value,
+        below * first,
+        above * first,
+        below * second,
+        above * second,
+    )
+
+
+def funnel_bounds(funnel: Funnel, time: float) -> FunnelBounds:
+    """Return ``axis_bounds`` of every axis of a funnel, ``time`` [s] after the transition began."""
+    intervals = (funnel.slice_lower, funnel.slice_upper, funnel.goal_lower, funnel.goal_upper)
+    smooth = funnel.shape == "smooth"
+    rows = [
+        axis_bounds(float(time), slice_lower, slice_upper, goal_lower, goal_upper, rate, smooth)
+        for slice_lower, slice_upper, goal_lower, goal_upper, rate in zip(
+            *intervals, funnel.decay_rate, strict=True
+        )
+    ]
+    return FunnelBounds(*np.array(rows).T)

@@ -45,6 +45,11 @@ class TransitionGains:
     rate_gain: float
     energy_bound: FloatArray
 
+    @property
+    def governor_row(self) -> FloatArray:
+        """K, zeta, K_G and c, as compiled code reads them, shape (4,)."""
+        return np.array([self.stiffness, self.damping, self.governor_gain, self.smoothing])
+
     def select(self, axes: NDArray[np.intp]) -> "TransitionGains":
         """Return the same gains for some axes only, for instance those that one robot controls."""
         return replace(

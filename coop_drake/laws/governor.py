@@ -1,18 +1,51 @@
-"""The reference governor of the object's position, equations (14)-(16)."""
+"""The reference governor of the object's position, equations (14)-(16).
+
+The governor moves a reference point p_G towards the target of the cell. A spring and a damper pull the
+object's origin p towards p_G. The governor slows down when the energy of this motion comes near what the
+clearance of p_G allows. The controllers, the planner's time estimate, the log, the figures and the tests
+all call these functions.
+"""
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 
-from coop_drake.laws import kernels
+from coop_drake.compiled import compiled
 from coop_drake.laws.gains import FloatArray
 
+__all__ = [
+    "ATTRACTION_RATE",
+    "FIELD_SPEED",
+    "VELOCITY_STEP",
+    "energy_margin",
+    "governed_acceleration",
+    "governor_velocity",
+    "object_energy_margin",
+    "slowdown_radius",
+    "tracking_energy",
+]
+
+Value = TypeVar("Value", float, FloatArray)
+
+FIELD_SPEED = 1.0
+"""Largest magnitude of the velocity field (13) [m/s]; the governor scales the field and bounds it by Delta
+E."""
+
 ATTRACTION_RATE = 30.0
-"""Rate at which p_G is drawn into its target [1/s]: faster than the object follows, slow enough for steps of
-0.02 s; a field that slows down only close to its target makes copies of p_G drift apart by its stiffness."""
+"""Rate at which p_G approaches its target at the end [1/s]: faster than the object follows, and slow enough
+for integration steps of 0.02 s. With a larger rate the robots' copies of p_G would drift apart by
+rounding."""
+
+VELOCITY_STEP = 2.0**-26
+"""The loop computes the energy from a velocity rounded to a multiple of this [m/s], some 1.5e-8 m/s. Each
+robot finds the object's velocity from its own joints, with its own rounding errors; after this rounding all
+robots have the same number, and therefore the same p_G, bit by bit."""
 
 
-def slowdown_radius(max_speed: float, *, governor_gain: float) -> float:
+@compiled
+def slowdown_radius(max_speed: float, governor_gain: float) -> float:
     """Return the distance from its target at which the field (13) starts to slow down [m].
 
     Inside it p_G approaches the target like exp(-``ATTRACTION_RATE`` t).
@@ -24,72 +57,91 @@ def slowdown_radius(max_speed: float, *, governor_gain: float) -> float:
     return governor_gain * max_speed / ATTRACTION_RATE
 
 
+@compiled
 def governed_acceleration(
-    position: FloatArray,
-    velocity: FloatArray,
-    governor_position: FloatArray,
-    *,
-    stiffness: float,
-    damping: float,
-) -> FloatArray:
-    """Return the object's desired acceleration, the force of (14) over the mass: -K (p - p_G) - zeta p'.
+    position: Value, velocity: Value, governor_position: Value, stiffness: float, damping: float
+) -> Value:
+    """Return one coordinate of the object's desired acceleration, the force of (14) over the mass [m/s^2].
+
+    p'' = -K (p - p_G) - zeta p'. Arrays of equal shape are treated element by element.
 
     Args:
-        position: p of the object's origin in W, shape (2,) [m].
-        velocity: p', shape (2,) [m/s].
-        governor_position: p_G in W, shape (2,) [m].
+        position: Coordinate of p, the object's origin in W [m].
+        velocity: The same coordinate of p' [m/s].
+        governor_position: The same coordinate of p_G [m].
         stiffness: K [1/s^2].
         damping: zeta [1/s].
-
-    Returns:
-        p'', shape (2,) [m/s^2].
     """
     return -stiffness * (position - governor_position) - damping * velocity
 
 
-def tracking_energy(
-    position: FloatArray, velocity: FloatArray, governor_position: FloatArray, *, stiffness: float
-) -> float:
-    """Return E = (|p'|^2 + K |p - p_G|^2) / 2 of (16) [m^2/s^2]; arguments as above."""
-    x, y = position[0] - governor_position[0], position[1] - governor_position[1]
-    return float(0.5 * (velocity[0] ** 2 + velocity[1] ** 2 + stiffness * (x * x + y * y)))
+@compiled
+def tracking_energy(x: float, y: float, vx: float, vy: float, stiffness: float) -> float:
+    """Return E = (|p'|^2 + K |p - p_G|^2) / 2 of (16) [m^2/s^2].
+
+    Args:
+        x: First coordinate of p - p_G in W [m].
+        y: Second coordinate of p - p_G [m].
+        vx: First coordinate of p' in W [m/s].
+        vy: Second coordinate of p' [m/s].
+        stiffness: K [1/s^2].
+    """
+    return 0.5 * (vx * vx + vy * vy + stiffness * (x * x + y * y))
 
 
-def energy_margin(energy: float, clearance: float, *, stiffness: float) -> float:
-    """Return Delta E = (K / 2) d^2 - E, (15) corrected: errata E15a and E15b.
+@compiled
+def energy_margin(energy: float, clearance: float, stiffness: float) -> float:
+    """Return Delta E = K d |d| / 2 - E, (15) corrected: errata E15a and E15b [m^2/s^2].
 
-    While it is not negative, p stays within d of p_G: K |p - p_G|^2 / 2 <= E <= K d^2 / 2.
+    While Delta E is not negative, p stays within d of p_G, because K |p - p_G|^2 / 2 <= E <= K d^2 / 2.
+    Outside the safe set, where d is negative, Delta E is below -E.
 
     Args:
         energy: E [m^2/s^2].
         clearance: d, signed distance of p_G to the boundary of the safe set, negative outside it [m].
         stiffness: K [1/s^2].
-
-    Returns:
-        Delta E; below -E outside the safe set [m^2/s^2].
     """
     return 0.5 * stiffness * clearance * abs(clearance) - energy
 
 
-def governor_velocity(
-    field_velocity: FloatArray, margin: float, *, stiffness: float, governor_gain: float, smoothing: float
-) -> FloatArray:
-    """Return p_G' = K_G v^ min(|v|, root(Delta E / K)) of (14), zero where Delta E is not positive.
-
-    The root is sqrt(x + c^2) - c: as printed for c = 0, and Lipschitz for c > 0.
+@compiled
+def object_energy_margin(
+    object_state: FloatArray, governor_position: FloatArray, clearance: float, stiffness: float
+) -> float:
+    """Return Delta E of (15) as robots compute it, from velocities in steps of ``VELOCITY_STEP``.
 
     Args:
-        field_velocity: v of (13) at p_G, shape (2,).
+        object_state: Pose and twist of the object in W, shape (6,).
+        governor_position: p_G in W, shape (2,) [m].
+        clearance: d, signed distance of p_G to the boundary of the safe set [m].
+        stiffness: K [1/s^2].
+    """
+    x, y = object_state[0] - governor_position[0], object_state[1] - governor_position[1]
+    vx = np.rint(object_state[3] / VELOCITY_STEP) * VELOCITY_STEP
+    vy = np.rint(object_state[4] / VELOCITY_STEP) * VELOCITY_STEP
+    return energy_margin(tracking_energy(x, y, vx, vy, stiffness), clearance, stiffness)
+
+
+@compiled
+def governor_velocity(
+    vx: float, vy: float, margin: float, stiffness: float, governor_gain: float, smoothing: float
+) -> tuple[float, float]:
+    """Return p_G' = K_G v^ min(|v|, root(Delta E / K)) of (14), zero where Delta E is not positive [m/s].
+
+    v^ is the direction of the field v. The root is sqrt(x + c^2) - c: for c = 0 as printed, and for c > 0
+    Lipschitz continuous at zero.
+
+    Args:
+        vx: First coordinate of the field v of (13) at p_G [m/s].
+        vy: Second coordinate of v [m/s].
         margin: Delta E [m^2/s^2].
         stiffness: K [1/s^2].
-        governor_gain: K_G.
+        governor_gain: K_G [-].
         smoothing: c [m].
-
-    Returns:
-        p_G', shape (2,) [m/s].
     """
-    velocity = np.empty(2)
-    kernels.governor_velocity(
-        field_velocity[0], field_velocity[1], margin, stiffness, governor_gain, smoothing, velocity
-    )
-    return velocity
+    length = np.hypot(vx, vy)
+    if margin <= 0.0 or length == 0.0:
+        return 0.0, 0.0
+    root = np.sqrt(margin / stiffness + smoothing * smoothing) - smoothing
+    scale = governor_gain * min(1.0, root / length)
+    return scale * vx, scale * vy

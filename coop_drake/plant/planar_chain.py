@@ -9,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, Joint, RigidBody
 from pydrake.systems.framework import Context
 
-from coop_drake.laws.planar_chain import (
+from coop_drake.laws.robot_dynamics import (
     COLUMNS,
     COM_X,
     COM_Y,
@@ -39,7 +39,7 @@ class BaseChain:
     """How a robot's base hangs on the object, through its grasp and its joints.
 
     Attributes:
-        chain: Rows of ``control.planar_chain``, the object first, the base's frame last.
+        chain: Rows as in ``coop_drake.laws.robot_dynamics``, the object first, the base's frame last.
         yaw: Angle of the base in the object where all joints are at zero [rad].
         joints: Where the robot's joints and their rates stand in the team's state, shape (2, n).
     """

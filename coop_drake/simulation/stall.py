@@ -1,4 +1,4 @@
-"""Notices that a run no longer gets anywhere, and says what it waits for."""
+"""How long a transition is waited for, and which condition keeps a team from going on."""
 
 from __future__ import annotations
 
@@ -6,27 +6,33 @@ import numpy as np
 
 from coop_drake.answers.plan import Plan
 from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.laws.governor import energy_margin, tracking_energy
-from coop_drake.laws.ready import arrival_margin, clearance_margin, funnel_margin, interval_margin
+from coop_drake.laws.axis_table import ENERGY_BOUND, axis_table, track_row
+from coop_drake.laws.readiness import (
+    clearance_margin,
+    funnel_margin,
+    interval_margin,
+    position_arrival,
+    rest_margin,
+)
 from coop_drake.simulation.telemetry import Sample
-from coop_drake.systems import axis_laws
-from coop_drake.tree.pose import FloatArray
+from coop_drake.systems.governor_kernels import cell_margin
 
 __all__ = ["blocking_margin", "narrowest_funnel", "patience"]
 
-#: A transition may take this many times its estimate ...
 PATIENCE_FACTOR = 10.0
-#: ... and this much more [s].
+"""A transition may take this many times its estimated time [-]: estimates are within a factor of two."""
+
 PATIENCE_ALLOWANCE = 20.0
+"""And this much longer [s], for transitions that are estimated at a fraction of a second."""
 
 
 def patience(plan: Plan, cell: int) -> float:
-    """Longest time that a transition is waited for [s]."""
+    """Return the longest time that a transition is waited for [s]."""
     return PATIENCE_FACTOR * plan.transitions[cell].estimated_time + PATIENCE_ALLOWANCE
 
 
 def blocking_margin(plan: Plan, sample: Sample, position_tolerance: float) -> str:
-    """The condition that keeps the team longest in its current cell, as a phrase with its margin.
+    """Return the condition that is furthest from being met in the current cell, as a phrase with its margin.
 
     Args:
         plan: The plan.
@@ -42,7 +48,7 @@ def blocking_margin(plan: Plan, sample: Sample, position_tolerance: float) -> st
 
 
 def narrowest_funnel(plan: Plan, sample: Sample) -> str:
-    """The axis that is nearest to a wall of its funnel, as a phrase with its margin and its rate.
+    """Return the axis that is nearest to a bound of its funnel, as a phrase with its margin and its rate.
 
     Args:
         plan: The plan.
@@ -61,47 +67,42 @@ def _axes(plan: Plan) -> tuple[str, ...]:
 def _intervals(plan: Plan, sample: Sample) -> dict[str, float]:
     transition = plan.transitions[sample.cell]
     return {
-        f"{name} reaches its goal interval": interval_margin(
-            sample.z[2 + i : 3 + i], transition.goal_lower[i : i + 1], transition.goal_upper[i : i + 1]
+        f"{name} reaches its goal interval": interval_margin(position, lower, upper)
+        for name, position, lower, upper in zip(
+            _axes(plan), sample.z[2:], transition.goal_lower, transition.goal_upper, strict=True
         )
-        for i, name in enumerate(_axes(plan))
     }
 
 
 def _readiness(plan: Plan, sample: Sample) -> dict[str, float]:
-    cell, stiffness = plan.cells[sample.cell + 1], plan.transitions[sample.cell + 1].gains.stiffness
-    clearance = BoundaryDistance(cell.tidied)(sample.governor_position)
-    energy = tracking_energy(sample.z[:2], sample.rates[:2], sample.governor_position, stiffness=stiffness)
+    following = sample.cell + 1
+    cell, gains = plan.cells[following], plan.transitions[following].gains
+    margin = cell_margin(
+        BoundaryDistance(cell.tidied).edges,
+        gains.stiffness,
+        np.concatenate([sample.z[:3], sample.rates[:3]]),
+        sample.governor_position,
+    )
     margins = _intervals(plan, sample)
     margins["the object's position is safe in the next cell (Delta E)"] = clearance_margin(
-        energy_margin(energy, clearance, stiffness=stiffness),
-        stiffness=stiffness,
-        inradius=plan.transitions[sample.cell].inradius,
+        margin, gains.stiffness, plan.transitions[sample.cell].inradius
     )
+    table = axis_table(plan.funnel(following), gains)
     for i, name in enumerate(_axes(plan)):
-        law = axis_laws(plan, [i])[sample.cell + 1]
+        energy = track_row(table[i], 0.0, sample.z[2 + i], sample.rates[2 + i])[1]
         margins[f"the energy of {name} falls below the next funnel's bound"] = funnel_margin(
-            sample.z[2 + i : 3 + i], sample.rates[2 + i : 3 + i], funnel=law.funnel, gains=law.gains
+            energy, table[i, ENERGY_BOUND]
         )
     return margins
 
 
 def _arrival(plan: Plan, sample: Sample, position_tolerance: float) -> dict[str, float]:
     margins = _intervals(plan, sample)
-    transition = plan.transitions[sample.cell]
-
-    def judge(position: FloatArray, rates: FloatArray) -> float:
-        return arrival_margin(
-            position=position,
-            velocity=rates[:2],
-            target=plan.goal_pose[:2],
-            axis_position=0.5 * (transition.goal_lower + transition.goal_upper),
-            axis_rate=rates[2:],
-            goal_lower=transition.goal_lower,
-            goal_upper=transition.goal_upper,
-            position_tolerance=position_tolerance,
-        )
-
-    margins["the object reaches its goal position"] = judge(sample.z[:2], np.zeros_like(sample.rates))
-    margins["the object and the joints come to rest"] = judge(plan.goal_pose[:2], sample.rates)
+    distance = float(np.hypot(*(sample.z[:2] - plan.goal_pose[:2])))
+    speed = float(np.hypot(*sample.rates[:2]))
+    margins["the object reaches its goal position"] = position_arrival(distance, 0.0, position_tolerance)
+    margins["the object and the joints come to rest"] = min(
+        position_arrival(0.0, speed, position_tolerance),
+        rest_margin(float(np.abs(sample.rates[2:]).max())),
+    )
     return margins

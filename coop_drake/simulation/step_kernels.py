@@ -11,7 +11,7 @@ from coop_drake.geometry.boundary import signed_distance
 from coop_drake.simulation.convex_distance import IntArray, nearest_pair, nearest_to_walls
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["LINK_COLUMNS", "largest_difference", "margins", "object_wrench", "team_distances"]
+__all__ = ["LINK_COLUMNS", "largest_difference", "margins", "team_distances"]
 
 #: Columns of a component's row: parent's row (-1 for the object's), X_PJ [m, m, rad], where the joint's value
 #: stands in z, how the joint's value turns the child (0 where it slides), direction of sliding in J.
@@ -95,27 +95,6 @@ def largest_difference(rows: FloatArray, others: FloatArray) -> float:
                 return np.nan
             largest = max(largest, difference)
     return largest
-
-
-@compiled
-def object_wrench(wrenches: FloatArray, grasps: FloatArray, p_LLcm: FloatArray, angle: float) -> FloatArray:
-    """The sum of wrenches about the centre of mass in W, see ``control.load_sharing.total_wrench``.
-
-    Args:
-        wrenches: What acts at the grasps in W, shape (N, 3) [N, N m].
-        grasps: The grasps in L, shape (N, 2) [m].
-        p_LLcm: The centre of mass in L, shape (2,) [m].
-        angle: Of the object [rad].
-    """
-    c, s, whole = cos(angle), sin(angle), np.zeros(3)
-    mx, my = c * p_LLcm[0] - s * p_LLcm[1], s * p_LLcm[0] + c * p_LLcm[1]
-    for k in range(wrenches.shape[0]):
-        rx = c * grasps[k, 0] - s * grasps[k, 1] - mx
-        ry = s * grasps[k, 0] + c * grasps[k, 1] - my
-        whole[0] += wrenches[k, 0]
-        whole[1] += wrenches[k, 1]
-        whole[2] += wrenches[k, 2] + rx * wrenches[k, 1] - ry * wrenches[k, 0]
-    return whole
 
 
 @compiled

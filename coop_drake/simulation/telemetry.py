@@ -11,7 +11,9 @@ import numpy as np
 from pydrake.systems.framework import Context, System
 
 from coop_drake.diagram import TELEMETRY, ClosedLoop
-from coop_drake.simulation.step_kernels import largest_difference, object_wrench
+from coop_drake.laws import total_wrench
+from coop_drake.simulation.step_kernels import largest_difference
+from coop_drake.systems.team_kernels import telemetry_parts
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Sample", "Telemetry", "port_reader"]
@@ -67,7 +69,7 @@ class Sample:
 
 
 class Telemetry:
-    """Evaluates the ports of a closed loop.
+    """Evaluates the ports of a closed loop, of named or of fused blocks.
 
     Args:
         loop: The closed loop.
@@ -80,7 +82,7 @@ class Telemetry:
         self._grasps = np.array([[robot.X_LE.x, robot.X_LE.y] for robot in self._team.robots])
         self._rates = self._team.plant.num_positions() + self._team.velocity_index
         self._ports = _PortRow(root)
-        self._places = _places(loop, self._ports)
+        self._places = _fused_places(loop, self._ports) if loop.fused else _named_places(loop, self._ports)
 
     def read(self) -> Sample:
         """Read the present instant."""
@@ -101,7 +103,7 @@ class Telemetry:
             funnel_lower=values[at.funnel_lower],
             funnel_upper=values[at.funnel_upper],
             energy_margin=float(values[at.energy_margins].min()),
-            object_wrench=object_wrench(commanded, self._grasps, team.object_inertia.p_LLcm, z[2]),
+            object_wrench=total_wrench(commanded, self._grasps, team.object_inertia.p_LLcm, z[2]),
             commanded_wrenches=commanded,
             measured_wrenches=team.grasps.wrenches(self._plant_context, base_wrenches),
             grasp_error=float(team.grasps.errors(self._plant_context).max()),
@@ -154,29 +156,68 @@ class _Places(NamedTuple):
     ready_margins: Any
 
 
-def _places(loop: ClosedLoop, ports: _PortRow) -> _Places:
-    """Add everything that is read of a loop to a row."""
-    station, planner = loop.station.diagram, loop.cell_planner
-    states = [ports.add(station, f"robot_{robot.index}_state") for robot in loop.team.robots]
+def _instant(loop: ClosedLoop, ports: _PortRow) -> Any:
+    """Add the current cell, its time of entry and whether the team has arrived."""
+    return np.concatenate([ports.add(loop.cell_planner, name) for name in ("current_cell", "arrived")])
+
+
+def _realised(loop: ClosedLoop, ports: _PortRow) -> Any:
+    """Add the object's acceleration in the plant, shape (1, 3)."""
+    added = ports.add(loop.station.diagram, "generalized_acceleration")
+    return added[loop.team.velocity_index[:3]][None]
+
+
+def _named_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
+    """Add everything that is read of a loop of named blocks."""
+    robots = loop.team.robots
+    states = [ports.add(loop.station.diagram, f"robot_{robot.index}_state") for robot in robots]
     efforts = [ports.add(controller, "robot_effort") for controller in loop.controllers]
     logged = [name for name in TELEMETRY if name != "object_state"]
     of = {name: [ports.add(law, name) for law in loop.laws] for name in ("ready", *logged)}
-    realised = ports.add(station, "generalized_acceleration")[loop.team.velocity_index[:3]]
-    # Every robot has walls for the angle; they are alike, and the first robot's are taken.
-    walls = [np.split(funnels, 2) for funnels in of["funnels"]]
+    # Every robot has bounds for the angle; they are equal, and the first robot's are taken.
+    bounds = [np.split(funnels, 2) for funnels in of["funnels"]]
     return _Places(
-        instant=np.concatenate([ports.add(planner, "current_cell"), ports.add(planner, "arrived")]),
+        instant=_instant(loop, ports),
         base_poses=np.array([state[:3] for state in states]),
         governors=np.array(of["governor_position"]),
-        funnel_lower=np.concatenate([walls[0][0][:1], *(lower[1:] for lower, _ in walls)]),
-        funnel_upper=np.concatenate([walls[0][1][:1], *(upper[1:] for _, upper in walls)]),
+        funnel_lower=np.concatenate([bounds[0][0][:1], *(lower[1:] for lower, _ in bounds)]),
+        funnel_upper=np.concatenate([bounds[0][1][:1], *(upper[1:] for _, upper in bounds)]),
         energy_margins=np.concatenate(of["energy_margin"]),
         commanded_wrenches=np.array(of["hand_command"])[:, 3:],
         base_wrenches=np.array([effort[:3] for effort in efforts]),
         joint_torques=np.concatenate([effort[3:] for effort in efforts]),
         accelerations=np.array(of["object_acceleration"]),
-        realised=realised[None],
+        realised=_realised(loop, ports),
         ready_margins=np.array([margin for _, margin in of["ready"]]),
+    )
+
+
+def _fused_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
+    """Add everything that is read of a loop of fused blocks."""
+    assert loop.fused is not None
+    fused, robots = loop.fused, len(loop.team.robots)
+    added = ports.add(fused.driver, "telemetry").astype(float)
+    acceleration, commands, bases, efforts, bounds, margin = (
+        part.astype(np.intp) for part in telemetry_parts(added, robots)
+    )
+    wrenches, torques = efforts[: 3 * robots].reshape(robots, 3), efforts[3 * robots :]
+    if fused.efforts:
+        held = [ports.add(port.get_system(), port.get_name()) for port in fused.efforts]
+        wrenches = np.array([effort[:3] for effort in held])
+        torques = np.concatenate([effort[3:] for effort in held])
+    return _Places(
+        instant=_instant(loop, ports),
+        base_poses=bases,
+        governors=ports.add(fused.governor, fused.governor.get_output_port().get_name())[None],
+        funnel_lower=bounds[: len(bounds) // 2],
+        funnel_upper=bounds[len(bounds) // 2 :],
+        energy_margins=margin,
+        commanded_wrenches=commands[:, 3:],
+        base_wrenches=wrenches,
+        joint_torques=torques,
+        accelerations=acceleration[None],
+        realised=_realised(loop, ports),
+        ready_margins=ports.add(fused.driver, "ready")[1::2],
     )
 
 

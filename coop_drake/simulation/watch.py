@@ -8,7 +8,6 @@ from pydrake.systems.framework import Context, EventStatus
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram import ClosedLoop
-from coop_drake.simulation.fused_telemetry import FusedTelemetry
 from coop_drake.simulation.invariants import Invariants
 from coop_drake.simulation.recorder import Recorder
 from coop_drake.simulation.stall import blocking_margin, narrowest_funnel, patience
@@ -43,7 +42,7 @@ class Watch:
         self.violation = ""
         self._loop, self._invariants = loop, invariants
         self._progress, self._onlooker = progress, onlooker
-        self._telemetry = FusedTelemetry(loop, root) if loop.fused else Telemetry(loop, root)
+        self._telemetry = Telemetry(loop, root)
         self._tolerance = position_tolerance
         self._last: Sample | None = None
 

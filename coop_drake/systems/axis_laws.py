@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from coop_drake.answers.plan import Plan
+from coop_drake.laws.axis_table import axis_table
 from coop_drake.laws.funnels import Funnel
 from coop_drake.laws.gains import TransitionGains
-from coop_drake.laws.kernels import LAW_COLUMNS
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["AxisLaw", "axis_laws"]
@@ -31,18 +31,8 @@ class AxisLaw:
 
     @cached_property
     def table(self) -> FloatArray:
-        """What the compiled laws read, shape (m, ``LAW_COLUMNS``), a row for each axis."""
-        funnel, gains, rows = self.funnel, self.gains, np.empty((self.axes, LAW_COLUMNS))
-        columns: tuple[FloatArray | float, ...] = (
-            *funnel.kernel_arguments,
-            gains.log_gain,
-            gains.position_gain,
-            gains.rate_gain,
-            gains.energy_bound,
-        )
-        for column, values in enumerate(columns):
-            rows[:, column] = values
-        return rows
+        """What the compiled laws read, shape (m, ``LAW_COLUMNS``), see ``axis_table``."""
+        return axis_table(self.funnel, self.gains)
 
     @property
     def axes(self) -> int:
@@ -51,7 +41,7 @@ class AxisLaw:
 
 
 def axis_laws(plan: Plan, axes: Sequence[int]) -> tuple[AxisLaw, ...]:
-    """Laws of some axes in every cell of a plan.
+    """Return the laws of some axes in every cell of a plan.
 
     Args:
         plan: The plan.
@@ -64,9 +54,7 @@ def axis_laws(plan: Plan, axes: Sequence[int]) -> tuple[AxisLaw, ...]:
     if any(not 0 <= axis < count for axis in axes):
         raise ValueError(f"axes {list(axes)} are not all in 0 to {count - 1}, the axes of the plan")
     chosen = np.array(axes, dtype=np.intp)
-    laws = []
-    for cell, transition in zip(plan.cells, plan.transitions, strict=True):
-        goal, gains = (transition.goal_lower, transition.goal_upper), transition.gains
-        funnel = Funnel(cell.lower, cell.upper, *goal, gains.decay_rate, gains.funnel)
-        laws.append(AxisLaw(funnel.select(chosen), gains.select(chosen)))
-    return tuple(laws)
+    return tuple(
+        AxisLaw(plan.funnel(index).select(chosen), transition.gains.select(chosen))
+        for index, transition in enumerate(plan.transitions)
+    )

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.laws.kernels import track_cell, write_walls
+from coop_drake.laws.axis_table import track_axes, write_bounds
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
@@ -24,8 +23,7 @@ class AxisPpc(Block):
     input   ``current_cell``         2          index of the current cell, time of its entry [-, s]
     output  ``axis_acceleration``    1 + n      desired angular acceleration of the object [rad/s^2],  W
                                                 of the joints [rad/s^2 or m/s^2]
-    output  ``funnels``              2 (1 + n)  lower walls, then upper walls of the funnels now
-                                                [rad or m]
+    output  ``funnels``              2 (1 + n)  lower, then upper funnel bounds now [rad or m]
     ======= ======================== ========== ====================================================== =====
 
     No state: the funnels depend on the time since the cell was entered. One law holds for all axes, so one
@@ -42,7 +40,7 @@ class AxisPpc(Block):
         super().__init__()
         if not laws or len({law.axes for law in laws}) != 1 or laws[0].axes < 1:
             raise ValueError("AxisPpc needs one law for each cell, all of the same axes, the angle first")
-        self._tables = np.stack([law.table for law in laws])
+        self._tables = [law.table for law in laws]
         axes = laws[0].axes
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._robot = self.DeclareVectorInputPort("robot_state", 2 * (2 + axes))
@@ -56,13 +54,12 @@ class AxisPpc(Block):
         )
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
-        cell, thing = self._cell.Eval(context), self._object.Eval(context)
-        robot = self._robot.Eval(context) if self._tables.shape[1] > 1 else thing
-        time, acceleration = context.get_time(), output.get_mutable_value()
-        if not track_cell(self._tables, cell, time, thing, robot, acceleration):
-            index_of(cell, len(self._tables))
+        cell, object_state = self._cell.Eval(context), self._object.Eval(context)
+        table, time = self._tables[index_of(cell, len(self._tables))], context.get_time() - cell[1]
+        robot = self._robot.Eval(context) if len(table) > 1 else object_state
+        track_axes(table, time, object_state, robot, output.get_mutable_value())
 
     def _write_funnels(self, context: Context, output: BasicVector) -> None:
         cell = self._cell.Eval(context)
         table = self._tables[index_of(cell, len(self._tables))]
-        write_walls(table, context.get_time() - cell[1], output.get_mutable_value())
+        write_bounds(table, context.get_time() - cell[1], output.get_mutable_value())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.laws.planar_chain import object_state
+from coop_drake.laws.robot_dynamics import estimate_object
 from coop_drake.plant import RobotPlant, robot_chain
 from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray
@@ -37,7 +37,7 @@ class ObjectEstimator(Block):
         self.DeclareVectorOutputPort("object_state", 6, self._write_state)
 
     def _write_state(self, context: Context, output: BasicVector) -> None:
-        object_state(
+        estimate_object(
             self._chain,
             self._p_LE,
             self._state.Eval(context),

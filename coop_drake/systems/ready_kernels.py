@@ -1,71 +1,77 @@
-"""The ready reports, compiled; what they compute is explained in control/ready.py."""
+"""One robot's ready report: the conditions of ``coop_drake.laws.readiness`` on object and joints."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.geometry.boundary import signed_distance
-from coop_drake.laws.kernels import track_row
-from coop_drake.laws.ready import CLEARANCE_FRACTION, EROSION, RATE_TOLERANCE, SPEED_TOLERANCE
+from coop_drake.laws.readiness import axis_arrival, axis_ready, clearance_margin, position_arrival
+from coop_drake.systems.governor_kernels import cell_margin
 from coop_drake.tree.pose import FloatArray
 
-__all__ = [
-    "axis_ready",
-    "axis_rests",
-    "position_arrived",
-    "position_ready",
-    "robot_arrival",
-    "robot_ready",
-]
+__all__ = ["ReadyConditions", "ready_conditions", "robot_ready"]
 
 
-@compiled
-def position_ready(
-    next_edges: FloatArray, next_stiffness: float, inradius: float, state: FloatArray, governor: FloatArray
-) -> float:
-    """Return ``clearance_margin`` of the next cell.
+class ReadyConditions(NamedTuple):
+    """What a robot needs to know in one cell to judge whether it is ready.
+
+    Attributes:
+        table: The axes (theta, own joints) in this cell, shape (1 + n, ``LAW_COLUMNS``).
+        next_table: The same in the next cell; in the last cell not read, as the next two.
+        next_edges: Edges of the next cell, shape (edges, 4) [m].
+        next_stiffness: K of the next cell [1/s^2].
+        inradius: R of the transition [m].
+        goal: Goal position of the object, shape (2,) [m].
+        tolerance: Largest distance to it that counts as arrived [m].
+        last: Whether this is the last cell.
+    """
+
+    table: FloatArray
+    next_table: FloatArray
+    next_edges: FloatArray
+    next_stiffness: float
+    inradius: float
+    goal: FloatArray
+    tolerance: float
+    last: bool
+
+
+def ready_conditions(
+    tables: Sequence[FloatArray],
+    edges: Sequence[FloatArray],
+    stiffness: Sequence[float],
+    inradii: Sequence[float],
+    goal: FloatArray,
+    tolerance: float,
+) -> list[ReadyConditions]:
+    """Return the conditions of every cell.
 
     Args:
-        next_edges: Of the next cell, shape (edges, 4) [m].
-        next_stiffness: K of the next cell [1/s^2].
-        inradius: R of the present transition [m].
-        state: Pose and twist of the object, shape (6,).
-        governor: p_G, shape (2,) [m].
+        tables: The axes in every cell.
+        edges: Edges of every governed set.
+        stiffness: K of every cell [1/s^2].
+        inradii: R of every transition [m].
+        goal: Goal position of the object, shape (2,) [m].
+        tolerance: Largest distance to it that counts as arrived [m].
     """
-    x, y = state[0] - governor[0], state[1] - governor[1]
-    energy = 0.5 * (state[3] ** 2 + state[4] ** 2 + next_stiffness * (x * x + y * y))
-    clearance = signed_distance(next_edges, governor[0], governor[1])
-    margin = 0.5 * next_stiffness * clearance * abs(clearance) - energy
-    floor = 0.5 * next_stiffness * CLEARANCE_FRACTION * inradius * abs(CLEARANCE_FRACTION * inradius)
-    return (margin - floor) / max(abs(margin), floor)
-
-
-@compiled
-def axis_ready(row: FloatArray, next_row: FloatArray, position: float, rate: float) -> float:
-    """Return the smaller of ``interval_margin`` and ``funnel_margin`` of one axis from its rows of tables."""
-    energy, bound = track_row(next_row, 0.0, position, rate)[1], next_row[9]
-    return min(_axis_inside(row, position), (bound - energy) / max(energy, bound))
-
-
-@compiled
-def position_arrived(goal: FloatArray, tolerance: float, state: FloatArray) -> float:
-    """Return the part of ``arrival_margin`` that speaks of the object's position."""
-    distance = np.hypot(state[0] - goal[0], state[1] - goal[1])
-    speed = np.hypot(state[3], state[4])
-    return min(1.0 - distance / ((1.0 - EROSION) * tolerance), 1.0 - speed / SPEED_TOLERANCE)
-
-
-@compiled
-def axis_rests(row: FloatArray, position: float, rate: float) -> float:
-    """Return the part of ``arrival_margin`` that speaks of one axis."""
-    return min(_axis_inside(row, position), 1.0 - abs(rate) / RATE_TOLERANCE)
-
-
-@compiled
-def _axis_inside(row: FloatArray, position: float) -> float:
-    half = 0.5 * (row[3] - row[2]) * (1.0 - 2.0 * EROSION)
-    return 1.0 - abs(position - 0.5 * (row[2] + row[3])) / half
+    count, place = len(tables), np.array(goal, dtype=float)
+    following = [*range(1, count), count - 1]
+    return [
+        ReadyConditions(
+            tables[i],
+            tables[j],
+            edges[j],
+            float(stiffness[j]),
+            float(inradii[i]),
+            place,
+            float(tolerance),
+            i == j,
+        )
+        for i, j in enumerate(following)
+    ]
 
 
 @compiled
@@ -75,45 +81,44 @@ def robot_ready(
     next_edges: FloatArray,
     next_stiffness: float,
     inradius: float,
-    thing: FloatArray,
-    state: FloatArray,
-    governor: FloatArray,
+    goal: FloatArray,
+    tolerance: float,
+    last: bool,
+    object_state: FloatArray,
+    robot: FloatArray,
+    governor_position: FloatArray,
 ) -> float:
-    """Return ``ready_margin`` of one robot.
+    """Return the margin with which one robot is ready for the next cell, ready if not negative.
+
+    In the last cell it is the margin with which the goal is reached and the motion has ended.
 
     Args:
-        table: Laws of the axes (theta, own joints) in the current cell.
-        next_table: The same in the next one.
-        next_edges: Of the next cell, shape (edges, 4) [m].
-        next_stiffness: K of the next cell [1/s^2].
-        inradius: R of the present transition [m].
-        thing: Pose and twist of the object, shape (6,).
-        state: (z_k, z_k'), shape (2 (3 + n),).
-        governor: p_G as the robot keeps it, shape (2,) [m].
+        table: With the next seven the ``ReadyConditions`` of the current cell.
+        next_table: The axes in the next cell.
+        next_edges: Edges of the next cell.
+        next_stiffness: K of the next cell.
+        inradius: R of the transition.
+        goal: Goal position.
+        tolerance: Tolerance of the goal position.
+        last: Whether this is the last cell.
+        object_state: Pose and twist of the object, shape (6,).
+        robot: (z_k, z_k'), shape (2 (3 + n),).
+        governor_position: p_G as the robot keeps it, shape (2,) [m].
     """
     n = table.shape[0] - 1
-    margin = position_ready(next_edges, next_stiffness, inradius, thing, governor)
-    margin = min(margin, axis_ready(table[0], next_table[0], thing[2], thing[5]))
-    for i in range(n):
-        margin = min(margin, axis_ready(table[1 + i], next_table[1 + i], state[3 + i], state[6 + n + i]))
-    return margin
-
-
-@compiled
-def robot_arrival(
-    table: FloatArray, goal: FloatArray, tolerance: float, thing: FloatArray, state: FloatArray
-) -> float:
-    """Return ``arrival_margin`` of one robot.
-
-    Args:
-        table: Laws of the axes (theta, own joints) in the last cell.
-        goal: Where the object shall end, shape (2,) [m].
-        tolerance: How close to it counts as arrived [m].
-        thing: Pose and twist of the object, shape (6,).
-        state: (z_k, z_k'), shape (2 (3 + n),).
-    """
-    n = table.shape[0] - 1
-    margin = min(position_arrived(goal, tolerance, thing), axis_rests(table[0], thing[2], thing[5]))
-    for i in range(n):
-        margin = min(margin, axis_rests(table[1 + i], state[3 + i], state[6 + n + i]))
+    if last:
+        distance = np.hypot(object_state[0] - goal[0], object_state[1] - goal[1])
+        speed = np.hypot(object_state[3], object_state[4])
+        margin = position_arrival(distance, speed, tolerance)
+    else:
+        energy_margin = cell_margin(next_edges, next_stiffness, object_state, governor_position)
+        margin = clearance_margin(energy_margin, next_stiffness, inradius)
+    for i in range(1 + n):
+        position, rate = object_state[2], object_state[5]
+        if i > 0:
+            position, rate = robot[2 + i], robot[5 + n + i]
+        if last:
+            margin = min(margin, axis_arrival(table[i], position, rate))
+        else:
+            margin = min(margin, axis_ready(table[i], next_table[i], position, rate))
     return margin

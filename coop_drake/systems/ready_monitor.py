@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
-from coop_drake.systems.ready_kernels import robot_arrival, robot_ready
+from coop_drake.systems.ready_kernels import ready_conditions, robot_ready
 from coop_drake.systems.reference_governor import GovernedCell
 from coop_drake.tree.pose import FloatArray
 
@@ -57,12 +56,14 @@ class ReadyMonitor(Block):
             )
         if not position_tolerance > 0.0:
             raise ValueError(f"ReadyMonitor's position tolerance must be positive, not {position_tolerance}")
-        self._cells, self._tables = len(cells), [law.table for law in laws]
-        self._leaving = [
-            (law.table, next_law.table, next_cell.clearance.edges, next_cell.gains.stiffness, inradius)
-            for law, next_law, next_cell, inradius in zip(laws, laws[1:], cells[1:], inradii, strict=False)
-        ]
-        self._goal, self._tolerance = np.array(goal_position, dtype=float), position_tolerance
+        self._conditions = ready_conditions(
+            [law.table for law in laws],
+            [cell.clearance.edges for cell in cells],
+            [cell.gains.stiffness for cell in cells],
+            inradii,
+            goal_position,
+            position_tolerance,
+        )
         n = laws[0].axes - 1
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + n))
@@ -71,14 +72,14 @@ class ReadyMonitor(Block):
         self.DeclareVectorOutputPort("ready", READY_SIZE, self._write_ready)
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
-        index = index_of(self._current.Eval(context), self._cells)
-        thing, state, report = (
-            self._object.Eval(context),
-            self._state.Eval(context),
+        index, report = (
+            index_of(self._current.Eval(context), len(self._conditions)),
             output.get_mutable_value(),
         )
         report[0] = index
-        if index == self._cells - 1:
-            report[1] = robot_arrival(self._tables[index], self._goal, self._tolerance, thing, state)
-        else:
-            report[1] = robot_ready(*self._leaving[index], thing, state, self._governor.Eval(context))
+        report[1] = robot_ready(
+            *self._conditions[index],
+            self._object.Eval(context),
+            self._state.Eval(context),
+            self._governor.Eval(context),
+        )

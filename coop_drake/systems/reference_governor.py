@@ -6,20 +6,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
 from coop_drake.fields import VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.laws import kernels
 from coop_drake.laws.gains import TransitionGains
-from coop_drake.laws.governor import energy_margin, tracking_energy
+from coop_drake.laws.governor import governor_velocity
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
-from coop_drake.systems.governor_kernels import VELOCITY_STEP, cell_margin, govern
+from coop_drake.systems.governor_kernels import accelerate_object, cell_margin, govern
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["VELOCITY_STEP", "GovernedCell", "ReferenceGovernor"]
+__all__ = ["GovernedCell", "ReferenceGovernor"]
 
 
 @dataclass(frozen=True)
@@ -36,40 +34,26 @@ class GovernedCell:
     field: Callable[[FloatArray], FloatArray]
     gains: TransitionGains
 
-    def energy_margin(
-        self, position: FloatArray, velocity: FloatArray, governor_position: FloatArray
-    ) -> float:
-        """Delta E of (15) in this cell [m^2/s^2]."""
-        stiffness = self.gains.stiffness
-        energy = tracking_energy(position, velocity, governor_position, stiffness=stiffness)
-        return energy_margin(energy, self.clearance(governor_position), stiffness=stiffness)
-
-    @cached_property
-    def gain_row(self) -> FloatArray:
-        """What the compiled governor reads of the gains: (K, zeta, K_G, c)."""
-        gains = self.gains
-        return np.array([gains.stiffness, gains.damping, gains.governor_gain, gains.smoothing])
-
     @cached_property
     def kernel_arguments(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
         """What the compiled governor reads of the cell; None if its field is not that of a harmonic map."""
         if not isinstance(self.field, VelocityField):
             return None
-        return self.gain_row, self.clearance.edges, *self.field.kernel_arguments
+        return self.gains.governor_row, self.clearance.edges, *self.field.kernel_arguments
 
-    def govern(self, state: FloatArray, governor_position: FloatArray, command: FloatArray) -> None:
-        """Write p_G' and -K (p - p_G) - zeta p' of (14) in this cell, whatever its field is.
+    def govern(self, object_state: FloatArray, governor_position: FloatArray, command: FloatArray) -> None:
+        """Write p_G' and the desired acceleration, both of (14), in this cell, whatever its field is.
 
         Args:
-            state: Pose and twist of the object, shape (6,).
+            object_state: Pose and twist of the object, shape (6,).
             governor_position: p_G, shape (2,) [m].
             command: Receives both, shape (4,) [m/s, m/s^2].
         """
-        stiffness, damping, gain, smoothing = self.gain_row
-        margin = cell_margin(self.clearance.edges, stiffness, state, governor_position)
-        vx, vy = self.field(governor_position)
-        kernels.governor_velocity(vx, vy, margin, stiffness, gain, smoothing, command[:2])
-        kernels.governed_acceleration(state, governor_position, stiffness, damping, command[2:])
+        gains, edges = self.gains, self.clearance.edges
+        margin = cell_margin(edges, gains.stiffness, object_state, governor_position)
+        vx, vy = (float(part) for part in self.field(governor_position))
+        command[:2] = governor_velocity(vx, vy, margin, gains.stiffness, gains.governor_gain, gains.smoothing)
+        accelerate_object(gains.governor_row, object_state, governor_position, command[2:])
 
 
 class ReferenceGovernor(Block):

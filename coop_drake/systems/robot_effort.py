@@ -1,10 +1,10 @@
-"""What one robot's actuators do to give its hand and its joints the accelerations asked for."""
+"""The actuator forces that give one robot's end effector and joints the accelerations asked for."""
 
 from __future__ import annotations
 
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.laws.planar_chain import axes_effort
+from coop_drake.laws.robot_dynamics import robot_effort
 from coop_drake.plant import RobotPlant, robot_chain
 from coop_drake.systems.block import Block
 
@@ -40,7 +40,7 @@ class RobotEffort(Block):
 
     def _write_effort(self, context: Context, output: BasicVector) -> None:
         state, effort = self._state.Eval(context), output.get_mutable_value()
-        axes_effort(self._chain, state, self._hand.Eval(context), self._axes.Eval(context), effort)
+        robot_effort(self._chain, state, self._hand.Eval(context), self._axes.Eval(context), effort)
         if self._springs:
             self._robot.set_state(state[: self._size], state[self._size :])
             effort += self._robot.spring_effort()

@@ -6,12 +6,41 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 from pydrake.systems.primitives import Selector
 
-from coop_drake.laws.planar_chain import read_team
+from coop_drake.compiled import compiled
+from coop_drake.laws.robot_dynamics import IntArray, read_robot
 from coop_drake.plant import SeparateTeam, TeamPlant, base_chain
 from coop_drake.systems.block import Block
 from coop_drake.systems.selector import build_selector
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["TeamSensor", "build_separate_sensor"]
+
+
+@compiled
+def _read_team(
+    pose: IntArray, first: IntArray, chains: FloatArray, yaws: FloatArray, first_joint: IntArray,
+    joints: IntArray, state: FloatArray, measured: FloatArray,
+) -> None:  # fmt: skip
+    """Write the object's pose, then for every robot what ``read_robot`` writes.
+
+    Args:
+        pose: Where the object's pose stands in the state, shape (3,).
+        first: Row of ``chains`` with which each robot's begin, and the number of rows, shape (N + 1,).
+        chains: From the object to every robot's base.
+        yaws: Angles of the bases in the object where all joints are at zero, shape (N,) [rad].
+        first_joint: As ``first``, of ``joints``.
+        joints: Where all joints stand in the state, then where their rates do, shape (2, n).
+        state: State of the team.
+        measured: Receives all, shape (3 + 6 N + 2 n,).
+    """
+    for i in range(3):
+        measured[i] = state[pose[i]]
+    at = 3
+    for k in range(yaws.size):
+        own = joints[:, first_joint[k] : first_joint[k + 1]]
+        end = at + 2 * (3 + own.shape[1])
+        read_robot(chains[first[k] : first[k + 1]], yaws[k], own, state, measured[at:end])
+        at = end
 
 
 class TeamSensor(Block):
@@ -23,8 +52,8 @@ class TeamSensor(Block):
                                                  z_k = (x, y, yaw of Bk, q_k) [m, rad]
     ======= ================ =================== =================================================== =====
 
-    No state. The object's angle is unwrapped; yaws are in (-pi, pi]. All sensors are one block because one
-    call is cheap; who gets which part is for the wires behind it.
+    No state. The object's angle is unwrapped; yaws are in (-pi, pi]. All sensors are one block, because one
+    call costs less than many; a demultiplexer gives each robot its own part.
 
     Args:
         team: The team whose plant gives the state.
@@ -32,22 +61,22 @@ class TeamSensor(Block):
 
     def __init__(self, team: TeamPlant) -> None:
         super().__init__()
-        ways = [base_chain(team, robot) for robot in team.robots]
+        chains = [base_chain(team, robot) for robot in team.robots]
         self._team = (
             team.position_index[:3].astype(np.int64),
-            np.array([0, *np.cumsum([len(way.chain) for way in ways])]),
-            np.vstack([way.chain for way in ways]),
-            np.array([way.yaw for way in ways]),
-            np.array([0, *np.cumsum([way.joints.shape[1] for way in ways])]),
-            np.hstack([way.joints for way in ways]),
+            np.array([0, *np.cumsum([len(chain.chain) for chain in chains])]),
+            np.vstack([chain.chain for chain in chains]),
+            np.array([chain.yaw for chain in chains]),
+            np.array([0, *np.cumsum([chain.joints.shape[1] for chain in chains])]),
+            np.hstack([chain.joints for chain in chains]),
         )
         #: Sizes of the measurements' parts: the object's, then each robot's.
-        self.sizes = [3, *(2 * (3 + way.joints.shape[1]) for way in ways)]
+        self.sizes = [3, *(2 * (3 + chain.joints.shape[1]) for chain in chains)]
         self._state = self.DeclareVectorInputPort("team_state", team.plant.num_multibody_states())
         self.DeclareVectorOutputPort("measurements", sum(self.sizes), self._write_measurements)
 
     def _write_measurements(self, context: Context, output: BasicVector) -> None:
-        read_team(*self._team, self._state.Eval(context), output.get_mutable_value())
+        _read_team(*self._team, self._state.Eval(context), output.get_mutable_value())
 
 
 def build_separate_sensor(team: SeparateTeam) -> Selector:

@@ -1,4 +1,4 @@
-"""What all robots of a team compute, in one call: the fused mode's law and its ready reports."""
+"""What the controllers of all robots compute, in one call, by the functions that their blocks call."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.kernels import governed_acceleration, hand_command, track_row, write_walls
-from coop_drake.laws.planar_chain import chain_effort, read_robot
-from coop_drake.systems.governor_kernels import cell_margin, govern
-from coop_drake.systems.ready_kernels import axis_ready, axis_rests, position_arrived, position_ready
+from coop_drake.laws.axis_table import track_axes, write_bounds
+from coop_drake.laws.load_sharing import end_effector_command, rotated
+from coop_drake.laws.robot_dynamics import read_robot, robot_effort
+from coop_drake.systems.governor_kernels import govern
+from coop_drake.systems.ready_kernels import robot_ready
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["FusedCell", "FusedTeam", "team_arrival", "team_command", "team_ready", "team_telemetry"]
+__all__ = ["FusedCell", "FusedTeam", "drive_team", "report_readiness", "telemetry_parts", "telemetry_size"]
 
 IntArray = NDArray[np.int64]
 
@@ -23,11 +24,11 @@ class FusedCell(NamedTuple):
     """One cell for the whole team.
 
     Attributes:
-        gains: (K, zeta, K_G, c).
-        edges: Of the governed set, shape (edges, 4) [m].
+        gains: K, zeta, K_G and c, shape (4,).
+        edges: Edges of the governed set, shape (edges, 4) [m].
         flat: The cell's map, as ``VelocityField.kernel_arguments`` has it.
         field: What the velocity field adds to the map.
-        table: Laws of the axes (theta, q...), shape (1 + n, ``LAW_COLUMNS``).
+        table: For each robot in turn the axes (theta, q_k), shape (N + n, ``LAW_COLUMNS``).
     """
 
     gains: FloatArray
@@ -38,210 +39,171 @@ class FusedCell(NamedTuple):
 
 
 class FusedTeam(NamedTuple):
-    """The robots side by side; row ``first[k]`` of what is stacked is robot k's first one.
+    """The robots, their tables stacked; row ``first[i, k]`` of a stack is the first one of robot k.
 
     Attributes:
         places: Where z, then its rates stand in the plant's state, shape (2, 3 + n).
-        first: First rows in ``chains`` and ``ways``, first joint, shape (3, N + 1).
-        chains: From every robot's base to its hand.
-        ways: From the object to every robot's base.
-        yaws: Angle of every base in the object, joints at zero, shape (N,) [rad].
-        shares: What ``hand_command`` takes of every robot, shape (N, 7).
+        first: First rows in ``chains`` and in ``base_chains``, first joint, shape (3, N + 1).
+        chains: From every robot's base to its end effector.
+        base_chains: From the object to every robot's base.
+        yaws: Angle of every base in the object where all joints are at zero, shape (N,) [rad].
+        loads: What ``end_effector_command`` takes of every robot, shape (N, 7).
     """
 
     places: IntArray
     first: IntArray
     chains: FloatArray
-    ways: FloatArray
+    base_chains: FloatArray
     yaws: FloatArray
-    shares: FloatArray
+    loads: FloatArray
+
+
+def telemetry_size(robots: int, joints: int) -> int:
+    """Return the size of what ``drive_team`` writes for the log."""
+    return 6 + 12 * robots + 3 * joints
 
 
 @compiled
-def team_law(
-    gains: FloatArray, table: FloatArray, places: IntArray, first: IntArray, chains: FloatArray,
-    ways: FloatArray, yaws: FloatArray, shares: FloatArray, time: float, state: FloatArray,
-    governor: FloatArray, acceleration: FloatArray, hands: FloatArray, bases: FloatArray, efforts: FloatArray,
-) -> None:  # fmt: skip
-    """Write the law of (14) to (39) for every robot.
+def telemetry_parts(
+    telemetry: FloatArray, robots: int
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return views of the parts of what ``drive_team`` writes for the log.
 
     Args:
-        gains: (K, zeta, K_G, c) of the cell.
-        table: Laws of all axes in the cell.
+        telemetry: All of it, shape (``telemetry_size``,).
+        robots: N.
+
+    Returns:
+        The object's commanded acceleration (3,); commands of the end effectors (N, 6); poses of the bases
+        (N, 3); wrenches on all bases in W, then all joint torques (3 N + n,); lower, then upper funnel
+        bounds of all axes (2 (1 + n),); Delta E (1,).
+    """
+    joints = (telemetry.size - 6 - 12 * robots) // 3
+    commands, bases, efforts = 3, 3 + 6 * robots, 3 + 9 * robots
+    bounds = efforts + 3 * robots + joints
+    return (
+        telemetry[:commands],
+        telemetry[commands:bases].reshape((robots, 6)),
+        telemetry[bases:efforts].reshape((robots, 3)),
+        telemetry[efforts:bounds],
+        telemetry[bounds:-1],
+        telemetry[-1:],
+    )
+
+
+@compiled
+def drive_team(
+    gains: FloatArray, edges: FloatArray, flat: FloatArray, field: FloatArray, table: FloatArray,
+    places: IntArray, first: IntArray, chains: FloatArray, base_chains: FloatArray, yaws: FloatArray,
+    loads: FloatArray, time: float, state: FloatArray, governor_position: FloatArray, on_bases: bool,
+    command: FloatArray, telemetry: FloatArray,
+) -> None:  # fmt: skip
+    """Write what drives the team, and what the robots' blocks would show to the log.
+
+    Args:
+        gains: With the next four a ``FusedCell``.
+        edges: Edges of the governed set.
+        flat: The map.
+        field: The velocity field.
+        table: The axes of all robots.
         places: With the next five a ``FusedTeam``.
         first: First rows.
-        chains: From bases to hands.
-        ways: From the object to bases.
-        yaws: Of the bases.
-        shares: Of the work.
-        time: Since the cell was entered [s].
-        state: Of the plant.
-        governor: p_G, shape (2,) [m].
-        acceleration: Receives the object's, shape (3,).
-        hands: Receives what ``hand_command`` writes, shape (N, 6).
-        bases: Receives the poses of the bases in W, shape (N, 3).
-        efforts: Receives wrenches on all bases in W, then all joint torques, shape (3 N + n,).
+        chains: From bases to end effectors.
+        base_chains: From the object to bases.
+        yaws: Angles of the bases.
+        loads: Shares of the load.
+        time: Time since the cell was entered [s].
+        state: State of the plant.
+        governor_position: p_G, shape (2,) [m].
+        on_bases: Whether base wrenches are given in the axes of the bases, not in those of W.
+        command: Receives wrenches on all bases, all joint torques and p_G', shape (3 N + n + 2,).
+        telemetry: Receives what ``telemetry_parts`` lists.
     """
-    robots, n, thing = yaws.size, table.shape[0] - 1, _object_state(places, state)
-    governed_acceleration(thing, governor, gains[0], gains[1], acceleration[:2])
-    acceleration[2] = track_row(table[0], time, thing[2], thing[5])[0]
-    joints, robot, effort = np.empty(n), np.empty(6 + 2 * n), np.empty(3 + n)
-    for i in range(n):
-        position, rate = state[places[0, 3 + i]], state[places[1, 3 + i]]
-        joints[i] = track_row(table[1 + i], time, position, rate)[0]
+    robots, n = yaws.size, places.shape[1] - 3
+    acceleration, commands, bases, efforts, bounds, margin = telemetry_parts(telemetry, robots)
+    object_state, robot, governed = _object_state(places, state), np.empty(6 + 2 * n), np.empty(4)
+    margin[0] = govern(gains, edges, flat, field, object_state, governor_position, governed)
+    acceleration[0], acceleration[1] = governed[2], governed[3]
+    axes, effort, own_bounds = np.empty(1 + n), np.empty(3 + n), np.empty(2 + 2 * n)
     for k in range(robots):
         start, stop = first[2, k], first[2, k + 1]
-        way, chain = ways[first[1, k] : first[1, k + 1]], chains[first[0, k] : first[0, k + 1]]
-        read_robot(way, yaws[k], places[:, 3 + start : 3 + stop], state, robot)
-        hand_command(shares[k], thing, acceleration[0], acceleration[1], acceleration[2], hands[k])
-        chain_effort(chain, robot, hands[k], joints[start:stop], effort)
+        m = 1 + stop - start
+        rows, chain = table[start + k : stop + k + 1], chains[first[0, k] : first[0, k + 1]]
+        _read_robot(k, places, first, base_chains, yaws, state, robot)
+        track_axes(rows, time, object_state, robot, axes)
+        end_effector_command(loads[k], object_state, governed[2:], axes, commands[k])
+        robot_effort(chain, robot, commands[k], axes, effort)
+        write_bounds(rows, time, own_bounds)
+        acceleration[2], bounds[0], bounds[1 + n] = axes[0], own_bounds[0], own_bounds[m]
         for i in range(3):
             bases[k, i], efforts[3 * k + i] = robot[i], effort[i]
         for i in range(stop - start):
             efforts[3 * robots + start + i] = effort[3 + i]
-
-
-@compiled
-def team_command(
-    gains: FloatArray, edges: FloatArray, flat: FloatArray, field: FloatArray, table: FloatArray,
-    places: IntArray, first: IntArray, chains: FloatArray, ways: FloatArray, yaws: FloatArray,
-    shares: FloatArray, time: float, state: FloatArray, governor: FloatArray, on_bases: bool,
-    command: FloatArray,
-) -> None:  # fmt: skip
-    """Write the wrenches on all bases, all joint torques and p_G'.
-
-    Args:
-        gains: With the next four a ``FusedCell``.
-        edges: Of the governed set.
-        flat: The map.
-        field: The velocity field.
-        table: Laws of all axes.
-        places: With the next five a ``FusedTeam``.
-        first: First rows.
-        chains: From bases to hands.
-        ways: From the object to bases.
-        yaws: Of the bases.
-        shares: Of the work.
-        time: Since the cell was entered [s].
-        state: Of the plant.
-        governor: p_G, shape (2,) [m].
-        on_bases: Whether wrenches are told in the axes of the bases, not in those of W.
-        command: Receives them, shape (3 N + n + 2,).
-    """
-    robots, last = yaws.size, command.size - 2
-    acceleration, hands, bases = np.empty(3), np.empty((robots, 6)), np.empty((robots, 3))
-    team_law(
-        gains, table, places, first, chains, ways, yaws, shares, time, state, governor,
-        acceleration, hands, bases, command[:last],
-    )  # fmt: skip
+            bounds[1 + start + i], bounds[2 + n + start + i] = own_bounds[1 + i], own_bounds[m + 1 + i]
+    command[: efforts.size], command[efforts.size :] = efforts, governed[:2]
     if on_bases:
         for k in range(robots):
-            c, s, fx, fy = np.cos(bases[k, 2]), np.sin(bases[k, 2]), command[3 * k], command[3 * k + 1]
-            command[3 * k], command[3 * k + 1] = c * fx + s * fy, c * fy - s * fx
-    governed = np.empty(4)
-    govern(gains, edges, flat, field, _object_state(places, state), governor, governed)
-    command[last:] = governed[:2]
+            c, s, at = np.cos(bases[k, 2]), np.sin(bases[k, 2]), 3 * k
+            command[at], command[at + 1] = rotated(c, -s, efforts[at], efforts[at + 1])
 
 
 @compiled
-def team_telemetry(
-    gains: FloatArray, edges: FloatArray, table: FloatArray,
-    places: IntArray, first: IntArray, chains: FloatArray, ways: FloatArray, yaws: FloatArray,
-    shares: FloatArray, time: float, state: FloatArray, governor: FloatArray, walls: FloatArray,
-    acceleration: FloatArray, hands: FloatArray, bases: FloatArray, efforts: FloatArray,
-) -> float:  # fmt: skip
-    """Write what the robots' blocks would tell the log, and return Delta E; arguments as in ``team_law``.
-
-    Args:
-        gains: (K, zeta, K_G, c) of the cell.
-        edges: Of the governed set.
-        table: Laws of all axes in the cell.
-        places: Where z and its rates stand in the plant's state.
-        first: First rows.
-        chains: From bases to hands.
-        ways: From the object to bases.
-        yaws: Of the bases.
-        shares: Of the work.
-        time: Since the cell was entered [s].
-        state: Of the plant.
-        governor: p_G, shape (2,) [m].
-        walls: Receives lower, then upper walls of all funnels, shape (2 (1 + n),).
-        acceleration: Receives the object's, shape (3,).
-        hands: Receives commands of the hands, shape (N, 6).
-        bases: Receives poses of the bases, shape (N, 3).
-        efforts: Receives all efforts, shape (3 N + n,).
-    """
-    team_law(
-        gains, table, places, first, chains, ways, yaws, shares, time, state, governor,
-        acceleration, hands, bases, efforts,
-    )  # fmt: skip
-    write_walls(table, time, walls)
-    return cell_margin(edges, gains[0], _object_state(places, state), governor)
-
-
-@compiled
-def team_ready(
-    table: FloatArray, next_table: FloatArray, next_edges: FloatArray, next_gains: FloatArray,
-    inradius: float, places: IntArray, first: IntArray, index: int, state: FloatArray, governor: FloatArray,
+def report_readiness(
+    table: FloatArray, next_table: FloatArray, next_edges: FloatArray, next_stiffness: float,
+    inradius: float, goal: FloatArray, tolerance: float, last: bool, places: IntArray, first: IntArray,
+    base_chains: FloatArray, yaws: FloatArray, index: int, state: FloatArray, governor_position: FloatArray,
     reports: FloatArray,
 ) -> None:  # fmt: skip
-    """Write of every robot the cell that it speaks of and its ``ready_margin``, shape (2 N,).
+    """Write for each robot the index of the current cell and the margin of ``robot_ready``, shape (2 N,).
 
     Args:
-        table: Laws of all axes in the current cell.
-        next_table: The same in the next one.
-        next_edges: Of the next cell.
-        next_gains: Of the next cell.
-        inradius: R of the present transition [m].
+        table: With the next seven ``ReadyConditions``, the tables those of a ``FusedCell``.
+        next_table: The axes in the next cell.
+        next_edges: Edges of the next cell.
+        next_stiffness: K of the next cell.
+        inradius: R of the transition.
+        goal: Goal position.
+        tolerance: Tolerance of the goal position.
+        last: Whether this is the last cell.
         places: Where z and its rates stand in the plant's state.
         first: First rows of a ``FusedTeam``.
-        index: Of the current cell.
-        state: Of the plant.
-        governor: p_G, shape (2,) [m].
-        reports: Receives them.
+        base_chains: From the object to bases.
+        yaws: Angles of the bases.
+        index: Index of the current cell.
+        state: State of the plant.
+        governor_position: p_G, shape (2,) [m].
+        reports: Receives the reports.
     """
-    thing = _object_state(places, state)
-    common = min(
-        position_ready(next_edges, next_gains[0], inradius, thing, governor),
-        axis_ready(table[0], next_table[0], thing[2], thing[5]),
-    )
-    for k in range(reports.size // 2):
-        margin = common
-        for i in range(1 + first[2, k], 1 + first[2, k + 1]):
-            position, rate = state[places[0, 2 + i]], state[places[1, 2 + i]]
-            margin = min(margin, axis_ready(table[i], next_table[i], position, rate))
-        reports[2 * k], reports[2 * k + 1] = index, margin
+    object_state, robot = _object_state(places, state), np.empty(2 * places.shape[1])
+    for k in range(yaws.size):
+        start, stop = first[2, k] + k, first[2, k + 1] + k + 1
+        _read_robot(k, places, first, base_chains, yaws, state, robot)
+        reports[2 * k] = index
+        reports[2 * k + 1] = robot_ready(
+            table[start:stop], next_table[start:stop], next_edges, next_stiffness, inradius, goal, tolerance,
+            last, object_state, robot, governor_position,
+        )  # fmt: skip
 
 
 @compiled
-def team_arrival(
-    table: FloatArray, goal: FloatArray, tolerance: float, places: IntArray, first: IntArray, index: int,
-    state: FloatArray, reports: FloatArray,
-) -> None:  # fmt: skip
-    """Write of every robot the cell that it speaks of and its ``arrival_margin``, shape (2 N,).
-
-    Args:
-        table: Laws of all axes in the last cell.
-        goal: Where the object shall end, shape (2,) [m].
-        tolerance: How close to it counts as arrived [m].
-        places: Where z and its rates stand in the plant's state.
-        first: First rows of a ``FusedTeam``.
-        index: Of the last cell.
-        state: Of the plant.
-        reports: Receives them.
-    """
-    thing = _object_state(places, state)
-    common = min(position_arrived(goal, tolerance, thing), axis_rests(table[0], thing[2], thing[5]))
-    for k in range(reports.size // 2):
-        margin = common
-        for i in range(1 + first[2, k], 1 + first[2, k + 1]):
-            margin = min(margin, axis_rests(table[i], state[places[0, 2 + i]], state[places[1, 2 + i]]))
-        reports[2 * k], reports[2 * k + 1] = index, margin
+def _read_robot(
+    k: int,
+    places: IntArray,
+    first: IntArray,
+    base_chains: FloatArray,
+    yaws: FloatArray,
+    state: FloatArray,
+    robot: FloatArray,
+) -> None:
+    """Write (z_k, z_k') of robot k, see ``read_robot``."""
+    joints = places[:, 3 + first[2, k] : 3 + first[2, k + 1]]
+    read_robot(base_chains[first[1, k] : first[1, k + 1]], yaws[k], joints, state, robot)
 
 
 @compiled
 def _object_state(places: IntArray, state: FloatArray) -> FloatArray:
-    thing = np.empty(6)
+    """Return pose and twist of the object, shape (6,)."""
+    object_state = np.empty(6)
     for i in range(3):
-        thing[i], thing[3 + i] = state[places[0, i]], state[places[1, i]]
-    return thing
+        object_state[i], object_state[3 + i] = state[places[0, i]], state[places[1, i]]
+    return object_state

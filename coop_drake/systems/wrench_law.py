@@ -1,11 +1,11 @@
-"""What one robot's hand shall do to the object: its share of the wrench, and the grasp's acceleration."""
+"""What one robot's end effector shall do: its share of the wrench on the object, and its acceleration."""
 
 from __future__ import annotations
 
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
-from coop_drake.laws.kernels import command_hand
+from coop_drake.laws.load_sharing import end_effector_command
 from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray
 
@@ -48,7 +48,7 @@ class WrenchLaw(Block):
             raise ValueError(f"WrenchLaw needs positive mass and inertia, not {mass} and {inertia}")
         if not 0.0 <= share <= 1.0:
             raise ValueError(f"WrenchLaw's share must lie in [0, 1], not {share}")
-        self._parameters = np.array([*p_LE, *p_LLcm, mass, inertia, share], dtype=float)
+        self._load = np.array([*p_LE, *p_LLcm, mass, inertia, share], dtype=float)
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._governor = self.DeclareVectorInputPort("governor_command", 4)
         self._axes = self.DeclareVectorInputPort("axis_acceleration", 1 + joints)
@@ -64,4 +64,4 @@ class WrenchLaw(Block):
             self._governor.Eval(context),
             self._axes.Eval(context),
         )
-        command_hand(self._parameters, state, governor, axes, output.get_mutable_value())
+        end_effector_command(self._load, state, governor[2:], axes, output.get_mutable_value())

@@ -10,7 +10,6 @@ from coop_drake.errors import ScenarioError
 from coop_drake.plant import set_configuration
 from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
 from coop_drake.simulation import simulate
-from coop_drake.simulation.fused_telemetry import FusedTelemetry
 from coop_drake.simulation.telemetry import Telemetry
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 from tests.support.small_loop import joint_names, small_maps, small_problem
@@ -44,7 +43,7 @@ class Side:
         self.root = self.loop.create_context()
         self.plant = self.loop.team.plant
         self.plant_context = self.plant.GetMyMutableContextFromRoot(self.root)
-        self.telemetry = (FusedTelemetry if self.loop.fused else Telemetry)(self.loop, self.root)
+        self.telemetry = Telemetry(self.loop, self.root)
 
     def put(self, time, cell, entry, z, rates, governor):
         self.root.SetTime(time)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws import Funnel, funnel_walls
+from coop_drake.laws import Funnel, funnel_bounds
 
 
 def make_funnel(shape):
@@ -18,7 +18,7 @@ def make_funnel(shape):
 @pytest.mark.parametrize("shape", ["exponential", "smooth"])
 def test_walls_go_from_the_slice_to_the_goal(shape):
     funnel = make_funnel(shape)
-    first, last = funnel_walls(funnel, 0.0), funnel_walls(funnel, 50.0)
+    first, last = funnel_bounds(funnel, 0.0), funnel_bounds(funnel, 50.0)
     assert first.lower == pytest.approx(funnel.slice_lower, abs=1e-15)
     assert first.upper == pytest.approx(funnel.slice_upper, abs=1e-15)
     assert last.lower == pytest.approx(funnel.goal_lower, abs=1e-15)
@@ -26,28 +26,28 @@ def test_walls_go_from_the_slice_to_the_goal(shape):
 
 
 def test_only_the_smooth_funnel_starts_at_rest():
-    assert funnel_walls(make_funnel("smooth"), 0.0).lower_rate.tolist() == [0.0, 0.0]
-    assert funnel_walls(make_funnel("exponential"), 0.0).lower_rate == pytest.approx([1.4, 0.0])
+    assert funnel_bounds(make_funnel("smooth"), 0.0).lower_rate.tolist() == [0.0, 0.0]
+    assert funnel_bounds(make_funnel("exponential"), 0.0).lower_rate == pytest.approx([1.4, 0.0])
 
 
 def test_values_at_one_instant():
-    lower = funnel_walls(make_funnel("exponential"), 0.5).lower[0]
+    lower = funnel_bounds(make_funnel("exponential"), 0.5).lower[0]
     assert lower == pytest.approx(0.7 * (1.0 - np.exp(-1.0)))
-    smooth = funnel_walls(make_funnel("smooth"), 0.5).upper[0]
+    smooth = funnel_bounds(make_funnel("smooth"), 0.5).upper[0]
     assert smooth == pytest.approx(0.9 + 0.1 * 2.0 * np.exp(-1.0))
 
 
 def test_whole_seconds_are_seconds():
     assert (
-        funnel_walls(make_funnel("smooth"), 1).lower[0] == funnel_walls(make_funnel("smooth"), 1.0).lower[0]
+        funnel_bounds(make_funnel("smooth"), 1).lower[0] == funnel_bounds(make_funnel("smooth"), 1.0).lower[0]
     )
 
 
 def test_a_wall_without_shrink_stands_still():
-    walls = funnel_walls(make_funnel("smooth"), 0.3)
-    assert (walls.lower[1], walls.lower_rate[1], walls.lower_acceleration[1]) == (-2.0, 0.0, 0.0)
+    bounds = funnel_bounds(make_funnel("smooth"), 0.3)
+    assert (bounds.lower[1], bounds.lower_rate[1], bounds.lower_acceleration[1]) == (-2.0, 0.0, 0.0)
 
 
 def test_select_keeps_the_axes_asked_for():
     own = make_funnel("smooth").select(np.array([1]))
-    assert funnel_walls(own, 0.3).lower.tolist() == [funnel_walls(make_funnel("smooth"), 0.3).lower[1]]
+    assert funnel_bounds(own, 0.3).lower.tolist() == [funnel_bounds(make_funnel("smooth"), 0.3).lower[1]]

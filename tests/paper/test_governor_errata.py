@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from coop_drake.laws import energy_margin, tracking_energy
-from coop_drake.laws.ready import clearance_margin
+from coop_drake.laws.readiness import clearance_margin
 from paper import printed
 from paper.governor_run import box_clearance, run_governor, straight_field
 
@@ -80,9 +80,7 @@ class TestE10:
         stiffness = TABLE_2[0]
         return np.array(
             [
-                energy_margin(
-                    tracking_energy(p, v, g, stiffness=stiffness), self.narrow(g), stiffness=stiffness
-                )
+                energy_margin(tracking_energy(*(p - g), *v, stiffness), self.narrow(g), stiffness)
                 for p, v, g in zip(run.position, run.velocity, run.governor, strict=True)
             ]
         )
@@ -96,9 +94,7 @@ class TestE10:
 
     def test_as_corrected_it_begins_when_it_can_be_kept(self):
         run, inradius = self.approach(), 0.15
-        ready = [
-            clearance_margin(m, stiffness=TABLE_2[0], inradius=inradius) >= 0.0 for m in self.margins(run)
-        ]
+        ready = [clearance_margin(m, TABLE_2[0], inradius) >= 0.0 for m in self.margins(run)]
         first_ready = ready.index(True)
         assert self.narrow(run.position[first_ready]) > 0.0
         taken_over = self.take_over(run, first_ready)

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws import consistent_projector, robot_acceleration, robot_torque
+from coop_drake.laws.robot_dynamics import robot_effort
 from paper import printed
 from tests.support.planar_arm import random_arm, random_state
+from tests.support.robot_matrices import consistent_projector, robot_acceleration
 
 JOINTS = [1, 2, 3]
 
@@ -59,10 +60,10 @@ def test_e33_task_space_forces_reach_the_actuators_through_the_transpose(joints)
         with pytest.raises(ValueError, match="mismatch"):
             jacobian @ wrench
         mass_matrix, bias = arm.dynamics(z, v)
-        wanted = robot_acceleration(
-            rng.normal(size=3), rng.normal(size=joints), jacobian=jacobian, jacobian_rate_term=rate_term
-        )
-        torque = robot_torque(wanted, wrench, mass_matrix=mass_matrix, bias=bias, jacobian=jacobian)
+        at_grasp, axes, torque = rng.normal(size=3), rng.normal(size=1 + joints), np.empty(3 + joints)
+        wanted = robot_acceleration(at_grasp, axes[1:], jacobian=jacobian, jacobian_rate_term=rate_term)
+        command = np.concatenate([at_grasp, wrench])
+        robot_effort(arm.chain(), np.concatenate([z, v]), command, axes, torque)
         # (2) solved for the acceleration, with the object pushing back.
         got = np.linalg.solve(mass_matrix, torque - bias - jacobian.T @ wrench)
         assert got == pytest.approx(wanted, abs=1e-9)

@@ -15,23 +15,12 @@ THREE = np.array([[0.4, 0.0], [-0.4, 0.0], [0.0, 0.25]])
 
 def total_as_printed(offsets):
     shares = [printed.wrench_share(FORCE, TORQUE, -offset, robots=len(offsets)) for offset in offsets]
-    return total_wrench(np.array(shares), offsets, com_offset=NO_COM_OFFSET)
+    return total_wrench(np.array(shares), offsets, NO_COM_OFFSET, 0.0)
 
 
 def total_as_corrected(offsets):
-    shares = [
-        wrench_share(
-            np.array([*FORCE, TORQUE]),
-            0.0,
-            offset,
-            com_offset=NO_COM_OFFSET,
-            mass=1.0,
-            inertia=1.0,
-            share=1.0 / len(offsets),
-        )
-        for offset in offsets
-    ]
-    return total_wrench(np.array(shares), offsets, com_offset=NO_COM_OFFSET)
+    shares = [wrench_share(*-offset, *FORCE, TORQUE, 1.0, 1.0, 1.0 / len(offsets)) for offset in offsets]
+    return total_wrench(np.array(shares), offsets, NO_COM_OFFSET, 0.0)
 
 
 @pytest.mark.parametrize("offsets", [OPPOSITE, ONE_SIDED, THREE])

@@ -56,7 +56,7 @@ def runs():
 def test_every_cell_is_passed_inside_its_funnels(runs, gain_set):
     run = runs[gain_set]
     assert len(run.durations) == 30
-    assert run.wall_margin > 0.0
+    assert run.bound_margin > 0.0
     assert abs(run.position[0] - GOAL_ANGLE) < ANGLE_TOLERANCE
 
 
@@ -72,7 +72,7 @@ def test_the_energy_gate_tames_the_gains_of_table_2(runs):
     rushed = play(table_transitions(CORRECTED), FixedGains(), start=START, gated=False)
     gated = runs["FixedGains"]
     assert np.all(rushed.peak_acceleration > 2.0 * gated.peak_acceleration)
-    assert rushed.wall_margin < gated.wall_margin
+    assert rushed.bound_margin < gated.bound_margin
 
 
 def test_one_bound_on_the_energy_for_all_transitions_would_stop_at_the_worst():

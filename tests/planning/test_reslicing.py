@@ -8,12 +8,13 @@ from shapely import Point
 
 from coop_drake.answers.plan_checks import check_plan
 from coop_drake.laws import FixedGains, ScheduledGains, transition_gains
+from coop_drake.laws.gain_schedule import schedule_of
 from coop_drake.planning import make_plan, plan_time
 from coop_drake.planning.cells.cells import CellMaker
 from coop_drake.planning.execution.channel_ends import turned_to_start
 from coop_drake.planning.execution.estimate import speed_per_clearance
-from coop_drake.planning.improvement.box_crossing import cross_box, scheduled_laws
-from coop_drake.planning.improvement.path_covering import resliced, schedule_of
+from coop_drake.planning.improvement.box_crossing import cross_box
+from coop_drake.planning.improvement.path_covering import resliced
 from coop_drake.planning.improvement.quickest import quickest_plan, way_through
 from coop_drake.planning.search.search import find_channel
 from tests.support.cases import case
@@ -94,25 +95,6 @@ def test_what_cannot_be_proved_is_not_used(base, monkeypatch):
     assert resliced(base[0], base[1].path, base[1].margin, ScheduledGains()) is None
     plan = quickest_plan(*base, ScheduledGains(), gain_set_name="scheduled")
     assert [cell.safe.wkb for cell in plan.cells] == [cell.safe.wkb for cell in own.cells]
-
-
-@pytest.mark.parametrize("gain_set", [FixedGains(), ScheduledGains()])
-def test_a_schedule_holds_the_rules_of_the_gains(gain_set):
-    schedule = schedule_of(gain_set)
-    lower, upper = np.array([-0.3, -0.2]), np.array([0.5, 0.4])
-    goal_lower, goal_upper, resting = np.array([0.2, 0.0]), np.array([0.4, 0.3]), np.array([-0.1, 0.2])
-    gains = transition_gains(
-        gain_set, neck=0.12, slice_lower=lower, slice_upper=upper, goal_lower=goal_lower,
-        goal_upper=goal_upper, resting=resting,
-    )  # fmt: skip
-    stiffness, rates, log_gains = scheduled_laws(
-        schedule, 0.12, lower, upper, goal_lower, goal_upper, resting
-    )
-    assert stiffness == pytest.approx(gains.stiffness)
-    assert schedule.damping * np.sqrt(stiffness) == pytest.approx(gains.damping)
-    assert schedule.governor * np.sqrt(stiffness) == pytest.approx(gains.governor_gain)
-    np.testing.assert_allclose(rates, gains.decay_rate)
-    np.testing.assert_allclose(log_gains, gains.log_gain)
 
 
 def test_a_long_aisle_is_crossed_at_the_governors_speed():

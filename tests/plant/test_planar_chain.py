@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.laws import robot_acceleration
-from coop_drake.laws.planar_chain import chain_effort, frame_twist, read_robot
+from coop_drake.laws.robot_dynamics import frame_twist, read_robot, robot_effort
 from coop_drake.plant import base_chain, build_robot_plant, build_team_plant, robot_chain
 from coop_drake.systems import RobotEffort
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
+from tests.support.robot_matrices import robot_acceleration
 from tests.support.system_checks import evaluate
 
 ARMS = [[REVOLUTE, PRISMATIC, REVOLUTE], [PRISMATIC], [REVOLUTE, REVOLUTE]]
@@ -20,7 +20,7 @@ def scenario(tmp_path_factory):
 
 
 @pytest.mark.parametrize("k", range(len(ARMS)))
-def test_a_hand_moves_and_is_moved_as_in_drake(scenario, k):
+def test_an_end_effector_moves_and_is_moved_as_in_drake(scenario, k):
     robot, n = build_robot_plant(scenario, k), len(ARMS[k])
     robot.scale_masses(1.3)
     for joint in robot.joints:
@@ -43,7 +43,7 @@ def test_a_hand_moves_and_is_moved_as_in_drake(scenario, k):
         )
         expected = robot.inertial_effort(acceleration) + hand[3:] @ jacobian
         effort = np.empty(3 + n)
-        chain_effort(chain, state, hand, joints, effort)
+        robot_effort(chain, state, hand, np.array([9.0, *joints]), effort)
         np.testing.assert_allclose(effort, expected, atol=1e-13 * np.abs(expected).max())
 
 
@@ -79,5 +79,5 @@ def test_springs_of_a_model_are_held(tmp_path):
     expected = robot.inertial_effort(z) + hand[3:] @ jacobian
     np.testing.assert_allclose(effort, expected, atol=1e-13)
     without = np.empty(4)
-    chain_effort(robot_chain(robot), state, hand, joints, without)
+    robot_effort(robot_chain(robot), state, hand, np.array([9.0, *joints]), without)
     assert effort[3] - without[3] == pytest.approx(2.0 * (state[3] - 0.4))

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.laws import Funnel, funnel_acceleration, funnel_walls, transition_gains
-from coop_drake.laws.ready import funnel_margin, interval_margin
+from coop_drake.laws import Funnel, funnel_acceleration, funnel_bounds, transition_gains
+from coop_drake.laws.axis_table import axis_table
+from coop_drake.laws.readiness import axis_ready, interval_margin, rest_margin
 
 
 @dataclass(frozen=True)
@@ -14,7 +15,7 @@ class AxesRun:
 
     durations: np.ndarray
     peak_acceleration: np.ndarray
-    wall_margin: float
+    bound_margin: float
     position: np.ndarray
     rate: np.ndarray
 
@@ -36,8 +37,9 @@ def play(transitions, gain_set, *, start, step=1e-3, time_limit=30.0, gated=True
         Funnel(t["slice_lower"], t["slice_upper"], t["goal_lower"], t["goal_upper"], g.decay_rate, g.funnel)
         for t, g in zip(transitions, gains, strict=True)
     ]
+    tables = [axis_table(funnel, gain) for funnel, gain in zip(funnels, gains, strict=True)]
     x, v = np.array(start, dtype=float), np.zeros(len(start))
-    durations, peak, wall_margin = [], np.zeros(len(x)), np.inf
+    durations, peak, bound_margin = [], np.zeros(len(x)), np.inf
     for i, (transition, gain, funnel) in enumerate(zip(transitions, gains, funnels, strict=True)):
 
         def law(x, v, t, funnel=funnel, gain=gain):
@@ -63,16 +65,16 @@ def play(transitions, gain_set, *, start, step=1e-3, time_limit=30.0, gated=True
                 x + step * v + step**2 / 6 * (a1 + a2 + a3),
                 v + step / 6 * (a1 + 2 * a2 + 2 * a3 + a4),
             )
-            walls = funnel_walls(funnel, t + step)
-            wall_margin = min(wall_margin, (x - walls.lower).min(), (walls.upper - x).min())
-            margin = interval_margin(x, transition["goal_lower"], transition["goal_upper"])
+            bounds = funnel_bounds(funnel, t + step)
+            bound_margin = min(bound_margin, (x - bounds.lower).min(), (bounds.upper - x).min())
+            margin = min(map(interval_margin, x, transition["goal_lower"], transition["goal_upper"]))
             if last:
-                margin = min(margin, 1.0 - np.abs(v).max() / 0.02)
+                margin = min(margin, *map(rest_margin, v))
             elif gated and margin >= 0.0:
-                margin = min(margin, funnel_margin(x, v, funnel=funnels[i + 1], gains=gains[i + 1]))
+                margin = min(map(axis_ready, tables[i], tables[i + 1], x, v))
             if margin >= 0.0:
                 durations.append(t + step)
                 break
         else:
             raise AssertionError(f"transition {i} was not left within {time_limit} s, margin {margin}")
-    return AxesRun(np.array(durations), peak, float(wall_margin), x, v)
+    return AxesRun(np.array(durations), peak, float(bound_margin), x, v)

@@ -4,6 +4,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coop_drake.laws.robot_dynamics import (
+    COLUMNS,
+    COM_X,
+    COM_Y,
+    INERTIA,
+    MASS,
+    PARENT,
+    POSITION,
+    RATE,
+    TURN,
+    X,
+    Y,
+)
+
 
 def perpendicular(vector):
     """Return the vector turned by a right angle."""
@@ -64,6 +78,20 @@ class PlanarArm:
         hinges, points = self._points(z)
         tip, count = points[-1]
         return tip, self._jacobian(z, hinges, tip, count), self._rate_term(z, z_dot, hinges, tip, count)
+
+    def chain(self):
+        """Return the arm as the table that ``coop_drake.laws.robot_dynamics`` reads."""
+        n = len(self.lengths)
+        chain = np.zeros((n + 2, COLUMNS))
+        chain[0, [RATE, MASS, INERTIA]] = 3 + n, self.base_mass, self.base_inertia
+        joints = self.shoulder[0] + np.concatenate([[0.0], np.cumsum(self.lengths)])
+        chain[1:, PARENT] = np.arange(n + 1)
+        chain[1:, X], chain[1:, Y] = joints, self.shoulder[1]
+        chain[1:-1, TURN], chain[1:-1, MASS] = 1.0, self.masses
+        chain[1:-1, POSITION], chain[1:-1, RATE] = 3 + np.arange(n), 6 + n + np.arange(n)
+        chain[1:-1, COM_X], chain[1:-1, COM_Y] = joints[:-1] + 0.5 * self.lengths, self.shoulder[1]
+        chain[1:-1, INERTIA] = self.masses * self.lengths**2 / 12.0
+        return chain
 
     def dynamics(self, z, z_dot):
         """Return M (3 + n, 3 + n) and C z' (3 + n,)."""

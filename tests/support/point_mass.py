@@ -11,16 +11,16 @@ from shapely import Point
 from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry import BoundaryDistance
 from coop_drake.laws import (
-    Funnel,
-    arrival_margin,
+    axis_table,
     energy_margin,
     funnel_acceleration,
     governed_acceleration,
     governor_velocity,
-    ready_margin,
     slowdown_radius,
     tracking_energy,
 )
+from coop_drake.systems.ready_kernels import ready_conditions
+from tests.support.readiness import margin_of as margin_of_robot
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def build_fields(plan, *, tolerance=1e-4):
     return [
         VelocityField(
             HarmonicMap(cell.tidied, Point(transition.target), tolerance=tolerance),
-            slowdown_radius=slowdown_radius(1.0, governor_gain=transition.gains.governor_gain),
+            slowdown_radius=slowdown_radius(1.0, transition.gains.governor_gain),
         )
         for cell, transition in zip(plan.cells, plan.transitions, strict=True)
     ]
@@ -82,9 +82,14 @@ def carry_out(plan, fields, *, position_tolerance=0.01, step=0.004, time_limit=6
     n = len(plan.joint_names) + 1
     state = np.concatenate([plan.start[:2], np.zeros(2), plan.start[:2], plan.start[2:], np.zeros(n)])
     distances = [BoundaryDistance(cell.tidied) for cell in plan.cells]
-    funnels = [
-        _funnel(cell, transition) for cell, transition in zip(plan.cells, plan.transitions, strict=True)
-    ]
+    conditions = ready_conditions(
+        [axis_table(plan.funnel(k), transition.gains) for k, transition in enumerate(plan.transitions)],
+        [distance.edges for distance in distances],
+        [transition.gains.stiffness for transition in plan.transitions],
+        [transition.inradius for transition in plan.transitions],
+        plan.transitions[-1].target,
+        position_tolerance,
+    )
     seen = {"energy": np.inf, "cell": np.inf, "gap": np.inf, "axis": 0.0, "force": 0.0}
     durations, hand_overs, stuck = [], [], None
     for index in range(len(plan.cells)):
@@ -94,9 +99,9 @@ def carry_out(plan, fields, *, position_tolerance=0.01, step=0.004, time_limit=6
             state,
             fields[index],
             distances,
-            funnels,
+            conditions[index],
             seen,
-            (position_tolerance, step, time_limit),
+            (step, time_limit),
         )
         durations.append(elapsed)
         hand_overs.append(state)
@@ -109,32 +114,24 @@ def carry_out(plan, fields, *, position_tolerance=0.01, step=0.004, time_limit=6
     )  # fmt: skip
 
 
-def _funnel(cell, transition):
-    gains = transition.gains
-    return Funnel(
-        cell.lower, cell.upper, transition.goal_lower, transition.goal_upper, gains.decay_rate, gains.funnel
-    )
-
-
-def _play(plan, index, state, field, distances, funnels, seen, limits):
-    position_tolerance, step, time_limit = limits
+def _play(plan, index, state, field, distances, conditions, seen, limits):
+    step, time_limit = limits
     transition, cell, distance, funnel = (
         plan.transitions[index],
         plan.cells[index],
         distances[index],
-        funnels[index],
+        plan.funnel(index),
     )
     gains, n = transition.gains, len(cell.lower)
 
     def margin_of(z):
-        energy = tracking_energy(z[:2], z[2:4], z[4:6], stiffness=gains.stiffness)
-        return energy_margin(energy, distance(z[4:6]), stiffness=gains.stiffness)
+        energy = tracking_energy(*(z[:2] - z[4:6]), *z[2:4], gains.stiffness)
+        return energy_margin(energy, distance(z[4:6]), gains.stiffness)
 
     def rates(z, t):
-        force = governed_acceleration(z[:2], z[2:4], z[4:6], stiffness=gains.stiffness, damping=gains.damping)
+        force = governed_acceleration(z[:2], z[2:4], z[4:6], gains.stiffness, gains.damping)
         governor = governor_velocity(
-            field(z[4:6]), margin_of(z), stiffness=gains.stiffness, governor_gain=gains.governor_gain,
-            smoothing=gains.smoothing,
+            *field(z[4:6]), margin_of(z), gains.stiffness, gains.governor_gain, gains.smoothing
         )  # fmt: skip
         axes = funnel_acceleration(
             z[6 : 6 + n], z[6 + n :], funnel, t, log_gain=gains.log_gain, position_gain=gains.position_gain,
@@ -143,22 +140,7 @@ def _play(plan, index, state, field, distances, funnels, seen, limits):
         return np.concatenate([z[2:4], force, governor, z[6 + n :], axes])
 
     def leaves(z):
-        common = {
-            "position": z[:2], "velocity": z[2:4], "axis_position": z[6 : 6 + n], "axis_rate": z[6 + n :],
-            "goal_lower": transition.goal_lower, "goal_upper": transition.goal_upper,
-        }  # fmt: skip
-        if index + 1 == len(plan.cells):
-            return (
-                arrival_margin(**common, target=transition.target, position_tolerance=position_tolerance)
-                >= 0.0
-            )
-        return (
-            ready_margin(
-                **common, governor_position=z[4:6], next_clearance=distances[index + 1](z[4:6]),
-                inradius=transition.inradius, next_funnel=funnels[index + 1],
-                next_gains=plan.transitions[index + 1].gains,
-            ) >= 0.0
-        )  # fmt: skip
+        return margin_of_robot(conditions, z[:2], z[2:4], z[4:6], z[6 : 6 + n], z[6 + n :]) >= 0.0
 
     for k in range(round(time_limit / step)):
         if leaves(state):

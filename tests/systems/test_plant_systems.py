@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.laws import robot_acceleration, robot_torque
 from coop_drake.plant import base_poses, build_robot_plant, build_team_plant, set_configuration
 from coop_drake.systems import ObjectEstimator, RobotEffort, TeamSensor
+from tests.support.robot_matrices import robot_acceleration, robot_torque
 from tests.support.small_scenario import small_scenario
 from tests.support.system_checks import (
     assert_every_input_is_required,

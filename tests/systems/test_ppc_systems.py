@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws import funnel_walls, prescribed_acceleration
+from coop_drake.laws import funnel_bounds, prescribed_acceleration
 from coop_drake.systems import AxisPpc, axis_laws
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
@@ -22,17 +22,17 @@ def ppc():
 
 def law_by_hand(axes, position, rate, cell, time):
     law = axis_laws(PLAN, axes)[cell]
-    walls = funnel_walls(law.funnel, time)
+    bounds = funnel_bounds(law.funnel, time)
     gains = law.gains
     acceleration = prescribed_acceleration(
         np.array(position),
         np.array(rate),
-        walls,
+        bounds,
         log_gain=gains.log_gain,
         position_gain=gains.position_gain,
         rate_gain=gains.rate_gain,
     )
-    return acceleration, walls
+    return acceleration, bounds
 
 
 def test_ports(ppc):
@@ -46,9 +46,9 @@ def test_ports(ppc):
 @pytest.mark.parametrize("cell", [0, 1, 2])
 def test_all_axes_obey_the_law_since_the_entry_into_the_cell(ppc, cell, time):
     inputs = {**INPUTS, "current_cell": [cell, 2.0]}
-    acceleration, walls = law_by_hand(AXES, [0.37, 0.11, 0.23], [0.4, -0.2, 0.3], cell, time - 2.0)
+    acceleration, bounds = law_by_hand(AXES, [0.37, 0.11, 0.23], [0.4, -0.2, 0.3], cell, time - 2.0)
     np.testing.assert_allclose(evaluate(ppc, inputs, "axis_acceleration", time), acceleration, rtol=1e-12)
-    np.testing.assert_array_equal(evaluate(ppc, inputs, "funnels", time), [*walls.lower, *walls.upper])
+    np.testing.assert_array_equal(evaluate(ppc, inputs, "funnels", time), [*bounds.lower, *bounds.upper])
 
 
 def test_a_robot_without_joints_tracks_the_angle_alone():

@@ -2,8 +2,9 @@ import numpy as np
 import pytest
 
 from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.laws import arrival_margin, ready_margin
 from coop_drake.systems import GovernedCell, ReadyMonitor, axis_laws
+from coop_drake.systems.ready_kernels import ready_conditions
+from tests.support.readiness import margin_of
 from tests.support.small_plan import GOAL_POSE, POSITION_TOLERANCE, small_plan, stiffer_and_stiffer
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
 
@@ -31,6 +32,17 @@ def monitor(cells):
     return ReadyMonitor(cells, axis_laws(PLAN, AXES), inradii, PLAN.goal_pose[:2], POSITION_TOLERANCE)
 
 
+def conditions(cells):
+    return ready_conditions(
+        [law.table for law in axis_laws(PLAN, AXES)],
+        [cell.clearance.edges for cell in cells],
+        [cell.gains.stiffness for cell in cells],
+        [transition.inradius for transition in PLAN.transitions],
+        PLAN.goal_pose[:2],
+        POSITION_TOLERANCE,
+    )
+
+
 def test_ports(monitor):
     inputs, outputs = port_sizes(monitor)
     assert inputs == {
@@ -44,22 +56,11 @@ def test_ports(monitor):
 
 @pytest.mark.parametrize("index", [0, 1])
 def test_the_report_is_the_law_with_the_next_cells_energy(monitor, cells, index):
-    laws = axis_laws(PLAN, AXES)
     inputs = {**INPUTS, "current_cell": [index, 0.0], "object_state": [3.8, 3.5, 0.3, 0.1, 0.0, 0.05]}
-    governor = np.array(INPUTS["governor_position"])
-    expected = ready_margin(
-        position=np.array([3.8, 3.5]),
-        velocity=np.array([0.1, 0.0]),
-        governor_position=governor,
-        next_clearance=cells[index + 1].clearance(governor),
-        inradius=PLAN.transitions[index].inradius,
-        axis_position=np.array([0.3, 0.1, 0.12]),
-        axis_rate=np.array([0.05, 0.0, 0.0]),
-        goal_lower=laws[index].funnel.goal_lower,
-        goal_upper=laws[index].funnel.goal_upper,
-        next_funnel=laws[index + 1].funnel,
-        next_gains=laws[index + 1].gains,
-    )
+    expected = margin_of(
+        conditions(cells)[index], [3.8, 3.5], [0.1, 0.0], INPUTS["governor_position"], [0.3, 0.1, 0.12],
+        [0.05, 0.0, 0.0],
+    )  # fmt: skip
     np.testing.assert_array_equal(evaluate(monitor, inputs, "ready"), [index, expected])
 
 
@@ -81,8 +82,7 @@ def test_ready_at_rest_on_the_target(monitor):
     assert evaluate(monitor, {**inputs, "robot_state": moved}, "ready")[1] < 0.0
 
 
-def test_in_the_last_cell_it_reports_arrival(monitor):
-    laws = axis_laws(PLAN, AXES)[-1]
+def test_in_the_last_cell_it_reports_arrival(monitor, cells):
     state = [0.0, 0.0, 0.0, 0.3, 0.28, 0.0, 0.0, 0.0, 0.001, 0.002]
     inputs = {
         **INPUTS,
@@ -90,16 +90,10 @@ def test_in_the_last_cell_it_reports_arrival(monitor):
         "object_state": [GOAL_POSE[0] + 0.002, GOAL_POSE[1], GOAL_POSE[2] + 0.001, 0.001, 0.0, 0.003],
         "robot_state": state,
     }
-    expected = arrival_margin(
-        position=np.array(inputs["object_state"][:2]),
-        velocity=np.array([0.001, 0.0]),
-        target=np.array(GOAL_POSE[:2]),
-        axis_position=np.array([GOAL_POSE[2] + 0.001, 0.3, 0.28]),
-        axis_rate=np.array([0.003, 0.001, 0.002]),
-        goal_lower=laws.funnel.goal_lower,
-        goal_upper=laws.funnel.goal_upper,
-        position_tolerance=POSITION_TOLERANCE,
-    )
+    expected = margin_of(
+        conditions(cells)[2], inputs["object_state"][:2], [0.001, 0.0], [3.8, 3.5],
+        [GOAL_POSE[2] + 0.001, 0.3, 0.28], [0.003, 0.001, 0.002],
+    )  # fmt: skip
     assert expected > 0.0
     np.testing.assert_array_equal(evaluate(monitor, inputs, "ready"), [2.0, expected])
 

@@ -5,9 +5,8 @@ import pytest
 
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.laws import governed_acceleration, governor_velocity
-from coop_drake.laws.governor import energy_margin, tracking_energy
+from coop_drake.laws.governor import object_energy_margin
 from coop_drake.systems import GovernedCell, ReferenceGovernor
-from coop_drake.systems.reference_governor import VELOCITY_STEP
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
 
@@ -33,10 +32,7 @@ def cells():
 
 def expected_margin(cell, inputs):
     state, governor = np.array(inputs["object_state"]), np.array(inputs["governor_position"])
-    state[3:5] = np.round(state[3:5] / VELOCITY_STEP) * VELOCITY_STEP
-    stiffness = cell.gains.stiffness
-    energy = tracking_energy(state[:2], state[3:5], governor, stiffness=stiffness)
-    return energy_margin(energy, cell.clearance(governor), stiffness=stiffness)
+    return object_energy_margin(state, governor, cell.clearance(governor), cell.gains.stiffness)
 
 
 def test_ports(cells):
@@ -60,18 +56,14 @@ def test_outputs_are_the_law_of_the_current_cell(cells, index):
             np.array(inputs["object_state"][:2]),
             np.array(inputs["object_state"][3:5]),
             governor,
-            stiffness=gains.stiffness,
-            damping=gains.damping,
+            gains.stiffness,
+            gains.damping,
         ),
     )
     np.testing.assert_array_equal(
         velocity,
         governor_velocity(
-            cell.field(governor),
-            margin,
-            stiffness=gains.stiffness,
-            governor_gain=gains.governor_gain,
-            smoothing=gains.smoothing,
+            *cell.field(governor), margin, gains.stiffness, gains.governor_gain, gains.smoothing
         ),
     )
     assert np.linalg.norm(velocity) > 0.0
@@ -122,5 +114,8 @@ def test_no_cells_are_refused():
 def test_a_stiffer_cell_has_another_margin(cells):
     cell = cells[0]
     stiffer = replace(cell, gains=replace(cell.gains, stiffness=2.0 * cell.gains.stiffness))
-    arguments = np.array([3.0, 3.0]), np.array([0.1, 0.0]), np.array([3.1, 3.0])
-    assert stiffer.energy_margin(*arguments) > cell.energy_margin(*arguments)
+    soft, hard = (
+        evaluate(ReferenceGovernor([kept]), {**INPUTS, "current_cell": [0.0, 0.0]}, "energy_margin")
+        for kept in (cell, stiffer)
+    )
+    assert hard[0] > soft[0]

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws import acceleration_at, rotate, wrench_share
+from coop_drake.laws import acceleration_at, wrench_share
 from coop_drake.systems import WrenchLaw
+from tests.support.robot_matrices import turned
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
 
 P_LE, P_LLCM = np.array([0.4, 0.1]), np.array([0.05, -0.02])
@@ -31,20 +32,12 @@ def test_ports(law):
 
 def test_outputs_are_the_laws(law):
     np.testing.assert_array_equal(evaluate(law, INPUTS, "object_acceleration"), DESIRED)
+    r, com = turned(0.7, P_LE), turned(0.7, P_LLCM)
     grasp, share = np.split(evaluate(law, INPUTS, "hand_command"), 2)
-    np.testing.assert_array_equal(grasp, acceleration_at(DESIRED, 0.9, rotate(0.7, P_LE)))
-    np.testing.assert_array_equal(
-        share,
-        wrench_share(
-            DESIRED,
-            0.9,
-            rotate(0.7, P_LE),
-            com_offset=rotate(0.7, P_LLCM),
-            mass=3.0,
-            inertia=0.7,
-            share=0.25,
-        ),
-    )
+    np.testing.assert_allclose(grasp, [*acceleration_at(*r, *DESIRED, 0.9), DESIRED[2]], rtol=1e-14)
+    of_com = acceleration_at(*com, *DESIRED, 0.9)
+    expected = wrench_share(*(com - r), *of_com, DESIRED[2], 3.0, 0.7, 0.25)
+    np.testing.assert_allclose(share, expected, rtol=1e-14)
 
 
 def test_inputs_are_required(law):

@@ -1,4 +1,4 @@
-"""A funnel contains its goal and lies in its slice at all times, and its rates are its walls' derivatives."""
+"""A funnel contains its goal and lies in its slice at all times, and rates are derivatives of bounds."""
 
 from itertools import pairwise
 
@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coop_drake.laws import Funnel, funnel_walls
+from coop_drake.laws import Funnel, funnel_bounds
 
 law = settings(max_examples=200, deadline=None, derandomize=True)
 shapes = st.sampled_from(["exponential", "smooth"])
@@ -31,7 +31,7 @@ def funnels(draw):
 @given(funnels(), times, times)
 def test_a_funnel_contains_its_goal_and_lies_in_its_slice(funnel, one, other):
     rounding = 1e-12
-    early, late = funnel_walls(funnel, min(one, other)), funnel_walls(funnel, max(one, other))
+    early, late = funnel_bounds(funnel, min(one, other)), funnel_bounds(funnel, max(one, other))
     chain = [funnel.slice_lower, early.lower, late.lower, funnel.goal_lower]
     assert all(below <= above + rounding for below, above in pairwise(chain))
     chain = [funnel.goal_upper, late.upper, early.upper, funnel.slice_upper]
@@ -44,8 +44,8 @@ def test_a_funnel_contains_its_goal_and_lies_in_its_slice(funnel, one, other):
 def test_rates_and_accelerations_of_the_walls_are_their_derivatives(funnel, time):
     h = 1e-5 / funnel.decay_rate[0]
     time = time + h
-    walls = funnel_walls(funnel, time)
-    ahead, behind = funnel_walls(funnel, time + h), funnel_walls(funnel, time - h)
+    bounds = funnel_bounds(funnel, time)
+    ahead, behind = funnel_bounds(funnel, time + h), funnel_bounds(funnel, time - h)
     scale = 1.0 + abs(funnel.slice_lower[0]) + abs(funnel.slice_upper[0])
     for value, derivative in (
         ("lower", "lower_rate"),
@@ -56,4 +56,4 @@ def test_rates_and_accelerations_of_the_walls_are_their_derivatives(funnel, time
         numeric = (getattr(ahead, value) - getattr(behind, value)) / (2.0 * h)
         # A value of size 15 is known to 2e-15; divided by 2 h it is known to some 1e-10 of the slope's scale.
         tolerance = 1e-8 * scale * (1.0 + funnel.decay_rate[0]) ** 3
-        assert getattr(walls, derivative) == pytest.approx(numeric, abs=tolerance)
+        assert getattr(bounds, derivative) == pytest.approx(numeric, abs=tolerance)

@@ -6,8 +6,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from coop_drake.laws import ScheduledGains, energy_margin, tracking_energy
-from coop_drake.laws.ready import clearance_margin
-from coop_drake.laws.schedule import stiffness_for_neck
+from coop_drake.laws.gain_schedule import schedule_of, scheduled_governor
+from coop_drake.laws.readiness import clearance_margin
 from paper.governor_run import box_clearance, run_governor, straight_field
 
 LOWER, UPPER = np.array([0.0, -1.0]), np.array([4.0, 1.0])
@@ -31,13 +31,11 @@ def test_the_margin_never_becomes_negative(gains, smoothing, start, target, head
     governor, target = LOWER + start * (UPPER - LOWER), LOWER + target * (UPPER - LOWER)
     clearance = box_clearance(LOWER, UPPER)
     stiffness = gains[0]
-    energy = filled * energy_margin(0.0, clearance(governor), stiffness=stiffness)
+    energy = filled * energy_margin(0.0, clearance(governor), stiffness)
     direction = np.array([np.cos(heading), np.sin(heading)])
     velocity = np.sqrt(2.0 * split * energy) * direction
     position = governor + np.sqrt(2.0 * (1.0 - split) * energy / stiffness) * direction
-    assume(
-        tracking_energy(position, velocity, governor, stiffness=stiffness) <= energy * (1.0 + 1e-9) + 1e-12
-    )
+    assume(tracking_energy(*(position - governor), *velocity, stiffness) <= energy * (1.0 + 1e-9) + 1e-12)
     run = run_governor(
         clearance,
         straight_field(target),
@@ -63,7 +61,7 @@ def test_every_hand_over_is_reached_and_leaves_margin(half_height, half_overlap,
     height = np.array([0.0, half_height])
     following = box_clearance(np.array([3.0 - half_overlap, 0.0]) - height, np.array([5.0, 0.0]) + height)
     target, inradius = np.array([3.0, 0.0]), min(half_height, half_overlap)
-    stiffness = stiffness_for_neck(ScheduledGains(), half_height)
+    stiffness = scheduled_governor(schedule_of(ScheduledGains()), half_height)[0]
     start = np.array([0.3, 1.8 * heading - 0.9])
     run = run_governor(
         here,
@@ -75,15 +73,13 @@ def test_every_hand_over_is_reached_and_leaves_margin(half_height, half_overlap,
         seconds=15.0,
     )
     margins = [
-        energy_margin(tracking_energy(p, v, g, stiffness=stiffness), following(g), stiffness=stiffness)
+        energy_margin(tracking_energy(*(p - g), *v, stiffness), following(g), stiffness)
         for p, v, g in zip(run.position, run.velocity, run.governor, strict=True)
     ]
-    ready = [clearance_margin(m, stiffness=stiffness, inradius=inradius) >= 0.0 for m in margins]
+    ready = [clearance_margin(m, stiffness, inradius) >= 0.0 for m in margins]
     first = ready.index(True)
     assert following(run.position[first]) > 0.0
     assert here(run.position[first]) > 0.0
     # Nothing takes the readiness away again while other conditions are still waited for, once at rest.
     assert ready[-1]
-    assert clearance_margin(margins[-1], stiffness=stiffness, inradius=inradius) == pytest.approx(
-        0.75, abs=0.01
-    )
+    assert clearance_margin(margins[-1], stiffness, inradius) == pytest.approx(0.75, abs=0.01)

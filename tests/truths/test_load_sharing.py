@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coop_drake.laws import acceleration_at, object_twist, rotate, total_wrench, wrench_share
+from coop_drake.laws import acceleration_at, object_twist, total_wrench, wrench_share
+from tests.support.robot_matrices import turned
 
 lengths = st.floats(-1.0, 1.0)
 vectors = st.tuples(lengths, lengths).map(np.array)
@@ -28,31 +29,23 @@ def test_shares_sum_to_the_command(offsets, com_offset, acceleration, rate, mass
         data.draw(st.lists(st.floats(0.01, 1.0), min_size=len(offsets), max_size=len(offsets)))
     )
     weights /= weights.sum()
+    of_com = acceleration_at(*com_offset, *acceleration, rate)
     shares = np.array(
         [
-            wrench_share(
-                acceleration,
-                rate,
-                offset,
-                com_offset=com_offset,
-                mass=mass,
-                inertia=inertia,
-                share=weight,
-            )
+            wrench_share(*(com_offset - offset), *of_com, acceleration[2], mass, inertia, weight)
             for offset, weight in zip(offsets, weights, strict=True)
         ]
     )
-    of_com = acceleration_at(acceleration, rate, com_offset)
-    commanded = np.array([mass * of_com[0], mass * of_com[1], inertia * of_com[2]])
+    commanded = np.array([mass * of_com[0], mass * of_com[1], inertia * acceleration[2]])
     # Every robot carries its part of the force.
     assert shares[:, :2] == pytest.approx(weights[:, None] * commanded[:2], rel=1e-12, abs=1e-12)
-    total = total_wrench(shares, np.array(offsets), com_offset=com_offset)
+    total = total_wrench(shares, np.array(offsets), com_offset, 0.0)
     assert total == pytest.approx(commanded, rel=1e-12, abs=1e-10)
 
 
 @law
 @given(vectors, accelerations, st.floats(-3.0, 3.0))
 def test_every_robot_knows_the_same_object_twist(offset_L, twist, theta):
-    offset = rotate(theta, offset_L)
+    offset = turned(theta, offset_L)
     at_grasp = np.array([twist[0] - twist[2] * offset[1], twist[1] + twist[2] * offset[0], twist[2]])
-    assert object_twist(offset, at_grasp) == pytest.approx(twist, rel=1e-12, abs=1e-12)
+    assert object_twist(*offset, *at_grasp) == pytest.approx(twist, rel=1e-12, abs=1e-12)

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from coop_drake.laws import (
     Funnel,
     funnel_acceleration,
-    funnel_walls,
+    funnel_bounds,
     prescribed_acceleration,
     prescribed_energy,
 )
@@ -21,11 +21,11 @@ log_gains = st.floats(0.01, 1.0)
 gains = st.floats(0.5, 10.0)
 
 
-def energy_and_terms(x, v, walls, kappa, k1):
+def energy_and_terms(x, v, bounds, kappa, k1):
     """Return V, s and x' - v, computed apart from the law itself."""
-    dl, du = x - walls.lower[0], walls.upper[0] - x
+    dl, du = x - bounds.lower[0], bounds.upper[0] - x
     s = np.log(dl / du)
-    wanted = (walls.lower_rate[0] * du + walls.upper_rate[0] * dl - k1 * s * dl * du) / (dl + du)
+    wanted = (bounds.lower_rate[0] * du + bounds.upper_rate[0] * dl - k1 * s * dl * du) / (dl + du)
     return 0.5 * kappa * s**2 + 0.5 * (v - wanted) ** 2, s, v - wanted
 
 
@@ -34,23 +34,23 @@ def energy_and_terms(x, v, walls, kappa, k1):
 def test_the_energy_decays_as_predicted(funnel, time, fraction, v, kappa, k1, k2):
     """V' along the flow, by central differences of V, is -kappa k1 s^2 - k2 (x' - v)^2."""
     time = time + 1e-3
-    walls = funnel_walls(funnel, time)
-    x = (1.0 - fraction) * walls.lower + fraction * walls.upper
-    width = (walls.upper - walls.lower)[0]
+    bounds = funnel_bounds(funnel, time)
+    x = (1.0 - fraction) * bounds.lower + fraction * bounds.upper
+    width = (bounds.upper - bounds.lower)[0]
     v *= width
     law = {"log_gain": np.array([kappa]), "position_gain": k1, "rate_gain": k2}
-    acceleration = prescribed_acceleration(x, np.array([v]), walls, **law)[0]
-    value, s, error = energy_and_terms(x[0], v, walls, kappa, k1)
-    assert prescribed_energy(x, np.array([v]), walls, log_gain=law["log_gain"], position_gain=k1)[0] == (
+    acceleration = prescribed_acceleration(x, np.array([v]), bounds, **law)[0]
+    value, s, error = energy_and_terms(x[0], v, bounds, kappa, k1)
+    assert prescribed_energy(x, np.array([v]), bounds, log_gain=law["log_gain"], position_gain=k1)[0] == (
         pytest.approx(value, rel=1e-9, abs=1e-12)
     )
     h = 1e-5 / (1.0 + k1 + k2 + funnel.decay_rate[0] + abs(v) / width + np.sqrt(abs(acceleration) / width))
 
     def along(step):
         moved = x[0] + v * step + 0.5 * acceleration * step**2
-        return energy_and_terms(moved, v + acceleration * step, funnel_walls(funnel, time + step), kappa, k1)[
-            0
-        ]
+        return energy_and_terms(
+            moved, v + acceleration * step, funnel_bounds(funnel, time + step), kappa, k1
+        )[0]
 
     numeric = (along(h) - along(-h)) / (2.0 * h)
     predicted = -kappa * k1 * s**2 - k2 * error**2
@@ -95,13 +95,13 @@ def test_an_axis_stays_in_its_funnel_and_ends_in_the_middle_of_its_goal(
     assert run.success
     energies = []
     for t, x, v in zip(run.t, *run.y, strict=True):
-        walls = funnel_walls(funnel, t)
-        assert walls.lower[0] < x < walls.upper[0]
+        bounds = funnel_bounds(funnel, t)
+        assert bounds.lower[0] < x < bounds.upper[0]
         energies.append(
             prescribed_energy(
                 np.array([x]),
                 np.array([v]),
-                walls,
+                bounds,
                 log_gain=law["log_gain"],
                 position_gain=law["position_gain"],
             )[0]

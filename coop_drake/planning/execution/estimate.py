@@ -11,10 +11,10 @@ import numpy as np
 import shapely
 from shapely import LineString
 
-from coop_drake.answers.plan import Cell, Plan, Transition
+from coop_drake.answers.plan import Plan
 from coop_drake.geometry.boundary import edges_of
 from coop_drake.geometry.passage import PassageFinder
-from coop_drake.laws import TransitionGains, slowdown_radius
+from coop_drake.laws import TransitionGains, axis_table
 from coop_drake.planning.execution.transport_kernels import cross_cell
 from coop_drake.tree.pose import FloatArray
 
@@ -33,9 +33,6 @@ SETTLING_TIME = 0.6
 
 SPEED_PER_CLEARANCE = 3.0
 """Speed over clearance with the paper's gains, for choices that are made before gains are [1/s]."""
-
-MAX_SPEED = 1.0
-"""Largest magnitude of the velocity fields [m/s]."""
 
 LONGEST = 120.0
 """A transition that takes longer than this is not integrated to its end [s]."""
@@ -97,20 +94,24 @@ def timed(plan: Plan, paths: Sequence[LineString] | None = None) -> Plan:
     """
     paths = paths if paths is not None else _widest_paths(plan)
     crossings = [
-        (np.ascontiguousarray(edges_of(cell.tidied)), _governor(transition.gains), _axes(cell, transition))
-        for cell, transition in zip(plan.cells, plan.transitions, strict=True)
+        (
+            np.ascontiguousarray(edges_of(cell.tidied)),
+            transition.gains.governor_row,
+            axis_table(plan.funnel(index), transition.gains),
+        )
+        for index, (cell, transition) in enumerate(zip(plan.cells, plan.transitions, strict=True))
     ]
     following = [*crossings[1:], crossings[-1]]
     state = _at_rest(plan.start[:2], plan.start[2:])
     transitions = []
-    for index, (transition, (edges, governor, axes)) in enumerate(
+    for index, (transition, (edges, gains, table)) in enumerate(
         zip(plan.transitions, crossings, strict=True)
     ):
         last = index + 1 == len(crossings)
         path = shapely.get_coordinates(paths[index])
-        next_edges, next_governor, next_axes = following[index]
+        next_edges, next_gains, next_table = following[index]
         seconds = cross_cell(
-            state, edges, path, governor, axes, transition.inradius, next_edges, next_governor, next_axes,
+            state, edges, path, gains, table, transition.inradius, next_edges, next_gains, next_table,
             last, LONGEST,
         )  # fmt: skip
         if not isfinite(seconds):
@@ -132,25 +133,3 @@ def _widest_paths(plan: Plan) -> list[LineString]:
 def _at_rest(position: FloatArray, axes: FloatArray) -> FloatArray:
     """State (p, p', p_G, axes, axis rates) without motion."""
     return np.concatenate([position, np.zeros(2), position, axes, np.zeros(len(axes))])
-
-
-def _governor(gains: TransitionGains) -> FloatArray:
-    """Numbers of the governor and of all axes, as ``cross_cell`` takes them."""
-    radius = slowdown_radius(MAX_SPEED, governor_gain=gains.governor_gain)
-    return np.array(
-        [
-            gains.stiffness, gains.damping, gains.governor_gain, gains.smoothing, radius,
-            float(gains.funnel == "smooth"), gains.position_gain, gains.rate_gain,
-        ]
-    )  # fmt: skip
-
-
-def _axes(cell: Cell, transition: Transition) -> FloatArray:
-    """Numbers of every axis, as ``cross_cell`` takes them."""
-    gains = transition.gains
-    return np.array(
-        [
-            cell.lower, cell.upper, transition.goal_lower, transition.goal_upper,
-            gains.decay_rate, gains.log_gain, gains.energy_bound,
-        ]
-    )  # fmt: skip

@@ -8,8 +8,9 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.geometry.sweep_kernels import IntArray, over_piece
+from coop_drake.laws.gain_schedule import Schedule
 from coop_drake.planning.boxes.box_kernels import BoxArrays, bodies_apart, enclosing_disc, ring_clearance
-from coop_drake.planning.improvement.box_crossing import Schedule, cross_box
+from coop_drake.planning.improvement.box_crossing import cross_box
 from coop_drake.planning.sampling.obstacle_grid import Walls
 from coop_drake.tree.pose import FloatArray
 

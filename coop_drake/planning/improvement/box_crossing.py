@@ -1,218 +1,148 @@
-"""Compiled simulation of a way through one box in one dimension, quick enough to compare thousands of boxes.
+"""Compiled simulation of one box of a box sequence, quick enough to compare thousands of boxes.
 
-The object moves along a line behind its governor (14)-(16), the clearance interpolated between waypoints,
-and every axis moves in its funnel, (18)-(20). Gains follow the rules of ``transition_gains``.
+The object moves in one dimension, along its path, behind its governor (14)-(16); the clearance is
+interpolated between waypoints. Every angle and joint moves in its funnel, (18)-(20). All laws are those of
+``coop_drake.laws``.
 """
 
 from __future__ import annotations
 
-from math import log, sqrt
-from typing import NamedTuple
+from math import sqrt
 
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.kernels import SATURATION, decay, track_axis
-from coop_drake.laws.ready import CLEARANCE_FRACTION, EROSION
-from coop_drake.planning.execution.transport_kernels import PERIOD, RATE_TOLERANCE, SPEED_TOLERANCE
+from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, LAW_COLUMNS, LOG_GAIN, track_row, write_row
+from coop_drake.laws.gain_schedule import Schedule, scheduled_axis, scheduled_governor
+from coop_drake.laws.governor import (
+    FIELD_SPEED,
+    energy_margin,
+    governed_acceleration,
+    governor_velocity,
+    slowdown_radius,
+    tracking_energy,
+)
+from coop_drake.laws.readiness import axis_arrival, clearance_margin, interval_margin, position_arrival
+from coop_drake.planning.execution.transport_kernels import PERIOD, axis_frequency
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Schedule", "cross_box", "scheduled_laws"]
+__all__ = ["cross_box"]
 
 MOST_STEPS = 64
-"""Steps of an axis between two judgements, at most."""
+"""Largest number of integration steps of an axis between two checks of readiness [-], to bound the time."""
 
-STEP_PER_PERIOD = 1.6
-"""Longest step of an axis, over the shortest period of its motion through 2 pi [-]."""
+RADIANS_PER_STEP = 1.6
+"""Longest step of an axis times the angular frequency of its motion [rad]: the fourth-order scheme is
+stable up to 2.8, and a comparison of boxes needs less accuracy than the estimate of a plan."""
 
-LEAVING_SHARE = 0.5
-"""Share of a goal interval within which an axis leaves a box: at its edge the next funnel, which is not
-known yet, would not be entered [-]."""
+SATURATION = 1e-3
+"""Smallest distance to a funnel bound, over the funnel's width, for which the step of an axis is shortened
+[-]."""
 
-GATE_SHARE = 0.9
-"""Share of the energy allowed in the next funnel that the rate of an axis may take [-]."""
+LEAVING_EROSION = 0.25
+"""Fraction of a goal interval, at each end, in which an axis does not leave a box [-]. It is larger than
+that of the closed loop: near an end the next funnel, which is not known yet, could not be entered."""
 
+RATE_FRACTION = 0.9
+"""Fraction of the energy allowance of the next funnel that the rate of an axis may take [-]."""
 
-class Schedule(NamedTuple):
-    """Numbers of a gain set, fixed gains with equal bounds.
-
-    Attributes:
-        wall_stiffness: K times the neck [m/s^2].
-        stiffness: Smallest and largest K [1/s^2], shape (2,).
-        damping: zeta over sqrt(K) [-].
-        governor: K_G over sqrt(K) [s].
-        smoothing: c [m].
-        attraction: Rate at which p_G is drawn into its target [1/s].
-        smooth: Whether funnels are smooth.
-        acceleration: Wall acceleration aimed at [rad/s^2 or m/s^2].
-        decay: Smallest and largest lambda of the angle and of joints [1/s], shape (2, 2).
-        log_gain: Largest kappa.
-        log_acceleration: Largest kappa |a s| at rest.
-        position_gain: k1 [1/s].
-        rate_gain: k2 [1/s].
-        allowance: Energy that a funnel is entered with, over kappa [-].
-    """
-
-    wall_stiffness: float
-    stiffness: FloatArray
-    damping: float
-    governor: float
-    smoothing: float
-    attraction: float
-    smooth: bool
-    acceleration: float
-    decay: FloatArray
-    log_gain: float
-    log_acceleration: float
-    position_gain: float
-    rate_gain: float
-    allowance: float
+LEAST_CLEARANCE = 1e-4
+"""A box narrower than this counts as this wide where gains are scheduled [m], so that K stays finite."""
 
 
 @compiled
-def scheduled_laws(
-    schedule: Schedule,
-    neck: float,
-    lower: FloatArray,
-    upper: FloatArray,
-    goal_lower: FloatArray,
-    goal_upper: FloatArray,
-    resting: FloatArray,
-) -> tuple[float, FloatArray, FloatArray]:
-    """K, and lambda and kappa of every axis: the rules of ``transition_gains``."""
-    stiffness = min(max(schedule.wall_stiffness / neck, schedule.stiffness[0]), schedule.stiffness[1])
-    m = len(lower)
-    rates, log_gains = np.empty(m), np.empty(m)
-    for a in range(m):
-        shrink = max(goal_lower[a] - lower[a], upper[a] - goal_upper[a], 1e-9)
-        slowest, fastest = schedule.decay[min(a, 1), 0], schedule.decay[min(a, 1), 1]
-        rates[a] = min(max(sqrt(schedule.acceleration / shrink), slowest), fastest)
-        width = upper[a] - lower[a]
-        dl = min(max(resting[a] - lower[a], SATURATION * width), (1.0 - SATURATION) * width)
-        pull = abs(log(dl / (width - dl))) * width / (dl * (width - dl))
-        log_gains[a] = min(schedule.log_gain, schedule.log_acceleration / max(pull, 1e-9))
-    return stiffness, rates, log_gains
-
-
-@compiled
-def _clearance_at(places: FloatArray, room: FloatArray, s: float) -> float:
-    """Clearance between two waypoints."""
+def _clearance_at(places: FloatArray, clearances: FloatArray, s: float) -> float:
+    """Return the clearance between two waypoints [m]."""
     for k in range(len(places) - 1):
         if s <= places[k + 1]:
-            share = max(s - places[k], 0.0) / max(places[k + 1] - places[k], 1e-12)
-            return float(room[k] + share * (room[k + 1] - room[k]))
-    return float(room[-1])
+            fraction = max(s - places[k], 0.0) / max(places[k + 1] - places[k], 1e-12)
+            return float(clearances[k] + fraction * (clearances[k + 1] - clearances[k]))
+    return float(clearances[-1])
 
 
 @compiled
 def _advance_position(
-    state: FloatArray, h: float, places: FloatArray, room: FloatArray, stiffness: float, schedule: Schedule
+    state: FloatArray,
+    h: float,
+    places: FloatArray,
+    clearances: FloatArray,
+    gains: tuple[float, float, float],
+    smoothing: float,
 ) -> None:
-    """One step of (s, s', s_G) with the governor's speed held: it changes slowly against the step."""
+    """Take one step of (s, s', s_G) at constant speed of p_G, which changes slowly against the step."""
     s, v, g = state[0], state[1], state[2]
-    damping, gain = schedule.damping * sqrt(stiffness), schedule.governor * sqrt(stiffness)
-    energy = 0.5 * (v * v + stiffness * (s - g) ** 2)
-    d = _clearance_at(places, room, g)
-    margin = 0.5 * stiffness * d * d - energy
-    speed = 0.0
-    if margin > 0.0:
-        root = sqrt(margin / stiffness + schedule.smoothing**2) - schedule.smoothing
-        speed = min(gain * min(1.0, root), schedule.attraction * max(places[-1] - g, 0.0))
+    stiffness, damping, gain = gains
+    d = _clearance_at(places, clearances, g)
+    margin = energy_margin(tracking_energy(s - g, 0.0, v, 0.0, stiffness), d, stiffness)
+    field = FIELD_SPEED * min(1.0, max(places[-1] - g, 0.0) / slowdown_radius(FIELD_SPEED, gain))
+    speed, _ = governor_velocity(field, 0.0, margin, stiffness, gain, smoothing)
     middle = g + 0.5 * h * speed
-    a1 = -stiffness * (s - g) - damping * v
+    a1 = governed_acceleration(s, v, g, stiffness, damping)
     v2 = v + 0.5 * h * a1
-    a2 = -stiffness * (s + 0.5 * h * v - middle) - damping * v2
+    a2 = governed_acceleration(s + 0.5 * h * v, v2, middle, stiffness, damping)
     v3 = v + 0.5 * h * a2
-    a3 = -stiffness * (s + 0.5 * h * v2 - middle) - damping * v3
+    a3 = governed_acceleration(s + 0.5 * h * v2, v3, middle, stiffness, damping)
     v4 = v + h * a3
-    a4 = -stiffness * (s + h * v3 - g - h * speed) - damping * v4
+    a4 = governed_acceleration(s + h * v3, v4, g + h * speed, stiffness, damping)
     state[0] = s + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
     state[1] = v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
     state[2] = g + h * speed
 
 
 @compiled
-def _pull(x: float, rate: float, time: float, axis: FloatArray, log_gain: float, schedule: Schedule) -> float:
-    """Acceleration of one axis; ``axis`` is (slice lower, upper, goal lower, upper, lambda)."""
-    value, first, second = decay(time, axis[4], schedule.smooth)
-    below, above = axis[0] - axis[2], axis[1] - axis[3]
-    acceleration, _ = track_axis(
-        x,
-        rate,
-        axis[2] + below * value,
-        axis[3] + above * value,
-        below * first,
-        above * first,
-        below * second,
-        above * second,
-        log_gain,
-        schedule.position_gain,
-        schedule.rate_gain,
-    )
-    return acceleration
-
-
-@compiled
-def _advance_axis(
-    state: FloatArray, at: int, m: int, time: float, axis: FloatArray, log_gain: float, schedule: Schedule
-) -> None:
-    """One period of one axis, in as many steps as its stiffness needs now."""
-    value, _, _ = decay(time, axis[4], schedule.smooth)
-    lower = axis[2] + (axis[0] - axis[2]) * value
-    upper = axis[3] + (axis[1] - axis[3]) * value
-    width = upper - lower
-    dl = min(max(state[at] - lower, 1e-3 * width), width)
-    du = min(max(upper - state[at], 1e-3 * width), width)
-    fastest = width / (dl * du) * sqrt(log_gain * (1.0 + abs(log(dl / du))))
-    steps = int(min(max(np.ceil(PERIOD * fastest / STEP_PER_PERIOD), 1.0), MOST_STEPS))
+def _advance_axis(state: FloatArray, at: int, m: int, time: float, row: FloatArray) -> None:
+    """Advance one axis by one period, in as many steps as its stiffness needs now."""
+    fastest = axis_frequency(row, time, state[at], SATURATION)
+    steps = int(min(max(np.ceil(PERIOD * fastest / RADIANS_PER_STEP), 1.0), MOST_STEPS))
     h = PERIOD / steps
     for k in range(steps):
         t = time + k * h
         x, v1 = state[at], state[at + m]
-        a1 = _pull(x, v1, t, axis, log_gain, schedule)
+        a1 = track_row(row, t, x, v1)[0]
         v2 = v1 + 0.5 * h * a1
-        a2 = _pull(x + 0.5 * h * v1, v2, t + 0.5 * h, axis, log_gain, schedule)
+        a2 = track_row(row, t + 0.5 * h, x + 0.5 * h * v1, v2)[0]
         v3 = v1 + 0.5 * h * a2
-        a3 = _pull(x + 0.5 * h * v2, v3, t + 0.5 * h, axis, log_gain, schedule)
+        a3 = track_row(row, t + 0.5 * h, x + 0.5 * h * v2, v3)[0]
         v4 = v1 + h * a3
-        a4 = _pull(x + h * v3, v4, t + h, axis, log_gain, schedule)
+        a4 = track_row(row, t + h, x + h * v3, v4)[0]
         state[at] = x + h / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4)
         state[at + m] = v1 + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
 
 
 @compiled
-def _may_leave(
-    state: FloatArray,
-    target: float,
-    room: float,
-    stiffness: float,
-    goals: FloatArray,
-    gates: FloatArray,
-    tolerance: float,
-) -> bool:
-    """The conditions of readiness, those of arrival where a tolerance is given."""
-    s, v, g = state[0], state[1], state[2]
-    m = goals.shape[1]
+def _arrived(state: FloatArray, target: float, table: FloatArray, tolerance: float) -> bool:
+    """Return whether the goal is reached and the motion has ended."""
+    m = table.shape[0]
     for a in range(m):
-        half = 0.5 * (goals[1, a] - goals[0, a])
-        share = 1.0 - 2.0 * EROSION if tolerance > 0.0 else LEAVING_SHARE
-        if abs(state[3 + a] - goals[0, a] - half) > share * half:
+        if axis_arrival(table[a], state[3 + a], state[3 + m + a]) < 0.0:
             return False
-        if abs(state[3 + m + a]) > (RATE_TOLERANCE if tolerance > 0.0 else gates[a]):
+    return bool(position_arrival(abs(state[0] - target), abs(state[1]), tolerance) >= 0.0)
+
+
+@compiled
+def _may_leave(
+    state: FloatArray, target: float, clearance: float, stiffness: float, table: FloatArray, allowance: float
+) -> bool:
+    """Return whether the next box, of which only the clearance at the target is known, may be entered."""
+    m = table.shape[0]
+    for a in range(m):
+        row = table[a]
+        if interval_margin(state[3 + a], row[GOAL_LOWER], row[GOAL_UPPER], LEAVING_EROSION) < 0.0:
             return False
-    if tolerance > 0.0:
-        return bool(abs(s - target) <= (1.0 - EROSION) * tolerance and abs(v) <= SPEED_TOLERANCE)
-    # The next cell's clearance at p_G is at least what it is at the target less the way to go.
-    left = max(room - abs(target - g), 0.0)
-    lag = v * v / stiffness + (s - g) ** 2
-    return bool(left * left - lag >= (CLEARANCE_FRACTION * room) ** 2)
+        if abs(state[3 + m + a]) > RATE_FRACTION * sqrt(2.0 * allowance * row[LOG_GAIN]):
+            return False
+    s, v, g = state[0], state[1], state[2]
+    # The next cell's clearance at p_G is at least that at the target less the distance to the target.
+    left = max(clearance - abs(target - g), 0.0)
+    margin = energy_margin(tracking_energy(s - g, 0.0, v, 0.0, stiffness), left, stiffness)
+    return bool(clearance_margin(margin, stiffness, clearance) >= 0.0)
 
 
 @compiled
 def cross_box(
     state: FloatArray,
     places: FloatArray,
-    room: FloatArray,
+    clearances: FloatArray,
     lower: FloatArray,
     upper: FloatArray,
     goals: FloatArray,
@@ -221,17 +151,17 @@ def cross_box(
     tolerance: float,
     limit: float,
 ) -> float:
-    """Simulate the way through one box.
+    """Simulate the motion through one box.
 
     Args:
         state: (s, s', s_G, axes, axis rates), shape (3 + 2 m,); changed in place [m, m/s, rad].
-        places: Where the waypoints lie along the whole way, the last one the target, shape (k,) [m].
-        room: Clearance at them, shape (k,) [m].
+        places: Where the waypoints lie along the whole path, the last one the target, shape (k,) [m].
+        clearances: Clearance at the waypoints, shape (k,) [m].
         lower: Lower ends of the slice, shape (m,).
-        upper: Upper ends, shape (m,).
+        upper: Upper ends of the slice, shape (m,).
         goals: Lower and upper ends of the goal intervals, shape (2, m).
         resting: Where the axes were aimed at before, shape (m,).
-        schedule: Gains.
+        schedule: The rule that gives the gains.
         tolerance: Of the goal's position in the last box, otherwise 0 [m].
         limit: Longest time [s].
 
@@ -239,20 +169,23 @@ def cross_box(
         Time that passed [s]; infinite beyond the limit.
     """
     m = len(lower)
-    neck = max(room.min(), 1e-4)
-    stiffness, rates, log_gains = scheduled_laws(schedule, neck, lower, upper, goals[0], goals[1], resting)
-    axes = np.empty((m, 5))
+    gains = scheduled_governor(schedule, max(clearances.min(), LEAST_CLEARANCE))
+    table = np.empty((m, LAW_COLUMNS))
     for a in range(m):
-        axes[a, 0], axes[a, 1], axes[a, 2], axes[a, 3] = lower[a], upper[a], goals[0, a], goals[1, a]
-        axes[a, 4] = rates[a]
-    gates = GATE_SHARE * np.sqrt(2.0 * schedule.allowance * log_gains)
+        ends = lower[a], upper[a], goals[0, a], goals[1, a]
+        scheduled = scheduled_axis(schedule, a > 0, ends[0], ends[1], ends[2], ends[3], resting[a])
+        gains_of_axes = schedule.position_gain, schedule.rate_gain
+        write_row(table[a], ends, scheduled, gains_of_axes, schedule.smooth)
     time = 0.0
     while time <= limit:
-        if _may_leave(state, places[-1], room[-1], stiffness, goals, gates, tolerance):
+        if tolerance > 0.0:
+            if _arrived(state, places[-1], table, tolerance):
+                return time
+        elif _may_leave(state, places[-1], clearances[-1], gains[0], table, schedule.energy_allowance):
             return time
         for _ in range(2):
-            _advance_position(state, 0.5 * PERIOD, places, room, stiffness, schedule)
+            _advance_position(state, 0.5 * PERIOD, places, clearances, gains, schedule.smoothing)
         for a in range(m):
-            _advance_axis(state, 3 + a, m, time, axes[a], log_gains[a], schedule)
+            _advance_axis(state, 3 + a, m, time, table[a])
         time += PERIOD
     return np.inf

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import ceil, sqrt
+from math import ceil
 
 import numpy as np
 
@@ -13,8 +12,8 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import SweptTree
-from coop_drake.laws import FixedGains, GainSet
-from coop_drake.laws.governor import ATTRACTION_RATE
+from coop_drake.laws import GainSet
+from coop_drake.laws.gain_schedule import schedule_of
 from coop_drake.planning.boxes.box_kernels import BoxArrays, padded
 from coop_drake.planning.boxes.boxes import Regions
 from coop_drake.planning.boxes.certify import PathBox, box_arrays
@@ -22,7 +21,6 @@ from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.cells.slices import nearest_turn
 from coop_drake.planning.execution.channel_ends import final_intervals
 from coop_drake.planning.improvement.box_choice import Course, choose_boxes, fits
-from coop_drake.planning.improvement.box_crossing import Schedule
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.sampling.obstacle_grid import Walls, walls_under
 from coop_drake.tree.pose import FloatArray
@@ -173,46 +171,3 @@ def _proved(course: Course, regions: Regions, first: int, last: int, pad: int) -
     if box is None:
         return None
     return FreeBox(to_polygon(box.full.section), to_polygon(box.core.section), lower, upper)
-
-
-def schedule_of(gain_set: GainSet) -> Schedule:
-    """The numbers of a gain set, fixed gains as a schedule whose bounds are equal."""
-    if isinstance(gain_set, FixedGains):
-        root = sqrt(gain_set.stiffness)
-        rates = [[gain_set.angle_decay_rate] * 2, [gain_set.joint_decay_rate] * 2]
-        return _schedule(
-            gain_set, (0.0, gain_set.stiffness, gain_set.stiffness),
-            (gain_set.damping / root, gain_set.governor_gain / root), (0.0, rates),
-            (gain_set.log_gain, np.inf),
-        )  # fmt: skip
-    rates = [[gain_set.min_decay_rate, gain_set.max_decay_rate]] * 2
-    return _schedule(
-        gain_set, (gain_set.wall_stiffness, gain_set.min_stiffness, gain_set.max_stiffness),
-        (gain_set.damping_factor, gain_set.governor_factor), (gain_set.funnel_acceleration, rates),
-        (gain_set.max_log_gain, gain_set.log_acceleration),
-    )  # fmt: skip
-
-
-def _schedule(
-    gain_set: GainSet,
-    stiffness: tuple[float, float, float],
-    factors: tuple[float, float],
-    decay: tuple[float, Sequence[Sequence[float]]],
-    log_gains: tuple[float, float],
-) -> Schedule:
-    return Schedule(
-        wall_stiffness=stiffness[0],
-        stiffness=np.array(stiffness[1:]),
-        damping=factors[0],
-        governor=factors[1],
-        smoothing=gain_set.smoothing,
-        attraction=ATTRACTION_RATE,
-        smooth=gain_set.funnel == "smooth",
-        acceleration=decay[0],
-        decay=np.array(decay[1], dtype=float),
-        log_gain=log_gains[0],
-        log_acceleration=log_gains[1],
-        position_gain=gain_set.position_gain,
-        rate_gain=gain_set.rate_gain,
-        allowance=gain_set.energy_allowance,
-    )

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from coop_drake.laws import FixedGains, Funnel, ScheduledGains, funnel_acceleration, transition_gains
-from coop_drake.laws.schedule import stiffness_for_neck
+from coop_drake.laws.gain_schedule import schedule_of, scheduled_governor
 
 SLICE = {"slice_lower": np.array([0.0, -1.0]), "slice_upper": np.array([1.0, 1.0])}
 GOAL = {"goal_lower": np.array([0.8, -1.0]), "goal_upper": np.array([1.0, 1.0])}
@@ -19,7 +19,7 @@ def schedule(gain_set, *, neck=0.2, **changes):
 )
 def test_stiffness_follows_the_neck_between_its_bounds(neck, stiffness):
     gains = schedule(ScheduledGains(), neck=neck)
-    assert stiffness_for_neck(ScheduledGains(), neck) == pytest.approx(stiffness, rel=1e-14)
+    assert scheduled_governor(schedule_of(ScheduledGains()), neck)[0] == pytest.approx(stiffness, rel=1e-14)
     assert gains.stiffness == pytest.approx(stiffness, rel=1e-14)
     assert gains.damping == pytest.approx(np.sqrt(stiffness))
     assert gains.governor_gain == pytest.approx(0.8 * np.sqrt(stiffness))

@@ -1,15 +1,10 @@
 import numpy as np
 import pytest
 
-from coop_drake.laws import (
-    acceleration_at,
-    consistent_projector,
-    grasp_matrix,
-    robot_acceleration,
-    robot_torque,
-    wrench_share,
-)
+from coop_drake.laws.load_sharing import end_effector_command
+from coop_drake.laws.robot_dynamics import frame_twist, robot_effort
 from tests.support.planar_arm import random_arm, random_state
+from tests.support.robot_matrices import consistent_projector, grasp_matrix, robot_acceleration
 
 
 @pytest.mark.parametrize("joints", [0, 1, 2, 4])
@@ -30,23 +25,19 @@ def test_the_closed_form_of_the_arm_satisfies_the_equations_of_motion(joints):
 
 @pytest.mark.parametrize("joints", [0, 1, 2, 4])
 def test_end_effector_and_joints_accelerate_as_asked(joints):
+    """Solve the equations of motion (2) with the effort of the law and the object's reaction."""
     rng = np.random.default_rng(10 + joints)
     arm = random_arm(rng, joints)
     z, v = random_state(rng, joints)
     _, jacobian, rate_term = arm.end_effector(z, v)
-    wanted, joint_wanted = rng.normal(size=3), rng.normal(size=joints)
-    acceleration = robot_acceleration(wanted, joint_wanted, jacobian=jacobian, jacobian_rate_term=rate_term)
-    assert jacobian @ acceleration + rate_term == pytest.approx(wanted, abs=1e-12)
-    assert acceleration[3:].tolist() == joint_wanted.tolist()
-
-
-def test_any_invertible_base_and_memory_layout_will_do():
-    """Bases may be driven in any directions, and matrices may lie in memory column by column."""
-    rng = np.random.default_rng(3)
-    jacobian, wanted, joints = rng.normal(size=(3, 5)), rng.normal(size=3), rng.normal(size=2)
-    for same in (jacobian, np.asfortranarray(jacobian), np.repeat(jacobian, 2, axis=1)[:, ::2]):
-        z = robot_acceleration(wanted, joints, jacobian=same, jacobian_rate_term=np.ones(3))
-        assert jacobian @ z + 1.0 == pytest.approx(wanted, abs=1e-12)
+    mass_matrix, bias = arm.dynamics(z, v)
+    command, axes, effort = rng.normal(size=6), rng.normal(size=1 + joints), np.empty(3 + joints)
+    robot = np.concatenate([z, v])
+    robot_effort(arm.chain(), robot, command, axes, effort)
+    acceleration = np.linalg.solve(mass_matrix, effort - bias - jacobian.T @ command[3:])
+    assert jacobian @ acceleration + rate_term == pytest.approx(command[:3], abs=1e-10)
+    assert acceleration[3:] == pytest.approx(axes[1:], abs=1e-10)
+    assert frame_twist(arm.chain(), robot) == pytest.approx(jacobian @ v)
 
 
 @pytest.mark.parametrize("joints", [(1, 1), (2, 1, 3), (1, 0, 2, 1, 2)])
@@ -77,13 +68,14 @@ def test_the_team_moves_the_object_as_commanded_and_loads_every_grasp_by_its_sha
         _, jacobian, rate_term = arm.end_effector(z, v)
         mass_matrix, bias = arm.dynamics(z, v)
         joint_wanted = rng.normal(size=n)
-        share = wrench_share(
-            wanted, rate, offset, com_offset=com_offset, mass=mass, inertia=inertia, share=shares[k]
+        load = np.array([*offset, *com_offset, mass, inertia, shares[k]])
+        command, torque, axes = np.empty(6), np.empty(3 + n), np.array([wanted[2], *joint_wanted])
+        end_effector_command(load, np.array([0.0, 0.0, 0.0, 0.0, 0.0, rate]), wanted[:2], axes, command)
+        robot_effort(arm.chain(), np.concatenate([z, v]), command, axes, torque)
+        z_wanted = robot_acceleration(
+            command[:3], joint_wanted, jacobian=jacobian, jacobian_rate_term=rate_term
         )
-        at_grasp = acceleration_at(wanted, rate, offset)
-        z_wanted = robot_acceleration(at_grasp, joint_wanted, jacobian=jacobian, jacobian_rate_term=rate_term)
-        torque = robot_torque(z_wanted, share, mass_matrix=mass_matrix, bias=bias, jacobian=jacobian)
-        commanded.append((z_wanted, share))
+        commanded.append((z_wanted, command[3:]))
         z_slice, w_slice = slice(columns, columns + 3 + n), slice(wrench_at + 3 * k, wrench_at + 3 * k + 3)
         system[:3, w_slice] = -grasp_matrix(offset - com_offset).T
         system[row : row + 3 + n, z_slice] = mass_matrix

@@ -1,0 +1,123 @@
+"""Funnel and gains of every axis of one cell as a table of numbers, one row for each axis.
+
+Compiled code reads the table, because handing over one array is much quicker than handing over ten.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coop_drake.compiled import compiled
+from coop_drake.laws.funnels import Funnel, axis_bounds
+from coop_drake.laws.gains import FloatArray, TransitionGains
+from coop_drake.laws.ppc import track_axis
+
+__all__ = [
+    "ENERGY_BOUND",
+    "GOAL_LOWER",
+    "GOAL_UPPER",
+    "LAW_COLUMNS",
+    "LOG_GAIN",
+    "axis_table",
+    "bounds_of",
+    "track_axes",
+    "track_row",
+    "write_bounds",
+    "write_row",
+]
+
+LAW_COLUMNS = 10
+"""Columns of a table: slice and goal interval [rad or m], lambda [1/s], 1 where the funnel is smooth and 0
+where it is not, kappa [rad^2/s^2 or m^2/s^2], k1 [1/s], k2 [1/s], and the largest V with which the cell may
+be entered."""
+
+GOAL_LOWER, GOAL_UPPER, LOG_GAIN, ENERGY_BOUND = 2, 3, 6, 9
+"""Some of these columns by name."""
+
+
+def axis_table(funnel: Funnel, gains: TransitionGains) -> FloatArray:
+    """Return the table of some axes, shape (m, ``LAW_COLUMNS``).
+
+    Args:
+        funnel: Funnels of m axes.
+        gains: Gains, those of each axis of shape (m,).
+    """
+    table = np.empty((funnel.goal_lower.size, LAW_COLUMNS))
+    smooth = funnel.shape == "smooth"
+    for i, row in enumerate(table):
+        write_row(
+            row,
+            (funnel.slice_lower[i], funnel.slice_upper[i], funnel.goal_lower[i], funnel.goal_upper[i]),
+            (funnel.decay_rate[i], gains.log_gain[i], gains.energy_bound[i]),
+            (gains.position_gain, gains.rate_gain),
+            smooth,
+        )
+    return table
+
+
+@compiled
+def write_row(
+    row: FloatArray,
+    intervals: tuple[float, float, float, float],
+    scheduled: tuple[float, float, float],
+    gains: tuple[float, float],
+    smooth: bool,
+) -> None:
+    """Write one row of a table.
+
+    Args:
+        row: Receives the numbers, shape (``LAW_COLUMNS``,).
+        intervals: Slice and goal interval [rad or m].
+        scheduled: lambda, kappa and the largest V, as ``scheduled_axis`` returns them.
+        gains: k1 and k2 [1/s].
+        smooth: Whether the funnel is smooth.
+    """
+    row[0], row[1], row[GOAL_LOWER], row[GOAL_UPPER] = intervals
+    row[4], row[LOG_GAIN], row[ENERGY_BOUND] = scheduled
+    row[5], row[7], row[8] = 1.0 if smooth else 0.0, gains[0], gains[1]
+
+
+@compiled
+def bounds_of(row: FloatArray, time: float) -> tuple[float, float, float, float, float, float]:
+    """Return ``axis_bounds`` of one axis from its row, ``time`` [s] after the cell was entered."""
+    return axis_bounds(time, row[0], row[1], row[2], row[3], row[4], row[5] != 0.0)
+
+
+@compiled
+def track_row(row: FloatArray, time: float, position: float, rate: float) -> tuple[float, float]:
+    """Return ``track_axis`` of one axis from its row.
+
+    Args:
+        row: The axis, shape (``LAW_COLUMNS``,).
+        time: Time since the cell was entered [s].
+        position: x [rad or m].
+        rate: x' [rad/s or m/s].
+    """
+    return track_axis(position, rate, bounds_of(row, time), row[LOG_GAIN], row[7], row[8])
+
+
+@compiled
+def track_axes(
+    table: FloatArray, time: float, object_state: FloatArray, robot: FloatArray, acceleration: FloatArray
+) -> None:
+    """Write the desired accelerations of the object's angle and of one robot's joints.
+
+    Args:
+        table: The axes (theta, q_k), shape (1 + n, ``LAW_COLUMNS``).
+        time: Time since the cell was entered [s].
+        object_state: Pose and twist of the object, shape (6,).
+        robot: (z_k, z_k'), shape (2 (3 + n),); not read where the robot has no joints.
+        acceleration: Receives theta'' and q_k'', shape (1 + n,) [rad/s^2 or m/s^2].
+    """
+    n = table.shape[0] - 1
+    acceleration[0] = track_row(table[0], time, object_state[2], object_state[5])[0]
+    for i in range(n):
+        acceleration[1 + i] = track_row(table[1 + i], time, robot[3 + i], robot[6 + n + i])[0]
+
+
+@compiled
+def write_bounds(table: FloatArray, time: float, bounds: FloatArray) -> None:
+    """Write the lower, then the upper funnel bounds of all axes, shape (2 m,) [rad or m]."""
+    m = table.shape[0]
+    for i in range(m):
+        bounds[i], bounds[m + i] = bounds_of(table[i], time)[:2]

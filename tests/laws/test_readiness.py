@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+
+from coop_drake.laws import Funnel, ScheduledGains, axis_table, transition_gains
+from coop_drake.laws.readiness import clearance_margin, funnel_margin, interval_margin
+from coop_drake.systems.ready_kernels import ready_conditions
+from tests.support.readiness import margin_of, square_with_clearance
+
+GOAL = {"goal_lower": np.array([0.8, -0.2]), "goal_upper": np.array([1.0, 0.2])}
+INTERVALS = {"slice_lower": np.array([0.0, -1.0]), "slice_upper": np.array([1.0, 1.0]), **GOAL}
+NEXT_INTERVALS = {
+    "slice_lower": np.array([0.8, -0.2]),
+    "slice_upper": np.array([1.8, 1.0]),
+    "goal_lower": np.array([1.6, 0.6]),
+    "goal_upper": np.array([1.8, 1.0]),
+}
+
+
+def table_of(intervals, resting):
+    gains = transition_gains(ScheduledGains(), neck=0.2, resting=np.array(resting), **intervals)
+    return axis_table(Funnel(**intervals, decay_rate=gains.decay_rate, shape=gains.funnel), gains), gains
+
+
+TABLE, _ = table_of(INTERVALS, [0.4, 0.5])
+NEXT_TABLE, NEXT_GAINS = table_of(NEXT_INTERVALS, [0.9, 0.0])
+AT_REST = {
+    "position": [3.0, 1.0],
+    "velocity": [0.0, 0.0],
+    "governor_position": [3.0, 1.0],
+    "axes": [0.9, 0.0],
+    "rates": [0.0, 0.0],
+}
+
+
+def ready(next_clearance=0.3, inradius=0.3, **change):
+    state = {**AT_REST, **change}
+    edges = square_with_clearance(state["governor_position"], next_clearance)
+    conditions = ready_conditions(
+        [TABLE, NEXT_TABLE], [edges, edges], [50.0, NEXT_GAINS.stiffness], [inradius, 0.1], np.zeros(2), 0.01
+    )
+    return margin_of(conditions[0], **state)
+
+
+def test_a_robot_at_rest_in_the_middle_of_the_goal_is_ready():
+    assert ready() > 0.0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"axes": [0.815, 0.0]},
+        {"axes": [0.9, 0.19]},
+        {"rates": [0.0, -1.0]},
+        {"rates": [1.0, 0.0]},
+        {"velocity": [4.0, 0.0]},
+        {"position": [3.29, 1.0]},
+        {"next_clearance": 0.1},
+        {"next_clearance": -0.3},
+    ],
+)
+def test_every_condition_alone_keeps_a_robot_from_being_ready(change):
+    assert ready(**change) < 0.0
+
+
+def test_intervals_are_eroded_by_a_tenth_of_their_width():
+    assert interval_margin(0.5, 0.0, 1.0) == 1.0
+    assert interval_margin(0.1, 0.0, 1.0) == pytest.approx(0.0, abs=1e-15)
+    assert interval_margin(0.9, -1.0, 1.0) < 0.0
+    assert interval_margin(0.9, -1.0, 1.0, 0.0) == pytest.approx(0.1)
+
+
+def test_clearance_counts_from_half_the_inradius():
+    floor = 0.5 * 100.0 * 0.15**2
+    assert clearance_margin(floor, 100.0, 0.3) == 0.0
+    assert clearance_margin(2.0 * floor, 100.0, 0.3) == pytest.approx(0.5)
+    assert clearance_margin(-floor, 100.0, 0.3) == pytest.approx(-2.0)
+
+
+def test_the_next_cell_is_judged_by_its_own_stiffness():
+    """With K = 100 and d = 0.02 m there is room for 0.17 m/s, whatever the present stiffness."""
+    assert NEXT_GAINS.stiffness == 100.0
+    assert ready(next_clearance=0.02, inradius=0.02) > 0.0
+    assert ready(next_clearance=0.02, inradius=0.02, velocity=[0.18, 0.0]) < 0.0
+    assert ready(next_clearance=0.02, inradius=0.02, velocity=[0.17, 0.0]) > 0.0
+
+
+def test_the_funnel_margin_vanishes_at_the_energy_bound():
+    assert funnel_margin(0.3, 0.3) == 0.0
+    assert funnel_margin(0.0, 0.3) == 1.0
+    assert funnel_margin(0.6, 0.3) == pytest.approx(-0.5)
+
+
+ARRIVED = {
+    "position": [5.0, 8.004],
+    "velocity": [0.0, 0.004],
+    "governor_position": [5.0, 8.0],
+    "axes": [4.66, 0.3],
+    "rates": [0.01, 0.0],
+}
+
+
+def arrival(**change):
+    intervals = {
+        "slice_lower": np.array([4.0, -1.0]),
+        "slice_upper": np.array([5.0, 1.0]),
+        "goal_lower": np.array([4.643, -1.0]),
+        "goal_upper": np.array([4.683, 1.0]),
+    }
+    table, gains = table_of(intervals, [4.5, 0.0])
+    edges = square_with_clearance([5.0, 8.0], 0.3)
+    conditions = ready_conditions([table], [edges], [gains.stiffness], [0.3], np.array([5.0, 8.0]), 0.01)
+    return margin_of(conditions[0], **{**ARRIVED, **change})
+
+
+def test_arrival_needs_place_angle_and_rest():
+    assert arrival() > 0.0
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"position": [5.0, 8.0095]},
+        {"velocity": [0.0, 0.011]},
+        {"axes": [4.644, 0.3]},
+        {"rates": [0.01, -0.03]},
+    ],
+)
+def test_every_condition_alone_delays_arrival(change):
+    assert arrival(**change) < 0.0
