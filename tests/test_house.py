@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from importlib import import_module
@@ -82,3 +83,13 @@ def test_the_laws_import_without_shapes_and_graphs():
     loaded = "{'shapely', 'networkx'} & set(sys.modules)"
     code = f"import sys; from coop_drake.laws import *; sys.exit(bool({loaded}))"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_contributing_names_every_package_and_nothing_else():
+    text = (HOUSE.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^\| `([\w/]+)/` \|", text, flags=re.MULTILINE))
+    inner = {f"planning/{path.parent.name}" for path in (HOUSE / "planning").glob("*/__init__.py")}
+    outer = {path.parent.name for path in HOUSE.glob("*/__init__.py")} - {"planning"}
+    assert listed == outer | inner
+    for path in re.findall(r"^\| [^|`]+ \| `([\w/]+\.py)` \|", text, flags=re.MULTILINE):
+        assert (HOUSE / path).is_file()
