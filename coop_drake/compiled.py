@@ -94,6 +94,20 @@ def _file_digest(path: str) -> str:
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
 
 
+class _Index(IndexDataCacheFile):  # type: ignore[misc]
+    """Numba's index of the machine code of one function, empty where an older version of the code wrote it.
+
+    An index holds the types of arguments. Numba reads them before it compares stamps, which fails if one was
+    a class that is no longer there.
+    """
+
+    def _load_index(self) -> dict[object, str]:
+        try:
+            return cast(dict[object, str], super()._load_index())
+        except (ImportError, AttributeError):
+            return {}
+
+
 class _KernelCache(FunctionCache):  # type: ignore[misc]
     """Numba's cache on disk with ``kernel_stamp`` in place of the digest of one file.
 
@@ -105,7 +119,7 @@ class _KernelCache(FunctionCache):  # type: ignore[misc]
     def __init__(self, function: Any, use: str) -> None:
         super().__init__(function)
         self.stamp, self._use = kernel_stamp(function), use
-        self._cache_file = IndexDataCacheFile(
+        self._cache_file = _Index(
             cache_path=self._cache_path, filename_base=self._impl.filename_base, source_stamp=self.stamp
         )
 

@@ -41,3 +41,26 @@ def test_an_edited_callee_compiles_its_callers_anew(tmp_path):
     assert run(tmp_path) == ["7.0", "6.0", "1"]
     (tmp_path / "callee.py").write_text(CALLEE.format(factor=5.0))
     assert run(tmp_path) == ["11.0", "10.0", "0"]
+
+
+PAIR = """
+from typing import NamedTuple
+from coop_drake.compiled import compiled
+
+class {name}(NamedTuple):
+    x: float
+
+@compiled
+def first(pair):
+    return pair.x
+
+print(first({name}(4.0)), sum(first.stats.cache_hits.values()))
+"""
+
+
+def test_a_class_that_an_older_version_had_is_no_error(tmp_path):
+    (tmp_path / "caller.py").write_text("import pairs")
+    for name in ("Pair", "Couple"):
+        (tmp_path / "pairs.py").write_text(PAIR.format(name=name))
+        assert run(tmp_path) == ["4.0", "0"]
+    assert run(tmp_path) == ["4.0", "1"]

@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 from pathlib import Path, PurePosixPath
 
+import numpy as np
 import pytest
 from pydrake.systems.framework import DiagramBuilder
 
+from coop_drake.diagram import build_closed_loop
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.scenario import load_scenario
 from coop_drake.scenario.model import Scenario
@@ -19,14 +21,22 @@ from docs.generate.links import for_site
 from docs.generate.port_tables import as_markdown
 from docs.generate.scenario_keys import sections
 from docs.generate.scenario_page import scenario_page
+from tests.support.scenarios import write_scenario
+from tests.support.small_loop import joint_names, small_maps, small_scenario
+from tests.support.small_plan import small_plan
 
 ROOT = Path(__file__).parents[1]
 
 
+def all_shown(page, language):
+    """The blocks of code of a language on a page."""
+    text = (ROOT / "docs" / "how_to" / page).read_text(encoding="utf-8")
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+
+
 def shown(page, language):
     """The first block of code of a language on a page."""
-    text = (ROOT / "docs" / "how_to" / page).read_text(encoding="utf-8")
-    return re.search(rf"```{language}\n(.*?)```", text, re.DOTALL)[1]
+    return all_shown(page, language)[0]
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +94,7 @@ def test_the_robot_that_is_shown_makes_a_team(tmp_path):
 def test_the_block_that_is_shown_stands_in_for_the_funnel():
     names = {}
     exec(shown("controller_block.md", "python"), names)  # the page's own code
-    block = names["SpringAxes"]([0.5, 0.1], stiffness=4.0, damping=2.0)
+    block = names["SpringAxes"]([0.5, 0.1], stiffness=4.0, damping=2.0, bound=0.1)
     outputs = {block.get_output_port(i).get_name() for i in range(block.num_output_ports())}
     assert outputs == set(re.findall(r"output  ``(\w+)``", AxisPpc.__doc__))
     context = block.CreateDefaultContext()
@@ -93,6 +103,27 @@ def test_the_block_that_is_shown_stands_in_for_the_funnel():
     expected = [-4 * 0.2 - 2 * 0.1, -4 * 0.3 + 2 * 0.3]
     assert block.GetOutputPort("axis_acceleration").Eval(context) == pytest.approx(expected)
     assert block.GetOutputPort("funnels").Eval(context) == pytest.approx([0.4, 0.0, 0.6, 0.2])
+
+
+def test_a_transport_arrives_with_the_block_that_is_shown(tmp_path, monkeypatch, capsys):
+    block, use = all_shown("controller_block.md", "python")
+    assert len([line for line in use.splitlines() if line.strip()]) <= 10
+    monkeypatch.chdir(tmp_path)
+    write_scenario(tmp_path / "room.scenario.yaml")
+    names = {}
+    exec(block, names)
+    exec(use, names)
+    assert capsys.readouterr().out.strip() == "reached: True"
+    assert np.ptp(names["log"].funnel_lower[:, 0]) == 0.0
+
+
+def test_only_named_blocks_that_exist_can_be_replaced():
+    scenario = small_scenario()
+    plan = small_plan(joint_names(scenario))
+    with pytest.raises(ValueError, match="'axis_pcc' is not allowed; expected one of object_estimator"):
+        build_closed_loop(scenario, plan, small_maps(), replacements={"axis_pcc": AxisPpc})
+    with pytest.raises(ValueError, match="fused blocks cannot be replaced"):
+        build_closed_loop(scenario, plan, (), blocks="fused", replacements={"axis_ppc": AxisPpc})
 
 
 def test_tables_of_ports_become_tables_of_markdown():

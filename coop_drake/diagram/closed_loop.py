@@ -12,7 +12,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import DeployedController, deploy
 from coop_drake.diagram.fused import FusedControllers, add_fused_controllers
 from coop_drake.diagram.knowledge import robot_knowledge
-from coop_drake.diagram.robot_controller import build_robot_controller
+from coop_drake.diagram.robot_controller import Replacements, build_robot_controller
 from coop_drake.diagram.station import TransportStation, build_driven_station, build_station
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import TeamPlant, set_configuration
@@ -83,7 +83,12 @@ def _release(diagram: Diagram) -> None:
 
 
 def build_closed_loop(
-    scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], *, blocks: Blocks = "named"
+    scenario: Scenario,
+    plan: Plan,
+    maps: Sequence[HarmonicMap],
+    *,
+    blocks: Blocks = "named",
+    replacements: Replacements | None = None,
 ) -> ClosedLoop:
     """Wire the loop; nothing but ready reports crosses between robots.
 
@@ -93,11 +98,16 @@ def build_closed_loop(
         maps: The harmonic map of every transition.
         blocks: ``named`` for the law as blocks of every robot; ``fused`` for speed alone: one block drives
             the team, and nothing shows any more that robots need no state of each other.
+        replacements: Blocks of a user's own in every robot's controller, see `build_robot_controller`; with
+            named blocks only.
 
     Raises:
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
         ScenarioError: The models do not make a team, or fused blocks do not know what the scenario wants.
+        ValueError: Replacements for fused blocks, or for a block that does not exist.
     """
+    if replacements and blocks == "fused":
+        raise ValueError("replacements: fused blocks cannot be replaced; expected blocks='named'")
     builder = DiagramBuilder()
     station = build_station(scenario) if blocks == "named" else build_driven_station(scenario)
     team = station.team
@@ -111,7 +121,7 @@ def build_closed_loop(
         return ClosedLoop(builder.Build(), station, planner, (), (), controllers, plan)
     built, deployed = [], []
     for k, known in enumerate(knowledge):
-        controller = build_robot_controller(known)
+        controller = build_robot_controller(known, replacements)
         if not scenario.deployment.ideal:
             deployed.append(deploy(controller, scenario.deployment, k))
             controller = deployed[-1].diagram

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +23,7 @@ from coop_drake.systems import (
 )
 from coop_drake.tree.pose import PlanarPose
 
-__all__ = ["TELEMETRY", "RobotKnowledge", "build_robot_controller"]
+__all__ = ["TELEMETRY", "Replacements", "RobotKnowledge", "build_robot_controller"]
 
 TELEMETRY = (
     "object_state",
@@ -63,7 +63,11 @@ class RobotKnowledge:
     period: float | None = None
 
 
-def build_robot_controller(knowledge: RobotKnowledge) -> Diagram:
+Replacements = Mapping[str, Callable[[RobotKnowledge], LeafSystem]]
+"""Blocks of a user's own: the name of the block that each replaces, and what builds it for a robot."""
+
+
+def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements | None = None) -> Diagram:
     """Wire one robot's controller.
 
     ======= ===================== =========== ==========================================================
@@ -77,9 +81,17 @@ def build_robot_controller(knowledge: RobotKnowledge) -> Diagram:
 
     Args:
         knowledge: What the robot is given before the run.
+        replacements: Blocks in place of those of the same name; their ports must have the same names.
+
+    Raises:
+        ValueError: No block has a name among the replacements.
     """
-    builder = DiagramBuilder()
-    blocks = {name: builder.AddNamedSystem(name, block) for name, block in _blocks(knowledge).items()}
+    builder, own = DiagramBuilder(), _blocks(knowledge)
+    for name, build in (replacements or {}).items():
+        if name not in own:
+            raise ValueError(f"replacements: {name!r} is not allowed; expected one of {', '.join(own)}")
+        own[name] = build(knowledge)
+    blocks = {name: builder.AddNamedSystem(name, block) for name, block in own.items()}
     outputs = {
         port.get_name(): port
         for block in blocks.values()

@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from coop_drake.answers.plan import Plan
-from coop_drake.diagram import Blocks, ClosedLoop, build_closed_loop
+from coop_drake.diagram import Blocks, ClosedLoop, Replacements, build_closed_loop
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import read_component_tree
 from coop_drake.scenario import Scenario
@@ -31,6 +31,7 @@ def simulate(
     maps: Sequence[HarmonicMap],
     *,
     blocks: Blocks = "named",
+    replacements: Replacements | None = None,
     progress: Progress | None = None,
     onlooker: Callable[[Sample], None] | None = None,
 ) -> SimulationLog:
@@ -46,6 +47,8 @@ def simulate(
         blocks: ``named`` for the law as blocks of every robot; ``fused`` is several times quicker and equal
             to 1e-12: one block drives the team. It is for many runs; that robots need nothing of each other
             but reports is what named blocks show.
+        replacements: Blocks of a user's own in every robot's controller, by the name of the block that they
+            replace, such as ``axis_ppc``; with named blocks only.
         progress: Told the stage and the fraction done, if given.
         onlooker: Called with every accepted step, for example a live view; it changes nothing about the run.
 
@@ -53,7 +56,7 @@ def simulate(
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
         ScenarioError: The models do not make a team, or fused blocks do not know what the scenario wants.
     """
-    loop = build_closed_loop(scenario, plan, maps, blocks=blocks)
+    loop = build_closed_loop(scenario, plan, maps, blocks=blocks, replacements=replacements)
     try:
         return _simulated(loop, scenario, progress, onlooker)
     finally:
