@@ -359,7 +359,7 @@ CASES = {
     ),
     "weld in the plane": (
         (WELD, WELD[:-1] + ", X_PC: {translation: [0.1, 0]}}"),
-        "directives[3]",
+        "directives[3].add_weld.X_PC",
         ...,
         "a vector of the wrong size",
     ),

@@ -31,6 +31,7 @@ def faults(
         remedy: What stands before the words that help.
     """
     shutil.rmtree(out, ignore_errors=True)
+    file.unlink(missing_ok=True)  # Some file systems write a file that is truncated to the disk at once.
     file.write_bytes(mutant.content)
     before = sorted(file.parent.iterdir())
     said, complained = io.StringIO(), io.StringIO()
