@@ -1,4 +1,4 @@
-"""The typed scenario file: dataclasses, loading and validation."""
+"""Scenario files: their dataclasses, loading, checking and writing."""
 
 import lazy_loader
 

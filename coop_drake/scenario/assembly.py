@@ -1,4 +1,4 @@
-"""Who is who in the directives: the object, the robots, and the weld by which each grasps the object."""
+"""Finds the object, the robots and the grasps in the model directives of a scenario."""
 
 from dataclasses import dataclass
 
@@ -17,11 +17,11 @@ class RobotAssembly:
     """One robot: one model, or several that are welded together.
 
     Attributes:
-        name: Name of the model that the base belongs to; the robot goes by this name.
+        name: Name of the model that the base belongs to; also the robot's name.
         models: Names of its models, in the order of the directives.
-        object_frame: The frame on the object that the grasp's weld starts from, scoped.
-        gripper_frame: The frame on the robot that it ends at, scoped.
-        key: Where the robot's model stands in the scenario file.
+        object_frame: Scoped name of the frame on the object where the grasp's weld begins.
+        gripper_frame: Scoped name of the frame on the robot where it ends.
+        key: Key of the robot's model in the scenario file.
     """
 
     name: str
@@ -36,12 +36,12 @@ class Assembly:
     """The team as the directives describe it.
 
     Attributes:
-        packages: Where ``package://`` addresses lead.
-        directives: Flat, with resolved file addresses.
-        keys: Where each of them stands in the scenario file.
+        packages: Folders of the packages that ``package://`` addresses name.
+        directives: All directives, nested files opened and file addresses resolved.
+        keys: Key of each of them in the scenario file.
         object_model: Name of the object's model.
-        robots: In the order of their base models in the directives.
-        owners: For each directive the models it speaks of.
+        robots: The robots in the order of their base models in the directives.
+        owners: For each directive the models that it adds or connects.
     """
 
     packages: PackageMap
@@ -52,23 +52,23 @@ class Assembly:
     owners: tuple[frozenset[str], ...]
 
     def of_robot(self, index: int) -> tuple[int, ...]:
-        """Indices of the directives that make one robot alone, without its grasp."""
+        """Indices of the directives that add one robot alone, without its grasp."""
         models = frozenset(self.robots[index].models)
-        return tuple(place for place, owners in enumerate(self.owners) if owners and owners <= models)
+        return tuple(number for number, owners in enumerate(self.owners) if owners and owners <= models)
 
 
 def assemble(scenario: Scenario) -> Assembly:
     """Read the team's structure from the scenario's directives.
 
     Raises:
-        ScenarioError: A model or frame is not known, a file is missing, fewer than two robots, a robot that
-            grasps nothing or twice, or anything that is welded to the world.
+        ScenarioError: A model or frame is not known, a file is missing, there are fewer than two robots, a
+            robot has no grasp or two, or a body is welded to the world.
     """
     return _Reader(scenario).assembly()
 
 
 class _Reader:
-    """Walks the directives once; keeps the file and keys at hand for messages."""
+    """Reads the directives of one scenario; its file and keys are for messages."""
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
@@ -96,7 +96,7 @@ class _Reader:
                 self.frames[directive.add_frame.name] = self._owner(base, f"{key}.add_frame.X_PF.base_frame")
 
     def _owner(self, frame: str, key: str) -> str:
-        """Name of the model that a scoped frame belongs to."""
+        """Return the name of the model that a scoped frame belongs to."""
         if frame in self.frames:
             return self.frames[frame]
         scope = frame
@@ -143,7 +143,7 @@ class _Reader:
         )
 
     def _turn_grasps(self, object_model: str) -> None:
-        """Make the object the parent of every grasp, so that all grasp wrenches are read the same way."""
+        """Make the object the parent of every grasp's weld: then all grasp wrenches have the same sign."""
         turned = []
         for key, directive in zip(self.keys, self.directives, strict=True):
             weld = directive.add_weld
@@ -163,7 +163,7 @@ class _Reader:
         return tuple(sorted(robots, key=lambda robot: order.index(robot.name)))
 
     def _groups(self, object_model: str, edges: list[tuple[str, str]]) -> list[tuple[str, ...]]:
-        """Models that hang together without the object."""
+        """Return the groups of models that welds connect when the object is left out."""
         group = {name: name for name in self.models if name != object_model}
         for parent, child in edges:
             if object_model not in (parent, child):

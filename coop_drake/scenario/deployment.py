@@ -1,4 +1,12 @@
-"""What keeps a real team from the ideal one: sampling, noise, delays, limits, errors, lost messages."""
+"""Departures of a real team from the ideal one: sampling, noise, delays, limits, model errors, lost messages.
+
+This file holds the values alone. They are applied in one place, :mod:`coop_drake.diagram.deployment`, which
+puts blocks between every controller and the plant; only ``mass_error`` acts elsewhere, where the controllers'
+model of the team is made (:mod:`coop_drake.diagram.knowledge`). A new departure is a field here, a block
+there, tests in ``tests/diagram/test_deployment.py``, a mild and a harsh case in
+``tests/closed_loop/test_deployment.py``, and a row of ``docs/how_to/deployment.md``. Fused blocks refuse
+every departure that ``coop_drake/diagram/fused.py`` does not list.
+"""
 
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -8,20 +16,26 @@ from coop_drake.typed_data import Limits, NotNegative, Positive
 # No `from __future__ import annotations` here: `typed_data` reads the types of the fields.
 
 Delay = Annotated[float, Limits(at_least=0.0, at_most=10.0)]
-"""A delay [s]; after ten seconds without news no controller of this kind could hold anything."""
+"""A delay [s]; the loop is lost after fractions of a second, so that a longer one is a typing error."""
 
 Probability = Annotated[float, Limits(at_least=0.0, at_most=1.0)]
+
+ControlRate = Annotated[float, Limits(at_least=1.0, at_most=1e4)]
+"""A control rate [Hz]; beyond 10 kHz it would only be a slow way to simulate continuous time."""
+
+MassError = Annotated[float, Limits(at_least=-0.9, at_most=10.0)]
+"""A relative error of masses [-]; at -1 the model would be massless."""
 
 
 @dataclass(frozen=True)
 class Measurements:
-    """How robots perceive the object's pose and their own state, anew in every control period.
+    """How robots measure the object's pose and their own state, once in every control period.
 
     Attributes:
         position_noise: Standard deviation of every measured position [m].
         angle_noise: Standard deviation of every measured angle and of every joint's position [rad or m].
         rate_noise: Standard deviation of every measured rate [m/s or rad/s].
-        delay: Age of what is measured, rounded up to whole control periods [s].
+        delay: Age of a measurement when the controller gets it, rounded up to whole control periods [s].
     """
 
     position_noise: NotNegative = 0.0
@@ -32,12 +46,12 @@ class Measurements:
 
 @dataclass(frozen=True)
 class ActuatorLimits:
-    """What actuators give at most; no limit where nothing is given.
+    """Largest efforts of the actuators; null for no limit.
 
     Attributes:
-        base_force: Along each axis of W, at every base [N].
-        base_torque: At every base [N m].
-        joint_effort: At every joint [N m or N].
+        base_force: Largest force of every base along each axis of W [N].
+        base_torque: Largest torque of every base [N m].
+        joint_effort: Largest effort of every joint [N m or N].
     """
 
     base_force: Positive | None = None
@@ -47,7 +61,7 @@ class ActuatorLimits:
 
 @dataclass(frozen=True)
 class Messages:
-    """How ready reports travel, one a control period from every robot.
+    """How ready reports travel; every robot sends one in each control period.
 
     Attributes:
         loss: Probability that a report is lost [-].
@@ -62,19 +76,20 @@ class Messages:
 
 @dataclass(frozen=True)
 class Deployment:
-    """The team as it would be built; left away, it is ideal and controlled in continuous time.
+    """The team as it would be built; without this section it is ideal and controlled in continuous time.
 
     Attributes:
-        control_rate: How often controllers compute, holding their effort meanwhile; null for always [Hz].
+        control_rate: How often controllers compute a new effort, which is held in between; null for
+            controllers in continuous time [Hz].
         mass_error: By how much robots overestimate all masses and inertias, relative; may be negative [-].
-        measurements: What robots perceive; needs a control rate.
-        actuators: What their actuators give.
-        messages: How their reports travel; needs a control rate.
-        seed: Of noise and losses.
+        measurements: Noise and delay of what robots measure; needs a control rate.
+        actuators: Largest efforts of the actuators.
+        messages: Losses and delay of ready reports; needs a control rate.
+        seed: Seed of noise and losses.
     """
 
-    control_rate: Annotated[float, Limits(at_least=1.0, at_most=1e4)] | None = None
-    mass_error: Annotated[float, Limits(at_least=-0.9, at_most=10.0)] = 0.0
+    control_rate: ControlRate | None = None
+    mass_error: MassError = 0.0
     measurements: Measurements = field(default_factory=Measurements)
     actuators: ActuatorLimits = field(default_factory=ActuatorLimits)
     messages: Messages = field(default_factory=Messages)
@@ -82,10 +97,10 @@ class Deployment:
 
     @property
     def ideal(self) -> bool:
-        """Whether the law's equations hold exactly: nothing of it all is switched on."""
+        """Whether nothing is switched on, so that the equations of the control law hold exactly."""
         return self == Deployment(seed=self.seed)
 
     @property
     def period(self) -> float | None:
-        """Time between two computations of a controller [s], None for continuous time."""
+        """Control period [s], None in continuous time."""
         return None if self.control_rate is None else 1.0 / self.control_rate

@@ -1,6 +1,6 @@
-"""Model directives as they stand in a file: each checked before Drake sees it, nested files opened.
+"""Checks model directives, and opens the files of directives that they name.
 
-Drake ends the process on some directives that it finds invalid; they are refused here first.
+Drake ends the process on some invalid directives; they are refused here before Drake gets them.
 """
 
 from collections.abc import Iterator
@@ -25,21 +25,22 @@ REQUIRED = {
     "add_collision_filter_group": ("name", "members"),
     "add_directives": ("file",),
 }
+"""Entries that a directive of each kind must have."""
 
 
 @dataclass(frozen=True)
 class DirectivesFile:
-    """A file of model directives, ``NAME.dmd.yaml`` by custom.
+    """A file of model directives, usually ``NAME.dmd.yaml``.
 
     Attributes:
-        directives: In order.
+        directives: The directives, in the order in which Drake applies them.
     """
 
     directives: tuple[Directive, ...]
 
 
 def check_directive(file: str, key: str, directive: ModelDirective) -> None:
-    """Refuse a directive that Drake would not survive, or whose values would be ignored.
+    """Refuse a directive on which Drake would end the process, or whose values would have no effect.
 
     Raises:
         ScenarioError: Naming the key inside the directive.
@@ -95,17 +96,17 @@ def _check_transform(file: str, key: str, transform: Transform) -> None:
 def flat(
     directives: tuple[ModelDirective, ...], path: Path, packages: PackageMap, file: str, key: str
 ) -> Iterator[tuple[str, ModelDirective]]:
-    """Yield ``(key, directive)`` with nested files opened and file addresses resolved.
+    """Yield ``(key, directive)``, with nested files opened and file addresses resolved.
 
     Args:
         directives: Checked directives.
-        path: The file they stand in; relative paths start beside it.
-        packages: Where ``package://`` addresses lead.
+        path: The file that holds them; relative paths are relative to its folder.
+        packages: Folders of the packages that ``package://`` addresses name.
         file: The scenario file, for messages.
-        key: Where the directives stand.
+        key: Key of the directives in the scenario file.
 
     Raises:
-        ScenarioError: A file is missing or wrong, or includes itself.
+        ScenarioError: A file is missing, is wrong, or includes itself.
     """
     yield from _flat(directives, (path,), packages, file, key)
 

@@ -39,8 +39,8 @@ def _read(value: object, kind: Any, key: str) -> Any:
         return None if value is None else _read(value, arguments[0], key)
     if kind is str:
         return convert(value, str, key)
-    if origin is list:
-        return list(convert(value, tuple[arguments[0], ...], key))
+    if kind == list[str]:
+        return list(convert(value, tuple[str, ...], key))
     if kind is np.ndarray:
         return np.array(convert(value, tuple[float, ...], key))
     if origin is dict:

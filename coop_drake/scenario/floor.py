@@ -1,4 +1,4 @@
-"""The workspace of a scenario that names a floor plan: the room in which the transport starts."""
+"""Reads the floor plan that a scenario names: the workspace is the room in which the object starts."""
 
 import dataclasses
 from pathlib import Path
@@ -11,10 +11,10 @@ from coop_drake.scenario.packages import package_map, resolve
 
 
 def with_floor(scenario: Scenario) -> Scenario:
-    """Put rings in place of a floor plan's file; a scenario that has rings already stays as it is.
+    """Replace the file of a floor plan by the rings of its floor; return a scenario with rings unchanged.
 
     Raises:
-        ScenarioError: Neither rings nor a file, or both, or a file that is not there.
+        ScenarioError: The workspace has neither rings nor a file, or both, or the file does not exist.
         FloorPlanError: The file cannot be read.
     """
     file, workspace = str(scenario.path), scenario.workspace
@@ -24,7 +24,7 @@ def with_floor(scenario: Scenario) -> Scenario:
     for key in ("outer", "holes"):
         if getattr(workspace, key):
             raise ScenarioError(file, f"workspace.{key}", "rings", "nothing beside workspace.file")
-    # Here and not above: most scenarios have rings, and should not wait for readers of drawings.
+    # Imported here because most scenarios have rings and need no readers of drawings.
     from coop_drake.floor_plans.plan import read_floor_plan
     from coop_drake.floor_plans.rooms import Inside
     from coop_drake.floor_plans.settings import FloorPlanSettings

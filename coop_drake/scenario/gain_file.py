@@ -1,4 +1,4 @@
-"""A gain set in a file of its own: the ``gains`` section of a scenario, as `coop-drake tune` writes it."""
+"""Files that hold one gain set: the ``gains`` section of a scenario, as ``coop-drake tune`` writes it."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -14,11 +14,11 @@ __all__ = ["dump_gains", "with_gains"]
 
 
 def with_gains(scenario: Scenario, choice: str | None) -> Scenario:
-    """The scenario with a gain set selected.
+    """Return the scenario with a gain set selected.
 
     Args:
-        scenario: As in its file.
-        choice: Name of one of its gain sets, or a file with a ``gains`` section; None for what it selects.
+        scenario: The scenario.
+        choice: Name of one of its gain sets, or a file with a ``gains`` section; None leaves the selection.
 
     Raises:
         ScenarioError: There is no such set and no such file, or the file is wrong.

@@ -1,4 +1,4 @@
-"""Loads a scenario file, and writes one."""
+"""Loads scenario files and writes them."""
 
 import dataclasses
 from pathlib import Path
@@ -14,12 +14,12 @@ from coop_drake.shipped import scenario_file, shipped_scenarios
 def load_scenario(path: Path | str) -> Scenario:
     """Read and check a scenario file.
 
-    Everything that can be judged without bodies is checked here; what needs them (collisions, joint
-    limits) is checked by :func:`coop_drake.plant.planning_problem`.
+    Collisions and joint limits need the models of the bodies and are checked later, by
+    :func:`coop_drake.plant.planning_problem`; all else is checked here.
 
     Args:
-        path: The file, ``NAME.scenario.yaml`` by custom; a folder with just one; or the name of a shipped
-            scenario, like ``base``.
+        path: The file, usually ``NAME.scenario.yaml``; a folder with exactly one such file; or the name of a
+            shipped scenario, such as ``base``.
 
     Raises:
         ScenarioError: With file, key, value and what is allowed there.

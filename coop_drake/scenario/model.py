@@ -1,4 +1,4 @@
-"""What a scenario file holds: plain frozen values, one class for each section of the file."""
+"""The sections of a scenario file as frozen dataclasses. Types hold the limits, docstrings the meanings."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,23 +16,30 @@ from coop_drake.typed_data import Limits, Positive
 
 # No `from __future__ import annotations` here: `typed_data` reads the types of the fields.
 
+MapTolerance = Annotated[float, Limits(above=0.0, below=0.01)]
+"""Error of a harmonic map [-]; a larger one would turn the direction of motion."""
+
+PlantStep = Annotated[float, Limits(above=0.0, at_most=0.01)]
+"""Time step of a plant [s]; forces that are held for longer do not model a continuous controller."""
+
 
 @dataclass(frozen=True)
 class Workspace:
-    """The floor W that bodies may use: rings in the scenario, or a floor plan in a file of its own.
+    """The floor W on which bodies may be: rings in the scenario, or a floor plan in a file of its own.
 
-    Loading a scenario reads the file, so that a loaded workspace always has rings and no file.
+    Loading a scenario reads the floor plan; a loaded workspace always has rings and no file.
 
     Attributes:
         outer: Corners of the outer ring, each (x, y) in W [m]; the last is joined to the first.
         holes: Rings of obstacles inside, each like ``outer``.
-        file: In place of rings a drawing (``.svg``, ``.dxf``, ``.geojson``, ``.wkt``) or a ROS occupancy map
-            (``.yaml``): a path relative to the scenario, or ``package://``. The room is the start's.
-        unit: What one unit of the drawing is; null for what the file says.
+        file: Instead of rings a drawing (``.svg``, ``.dxf``, ``.geojson``, ``.wkt``) or a ROS occupancy map
+            (``.yaml``): a path relative to the scenario, or ``package://``. The floor is the room in which
+            the object starts.
+        unit: Unit of the drawing's coordinates; null for the one that the file states.
         scale: Factor on all lengths of the file, 50 for a drawing at 1:50 [-].
-        layers: Layers of the drawing that hold walls; empty for all that are shown.
+        layers: Layers of the drawing that hold walls; empty for all visible ones.
         tolerance: How far walls may grow where that saves corners [m]; null for 1 cm, or for one and a half
-            cells of a map.
+            cells of an occupancy map.
         gap: Lines of a drawing that end this close to another line are joined to it [m].
         unknown_is_free: Whether the unknown cells of a map count as floor.
     """
@@ -49,7 +56,7 @@ class Workspace:
 
     @property
     def polygon(self) -> Polygon:
-        """The same as a shapely polygon."""
+        """The floor as a polygon with holes."""
         return Polygon(self.outer, self.holes)
 
 
@@ -69,17 +76,17 @@ class ObjectPose:
 
     @property
     def pose(self) -> PlanarPose:
-        """The same as a rigid motion of the plane."""
+        """The pose as a rigid motion of the plane."""
         return PlanarPose(self.x, self.y, self.theta)
 
 
 @dataclass(frozen=True)
 class Start:
-    """Where everything stands at the beginning, at rest.
+    """Configuration in which the team starts, at rest.
 
     Attributes:
         object: The object's pose.
-        joints: For each robot the values of its joints from its base outwards [rad or m].
+        joints: For each robot the positions of its joints, from the base to the end effector [rad or m].
     """
 
     object: ObjectPose
@@ -88,12 +95,12 @@ class Start:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """How close to the goal counts as arrived.
+    """Largest errors with which the goal counts as reached.
 
     Attributes:
-        position: Distance of the object [m].
-        angle: Angle of the object [rad].
-        joint: Error of every joint that has a goal [rad or m].
+        position: Largest distance of the object from its goal [m].
+        angle: Largest error of the object's angle [rad].
+        joint: Largest error of every joint that has a goal [rad or m].
     """
 
     position: Positive = 0.01
@@ -103,12 +110,13 @@ class Tolerances:
 
 @dataclass(frozen=True)
 class Goal:
-    """Where the object shall be at the end, at rest.
+    """Configuration in which the transport ends, at rest.
 
     Attributes:
-        object: The object's pose; theta counts modulo 2 pi.
-        joints: For some robots the goal values of their joints, null for a free one; other robots are free.
-        tolerances: How close counts as arrived.
+        object: The object's pose; theta is taken modulo 2 pi.
+        joints: For each robot that has a goal of its own the positions of its joints, null for a joint that
+            is free [rad or m]. All joints of other robots are free.
+        tolerances: Largest errors with which the goal counts as reached.
     """
 
     object: ObjectPose
@@ -122,45 +130,46 @@ def _shipped_gain_sets() -> dict[str, GainSet]:
 
 @dataclass(frozen=True)
 class Gains:
-    """The gain sets at hand, and which of them the run uses.
+    """The gain sets, and which of them the run uses.
 
     Attributes:
-        selected: Name of the set in use.
-        sets: Sets by name; ``scheduled`` and ``table_2`` (the paper's) are always there.
+        selected: Name of the set that the run uses.
+        sets: Sets by name; ``scheduled`` and ``table_2`` (the paper's) are always defined.
     """
 
     selected: str = "scheduled"
     sets: dict[str, FixedGains | ScheduledGains] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Add the sets that are always there."""
+        """Add the sets that are always defined."""
         object.__setattr__(self, "sets", _shipped_gain_sets() | self.sets)
 
 
 @dataclass(frozen=True)
 class MapSettings:
-    """How well the cells are mapped.
+    """Accuracy of the harmonic maps of the cells.
 
     Attributes:
-        tolerance: Largest error of a harmonic map that is accepted, as certified; cells that cannot be mapped
-            as well as that are refused. The disk they are mapped to has radius 1 [-].
+        tolerance: Largest certified error of a harmonic map onto the disk of radius 1 [-]. Cells that cannot
+            be mapped as accurately are refused.
     """
 
-    tolerance: Annotated[float, Limits(above=0.0, below=0.01)] = TOLERANCE
+    tolerance: MapTolerance = TOLERANCE
 
 
 @dataclass(frozen=True)
 class PlantSettings:
-    """How the team that is simulated hangs together; controllers know nothing of it.
+    """Model of the grasps in the simulated plant; controllers are the same for all.
 
     Attributes:
-        grasps: ``joints`` for one tree rooted at the object, its grasps exactly rigid, in continuous time;
-            ``constraints`` for a tree of every robot's own, held at the object by constraints, in steps.
-        time_step: Of the discrete plant, in place of the simulator's steps; the other has none [s].
+        grasps: ``joints`` for one kinematic tree rooted at the object, with exactly rigid grasps, in
+            continuous time; ``constraints`` for one tree per robot, held at the object by weld constraints,
+            in discrete time.
+        time_step: Time step of the plant in discrete time [s].
     """
 
     grasps: Literal["joints", "constraints"] = "joints"
-    time_step: Annotated[float, Limits(above=0.0, at_most=0.01)] = 0.001
+    time_step: PlantStep = 0.001
 
     @property
     def ideal(self) -> bool:
@@ -170,15 +179,15 @@ class PlantSettings:
 
 @dataclass(frozen=True)
 class SimulatorSettings:
-    """How the closed loop is integrated.
+    """Numerical integration of the closed loop.
 
     Attributes:
-        max_time: The run fails when the goal is not reached by then [s].
-        integration_scheme: Name of the integrator, as Drake spells it; where controllers are sampled,
-            ``bogacki_shampine3`` stands in for ``runge_kutta5``.
+        max_time: The run fails if the goal is not reached by then [s].
+        integration_scheme: Drake's name of the integrator; for sampled controllers ``bogacki_shampine3`` is
+            used instead of ``runge_kutta5``.
         max_step_size: Longest step [s].
-        accuracy: Relative accuracy of the error-controlled step [-]. What ``runge_kutta3`` does with 1e-3 is
-            nearer to the truth, at its worst, than ``runge_kutta5`` with 1e-4: the laws have corners.
+        accuracy: Relative accuracy of the error-controlled step [-]. The control laws are not smooth, and the
+            largest error of ``runge_kutta3`` with 1e-3 is smaller than that of ``runge_kutta5`` with 1e-4.
     """
 
     max_time: Positive = 300.0
@@ -191,12 +200,12 @@ class SimulatorSettings:
 
 @dataclass(frozen=True)
 class VisualizationSettings:
-    """How recordings look.
+    """Appearance of recordings.
 
     Attributes:
-        frames_per_second: Pictures a second of simulated time.
-        wall_height: Height of the walls that stand round the workspace [m].
-        show_collision: Whether collision geometry is shown over the pictures of the bodies.
+        frames_per_second: Frames per second of simulated time [1/s].
+        wall_height: Height of the walls around the workspace [m].
+        show_collision: Whether collision geometry is shown, too.
     """
 
     frames_per_second: Positive = 25.0
@@ -211,20 +220,21 @@ class Scenario:
     Attributes:
         workspace: The floor.
         directives: Drake's model directives: the object, two or more robots, a weld for every grasp.
-        start: Pose and joints at the beginning.
-        goal: Pose, and joints if any, at the end.
+        start: Pose of the object and positions of the joints at the beginning.
+        goal: Pose of the object, and positions of joints if any, at the end.
         object: Name of the object's model.
-        fixed_joints: For some robots joints that stay as they are: values by names, or by patterns such as
-            ``*wheel*``, as joints must that would leave the plane; null for what a pattern shall not fix
-            [rad or m].
-        load_shares: What part of the work each robot takes; they sum to one. Empty for equal parts.
-        planner: How hard the planner tries.
+        fixed_joints: For some robots positions of joints that never move, by joint name or by a pattern such
+            as ``*wheel*`` [rad or m]; null for a joint that a pattern matches and that shall move. A joint
+            that moves bodies out of the plane must be fixed.
+        load_shares: Fraction of the object's wrench that each robot applies; the sum is 1. Empty for equal
+            fractions [-].
+        planner: Effort and resolution of the planner.
         gains: The gain sets.
-        maps: How well the cells are mapped.
-        plant: How the simulated team hangs together.
-        simulator: How the closed loop is integrated.
-        deployment: What keeps the team from being ideal.
-        visualization: How recordings look.
+        maps: Accuracy of the harmonic maps.
+        plant: Model of the grasps in the simulated plant.
+        simulator: Numerical integration of the closed loop.
+        deployment: Departures of the real team from the ideal one.
+        visualization: Appearance of recordings.
         path: The file it was read from.
     """
 
@@ -250,12 +260,12 @@ class Scenario:
         return self.path.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".scenario")
 
     def load_share(self, robot: str, robots: int) -> float:
-        """What part of the work a robot takes, one of ``robots`` [-]."""
+        """Fraction of the object's wrench that a robot applies, in a team of ``robots`` [-]."""
         return self.load_shares.get(robot, 1.0 / robots)
 
     @property
     def ideal(self) -> bool:
-        """Whether the law's equations hold exactly in simulation."""
+        """Whether the equations of the control law hold exactly in simulation."""
         return self.plant.ideal and self.deployment.ideal
 
     @property
@@ -265,5 +275,5 @@ class Scenario:
 
     @property
     def selected_gains(self) -> str:
-        """Name of the gain set in use."""
+        """Name of the gain set that the run uses."""
         return self.gains.selected

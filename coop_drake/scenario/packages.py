@@ -1,4 +1,4 @@
-"""Where models are found: package.xml files round the scenario file, and paths relative to it."""
+"""Finds model files: in packages around the scenario file, or by paths relative to it."""
 
 from pathlib import Path
 
@@ -11,8 +11,8 @@ from coop_drake.shipped import SHIPPED
 def package_map(scenario_path: Path) -> PackageMap:
     """Collect the packages that a scenario may name in ``package://`` addresses.
 
-    They are those of every ``package.xml`` beside the scenario file or in a folder above it, the nearest
-    first, then coop_drake's own models, then what Drake knows by itself.
+    A name is looked up in every ``package.xml`` beside the scenario file or in a folder above it, the nearest
+    first, then in coop_drake's own models, then in Drake's.
 
     Args:
         scenario_path: The scenario file.
@@ -29,7 +29,7 @@ def package_map(scenario_path: Path) -> PackageMap:
 
 
 def _add(packages: PackageMap, file: Path) -> None:
-    """Add a package in place of any other of its name."""
+    """Add a package, and remove another one of its name."""
     single = PackageMap.MakeEmpty()
     try:
         single.AddPackageXml(file)
@@ -44,14 +44,14 @@ def _add(packages: PackageMap, file: Path) -> None:
 
 
 def resolve(file: str, beside: Path, packages: PackageMap, scenario_file: str, key: str) -> str:
-    """Turn the file of a directive into an address that Drake can open.
+    """Return the file of a directive as an address that Drake can open.
 
     Args:
-        file: ``package://name/path``, ``file:///path``, or a path relative to the file it stands in.
-        beside: The file it stands in.
-        packages: The packages at hand.
-        scenario_file: The scenario, for messages.
-        key: Where ``file`` stands in the scenario.
+        file: ``package://name/path``, ``file:///path``, or a path relative to the folder of ``beside``.
+        beside: The file that names it.
+        packages: Folders of the packages that may be named.
+        scenario_file: The scenario file, for messages.
+        key: Key of ``file`` in the scenario file.
 
     Returns:
         A ``file://`` address of a file that exists.

@@ -1,4 +1,4 @@
-"""Rings that enclose an area: no crossing edges, holes inside the outer ring and apart from each other."""
+"""Checks the rings of a workspace: edges do not cross, holes are inside the outer ring and apart."""
 
 from collections.abc import Sequence
 
@@ -12,14 +12,14 @@ from coop_drake.scenario.model import Scenario
 Ring = Sequence[tuple[float, float]]
 
 _LEAST_AREA = 1e-9
-"""Rings round less are degenerate [m^2]."""
+"""Rings with a smaller area are degenerate [m^2]."""
 
 
 def check_workspace(scenario: Scenario) -> None:
-    """Refuse rings that do not enclose one floor.
+    """Refuse rings that do not enclose one connected floor.
 
     Raises:
-        ScenarioError: Naming the ring, and the corner where one is to blame.
+        ScenarioError: Naming the ring, and the corner if a single one is wrong.
     """
     file, workspace = str(scenario.path), scenario.workspace
     _check_ring(file, "workspace.outer", workspace.outer)
@@ -50,7 +50,9 @@ def _check_ring(file: str, key: str, ring: Ring) -> None:
     polygon = Polygon(ring)
     if polygon.is_valid:
         if polygon.area < _LEAST_AREA:
-            raise ScenarioError(file, key, _plain(ring), f"a ring round {_LEAST_AREA:g} m^2 or more")
+            raise ScenarioError(
+                file, key, _plain(ring), f"a ring with an area of {_LEAST_AREA:g} m^2 or more"
+            )
         return
     first, second, place = _meeting_edges(ring)
     raise ScenarioError(
@@ -63,7 +65,7 @@ def _check_ring(file: str, key: str, ring: Ring) -> None:
 
 
 def _meeting_edges(ring: Ring) -> tuple[int, int, tuple[float, float]]:
-    """Find the first two edges that meet where they should not."""
+    """Return the first two edges that meet elsewhere than at a common corner, and where they meet."""
     corners = [index for index in range(len(ring)) if tuple(ring[index]) != tuple(ring[index - 1])]
     ends = zip(corners, corners[1:] + corners[:1], strict=True)
     edges = [LineString([ring[a], ring[b]]) for a, b in ends]
@@ -76,7 +78,7 @@ def _meeting_edges(ring: Ring) -> tuple[int, int, tuple[float, float]]:
         if not (neighbours and common.geom_type == "Point"):
             x, y = np.array(common.representative_point().coords)[0]
             return corners[first], corners[second], (float(x), float(y))
-    raise AssertionError("a ring without meeting edges is valid")
+    raise AssertionError("a ring whose edges do not meet is valid")
 
 
 def _plain(ring: Ring) -> list[list[float]]:

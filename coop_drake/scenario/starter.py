@@ -1,4 +1,4 @@
-"""A scenario to start from: a team, and two rooms with a door between them or a floor plan."""
+"""Writes a scenario to start from: a team in two rooms with a door between them, or in a floor plan."""
 
 from __future__ import annotations
 
@@ -10,29 +10,34 @@ from coop_drake.errors import ScenarioError
 
 __all__ = ["Starter", "starter_text"]
 
-_ROOM = 0.5
-"""What the rooms leave round the team [m]."""
+_CLEARANCE = 0.5
+"""Distance between the walls of a room and the team in its middle [m]; the team can turn there."""
 
 _WALL = 0.2
+"""Thickness of the wall between the rooms [m], that of a usual partition."""
+
+_DOOR_CLEARANCE = 0.2
+"""Distance between the team and each side of the door, if no width is given [m]."""
+
 Pose = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Starter:
-    """What is asked of someone who begins.
+    """Dimensions of a new scenario.
 
     Attributes:
         name: Name of the scenario.
-        robots: How many, two to four.
-        links: Lengths of an arm's links from the base's centre to the hand [m].
+        robots: Number of robots, two to four.
+        links: Lengths of an arm's links from the base's centre to the end effector [m].
         base_radius: Radius of a base [m].
-        length: Of the object [m].
-        width: Of the object [m].
-        door: Width of the door between two rooms [m]; None for one that the team gets through with room to
-            spare. Without meaning beside a floor plan.
-        workspace: The section that names a floor plan; empty for two rooms.
-        start: Pose of the object; None for the middle of the first room.
-        goal: Pose of the object; None for the middle of the second room.
+        length: Length of the object [m].
+        width: Width of the object [m].
+        door: Width of the door between the two rooms [m]; None for the team's width and some clearance. A
+            floor plan has no such door.
+        workspace: The section ``workspace`` that names a floor plan; None for two rooms.
+        start: Pose of the object (x, y, theta) [m, rad]; None for the middle of the first room.
+        goal: Pose of the object (x, y, theta) [m, rad]; None for the middle of the second room.
     """
 
     name: str
@@ -47,10 +52,10 @@ class Starter:
     goal: Pose | None = None
 
     def check(self) -> None:
-        """Refuse what no team can be made of.
+        """Refuse dimensions that make no team.
 
         Raises:
-            ScenarioError: Naming the flag.
+            ScenarioError: Naming the option of the command line.
         """
         if not 2 <= self.robots <= 4:
             raise ScenarioError("coop-drake new", "--robots", self.robots, "two to four")
@@ -63,38 +68,38 @@ class Starter:
                 raise ScenarioError("coop-drake new", flag, value, "a length between 0.05 and 10 m")
         if self.workspace and (self.start is None or self.goal is None):
             flag = "--start" if self.start is None else "--goal"
-            raise ScenarioError("coop-drake new", flag, None, "X Y THETA beside a floor plan")
+            raise ScenarioError("coop-drake new", flag, None, "X Y THETA, because there is a floor plan")
 
     @property
     def reach(self) -> float:
-        """From the object's middle to the far side of a base before it [m]."""
+        """Distance from the object's middle to the far side of a base in front of it, arms straight [m]."""
         return 0.5 * self.length + sum(self.links) + self.base_radius
 
     @property
     def half_width(self) -> float:
-        """From the object's middle to the team's side, arms straight [m]."""
+        """Distance from the object's middle to the side of the team, arms straight [m]."""
         aside = sum(self.links) + self.base_radius if self.robots > 2 else 0.0
         return max(self.base_radius, 0.5 * self.width + aside)
 
     @property
-    def room(self) -> float:
-        """Edge of each of the two rooms: the team can turn in it [m]."""
-        return round(2.0 * (max(self.reach, self.half_width) + _ROOM), 2)
+    def room_size(self) -> float:
+        """Edge of each of the two square rooms [m]."""
+        return round(2.0 * (max(self.reach, self.half_width) + _CLEARANCE), 2)
 
     @property
     def doorway(self) -> float:
         """Width of the door [m]."""
-        return round(2.0 * self.half_width + 0.4, 2) if self.door is None else self.door
+        return round(2.0 * (self.half_width + _DOOR_CLEARANCE), 2) if self.door is None else self.door
 
 
 def starter_text(starter: Starter) -> str:
-    """The scenario file; models lie beside it as ``object.sdf`` and ``robot.sdf``.
+    """Return the text of the scenario file; its models are ``object.sdf`` and ``robot.sdf`` beside it.
 
     Raises:
-        ScenarioError: What is asked for does not make a team.
+        ScenarioError: The dimensions make no team.
     """
     starter.check()
-    size, joints = starter.room, len(starter.links) - 1
+    size, joints = starter.room_size, len(starter.links) - 1
     start = starter.start or (0.5 * size, 0.5 * size, 1.57)
     goal = starter.goal or (1.5 * size + _WALL, 0.5 * size, 0.0)
     names = [f"robot_{k}" for k in range(starter.robots)]
@@ -124,7 +129,7 @@ def _workspace(starter: Starter) -> list[str]:
     if starter.workspace:
         said = ", ".join(f"{key}: {json.dumps(value)}" for key, value in starter.workspace.items())
         return [f"workspace: {{{said}}}"]
-    size, half = starter.room, 0.5 * min(starter.doorway, starter.room)
+    size, half = starter.room_size, 0.5 * min(starter.doorway, starter.room_size)
     low, high = _short(0.5 * size - half), _short(0.5 * size + half)
     near, far, end, top = _short(size), _short(size + _WALL), _short(2.0 * size + _WALL), _short(size)
     corners = [("0", "0"), (near, "0"), (near, low), (far, low), (far, "0"), (end, "0")]

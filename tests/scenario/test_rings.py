@@ -14,7 +14,12 @@ CASES = {
     "spike": ([[0, 0], [6, 0], [6, 4], [6, 7], [6, 4], [0, 4]], [], "workspace.outer[1]", "touch itself"),
     "touching corner": ([[0, 0], [6, 0], [6, 4], [3, 0], [0, 4]], [], "workspace.outer[0]", "meet at (3, 0)"),
     "flat": ([[0, 0], [6, 0], [3, 0]], [], "workspace.outer[0]", "touch itself"),
-    "speck": ([[0, 0], [1e-9, 0], [0, 1e-9]], [], "workspace.outer", "a ring round 1e-09 m^2 or more"),
+    "speck": (
+        [[0, 0], [1e-9, 0], [0, 1e-9]],
+        [],
+        "workspace.outer",
+        "a ring with an area of 1e-09 m^2 or more",
+    ),
     "two corners": ([[0, 0], [6, 0], [0, 0]], [], "workspace.outer", "three or more different corners"),
     "hole outside": (SQUARE, [[[8, 8], [9, 8], [9, 9]]], "workspace.holes[0]", "not outside it"),
     "hole across": (SQUARE, [[[5, 3], [7, 3], [7, 3.5]]], "workspace.holes[0]", "not across it"),
