@@ -1,4 +1,4 @@
-"""Watching the planner: search with a recorder on, and draw what it saw."""
+"""The command watch: records a search, and draws it."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["watch_command"]
 
-_FEWEST, _MOST = 2, 500  # Frames.
+_FEWEST, _MOST = 2, 500  # Keyframes.
 _OURS = ("think_[0-9][0-9][0-9][0-9].png", "think.png", "think.gif", "think.html")
 
 
@@ -46,7 +46,11 @@ def watch_command(
     frames: Annotated[
         int,
         typer.Option(
-            "--frames", metavar="N", min=_FEWEST, max=_MOST, help="Moments to show at most; 36 by default."
+            "--frames",
+            metavar="N",
+            min=_FEWEST,
+            max=_MOST,
+            help="Largest number of keyframes; 36 by default.",
         ),
     ] = 36,
     strategy: Annotated[
@@ -60,13 +64,13 @@ def watch_command(
             metavar="M",
             min=0.0,
             callback=_checked_margin,
-            help="Metres to keep from the walls; cells: 0 by default, else 'no way' is no proof.",
+            help="Metres to keep from the walls; cells: 0 by default, else 'no path' is no proof.",
         ),
     ] = None,
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Watch the planner think: pictures, a moving picture and a page to turn in space."""
+    """Watch the planner search: pictures, a moving picture and a page to turn in space."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         task = read_task(scenario)
         directory = ResultFolder.of(task.name, output, "think").path
@@ -88,22 +92,25 @@ def _watch(
     if margin is None:
         margin = problem.settings.margin if chosen is watching.Strategy.PORTFOLIO else 0.0
     with reporter.stage("searching") as progress:
-        film = watching.record(problem, chosen, margin, progress)
-        shots = watching.storyboard(film, frames)
+        recording = watching.record_search(problem, chosen, margin, progress)
+        shown = watching.keyframes(recording, frames)
     reporter.facts.update(
-        answer=film.verdict.value, slices=shots[-1].moment.slices, events=len(film.events), frames=len(shots)
+        answer=recording.verdict.value,
+        slices=shown[-1].state.slices,
+        events=len(recording.events),
+        frames=len(shown),
     )
     _forget(directory)
     with reporter.stage("drawing") as progress:
-        written = watching.write_sequence(film, shots, directory, progress)
+        written = watching.write_pictures(recording, shown, directory, progress)
     with reporter.stage("scene") as progress:
-        written.append(watching.write_scene(film, shots, directory / "think.html", progress))
+        written.append(watching.write_scene(recording, shown, directory / "think.html", progress))
     reporter.facts["bytes"] = {path.name: path.stat().st_size for path in written}
-    reporter.say(f"[bold]{escape(shots[-1].headline)}[/]")
+    reporter.say(f"[bold]{escape(shown[-1].headline)}[/]")
     reporter.say(
-        f"{len(shots)} pictures are in {escape(str(directory))}; open {escape(str(written[-1]))} in a browser"
+        f"{len(shown)} pictures are in {escape(str(directory))}; open {escape(str(written[-1]))} in a browser"
     )
-    return _code(film.verdict.value, film.margin)
+    return _code(recording.verdict.value, recording.margin)
 
 
 def _forget(directory: Path) -> None:
@@ -114,7 +121,7 @@ def _forget(directory: Path) -> None:
 
 
 def _code(verdict: str, margin: float) -> ExitCode:
-    """What the answer is worth: that there is no way with a margin proves nothing about the question."""
+    """Return the exit code: that no path keeps a margin proves nothing about the scenario itself."""
     if verdict == "found":
         return ExitCode.DONE
     return ExitCode.INFEASIBLE if verdict == "infeasible" and margin == 0.0 else ExitCode.UNDECIDED

@@ -14,13 +14,11 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.blocking import Passage
 from coop_drake.diagnosis.diagnosis import Diagnosis
 from coop_drake.drawing import draw_polygon, draw_workspace, new_figure, team_footprints
-from coop_drake.drawing.colours import BLUE, GREY, INK, VERMILLION, WALL
+from coop_drake.drawing.colours import AT_FAULT, BLUE, GREY, INK, NOT_AT_FAULT, OUTSIDE, PAPER, WALL
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["diagnosis_figure"]
 
-_OUT = "#8b0000"
-_CALM = "#b9c4cc"
 _MOST_PANELS = 3
 _ROOM = 0.35
 _SIDE = 4.8  # Height of every part [in].
@@ -57,7 +55,7 @@ def diagnosis_figure(problem: PlanningProblem, diagnosis: Diagnosis) -> Figure |
             title += _mark_gap(ax, passage)
         else:
             title += _goal_title(diagnosis)
-        ax.set_title(title, color=_OUT, fontweight="bold")
+        ax.set_title(title, color=OUTSIDE, fontweight="bold")
     return figure
 
 
@@ -101,16 +99,16 @@ def _overview(ax: Axes, problem: PlanningProblem, diagnosis: Diagnosis, places: 
         ax.annotate(label, _xy(pose), xytext=(6, 5), textcoords="offset points", zorder=6, fontweight="bold")
     for number, z in enumerate(places, start=1):
         for footprint in team_footprints(problem.tree, z):
-            draw_polygon(ax, footprint.shape, facecolor=_CALM, edgecolor="none", zorder=3)
+            draw_polygon(ax, footprint.shape, facecolor=NOT_AT_FAULT, edgecolor="none", zorder=3)
         ax.add_patch(_ring(z, problem.tree.reach))
         if len(places) > 1:
             ax.annotate(
-                str(number), _xy(z), ha="center", va="center", zorder=7, color=_OUT, fontweight="bold"
+                str(number), _xy(z), ha="center", va="center", zorder=7, color=OUTSIDE, fontweight="bold"
             )
 
 
 def _ring(z: FloatArray, radius: float) -> Circle:
-    return Circle((float(z[0]), float(z[1])), radius, fill=False, edgecolor=_OUT, linewidth=1.6, zorder=6)
+    return Circle((float(z[0]), float(z[1])), radius, fill=False, edgecolor=OUTSIDE, linewidth=1.6, zorder=6)
 
 
 def _enlarged(ax: Axes, problem: PlanningProblem, z: FloatArray, bodies: frozenset[str]) -> None:
@@ -118,12 +116,12 @@ def _enlarged(ax: Axes, problem: PlanningProblem, z: FloatArray, bodies: frozens
     ax.set_facecolor(WALL)
     for footprint in team_footprints(problem.tree, z):
         faulty = footprint.name in bodies
-        fill, edge = (VERMILLION, VERMILLION) if faulty else (_CALM, GREY)
+        fill, edge = (AT_FAULT, AT_FAULT) if faulty else (NOT_AT_FAULT, GREY)
         draw_polygon(ax, footprint.shape, facecolor=fill, edgecolor="none", alpha=0.65, zorder=3)
         draw_polygon(ax, footprint.shape, facecolor="none", edgecolor=edge, linewidth=1.0, zorder=4)
         outside = footprint.shape.difference(problem.workspace)
         for part in _areas(outside):
-            draw_polygon(ax, part, facecolor=_OUT, edgecolor=_OUT, linewidth=1.5, zorder=5)
+            draw_polygon(ax, part, facecolor=OUTSIDE, edgecolor=OUTSIDE, linewidth=1.5, zorder=5)
     reach = max(_reach(problem, z), 0.5) + _ROOM
     ax.set_xlim(z[0] - reach, z[0] + reach)
     ax.set_ylim(z[1] - reach, z[1] + reach)
@@ -154,7 +152,7 @@ def _mark_gap(ax: Axes, passage: Passage) -> str:
         arrowprops={"arrowstyle": "<->", "color": INK, "linewidth": 2.0, "shrinkA": 0, "shrinkB": 0},
         zorder=7,
     )
-    ax.plot(*np.array([gap.first, gap.second]).T, "o", color=_OUT, markersize=7, zorder=8)
+    ax.plot(*np.array([gap.first, gap.second]).T, "o", color=OUTSIDE, markersize=7, zorder=8)
     ax.annotate(
         f"{gap.width:.3f} m\n+ {2.0 * passage.enough:.3f} m",
         _xy(0.5 * (gap.first + gap.second)),
@@ -162,7 +160,7 @@ def _mark_gap(ax: Axes, passage: Passage) -> str:
         va="center",
         zorder=9,
         fontweight="bold",
-        bbox={"boxstyle": "round,pad=0.25", "facecolor": "white", "edgecolor": INK, "linewidth": 0.8},
+        bbox={"boxstyle": "round,pad=0.25", "facecolor": PAPER, "edgecolor": INK, "linewidth": 0.8},
     )
     return f"{gap.width:.3f} m wide, {missing}"
 

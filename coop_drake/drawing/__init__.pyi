@@ -4,13 +4,14 @@ from .floor import draw_polygon, draw_team, draw_workspace, team_legend
 from .footprints import BodyFootprint, team_footprints
 from .solids import (
     TriangleMesh,
+    extruded_section,
     flat_mesh,
     joined,
     parts_of,
     ribbon_mesh,
     ring_lines,
     slab_mesh,
-    wall_mesh,
+    tube_mesh,
     wall_polygons,
 )
 
@@ -21,6 +22,7 @@ __all__ = [
     "draw_polygon",
     "draw_team",
     "draw_workspace",
+    "extruded_section",
     "flat_mesh",
     "house_style",
     "joined",
@@ -33,6 +35,6 @@ __all__ = [
     "slab_mesh",
     "team_footprints",
     "team_legend",
-    "wall_mesh",
+    "tube_mesh",
     "wall_polygons",
 ]

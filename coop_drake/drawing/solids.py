@@ -1,11 +1,13 @@
-"""Triangle meshes of polygons lying flat or standing up, for Meshcat."""
+"""Triangle meshes of shapes that lie flat or stand up, of lines on the floor, and of tubes."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from manifold3d import CrossSection
 from numpy.typing import NDArray
 from shapely import Polygon, constrained_delaunay_triangles
 from shapely.geometry.base import BaseGeometry
@@ -14,24 +16,28 @@ from coop_drake.tree.pose import FloatArray
 
 __all__ = [
     "TriangleMesh",
+    "extruded_section",
     "flat_mesh",
     "joined",
     "parts_of",
     "ribbon_mesh",
     "ring_lines",
     "slab_mesh",
-    "wall_mesh",
+    "tube_mesh",
     "wall_polygons",
 ]
+
+_TUBE_CORNERS = 6
+"""Corners of a tube's cross-section: it looks round where it is a few pixels wide."""
 
 
 @dataclass(frozen=True)
 class TriangleMesh:
-    """A triangle mesh in the layout that Meshcat takes.
+    """A triangle mesh.
 
     Attributes:
-        vertices: Shape (3, v) [m].
-        faces: Vertex indices, shape (3, f).
+        vertices: Shape (v, 3) [m].
+        faces: Indices of vertices, shape (f, 3).
     """
 
     vertices: FloatArray
@@ -45,7 +51,7 @@ def parts_of(shape: BaseGeometry) -> list[Polygon]:
 
 
 def wall_polygons(workspace: Polygon, thickness: float) -> list[Polygon]:
-    """Return what stands: a rim of the given thickness [m] around the floor, and every hole filled."""
+    """Return what stands on the floor: a rim of the given thickness [m] around it, and every hole filled."""
     outer = Polygon(workspace.exterior)
     rim = outer.buffer(thickness, join_style="mitre", mitre_limit=2.0).difference(outer)
     return parts_of(rim) + [Polygon(hole) for hole in workspace.interiors]
@@ -53,13 +59,7 @@ def wall_polygons(workspace: Polygon, thickness: float) -> list[Polygon]:
 
 def flat_mesh(shapes: Iterable[Polygon], height: float) -> TriangleMesh:
     """Return the shapes triangulated at one height [m]."""
-    corners = [_triangles(shape, height) for shape in shapes]
-    return _mesh(np.concatenate(corners))
-
-
-def wall_mesh(shapes: Iterable[Polygon], height: float) -> TriangleMesh:
-    """Return the shapes extruded from the floor to ``height`` [m]: their sides and tops."""
-    return slab_mesh(shapes, 0.0, height)
+    return _mesh(np.concatenate([_triangles(shape, height) for shape in shapes]))
 
 
 def slab_mesh(shapes: Iterable[Polygon], bottom: float, top: float) -> TriangleMesh:
@@ -70,6 +70,22 @@ def slab_mesh(shapes: Iterable[Polygon], bottom: float, top: float) -> TriangleM
         rings = (shape.exterior, *shape.interiors)
         pieces.extend(_sides(np.asarray(ring.coords)[:, :2], bottom, top) for ring in rings)
     return _mesh(np.concatenate(pieces))
+
+
+def extruded_section(section: CrossSection, bottom: float, top: float, tolerance: float) -> TriangleMesh:
+    """Return a section of many parts extruded from one height to another.
+
+    Args:
+        section: Positions, not empty [m].
+        bottom: Height of its bottom.
+        top: Height of its top.
+        tolerance: Distance by which outlines may move when they are simplified [m].
+    """
+    simpler = section.simplify(tolerance)
+    solid = (section if simpler.is_empty() else simpler).extrude(top - bottom).translate((0.0, 0.0, bottom))
+    mesh = solid.to_mesh()
+    vertices = np.asarray(mesh.vert_properties, dtype=float)[:, :3]
+    return TriangleMesh(vertices, np.asarray(mesh.tri_verts, dtype=np.int32))
 
 
 def ribbon_mesh(points: FloatArray, width: float, height: float) -> TriangleMesh:
@@ -84,20 +100,26 @@ def ribbon_mesh(points: FloatArray, width: float, height: float) -> TriangleMesh
     lengths = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
     aside = 0.5 * width * np.column_stack([-along[:, 1], along[:, 0]]) / lengths
     edges = np.stack([points + aside, points - aside], axis=1).reshape(-1, 2)
-    vertices = np.column_stack([edges, np.full(len(edges), height)]).T
     first = 2 * np.arange(len(points) - 1)
-    faces = np.stack([first, first + 1, first + 3, first, first + 3, first + 2], axis=1).reshape(-1, 3).T
-    return TriangleMesh(np.asfortranarray(vertices), np.asfortranarray(faces.astype(np.int32)))
+    faces = np.stack([first, first + 1, first + 3, first, first + 3, first + 2], axis=1).reshape(-1, 3)
+    return TriangleMesh(np.column_stack([edges, np.full(len(edges), height)]), faces.astype(np.int32))
+
+
+def tube_mesh(points: FloatArray, radius: float) -> TriangleMesh:
+    """Return straight pieces of tube from point to point, shape (P, 3); NaN interrupts the tube."""
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    pieces = zip(pairwise(points), lengths, strict=True)
+    return joined(_tube_piece(a, b, radius) for (a, b), length in pieces if length > 1e-9)
 
 
 def joined(meshes: Iterable[TriangleMesh]) -> TriangleMesh:
-    """Return several meshes as one."""
-    vertices, faces, count = [], [], 0
+    """Return several meshes as one; an empty one of none."""
+    vertices, faces, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int32)], 0
     for mesh in meshes:
         vertices.append(mesh.vertices)
         faces.append(mesh.faces + np.int32(count))
-        count += mesh.vertices.shape[1]
-    return TriangleMesh(np.asfortranarray(np.hstack(vertices)), np.asfortranarray(np.hstack(faces)))
+        count += len(mesh.vertices)
+    return TriangleMesh(np.concatenate(vertices), np.concatenate(faces))
 
 
 def ring_lines(shapes: Iterable[Polygon], height: float) -> tuple[FloatArray, FloatArray]:
@@ -113,7 +135,7 @@ def ring_lines(shapes: Iterable[Polygon], height: float) -> tuple[FloatArray, Fl
 
 
 def _triangles(shape: Polygon, height: float) -> FloatArray:
-    """Corners of triangles that tile the shape, shape (f, 3, 3)."""
+    """Return the corners of triangles that tile the shape, shape (f, 3, 3)."""
     tiles = [
         np.asarray(tile.exterior.coords)[:3, :2] for tile in parts_of(constrained_delaunay_triangles(shape))
     ]
@@ -122,7 +144,7 @@ def _triangles(shape: Polygon, height: float) -> FloatArray:
 
 
 def _sides(ring: FloatArray, bottom: float, top: float) -> FloatArray:
-    """Corners of two triangles for every edge of a closed ring, shape (2 m, 3, 3)."""
+    """Return the corners of two triangles for every edge of a closed ring, shape (2 m, 3, 3)."""
     low = np.column_stack([ring, np.full(len(ring), bottom)])
     high = np.column_stack([ring, np.full(len(ring), top)])
     first = np.stack([low[:-1], low[1:], high[1:]], axis=1)
@@ -130,9 +152,23 @@ def _sides(ring: FloatArray, bottom: float, top: float) -> FloatArray:
     return np.concatenate([first, second])
 
 
+def _tube_piece(a: FloatArray, b: FloatArray, radius: float) -> TriangleMesh:
+    """Return a straight tube from a to b, each of shape (3,), a little longer so that bends have no notch."""
+    along = (b - a) / np.linalg.norm(b - a)
+    across = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+    across /= np.linalg.norm(across)
+    turns = np.arange(_TUBE_CORNERS) * (2.0 * np.pi / _TUBE_CORNERS)
+    ring = radius * (np.outer(np.cos(turns), across) + np.outer(np.sin(turns), np.cross(along, across)))
+    i = np.arange(_TUBE_CORNERS)
+    j = (i + 1) % _TUBE_CORNERS
+    first = np.column_stack([i, j, j + _TUBE_CORNERS])
+    second = np.column_stack([i, j + _TUBE_CORNERS, i + _TUBE_CORNERS])
+    reach = 0.5 * radius * along
+    vertices = np.concatenate([a - reach + ring, b + reach + ring])
+    return TriangleMesh(vertices, np.concatenate([first, second]).astype(np.int32))
+
+
 def _mesh(corners: FloatArray) -> TriangleMesh:
-    """The mesh of triangles of shape (f, 3, 3), corners that several share kept once."""
+    """Return the mesh of triangles of shape (f, 3, 3); corners that several share are kept once."""
     vertices, faces = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
-    return TriangleMesh(
-        np.asfortranarray(vertices.T), np.asfortranarray(faces.reshape(-1, 3).T.astype(np.int32))
-    )
+    return TriangleMesh(vertices, faces.reshape(-1, 3).astype(np.int32))

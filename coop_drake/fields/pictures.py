@@ -15,7 +15,7 @@ from shapely import LineString, Point
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.drawing import draw_polygon, new_figure
-from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, VERMILLION, WALL
+from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, PAPER, VERMILLION, WALL
 from coop_drake.fields.boundary import BoundarySamples, sample_boundary
 from coop_drake.fields.harmonic_map import HarmonicMap
 from coop_drake.fields.quadrature import FloatArray
@@ -123,7 +123,7 @@ def _two_panels(harmonic_map: HarmonicMap, caption: str) -> tuple[Figure, tuple[
     rim = _RIM * max(x1 - x0, y1 - y0)
     cell.set(xlim=(x0 - rim, x1 + rim), ylim=(y0 - rim, y1 + rim), xlabel="x [m]", ylabel="y [m]")
     cell.set_facecolor(WALL)
-    draw_polygon(cell, harmonic_map.region, facecolor="white", edgecolor="none", zorder=0)
+    draw_polygon(cell, harmonic_map.region, facecolor=PAPER, edgecolor="none", zorder=0)
     if not isinstance(harmonic_map.goal, Point):
         draw_polygon(cell, harmonic_map.goal, facecolor=GREEN, edgecolor="none", alpha=0.5, zorder=0.5)
     disk.set(xlim=(-1.3, 1.3), ylim=(-1.2, 1.2), xlabel="u [-]", ylabel="v [-]")

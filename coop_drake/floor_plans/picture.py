@@ -15,14 +15,13 @@ from coop_drake.drawing import (
     new_figure,
     save_figure,
 )
+from coop_drake.drawing.colours import FLOOR, INK, LIGHT_GREY, VERMILLION
 from coop_drake.floor_plans.plan import FloorPlan
 
 __all__ = ["save_picture"]
 
 _WIDTH = 8.0
 _TALLEST = 9.0
-_TAKEN = "#d55e00"
-_DRAWN = "#999999"
 
 
 def save_picture(plan: FloorPlan, path: Path, title: str, inside: tuple[float, float] | None = None) -> None:
@@ -44,15 +43,15 @@ def save_picture(plan: FloorPlan, path: Path, title: str, inside: tuple[float, f
         axes = figure.add_subplot()
         draw_workspace(axes, plan.polygon)
         if taken.area > 1e-9:
-            draw_polygon(axes, _areas(taken), facecolor=_TAKEN, edgecolor="none", zorder=2)
+            draw_polygon(axes, _areas(taken), facecolor=VERMILLION, edgecolor="none", zorder=2)
         for ring in (plan.drawn.exterior, *plan.drawn.interiors):
-            axes.plot(*shapely.get_coordinates(ring).T, color=_DRAWN, linewidth=0.6, zorder=3)
+            axes.plot(*shapely.get_coordinates(ring).T, color=LIGHT_GREY, linewidth=0.6, zorder=3)
         if inside is not None:
-            axes.plot(*inside, marker="x", color="black", markersize=8, zorder=4)
+            axes.plot(*inside, marker="x", color=INK, markersize=8, zorder=4)
         axes.set_title(title, loc="left")
-        patches = [Patch(facecolor="white", edgecolor="black", label="floor")]
+        patches = [Patch(facecolor=FLOOR, edgecolor=INK, label="floor")]
         if taken.area > 1e-9:
-            patches.append(Patch(color=_TAKEN, label=f"taken by walls: {taken.area:.3g} m²"))
+            patches.append(Patch(color=VERMILLION, label=f"taken by walls: {taken.area:.3g} m²"))
         legend_above(axes, patches)
         save_figure(figure, path)
 

@@ -13,7 +13,18 @@ from matplotlib.path import Path
 
 from coop_drake.diagram import TELEMETRY, ClosedLoop
 from coop_drake.drawing.canvas import house_style, new_figure
-from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, ORANGE, PURPLE, SKY, VERMILLION
+from coop_drake.drawing.colours import (
+    BLOCK_OF_DIAGRAM,
+    BLUE,
+    GREEN,
+    GREY,
+    INK,
+    ORANGE,
+    PAPER,
+    PURPLE,
+    SKY,
+    VERMILLION,
+)
 from coop_drake.viz.signal_flow import INPUTS, OUTPUTS, Block, Signal, SignalFlow, signal_flow
 
 __all__ = ["block_diagram_figure"]
@@ -191,7 +202,7 @@ def _draw_block(ax: Axes, block: Block, place: _Place) -> None:
             _WIDTH,
             place.height,
             boxstyle="round,pad=0,rounding_size=0.08",
-            facecolor="#ffffff" if outside else "#f4f4f4",
+            facecolor=PAPER if outside else BLOCK_OF_DIAGRAM,
             edgecolor=GREY if outside else INK,
             linestyle="dashed" if outside else "solid",
             linewidth=1.0,

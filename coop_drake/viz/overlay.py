@@ -10,6 +10,8 @@ from pydrake.geometry import Rgba
 from shapely import Polygon, box
 
 from coop_drake.answers.plan import Plan
+from coop_drake.drawing.colours import GREY
+from coop_drake.drawing.player import player_style
 from coop_drake.errors import CoopDrakeError
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import SimulationLog
@@ -19,12 +21,13 @@ from coop_drake.viz.cells import CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR
 from coop_drake.viz.paint import hex_colour
 from coop_drake.viz.trail import TRAIL_COLOUR
 
-__all__ = ["story_of", "with_overlay"]
+__all__ = ["page_content", "with_overlay"]
 
-_RATE = 10.0  # Clearances told a second.
+_RATE = 10.0
+"""Clearances shown per second [1/s]: digits that change faster cannot be read."""
 
 
-def story_of(
+def page_content(
     scenario: Scenario,
     plan: Plan,
     log: SimulationLog,
@@ -60,25 +63,25 @@ def story_of(
         "side": _emptier_side(scenario.workspace.polygon),
         "key": [
             ("area", CELL_COLOUR, "cell: the object's centre stays in here"),
-            ("area", GOAL_COLOUR, "goal region, the way into the next cell"),
+            ("area", GOAL_COLOUR, "goal region: from here the next cell is entered"),
             ("area", GOAL_POSE_COLOUR, "where the object is to stand"),
             ("line", TRAIL_COLOUR, "trail of the object's centre"),
             *(
                 ("arrow", hex_colour(colour), f"force of {robot} on the object, {of_a_metre:g} N a metre")
                 for robot, colour in zip(log.robot_names, colours, strict=True)
             ),
-            ("dot", "#888888", f"grasps, in their robots' colours; arrows end at {LONGEST:g} m"),
+            ("dot", GREY, f"grasps, in their robots' colours; arrows end at {LONGEST:g} m"),
         ],
     }
 
 
-def with_overlay(page: str, story: dict[str, Any]) -> str:
+def with_overlay(page: str, content: dict[str, Any]) -> str:
     """Add headline, key and player to a page that Drake's Meshcat wrote.
 
     Raises:
         CoopDrakeError: The page is not built as Drake builds it.
     """
-    overlay = rendered("coop_drake.viz", "overlay.html", story=story)
+    overlay = rendered("coop_drake.viz", "overlay.html", content=content, style=player_style())
     body, end, rest = page.rpartition("</body>")
     if not end or not re.search(r"\bvar viewer = new MeshCat\.Viewer\b", body):
         raise CoopDrakeError("this version of Drake writes recordings in a way that coop_drake does not know")
@@ -86,7 +89,7 @@ def with_overlay(page: str, story: dict[str, Any]) -> str:
 
 
 def _emptier_side(floor: Polygon) -> str:
-    """In which lower corner of the page the key hides less of the floor."""
+    """Return the lower corner of the page, left or right, in which the key hides less of the floor."""
     x_min, y_min, x_max, y_max = floor.bounds
     across, up = 0.35 * (x_max - x_min), y_min + 0.3 * (y_max - y_min)
     hidden = {

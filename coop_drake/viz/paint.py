@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 from pydrake.geometry import Meshcat, Rgba
 
+from coop_drake.drawing.colours import red_green_blue
 from coop_drake.drawing.solids import TriangleMesh
 
 __all__ = ["hex_colour", "rgba", "set_mesh"]
@@ -11,13 +13,13 @@ __all__ = ["hex_colour", "rgba", "set_mesh"]
 
 def set_mesh(meshcat: Meshcat, path: str, mesh: TriangleMesh, colour: Rgba) -> None:
     """Put a triangle mesh at a path."""
-    meshcat.SetTriangleMesh(path, mesh.vertices, mesh.faces, colour)
+    vertices, faces = (np.asfortranarray(rows.T) for rows in (mesh.vertices, mesh.faces))
+    meshcat.SetTriangleMesh(path, vertices, faces, colour)
 
 
 def rgba(colour: str, opacity: float = 1.0) -> Rgba:
     """Return a colour ``#rrggbb`` as Drake takes it."""
-    red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
-    return Rgba(red, green, blue, opacity)
+    return Rgba(*(part / 255 for part in red_green_blue(colour)), opacity)
 
 
 def hex_colour(colour: Rgba) -> str:

@@ -10,14 +10,15 @@ from coop_drake.answers.plan import Plan
 from coop_drake.files import write_atomically
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import SimulationLog
-from coop_drake.viz.overlay import story_of, with_overlay
+from coop_drake.viz.overlay import page_content, with_overlay
 from coop_drake.viz.replay import Progress, animation_of
 from coop_drake.viz.scene import TransportScene
 from coop_drake.viz.server import silent_meshcat
 
 __all__ = ["inline_frame", "recording_html", "write_recording"]
 
-_MOST_FRAMES = 4000  # Longer runs get fewer frames per second, so that the file stays small.
+_MOST_FRAMES = 4000
+"""Largest number of frames; longer runs get fewer frames per second, so that the file stays small."""
 
 
 def write_recording(
@@ -53,7 +54,7 @@ def recording_html(
     times = np.arange(0.0, duration + 0.5 / rate, 1.0 / rate)
     meshcat.SetAnimation(animation_of(scene, log, times, progress))
     scene.place_camera()
-    story = story_of(
+    content = page_content(
         scenario,
         plan,
         log,
@@ -61,7 +62,7 @@ def recording_html(
         colours=scene.team.colours,
         of_a_metre=scene.of_a_metre,
     )
-    return with_overlay(meshcat.StaticHtml(), story)
+    return with_overlay(meshcat.StaticHtml(), content)
 
 
 def inline_frame(page: str, *, height: int = 600) -> str:

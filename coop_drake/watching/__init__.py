@@ -1,26 +1,26 @@
-"""Watching the planner think: what it tells while it searches, as pictures and as a scene in space."""
+"""Watching the planner search: the events of a search, as pictures and as a scene in space."""
 
-from coop_drake.watching.film import Film, Strategy, record
-from coop_drake.watching.frames import frame_figure
-from coop_drake.watching.moments import Leaf, Link, Moment, moments
+from coop_drake.watching.keyframe_figure import keyframe_figure
+from coop_drake.watching.keyframes import Keyframe, keyframes
+from coop_drake.watching.pictures import write_pictures
+from coop_drake.watching.recording import SearchRecording, Strategy, record_search
 from coop_drake.watching.scene import scene_page, write_scene
-from coop_drake.watching.sequence import write_sequence
-from coop_drake.watching.slice_view import slice_figure
-from coop_drake.watching.storyboard import Shot, storyboard
+from coop_drake.watching.search_states import ChannelCell, Leaf, SearchState, search_states
+from coop_drake.watching.slice_figure import slice_figure
 
 __all__ = [
-    "Film",
+    "ChannelCell",
+    "Keyframe",
     "Leaf",
-    "Link",
-    "Moment",
-    "Shot",
+    "SearchRecording",
+    "SearchState",
     "Strategy",
-    "frame_figure",
-    "moments",
-    "record",
+    "keyframe_figure",
+    "keyframes",
+    "record_search",
     "scene_page",
+    "search_states",
     "slice_figure",
-    "storyboard",
+    "write_pictures",
     "write_scene",
-    "write_sequence",
 ]

@@ -1,58 +1,61 @@
-"""What happens at a moment, in words."""
+"""What happens at a keyframe, in words."""
 
 from __future__ import annotations
 
 from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.planning.cells.exploration import Verdict
-from coop_drake.watching.film import BOXES, Film
-from coop_drake.watching.moments import Moment
+from coop_drake.watching.recording import BOXES, SearchRecording
+from coop_drake.watching.search_states import SearchState
 
 __all__ = ["counters", "headline"]
 
 
-def headline(film: Film, moment: Moment) -> str:
-    """What happened since the moment before, or how the search ended."""
-    if moment.verdict is not None:
-        return _verdict(film, moment)
-    if moment.question == BOXES:
-        return f"Box {len(moment.channel)} is laid: all of it is free"
-    if moment.splits:
-        leaf, axis = moment.splits[-1]
-        along = film.axis_names[film.axes_of(moment.robots)[axis]]
-        if len(moment.splits) == 1:
+def headline(recording: SearchRecording, state: SearchState) -> str:
+    """Return what happened since the keyframe before, or how the search ended."""
+    if state.verdict is not None:
+        return _verdict(recording, state)
+    if state.question == BOXES:
+        return f"Box {len(state.channel)} is added: all of it is free"
+    if state.splits:
+        leaf, axis = state.splits[-1]
+        along = recording.axis_names[recording.axes_of(state.robots)[axis]]
+        if len(state.splits) == 1:
             return f"Slice {leaf.slice} is halved along {along}"
-        return f"{len(moment.splits)} slices are halved, the last one ({leaf.slice}) along {along}"
-    if moment.searched:
-        return f"The cheapest channel has {len(moment.channel)} cells, {moment.undecided_links} undecided"
-    return f"{len(moment.leaves)} coarse slices of θ to begin with"
+        return f"{len(state.splits)} slices are halved, the last one ({leaf.slice}) along {along}"
+    if state.searched:
+        return f"The cheapest channel has {len(state.channel)} cells, {state.undecided} undecided"
+    return f"{len(state.leaves)} coarse slices of θ to begin with"
 
 
-def counters(moment: Moment) -> str:
-    """How far the search is, in numbers."""
-    if moment.question == BOXES:
-        return f"{len(moment.channel)} boxes, each overlaps the one before"
-    free, mixed = moment.count(Kind.FREE), moment.count(Kind.MIXED)
+def counters(state: SearchState) -> str:
+    """Return how far the search is, in numbers."""
+    if state.question == BOXES:
+        return f"{len(state.channel)} boxes, each of which overlaps the one before"
+    free, mixed = state.count(Kind.FREE), state.count(Kind.MIXED)
     parts = [
-        f"{moment.slices} slices made, {len(moment.leaves)} in use",
+        f"{state.slices} slices made, {len(state.leaves)} in use",
         f"{free} free and {mixed} undecided cells",
     ]
-    if moment.channel:
-        undecided = f"{moment.undecided_links} undecided" if moment.undecided_links else "all free"
-        parts.append(f"channel of {len(moment.channel)} cells, {undecided}, cost {moment.cost:.0f}")
+    if state.channel:
+        undecided = f"{state.undecided} undecided" if state.undecided else "all free"
+        parts.append(f"channel of {len(state.channel)} cells, {undecided}, cost {state.cost:.0f}")
     return "  ·  ".join(parts)
 
 
-def _verdict(film: Film, moment: Moment) -> str:
-    if moment.verdict == Verdict.FOUND.value:
-        return f"Found: {len(moment.channel)} free cells join start and goal"
-    if moment.verdict == Verdict.INFEASIBLE.value:
-        if film.reason:
-            return f"Infeasible, proved: {film.reason}"
-        if film.margin > 0.0:
-            return f"No way keeps {film.margin:g} m from the walls: start and goal lie in separate parts"
-        return "Infeasible, proved: whatever may be free falls apart between start and goal"
-    if film.reason:
-        return f"Undecided: {film.reason}"
-    if moment.verdict == Verdict.BUDGET.value:
-        return f"Undecided: the budget of slices is spent, {moment.undecided_links} cells to prove"
-    return f"Undecided: {moment.undecided_links} cells of the channel are as fine as the resolution"
+def _verdict(recording: SearchRecording, state: SearchState) -> str:
+    """Return how the search ended."""
+    if state.verdict == Verdict.FOUND.value:
+        return f"Found: {len(state.channel)} free cells join start and goal"
+    if state.verdict == Verdict.INFEASIBLE.value:
+        if recording.reason:
+            return f"Infeasible, proved: {recording.reason}"
+        if recording.margin > 0.0:
+            return (
+                f"No path keeps {recording.margin:g} m from the walls: start and goal lie in separate parts"
+            )
+        return "Infeasible, proved: start and goal lie in separate parts of what may be free"
+    if recording.reason:
+        return f"Undecided: {recording.reason}"
+    if state.verdict == Verdict.BUDGET.value:
+        return f"Undecided: the budget of slices is spent, {state.undecided} cells to prove"
+    return f"Undecided: {state.undecided} cells of the channel are as fine as the resolution"

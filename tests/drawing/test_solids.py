@@ -10,7 +10,7 @@ from coop_drake.drawing.solids import (
     ribbon_mesh,
     ring_lines,
     slab_mesh,
-    wall_mesh,
+    tube_mesh,
     wall_polygons,
 )
 
@@ -18,18 +18,18 @@ FLOOR = Polygon([(0, 0), (4, 0), (4, 3), (2, 1), (0, 3)], [[(1, 0.5), (2, 0.5), 
 
 
 def area(mesh):
-    a, b, c = (mesh.vertices[:, mesh.faces[k]].T for k in range(3))
+    a, b, c = (mesh.vertices[mesh.faces[:, k]] for k in range(3))
     return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
 
 
 def test_a_flat_mesh_has_the_polygons_area_and_height():
     mesh = flat_mesh([FLOOR], 0.3)
     assert area(mesh) == pytest.approx(FLOOR.area)
-    assert set(mesh.vertices[2]) == {0.3}
+    assert set(mesh.vertices[:, 2]) == {0.3}
 
 
 def test_a_wall_has_its_top_and_all_its_sides():
-    assert area(wall_mesh([FLOOR], 0.5)) == pytest.approx(FLOOR.area + 0.5 * FLOOR.length)
+    assert area(slab_mesh([FLOOR], 0.0, 0.5)) == pytest.approx(FLOOR.area + 0.5 * FLOOR.length)
 
 
 def test_walls_stand_beside_the_floor_never_on_it():
@@ -47,18 +47,25 @@ def test_ring_lines_run_once_round_every_ring():
 def test_a_slab_stands_between_its_heights():
     mesh = slab_mesh([FLOOR], 0.2, 0.3)
     assert area(mesh) == pytest.approx(FLOOR.area + 0.1 * FLOOR.length)
-    assert (mesh.vertices[2].min(), mesh.vertices[2].max()) == (0.2, 0.3)
+    assert (mesh.vertices[:, 2].min(), mesh.vertices[:, 2].max()) == (0.2, 0.3)
 
 
 def test_a_ribbon_has_two_triangles_a_piece_in_the_order_of_the_line():
     points = np.column_stack([np.linspace(0.0, 3.0, 7), np.zeros(7)])
     mesh = ribbon_mesh(points, 0.1, 0.02)
-    assert mesh.faces.shape == (3, 12)
+    assert mesh.faces.shape == (12, 3)
     assert area(mesh) == pytest.approx(0.3)
-    middles = mesh.vertices[0, mesh.faces].mean(axis=0).reshape(-1, 2).mean(axis=1)
+    middles = mesh.vertices[mesh.faces, 0].mean(axis=1).reshape(-1, 2).mean(axis=1)
     np.testing.assert_allclose(middles, points[:-1, 0] + 0.25)
 
 
 def test_joined_meshes_keep_their_areas():
     mesh = joined([flat_mesh([FLOOR], 0.0), slab_mesh([FLOOR], 0.2, 0.3)])
     assert area(mesh) == pytest.approx(2.0 * FLOOR.area + 0.1 * FLOOR.length)
+
+
+def test_a_tube_has_the_surface_of_a_prism_and_stops_where_the_line_is_interrupted():
+    points = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [np.nan] * 3, [5.0, 1.0, 0.0], [5.0, 1.0, 3.0]])
+    mesh = tube_mesh(points, 0.01)
+    # Six sides as broad as the radius; each of the two pieces is longer by the radius.
+    assert area(mesh) == pytest.approx(6 * 0.01 * (5.0 + 2 * 0.01))

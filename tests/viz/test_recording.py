@@ -13,7 +13,7 @@ from pydrake.geometry import Rgba
 from coop_drake.errors import CoopDrakeError
 from coop_drake.scenario import load_scenario
 from coop_drake.viz import inline_frame, recording_html, write_recording
-from coop_drake.viz.overlay import story_of, with_overlay
+from coop_drake.viz.overlay import page_content, with_overlay
 from tests.support.cases import case
 from tests.support.recorded import paths, played, track
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
@@ -119,8 +119,8 @@ def test_the_page_says_how_it_ended():
     plan, log = synthetic_plan(problem), synthetic_log(problem)
     told = {"duration": 12.0, "colours": [Rgba(0, 0, 1), Rgba(1, 0, 0)], "of_a_metre": 5.0}
     lost = dataclasses.replace(log, violation="too near at t = 12 s", reached=False)
-    assert story_of(scenario, plan, log, **told)["verdict"] == "arrived after 12.0 s"
-    assert story_of(scenario, plan, lost, **told)["verdict"] == "too near at t = 12 s"
+    assert page_content(scenario, plan, log, **told)["verdict"] == "arrived after 12.0 s"
+    assert page_content(scenario, plan, lost, **told)["verdict"] == "too near at t = 12 s"
 
 
 def test_an_arrow_is_as_long_as_the_force_is_strong(text):

@@ -1,4 +1,4 @@
-"""Films of a rod that must pass a corridor: small enough to record and draw in a test."""
+"""Recordings of a rod that must pass a corridor: small enough to record and draw in a test."""
 
 from __future__ import annotations
 
@@ -9,16 +9,18 @@ import numpy as np
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.tree.component_tree import Component, ComponentTree, TreeJoint
 from coop_drake.tree.pose import PlanarPose
-from coop_drake.watching import Film, Strategy, record
+from coop_drake.watching import SearchRecording, Strategy, record_search
 from tests.planning.test_search import rod_problem
 
 WIDE, NARROW = 0.22, 0.198
 """Widths of the corridor in which the rod, 0.2 m broad, gets through and does not [m]."""
 
 
-def rod_film(corridor: float = WIDE, strategy: Strategy = Strategy.CELLS, margin: float = 0.0) -> Film:
-    """Record the search for the rod's way."""
-    return record(rod_problem(corridor), strategy, margin)
+def rod_recording(
+    corridor: float = WIDE, strategy: Strategy = Strategy.CELLS, margin: float = 0.0
+) -> SearchRecording:
+    """Record the search for the rod's path."""
+    return record_search(rod_problem(corridor), strategy, margin)
 
 
 def jointed_rod() -> PlanningProblem:

@@ -13,10 +13,11 @@ import umsgpack
 from matplotlib.colors import to_rgba
 from PIL import Image
 
-from coop_drake.watching import look, scene_page, storyboard, write_sequence
-from coop_drake.watching.frames import frame_figure
-from coop_drake.watching.sequence import telling
-from tests.watching.rods import NARROW, WIDE, rod_film
+from coop_drake.drawing.colours import REACHED, UNDECIDED, UNREACHED
+from coop_drake.watching import keyframes, scene_page, write_pictures
+from coop_drake.watching.keyframe_figure import keyframe_figure
+from coop_drake.watching.pictures import on_sheet
+from tests.watching.rods import NARROW, WIDE, rod_recording
 
 
 def commands(page):
@@ -33,16 +34,16 @@ def commands(page):
 
 @pytest.fixture(scope="module")
 def shown():
-    recorded = rod_film(WIDE)
-    shots = storyboard(recorded, 5)
-    return recorded, shots, scene_page(recorded, shots)
+    recorded = rod_recording(WIDE)
+    frames = keyframes(recorded, 5)
+    return recorded, frames, scene_page(recorded, frames)
 
 
-def test_one_picture_a_moment_a_sheet_and_a_moving_picture(shown, tmp_path):
-    recorded, shots, _ = shown
-    written = write_sequence(recorded, shots, tmp_path)
+def test_one_picture_a_keyframe_a_sheet_and_a_moving_picture(shown, tmp_path):
+    recorded, frames, _ = shown
+    written = write_pictures(recorded, frames, tmp_path)
     assert [path.name for path in written] == [
-        *(f"think_{number:04d}.png" for number in range(1, len(shots) + 1)),
+        *(f"think_{number:04d}.png" for number in range(1, len(frames) + 1)),
         "think.png",
         "think.gif",
     ]
@@ -51,41 +52,41 @@ def test_one_picture_a_moment_a_sheet_and_a_moving_picture(shown, tmp_path):
         with Image.open(path) as image:
             assert np.ptp(np.asarray(image.convert("L"))) > 100
     with Image.open(tmp_path / "think.gif") as moving:
-        assert moving.n_frames == len(shots)
+        assert moving.n_frames == len(frames)
     assert (tmp_path / "think.gif").stat().st_size < 6e6
 
 
-def test_the_sheet_shows_the_first_and_the_last_moment(shown):
-    _, shots, _ = shown
-    chosen = telling(shots)
-    assert (chosen[0], chosen[-1]) == (0, len(shots) - 1)
+def test_the_sheet_shows_the_first_and_the_last_keyframe(shown):
+    _, frames, _ = shown
+    chosen = on_sheet(frames)
+    assert (chosen[0], chosen[-1]) == (0, len(frames) - 1)
     assert len(chosen) <= 6
 
 
 def test_the_last_picture_of_a_proof_shows_the_two_parts_in_two_colours():
-    recorded = rod_film(NARROW)
-    *_, last = storyboard(recorded, 3)
-    figure = frame_figure(recorded, last, last.moment.open_links)
+    recorded = rod_recording(NARROW)
+    *_, last = keyframes(recorded, 3)
+    figure = keyframe_figure(recorded, last, last.state.history)
     fills = {tuple(patch.get_facecolor()[:3]) for patch in figure.axes[0].patches}
-    assert {to_rgba(look.REACHED)[:3], to_rgba(look.OTHERS)[:3]} <= fills
-    assert to_rgba(look.MIXED)[:3] not in fills
+    assert {to_rgba(REACHED)[:3], to_rgba(UNREACHED)[:3]} <= fills
+    assert to_rgba(UNDECIDED)[:3] not in fills
     assert figure.texts[0].get_text().startswith("Infeasible, proved")
 
 
-def test_the_page_holds_stage_slabs_channel_and_frames_by_name(shown):
-    _, shots, page = shown
+def test_the_page_holds_surroundings_slabs_channel_and_halved_layers_by_name(shown):
+    _, frames, page = shown
     names = {command["path"] for command in commands(page) if command["type"] == "set_object"}
     for name in ("floor", "walls", "theta", "start/footprint", "start/pole", "goal/footprint", "goal/pole"):
         assert f"/think/{name}" in names
     assert any(name.startswith("/think/undecided/") for name in names)
-    assert any(name.startswith("/think/looked_at/") for name in names)
-    last = f"{len(shots):03d}-{len(shots):03d}"
+    assert any(name.startswith("/think/halved/") for name in names)
+    last = f"{len(frames):03d}-{len(frames):03d}"
     assert f"/think/channel/{last}" in names
     assert f"/think/channel/proved/{last}" in names
 
 
-def test_what_a_moment_shows_is_visible_then_and_never_else(shown):
-    _, shots, page = shown
+def test_what_a_keyframe_shows_is_visible_then_and_never_else(shown):
+    _, frames, page = shown
     (animation,) = [command for command in commands(page) if command["type"] == "set_animation"]
     moving = {command["path"] for command in commands(page) if command["type"] == "set_object"}
     for entry in animation["animations"]:
@@ -95,27 +96,19 @@ def test_what_a_moment_shows_is_visible_then_and_never_else(shown):
         first, last = (int(part) - 1 for part in entry["path"].rsplit("/", 1)[1].split("-"))
         shown_at = []
         value = None
-        for number in range(len(shots)):
+        for number in range(len(frames)):
             value = keys.get(number, value)
             if value:
                 shown_at.append(number)
         assert shown_at == list(range(first, last + 1))
-        assert max(keys) == len(shots)
+        assert max(keys) == len(frames)
 
 
 def test_the_page_is_small_needs_no_network_and_repeats(shown):
-    recorded, shots, page = shown
+    recorded, frames, page = shown
     assert len(page) < 6e6
-    fetched = re.findall(r"""<(?:script|link|img|iframe)\b[^>]*?\b(?:src|href)=["']?([^"'>\s]+)""", page)
+    fetched = re.findall(r"""<(?:script|cell|img|iframe)\b[^>]*?\b(?:src|href)=["']?([^"'>\s]+)""", page)
     assert all(address.startswith("data:") for address in fetched)
-    assert page == scene_page(recorded, shots)
-    for shot in shots:
-        assert json.dumps(shot.headline)[1:-1] in page
-
-
-def test_outlines_are_coarser_where_a_page_would_be_large(shown, monkeypatch):
-    recorded, shots, page = shown
-    monkeypatch.setattr("coop_drake.watching.scene._MOST_BYTES", len(page) - 1)
-    smaller = scene_page(recorded, shots)
-    assert len(smaller) < len(page)
-    assert len(commands(smaller)) == len(commands(page))
+    assert page == scene_page(recorded, frames)
+    for frame in frames:
+        assert json.dumps(frame.headline)[1:-1] in page

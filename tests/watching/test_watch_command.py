@@ -38,9 +38,9 @@ def test_a_recording_leaves_pictures_and_a_page_and_none_of_an_older_one(room, t
 
 def test_no_way_is_told_by_the_exit_code_and_a_margin_proves_nothing(tmp_path, monkeypatch):
     # What is drawn is looked at above.
-    monkeypatch.setattr(watching, "write_sequence", lambda film, shots, directory, progress: [])
+    monkeypatch.setattr(watching, "write_pictures", lambda recording, frames, directory, progress: [])
     monkeypatch.setattr(
-        watching, "write_scene", lambda film, shots, path, progress: write_atomically(path, b"")
+        watching, "write_scene", lambda recording, frames, path, progress: write_atomically(path, b"")
     )
     below, above = [[4, 0], [4, 1.8], [5, 1.8], [5, 0]], [[5, 4], [5, 2.2], [4, 2.2], [4, 4]]
     outer = [[0, 0], *below, [9, 0], [9, 4], *above, [0, 4]]

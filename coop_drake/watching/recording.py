@@ -1,4 +1,4 @@
-"""A film: one question to the planner and everything that was told while it was answered."""
+"""Recording a search: one planning problem, and all events while the planner answers it."""
 
 from __future__ import annotations
 
@@ -30,36 +30,36 @@ from coop_drake.planning.questions.margins import marginal_workspace
 from coop_drake.planning.search.search import find_channel
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BOXES", "Film", "Strategy", "record"]
+__all__ = ["BOXES", "SearchRecording", "Strategy", "record_search"]
 
 Progress = Callable[[str, float], None]
 
 BOXES = "boxes along a sampled path"
-"""The question under which the boxes of a channel are laid one by one."""
+"""The question of the events that add the boxes of a channel one by one."""
 
 
 class Strategy(Enum):
-    """What is watched."""
+    """Which search is recorded."""
 
     CELLS = "cells"
     """The exploration of the whole team by cells."""
     PAPER = "paper"
-    """The same as the paper's Algorithms 1 and 2 are printed."""
+    """The exploration by cells as the paper's Algorithms 1 and 2 are printed."""
     PORTFOLIO = "portfolio"
-    """All that planning does: proofs, where it needs them, and the boxes along a sampled path."""
+    """All that planning does: proofs of infeasibility where it tries them, and boxes along a sampled path."""
 
 
 @dataclass(frozen=True, eq=False)
-class Film:
+class SearchRecording:
     """A recording of one search.
 
     Attributes:
-        problem: The question.
+        problem: The planning problem.
         strategy: How it was searched.
         margin: Clearance from the walls that was asked for [m].
-        events: What was told, in order.
-        verdict: How it ended.
-        reason: Why there is no channel, in a sentence; empty if the events tell.
+        events: What happened, in order.
+        verdict: How the search ended.
+        reason: Why there is no channel, in a sentence; empty if the events say it.
     """
 
     problem: PlanningProblem
@@ -70,43 +70,44 @@ class Film:
     reason: str = ""
 
     def axes_of(self, robots: tuple[int, ...]) -> list[int]:
-        """Indices into (theta, q...) of the whole team of the axes that some robots have."""
+        """Return the indices of theta and of some robots' joints among the axes (theta, q...) of the team."""
         joints = self.problem.tree.joints
         return [0, *[1 + joint.index for joint in joints if joint.robot in robots]]
 
     def start_of(self, robots: tuple[int, ...]) -> FloatArray:
-        """The start (x, y, theta, q...) with the joints of some robots only, shape (2 + axes,) [m, rad]."""
+        """Return the start (x, y, theta, q...) with some robots' joints only, shape (2 + axes,) [m, rad]."""
         return self.problem.start[[0, 1, *[2 + axis for axis in self.axes_of(robots)]]]
 
     def goal_of(self, robots: tuple[int, ...]) -> FloatArray:
-        """The goal with the joints of some robots only, NaN for free joints, shape (2 + axes,) [m, rad]."""
+        """Return the goal with some robots' joints only, NaN for free ones, shape (2 + axes,) [m, rad]."""
         joints = [np.nan if goal is None else goal for goal in self.problem.goal_joints]
         goal = np.array([*self.problem.goal_pose, *joints])
         return goal[[0, 1, *[2 + axis for axis in self.axes_of(robots)]]]
 
     @property
     def axis_names(self) -> tuple[str, ...]:
-        """Names of all axes as people read them: θ, then every joint."""
+        """Names of all axes for captions: θ, then every joint."""
         return ("θ", *(joint.name.replace("::", " ") for joint in self.problem.tree.joints))
 
 
-def record(
+def record_search(
     problem: PlanningProblem, strategy: Strategy, margin: float, progress: Progress | None = None
-) -> Film:
-    """Answer a question once more, and record what is told on the way.
+) -> SearchRecording:
+    """Search for a plan, and record every event of the search.
 
     Args:
-        problem: The question; its settings give the budget of slices.
-        strategy: What to watch.
+        problem: The planning problem; its settings give the budget of slices.
+        strategy: Which search to record.
         margin: Clearance to keep from the walls [m]; the portfolio takes less where there is less.
-        progress: Called with a text and the share of the work that is done.
+        progress: Called with a text and the fraction of the work that is done.
     """
     if strategy is Strategy.PORTFOLIO:
-        return _film_portfolio(problem, margin, progress)
+        return _record_portfolio(problem, margin, progress)
     events: list[Event] = []
     swept = SweptTree(problem.tree)
-    made = Exploration if strategy is Strategy.CELLS else PaperExploration
-    exploration = made(problem, marginal_workspace(problem, margin), swept, BodyPairs(swept), events.append)
+    algorithm = Exploration if strategy is Strategy.CELLS else PaperExploration
+    free = marginal_workspace(problem, margin)
+    exploration = algorithm(problem, free, swept, BodyPairs(swept), events.append)
     budget = problem.settings.max_slices
 
     def count(slices: int) -> None:
@@ -114,32 +115,32 @@ def record(
             progress(f"{slices} slices", slices / budget)
 
     outcome = exploration.run(budget, count)
-    return Film(problem, strategy, margin, tuple(events), outcome.verdict)
+    return SearchRecording(problem, strategy, margin, tuple(events), outcome.verdict)
 
 
-def _film_portfolio(problem: PlanningProblem, margin: float, progress: Progress | None) -> Film:
-    """Record the proofs, then lay the boxes of the channel one by one."""
+def _record_portfolio(problem: PlanningProblem, margin: float, progress: Progress | None) -> SearchRecording:
+    """Record the proofs of infeasibility, then the boxes of the channel one by one."""
     events: list[Event] = []
-    question = replace(problem, settings=replace(problem.settings, strategy="portfolio", margin=margin))
-    answer, _ = find_channel(question, progress, watch=events.append)
+    asked = replace(problem, settings=replace(problem.settings, strategy="portfolio", margin=margin))
+    answer, _ = find_channel(asked, progress, watch=events.append)
     if isinstance(answer, Channel):
-        events += _laid(answer, tuple(sorted({joint.robot for joint in problem.tree.joints})))
-        return Film(problem, Strategy.PORTFOLIO, answer.margin, tuple(events), Verdict.FOUND)
+        events += _box_events(answer, tuple(sorted({joint.robot for joint in problem.tree.joints})))
+        return SearchRecording(problem, Strategy.PORTFOLIO, answer.margin, tuple(events), Verdict.FOUND)
     verdict = Verdict.INFEASIBLE if answer.proved else Verdict.BUDGET
     last = events[-1] if events else None
     if not (isinstance(last, ExplorationEnded) and last.verdict == verdict.value):
         events += [ExplorationBegan(answer.reason, ()), ExplorationEnded(verdict.value, 0)]
-    return Film(problem, Strategy.PORTFOLIO, 0.0, tuple(events), verdict, answer.reason)
+    return SearchRecording(problem, Strategy.PORTFOLIO, 0.0, tuple(events), verdict, answer.reason)
 
 
-def _laid(channel: Channel, robots: tuple[int, ...]) -> list[Event]:
-    """The boxes of a channel as events: each is a slice of its own that is free."""
+def _box_events(channel: Channel, robots: tuple[int, ...]) -> list[Event]:
+    """Return the boxes of a channel as events: each box is a slice of its own that is free."""
     events: list[Event] = [ExplorationBegan(BOXES, robots)]
-    chain: list[SeenCell] = []
+    cells: list[SeenCell] = []
     for number, box in enumerate(channel.boxes):
         section = CrossSection(polygon_rings(box.polygon), FillRule.Positive)
         cell = SeenCell(number, Kind.FREE, Region.of(section))
-        chain.append(cell)
+        cells.append(cell)
         intervals = tuple((float(a), float(b)) for a, b in zip(box.lower, box.upper, strict=True))
-        events += [SliceAdded(number, intervals, (cell,)), ChannelSearched(tuple(chain), float(len(chain)))]
+        events += [SliceAdded(number, intervals, (cell,)), ChannelSearched(tuple(cells), float(len(cells)))]
     return [*events, ExplorationEnded(Verdict.FOUND.value, len(channel.boxes))]

@@ -11,6 +11,7 @@ from typing import Any
 import meshcat
 from meshcat.visualizer import ViewerWindow, Visualizer
 
+from coop_drake.drawing.player import player_style
 from coop_drake.templates import rendered
 
 __all__ = ["OfflineWindow", "offline_visualizer"]
@@ -18,15 +19,15 @@ __all__ = ["OfflineWindow", "offline_visualizer"]
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
 
 
-class _Shelf:
+class _Messages:
     """Stands in for the socket: keeps messages in the order in which they come."""
 
     def __init__(self) -> None:
-        self.messages: list[bytes] = []
+        self.packed: list[bytes] = []
 
     def send_multipart(self, frames: list[bytes]) -> None:
         """Keep a message: its kind, its path, and the packed command that the viewer takes."""
-        self.messages.append(frames[2])
+        self.packed.append(frames[2])
 
     def recv(self) -> bytes:
         """Answer as a server does."""
@@ -38,28 +39,28 @@ class OfflineWindow(ViewerWindow):
 
     Args:
         title: Title of the page.
-        story: What the page's own script shows beside the scene; anything that JSON can say.
+        content: What the page's own script shows beside the scene; anything that JSON can say.
     """
 
-    def __init__(self, title: str, story: Mapping[str, Any]) -> None:
-        self.zmq_socket = _Shelf()
-        self._title, self._story = title, story
+    def __init__(self, title: str, content: Mapping[str, Any]) -> None:
+        self.zmq_socket = _Messages()
+        self._title, self._content = title, content
 
     def get_scene(self) -> str:
-        """The page: viewer, scene and player in one file that needs no network."""
-        messages = self.zmq_socket.messages
-        packed = gzip.compress(b"".join(messages), mtime=0)
+        """Return the page: viewer, scene and player in one file that needs no network."""
+        messages = self.zmq_socket.packed
         return rendered(
             "coop_drake.watching",
             "page.html",
             title=self._title,
+            style=player_style(),
             viewer=_VIEWER.read_text(encoding="utf-8"),
             lengths=[len(message) for message in messages],
-            commands=base64.b64encode(packed).decode(),
-            story=self._story,
+            commands=base64.b64encode(gzip.compress(b"".join(messages), mtime=0)).decode(),
+            content=self._content,
         )
 
 
-def offline_visualizer(title: str, story: Mapping[str, Any]) -> Any:
-    """A Meshcat visualizer whose ``static_html()`` gives the page."""
-    return Visualizer(window=OfflineWindow(title, story))
+def offline_visualizer(title: str, content: Mapping[str, Any]) -> Any:
+    """Return a Meshcat visualizer whose ``static_html()`` gives the page."""
+    return Visualizer(window=OfflineWindow(title, content))

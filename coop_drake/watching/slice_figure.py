@@ -10,21 +10,20 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from shapely import Polygon, union_all
-from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.drawing.canvas import new_figure
-from coop_drake.drawing.colours import FLOOR, INK
+from coop_drake.drawing.colours import FLOOR, INK, PROVED_FREE, UNDECIDED
 from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region
-from coop_drake.watching import look
-from coop_drake.watching.floor_view import draw_section
+from coop_drake.watching.floor_panel import draw_section
 
 __all__ = ["slice_figure"]
 
-_SAMPLES = 3  # Values of every axis at which the team is drawn.
+_SAMPLES = 3
+"""Number of values of every axis at which the team is drawn."""
 
 
 def slice_figure(problem: PlanningProblem, slices: Sequence[Intervals]) -> Figure:
@@ -55,29 +54,25 @@ def _draw_footprints(ax: Axes, problem: PlanningProblem, swept: SweptTree, inter
     over = union_all([Polygon(swept.over(index, intervals)) for index in pieces])
     under = [swept.under(index, intervals) for index in pieces]
     draw_polygon(ax, over, facecolor="none", edgecolor=INK, linewidth=1.6, zorder=4.0)
-    _draw_filled(ax, union_all([Polygon(ring) for ring in under if ring is not None]))
+    common = union_all([Polygon(ring) for ring in under if ring is not None])
+    draw_polygon(ax, common, facecolor=INK, edgecolor="none", alpha=0.75, zorder=3.5)
     ax.autoscale_view()
     ax.set_aspect("equal")
     ax.set_xlabel("x from the object [m]")
     ax.set_ylabel("y from the object [m]")
-    ax.set_title(_named(problem, intervals), fontsize=9, loc="left")
-
-
-def _draw_filled(ax: Axes, shape: BaseGeometry) -> None:
-    if not shape.is_empty:
-        draw_polygon(ax, shape, facecolor=INK, edgecolor="none", alpha=0.75, zorder=3.5)
+    ax.set_title(_slice_name(problem, intervals), fontsize=9, loc="left")
 
 
 def _draw_cells(ax: Axes, problem: PlanningProblem, cells: CellMaker, intervals: Intervals) -> None:
     draw_workspace(ax, problem.workspace)
     over, under = cells.over_cells(intervals), cells.under_cells(intervals)
-    for regions, colour in ((over, look.MIXED), (under, look.FREE)):
+    for regions, colour in ((over, UNDECIDED), (under, PROVED_FREE)):
         for region in regions:
             draw_section(ax, region.section, colour, 0.55)
     ax.legend(
         handles=[
-            Patch(color=look.FREE, alpha=0.6, label=f"proved free: {_area(under):.1f} m²"),
-            Patch(color=look.MIXED, alpha=0.6, label=f"may be free: {_area(over):.1f} m²"),
+            Patch(color=PROVED_FREE, alpha=0.6, label=f"proved free: {_area(under):.1f} m²"),
+            Patch(color=UNDECIDED, alpha=0.6, label=f"may be free: {_area(over):.1f} m²"),
             Patch(facecolor=FLOOR, edgecolor=INK, label="no configuration is free"),
         ],
         fontsize=8,
@@ -89,7 +84,8 @@ def _area(regions: Sequence[Region]) -> float:
     return sum(region.area for region in regions)
 
 
-def _named(problem: PlanningProblem, intervals: Intervals) -> str:
+def _slice_name(problem: PlanningProblem, intervals: Intervals) -> str:
+    """Return the intervals of a slice in words."""
     axes = [("θ", "rad"), *((joint.name.replace("::", " "), joint.unit) for joint in problem.tree.joints)]
     return ",  ".join(
         f"{name} {np.degrees(lower):.0f}° to {np.degrees(upper):.0f}°"

@@ -1,4 +1,4 @@
-"""A line through a channel: taut inside every region, theta moving with it; a sketch, not a plan."""
+"""A path through a channel: shortest inside every region, theta moving with it; a sketch, not a plan."""
 
 from __future__ import annotations
 
@@ -15,22 +15,25 @@ from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.planning.cells.slices import nearest_turn
 from coop_drake.tree.pose import FloatArray
-from coop_drake.watching.moments import Link
+from coop_drake.watching.search_states import ChannelCell
 
-__all__ = ["Leg", "legs_through"]
+__all__ = ["PathPiece", "path_through"]
 
-_INSET = 0.02  # How far crossings stay inside what two regions share, where there is room [m].
-_COARSE = 0.01  # Corners of regions that are straightened before lines are drawn round them [m].
+_INSET = 0.02
+"""Distance by which crossings stay inside what two regions share, where that is wide enough [m]."""
+
+_OUTLINE_TOLERANCE = 0.01
+"""Distance by which outlines may move when they are simplified [m]: fewer corners, quicker paths."""
 
 
 @dataclass(frozen=True, eq=False)
-class Leg:
-    """The line through one cell.
+class PathPiece:
+    """The path through one cell.
 
     Attributes:
         kind: What is known about the cell.
         positions: Shape (k, 2), k >= 2 [m].
-        angles: (theta, q...) along it, theta unwrapped from leg to leg, shape (k, 1 + n) [rad, m].
+        angles: (theta, q...) along it, theta unwrapped from piece to piece, shape (k, 1 + n) [rad, m].
     """
 
     kind: Kind
@@ -38,42 +41,43 @@ class Leg:
     angles: FloatArray
 
 
-def legs_through(channel: Sequence[Link], start: FloatArray, goal: FloatArray) -> list[Leg]:
-    """Draw a line from start to goal through the cells of a channel.
+def path_through(channel: Sequence[ChannelCell], start: FloatArray, goal: FloatArray) -> list[PathPiece]:
+    """Return a path from start to goal through the cells of a channel.
 
     Args:
         channel: Cells whose regions meet one after the other.
         start: (x, y, theta, q...), shape (2 + axes,) [m, rad].
         goal: The same at the goal; NaN for joints that are free.
     """
-    legs: list[Leg] = []
-    polygons = [_coarse(to_polygon(link.region.section)) for link in channel]
+    pieces: list[PathPiece] = []
+    polygons = [_simplified(to_polygon(cell.region.section)) for cell in channel]
     here, angles = np.asarray(start[:2]), np.asarray(start[2:])
-    for number, link in enumerate(channel):
-        if number + 1 == len(channel) and not link.region.holds(goal[:2]):
-            there, then = here, angles  # A channel that is still being laid.
+    for number, cell in enumerate(channel):
+        if number + 1 == len(channel) and not cell.region.holds(goal[:2]):
+            there, then = here, angles  # The channel is not complete yet.
         elif number + 1 < len(channel):
             there = _crossing(polygons[number], polygons[number + 1], here)
-            then = _shared_angles(link, channel[number + 1], angles)
+            then = _shared_angles(cell, channel[number + 1], angles)
         else:
             there, then = np.asarray(goal[:2]), np.where(np.isnan(goal[2:]), angles, goal[2:])
             then = np.array([angles[0] + nearest_turn(then[0] - angles[0]), *then[1:]])
-        positions = _taut(polygons[number], here, there)
+        positions = _shortest_inside(polygons[number], here, there)
         steps = np.hypot(*np.diff(positions, axis=0).T)
-        share = np.concatenate([[0.0], np.cumsum(steps)]) / max(float(steps.sum()), 1e-12)
-        share[-1] = 1.0
-        legs.append(Leg(link.kind, positions, angles + share[:, None] * (then - angles)))
+        fraction = np.concatenate([[0.0], np.cumsum(steps)]) / max(float(steps.sum()), 1e-12)
+        fraction[-1] = 1.0
+        pieces.append(PathPiece(cell.kind, positions, angles + fraction[:, None] * (then - angles)))
         here, angles = there, then
-    return legs
+    return pieces
 
 
-def _coarse(polygon: Polygon) -> Polygon:
-    simpler = polygon.simplify(_COARSE)
+def _simplified(polygon: Polygon) -> Polygon:
+    """Return a polygon with fewer corners, or itself where it would fall apart."""
+    simpler = polygon.simplify(_OUTLINE_TOLERANCE)
     return simpler if isinstance(simpler, Polygon) and simpler.is_valid else polygon
 
 
 def _crossing(first: Polygon, second: Polygon, here: FloatArray) -> FloatArray:
-    """Point nearest to ``here`` that both polygons hold, a little inside where there is room."""
+    """Return the point of both polygons nearest to ``here``, a little inside where they overlap widely."""
     shared = shapely.intersection(first, second)
     inner = shared.buffer(-_INSET)
     target = shared if inner.is_empty else inner
@@ -83,10 +87,10 @@ def _crossing(first: Polygon, second: Polygon, here: FloatArray) -> FloatArray:
     return np.asarray(nearest.coords[0])
 
 
-def _shared_angles(link: Link, following: Link, angles: FloatArray) -> FloatArray:
-    """Angles in both cells' intervals nearest to ``angles``; theta on the turn nearest to it."""
+def _shared_angles(cell: ChannelCell, following: ChannelCell, angles: FloatArray) -> FloatArray:
+    """Return the angles in both cells' intervals nearest to ``angles``; theta on the turn nearest to it."""
     result = []
-    for axis, ((a, b), (c, d)) in enumerate(zip(link.intervals, following.intervals, strict=True)):
+    for axis, ((a, b), (c, d)) in enumerate(zip(cell.intervals, following.intervals, strict=True)):
         turn_a = _turn(0.5 * (a + b), float(angles[axis])) if axis == 0 else 0.0
         turn_c = _turn(0.5 * (c + d), 0.5 * (a + b) + turn_a) if axis == 0 else 0.0
         low, high = max(a + turn_a, c + turn_c), min(b + turn_a, d + turn_c)
@@ -95,28 +99,28 @@ def _shared_angles(link: Link, following: Link, angles: FloatArray) -> FloatArra
 
 
 def _turn(value: float, near: float) -> float:
-    """Whole turns that bring an angle nearest to another one."""
+    """Return the whole turns that bring an angle nearest to another one."""
     return near + nearest_turn(value - near) - value
 
 
-def _taut(polygon: Polygon, here: FloatArray, there: FloatArray) -> FloatArray:
-    """Shortest line between two points of a polygon, straight where there is none; shape (k, 2)."""
+def _shortest_inside(polygon: Polygon, here: FloatArray, there: FloatArray) -> FloatArray:
+    """Return the shortest path between two points of a polygon, shape (k, 2); straight if there is none."""
     ends = np.array([here, there])
-    room = polygon.buffer(1e-6)
-    if room.covers(shapely.LineString(ends)):
+    inside = polygon.buffer(1e-6)
+    if inside.covers(shapely.LineString(ends)):
         return ends
     rings = [polygon.exterior, *polygon.interiors]
     nodes = np.concatenate([ends, *[np.asarray(ring.coords)[:-1] for ring in rings]])
     i, j = np.triu_indices(len(nodes), 1)
     lines = np.asarray(shapely.linestrings(np.stack([nodes[i], nodes[j]], axis=1)))
-    shapely.prepare(room)
-    seen = shapely.covers(room, lines)
+    shapely.prepare(inside)
+    seen = shapely.covers(inside, lines)
     lengths = np.maximum(shapely.length(lines[seen]), 1e-9)
     graph = csr_array((lengths, (i[seen], j[seen])), shape=(len(nodes), len(nodes)))
     _, back = dijkstra(graph, directed=False, indices=np.array([0]), return_predecessors=True)
     if back[0, 1] < 0:
         return ends
-    way = [1]
-    while way[-1] != 0:
-        way.append(int(back[0, way[-1]]))
-    return nodes[way[::-1]]
+    visited = [1]
+    while visited[-1] != 0:
+        visited.append(int(back[0, visited[-1]]))
+    return nodes[visited[::-1]]

@@ -1,4 +1,4 @@
-"""Moments are the exploration itself, step by step, only merged."""
+"""States are the exploration itself, step by step, only merged."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from coop_drake.planning.cells.events import (
 )
 from coop_drake.planning.cells.exploration import Exploration
 from coop_drake.planning.questions.margins import shrunk
-from coop_drake.watching import moments
+from coop_drake.watching import search_states
 from tests.planning.test_search import rod_problem
-from tests.watching.rods import NARROW, WIDE, rod_film
+from tests.watching.rods import NARROW, WIDE, rod_recording
 
 
 @pytest.mark.parametrize("corridor", [WIDE, NARROW])
@@ -32,7 +32,7 @@ def test_events_replayed_give_the_leaves_cells_and_channel_of_the_exploration(co
         problem, shrunk(problem.workspace, 0.0), swept, BodyPairs(swept), watch=events.append
     )
     outcome = exploration.run(500)
-    last = moments(events, 7)[-1]
+    last = search_states(events, 7)[-1]
     assert sorted(last.leaves) == exploration.slices.leaves()
     for index, leaf in last.leaves.items():
         assert leaf.intervals == exploration.slices.all[index].intervals
@@ -40,37 +40,37 @@ def test_events_replayed_give_the_leaves_cells_and_channel_of_the_exploration(co
             cell.region for cell in exploration.graph.by_slice[index]
         ]
     assert (last.count(Kind.FREE), last.count(Kind.MIXED)) == exploration.counts()
-    assert [link.region for link in last.channel] == [cell.region for cell in outcome.path]
+    assert [cell.region for cell in last.channel] == [cell.region for cell in outcome.path]
     assert last.cost == sum(cell.weight for cell in outcome.path)
     assert (last.slices, last.verdict) == (outcome.slices, outcome.verdict.value)
 
 
 @pytest.mark.parametrize("most", [2, 3, 10, 10_000])
-def test_no_more_moments_than_asked_for_the_last_one_the_verdict_no_split_lost(most):
-    recorded = rod_film().events
-    found = moments(recorded, most)
+def test_no_more_states_than_asked_for_the_last_one_the_verdict_no_split_lost(most):
+    recorded = rod_recording().events
+    found = search_states(recorded, most)
     assert 2 <= len(found) <= most
     assert found[-1].verdict == "found"
-    assert all(moment.verdict is None for moment in found[:-1])
-    slices = [moment.slices for moment in found]
+    assert all(state.verdict is None for state in found[:-1])
+    slices = [state.slices for state in found]
     assert slices == sorted(slices)
     told = [(event.slice, event.axis) for event in recorded if isinstance(event, SliceSplit)]
-    assert [(leaf.slice, axis) for moment in found for leaf, axis in moment.splits] == told
-    assert len(found[-1].open_links) == sum(isinstance(event, ChannelSearched) for event in recorded)
+    assert [(leaf.slice, axis) for state in found for leaf, axis in state.splits] == told
+    assert len(found[-1].history) == sum(isinstance(event, ChannelSearched) for event in recorded)
 
 
-def test_moments_lie_evenly_over_the_steps():
-    recorded = rod_film().events
-    every = moments(recorded, 10_000)
-    few = moments(recorded, 6)
-    steps = [[moment.slices for moment in every].index(moment.slices) for moment in few]
+def test_states_lie_evenly_over_the_steps():
+    recorded = rod_recording().events
+    every = search_states(recorded, 10_000)
+    few = search_states(recorded, 6)
+    steps = [[state.slices for state in every].index(state.slices) for state in few]
     gaps = [second - first for first, second in pairwise(steps)]
     assert max(gaps) - min(gaps) <= 3
 
 
-def test_a_single_moment_is_refused():
-    with pytest.raises(ValueError, match="2 moments or more, got 1"):
-        moments(rod_film().events, 1)
+def test_a_single_keyframe_is_refused():
+    with pytest.raises(ValueError, match="2 keyframes or more, got 1"):
+        search_states(rod_recording().events, 1)
 
 
 def test_explorations_that_take_turns_are_kept_apart():
@@ -87,12 +87,12 @@ def test_explorations_that_take_turns_are_kept_apart():
         SliceAdded(2, ((0.5, 1.0),), ()),
         ExplorationEnded("infeasible", 3),
     ]
-    found = moments(events, 50)
-    assert [moment.question for moment in found] == [*["first"] * 2, *["second"] * 2, *["first"] * 2]
-    middle = next(moment for moment in reversed(found) if moment.question == "second")
+    found = search_states(events, 50)
+    assert [state.question for state in found] == [*["first"] * 2, *["second"] * 2, *["first"] * 2]
+    middle = next(state for state in reversed(found) if state.question == "second")
     assert {leaf.intervals for leaf in middle.leaves.values()} == {((2.0, 3.0),)}
     assert (middle.robots, middle.verdict) == ((), "budget spent")
     last = found[-1]
     assert (last.question, last.robots, last.slices, last.verdict) == ("first", (0,), 3, "infeasible")
     assert sorted(last.leaves) == [1, 2]
-    assert [moment.question for moment in moments(events, 3)] == ["first", "second", "first"]
+    assert [state.question for state in search_states(events, 3)] == ["first", "second", "first"]

@@ -1,0 +1,74 @@
+"""The left half of a keyframe's figure: the floor, what is known about it, and the channel's path."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from manifold3d import CrossSection
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
+from matplotlib.patches import PathPatch
+
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.drawing import colours
+from coop_drake.drawing.floor import draw_team, draw_workspace, outline_of
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.tree.pose import FloatArray
+from coop_drake.watching.channel_path import PathPiece
+
+__all__ = ["DASHES", "draw_ends", "draw_path", "draw_section"]
+
+DASHES = (0.0, (1.4, 0.9))
+"""Dashes of what is not proved, in widths of the line."""
+
+
+def draw_ends(ax: Axes, problem: PlanningProblem, goal_joints: FloatArray) -> None:
+    """Draw the floor, and the team's footprint at the start and at the goal.
+
+    Args:
+        ax: Where to draw.
+        problem: The planning problem.
+        goal_joints: Joint values to draw the goal with, shape (n,) [rad, m].
+    """
+    draw_workspace(ax, problem.workspace)
+    goal = np.concatenate([problem.goal_pose, goal_joints])
+    box = {"boxstyle": "round,pad=0.15", "facecolor": colours.PAPER, "edgecolor": "none", "alpha": 0.8}
+    for label, z in (("start", problem.start), ("goal", goal)):
+        draw_team(ax, problem.tree, z, colour=colours.INK, alpha=0.12, zorder=5.0)
+        ax.annotate(
+            label, (z[0], z[1]), ha="center", va="center", fontsize=10, fontweight="bold", zorder=8, bbox=box
+        )
+
+
+def draw_section(ax: Axes, section: CrossSection, colour: str, alpha: float, *, width: float = 0.8) -> None:
+    """Fill a section, holes left open, and draw its outline.
+
+    Args:
+        ax: Where to draw.
+        section: Positions [m].
+        colour: Of filling and outline.
+        alpha: Opacity of the filling; 0 draws the outline alone, above what is filled.
+        width: Of the outline [points].
+    """
+    rings = [np.vstack([ring, ring[:1]]) for ring in section.to_polygons()]
+    if rings:
+        patch = PathPatch(
+            outline_of(rings), facecolor=to_rgba(colour, alpha), edgecolor=colour, linewidth=width
+        )
+        patch.set_zorder(2.0 if alpha > 0.0 else 4.0)
+        ax.add_patch(patch)
+
+
+def draw_path(ax: Axes, path: Sequence[PathPiece]) -> None:
+    """Draw the path through a channel: a firm line where it is proved free, a dashed one where not."""
+    for piece in path:
+        proved = piece.kind is Kind.FREE
+        ax.plot(
+            *piece.positions.T,
+            color=colours.CHANNEL if proved else colours.UNDECIDED_CHANNEL,
+            linewidth=2.6,
+            linestyle="-" if proved else DASHES,
+            solid_capstyle="round",
+            zorder=6.0 if proved else 6.5,
+        )

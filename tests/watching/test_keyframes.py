@@ -1,0 +1,214 @@
+"""What is drawn is what the events say: components, paths, projections, layers and cuts."""
+
+from __future__ import annotations
+
+from itertools import combinations, pairwise
+from math import pi
+
+import numpy as np
+import pytest
+from shapely import LineString, union_all
+
+from coop_drake.geometry.minkowski import to_polygon
+from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.slices import holds, nearest_turn, share_facet
+from coop_drake.watching import Strategy, keyframes, record_search
+from coop_drake.watching.angle_panels import cut
+from coop_drake.watching.projections import Projections
+from coop_drake.watching.recording import BOXES
+from coop_drake.watching.theta_layers import THETA, Knowledge, on_turn, slabs_of
+from tests.watching.rods import NARROW, WIDE, jointed_rod, rod_recording
+
+
+@pytest.fixture(scope="module")
+def found():
+    recorded = rod_recording(WIDE)
+    return recorded, keyframes(recorded, 12)
+
+
+@pytest.fixture(scope="module")
+def apart():
+    recorded = rod_recording(NARROW)
+    return recorded, keyframes(recorded, 12)
+
+
+def area(section):
+    return section.area()
+
+
+def test_a_proof_shows_two_parts_that_never_touch_with_start_and_goal_in_different_ones(apart):
+    recorded, frames = apart
+    parts = frames[-1].components
+    assert all(frame.components is None for frame in frames[:-1])
+    start, goal = recorded.start_of(()), recorded.goal_of(())
+
+    def members(end, part):
+        return [
+            leaf for leaf, region in part if holds(leaf.intervals, [float(end[2])]) and region.holds(end[:2])
+        ]
+
+    assert members(start, parts.reached)
+    assert not members(start, parts.others)
+    assert members(goal, parts.others)
+    assert not members(goal, parts.reached)
+    for leaf, region in parts.reached:
+        for other, beyond in parts.others:
+            neighbours = leaf.slice != other.slice and share_facet(leaf.intervals, other.intervals)
+            assert not (neighbours and region.meets(beyond))
+    mixed = sum(len(leaf.regions(Kind.MIXED)) for leaf in frames[-1].state.leaves.values())
+    assert len(parts.reached) + len(parts.others) == mixed
+
+
+def test_the_line_runs_from_start_to_goal_inside_the_cells_of_the_channel(found):
+    recorded, frames = found
+    frame = frames[-1]
+    assert frame.headline.startswith("Found")
+    path, channel = frame.path, frame.state.channel
+    assert [piece.kind for piece in path] == [cell.kind for cell in channel]
+    np.testing.assert_array_equal(path[0].positions[0], recorded.problem.start[:2])
+    np.testing.assert_array_equal(path[-1].positions[-1], recorded.problem.goal_pose[:2])
+    assert nearest_turn(path[-1].angles[-1, 0] - recorded.problem.goal_pose[2]) == pytest.approx(0.0)
+    for before, after in pairwise(path):
+        np.testing.assert_array_equal(before.positions[-1], after.positions[0])
+        np.testing.assert_allclose(before.angles[-1], after.angles[0], rtol=0, atol=1e-12)
+    for piece, cell in zip(path, channel, strict=True):
+        # Outlines are straightened by a centimetre before lines are drawn round their corners.
+        assert to_polygon(cell.region.section).buffer(0.011).covers(LineString(piece.positions))
+        for theta in piece.angles[:, 0]:
+            assert holds(cell.intervals, [theta])
+
+
+def test_projections_are_the_unions_of_the_cells_and_do_not_overlap(found):
+    _, frames = found
+    leaves = list(frames[-1].state.leaves.values())
+    projection = Projections().of(leaves)
+    for kinds, section in (
+        ((Kind.FREE,), projection.free),
+        ((Kind.FREE, Kind.GUIDE), projection.free + projection.guide),
+        ((Kind.FREE, Kind.GUIDE, Kind.MIXED), projection.free + projection.guide + projection.mixed),
+    ):
+        exact = union_all(
+            [to_polygon(r.section) for leaf in leaves for kind in kinds for r in leaf.regions(kind)]
+        )
+        assert area(section) == pytest.approx(exact.area, abs=0.01 * exact.length)
+    for first, second in combinations((projection.free, projection.guide, projection.mixed), 2):
+        assert area(first ^ second) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_kept_projections_are_those_made_anew(found):
+    _, frames = found
+    for frame in frames:
+        anew = Projections().of(frame.state.leaves.values())
+        assert area(frame.projection.free) == area(anew.free)
+        assert area(frame.projection.mixed) == area(anew.mixed)
+
+
+def test_every_keyframe_shows_the_whole_turn_and_the_last_one_its_answer(found, apart):
+    for (_, frames), answers in (
+        (found, {Knowledge.CHANNEL}),
+        (apart, {Knowledge.REACHED, Knowledge.OTHERS}),
+    ):
+        slabs = slabs_of(frames)
+        last = len(frames) - 1
+        assert {slab.knowledge for slab in slabs if slab.last == last} == answers
+        for number in range(last):
+            shown = [slab for slab in slabs if slab.first <= number <= slab.last]
+            assert {slab.knowledge for slab in shown} <= {Knowledge.FREE, Knowledge.UNDECIDED}
+            layers = sorted({slab.theta for slab in shown})
+            assert layers[0][0] == pytest.approx(THETA[0])
+            assert layers[-1][1] == pytest.approx(THETA[1])
+            for below, above in pairwise(layers):
+                assert below[1] == above[0]
+
+
+def test_a_layer_shows_what_some_slice_in_it_knows(found):
+    _, frames = found
+    number = len(frames) // 2
+    leaves = frames[number].state.leaves.values()
+    for slab in slabs_of(frames):
+        if slab.knowledge is not Knowledge.FREE or not slab.first <= number <= slab.last:
+            continue
+        met = [
+            to_polygon(region.section)
+            for leaf in leaves
+            for lower, upper in on_turn(leaf.intervals[0])
+            if min(upper, slab.theta[1]) - max(lower, slab.theta[0]) > 1e-9
+            for region in leaf.regions(Kind.FREE)
+        ]
+        exact = union_all(met)
+        assert area(slab.section) == pytest.approx(exact.area, abs=0.01 * exact.length)
+
+
+@pytest.mark.parametrize(
+    ("interval", "parts"),
+    [
+        ((0.0, 1.0), [(0.0, 1.0)]),
+        ((2 * pi, 2 * pi + 1.0), [(0.0, 1.0)]),
+        ((-pi / 4 - 0.5, -pi / 4 + 0.5), [(-pi / 4, -pi / 4 + 0.5), (7 * pi / 4 - 0.5, 7 * pi / 4)]),
+        ((-pi, pi), [(-pi / 4, pi), (pi, 7 * pi / 4)]),
+    ],
+)
+def test_intervals_of_theta_are_brought_onto_the_turn_drawn(interval, parts):
+    np.testing.assert_allclose(sorted(on_turn(interval)), parts, rtol=0, atol=1e-12)
+
+
+def test_a_cut_tiles_theta_and_the_joint_without_gap_or_overlap():
+    recorded = record_search(jointed_rod(), Strategy.CELLS, 0.0)
+    for frame in keyframes(recorded, 8):
+        tiles = cut(frame.state.leaves.values(), 1, frame.cut_at)
+        total = sum((b - a) * (d - c) for (a, b), (c, d) in (leaf.intervals for leaf in tiles))
+        assert total == pytest.approx(2 * pi * 2.0)
+        strips = cut(frame.state.leaves.values(), 0, frame.cut_at)
+        assert sum(leaf.intervals[0][1] - leaf.intervals[0][0] for leaf in strips) == pytest.approx(2 * pi)
+
+
+def test_captions_say_what_happens_and_what_a_margin_is_worth(found, apart):
+    recorded, frames = found
+    splitting = next(frame for frame in frames if frame.state.splits and frame.state.verdict is None)
+    assert "halved" in splitting.headline
+    assert splitting.headline.endswith("along θ")
+    assert f"{frames[-1].state.slices} slices made" in frames[-1].counters
+    assert recorded.axis_names == ("θ",)
+    assert apart[1][-1].headline.startswith("Infeasible, proved")
+    shy = keyframes(rod_recording(WIDE, margin=0.06), 3)[-1]
+    assert shy.headline.startswith("No path keeps 0.06 m from the walls")
+    assert "proved" not in shy.headline
+
+
+def test_the_papers_algorithms_and_the_whole_portfolio_can_be_watched():
+    printed = keyframes(rod_recording(WIDE, Strategy.PAPER), 6)
+    assert printed[0].state.slices < printed[-1].state.slices
+    assert printed[-1].state.verdict in {"found", "below resolution", "budget spent"}
+    boxes = keyframes(rod_recording(0.6, Strategy.PORTFOLIO, 0.02), 500)
+    laying = [frame for frame in boxes if frame.state.question == BOXES]
+    assert len(laying) > 2
+    for laid, frame in enumerate(laying):
+        assert all(leaf.free_fraction == 1.0 for leaf in frame.state.leaves.values())
+        line = LineString(np.concatenate([piece.positions for piece in frame.path] or [np.zeros((2, 2))]))
+        free = union_all([to_polygon(cell.region.section) for cell in frame.state.channel])
+        assert laid == 0 or free.buffer(0.011).covers(line)
+    assert boxes[-1].headline.startswith("Found")
+    assert all(cell.kind is Kind.FREE for cell in boxes[-1].state.channel)
+    refuted = keyframes(rod_recording(NARROW, Strategy.PORTFOLIO, 0.02), 6)
+    assert refuted[-1].state.verdict == "infeasible"
+
+
+def test_the_same_question_gives_the_same_storyboard(found):
+    _, frames = found
+    again = keyframes(rod_recording(WIDE), 12)
+    for first, second in zip(frames, again, strict=True):
+        assert (first.headline, first.counters) == (second.headline, second.counters)
+        assert first.state.leaves.keys() == second.state.leaves.keys()
+        for piece, other in zip(first.path, second.path, strict=True):
+            np.testing.assert_array_equal(piece.positions, other.positions)
+            np.testing.assert_array_equal(piece.angles, other.angles)
+    for slab, other in zip(slabs_of(frames), slabs_of(again), strict=True):
+        assert (slab.knowledge, slab.theta, slab.first, slab.last) == (
+            other.knowledge,
+            other.theta,
+            other.first,
+            other.last,
+        )
+        assert [ring.tolist() for ring in slab.section.to_polygons()] == [
+            ring.tolist() for ring in other.section.to_polygons()
+        ]
