@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from types import FunctionType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, TypeVar, cast, overload
 
 import numba
+import numpy as np
 from numba import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
@@ -44,6 +46,8 @@ def compiled(function: F | None = None, *, reassociate: bool = False) -> F | Cal
         flags = _REASSOCIATED if reassociate else False
         options = {"nogil": True, "error_model": "numpy", "fastmath": flags, "no_cfunc_wrapper": True}
         dispatcher = numba.njit(**options)(function)
+        if not isinstance(dispatcher, CPUDispatcher):  # NUMBA_DISABLE_JIT is set: nothing is compiled
+            return function
         dispatcher._cache = _KernelCache(function, "called from Python")
         # Most functions are called from compiled ones only. Then the wrapper that unpacks Python's arguments,
         # a sixth of the time to compile, is left out.
@@ -72,21 +76,45 @@ def _by_type_alone(get_call_template: Callable[..., object]) -> Callable[..., ob
 def kernel_stamp(function: FunctionType) -> str:
     """Return a digest of all that a function's machine code depends on.
 
-    Numba's own cache looks at the file that holds the function. A function compiled from another file, or a
-    constant imported from one, is part of the machine code too, so the stamp also holds the stamps of all
-    compiled functions and the values of all numbers that the function's module has imported.
+    Numba's own cache looks at the file that holds the function. The machine code also depends on what other
+    files define: the compiled functions that it calls, the constants that it reads, and the fields of the
+    named tuples that it takes. The stamp therefore holds the stamps, values and definitions of all of these
+    that the function's module has imported, by name or as attributes of imported modules.
 
     Args:
         function: The function before it is compiled; its module's imports have been executed.
     """
+    attributes = _names_in(function.__code__)
     parts = [_file_digest(function.__code__.co_filename)]
     for name, value in sorted(function.__globals__.items()):
-        if isinstance(value, CPUDispatcher):
-            if value.py_func.__module__ != function.__module__:
-                parts.append(f"{name}={value._cache.stamp}")
-        elif isinstance(value, (bool, int, float, tuple)):
-            parts.append(f"{name}={value!r}")
+        if isinstance(value, ModuleType):
+            found = {f"{name}.{attribute}": getattr(value, attribute, None) for attribute in attributes}
+        else:
+            found = {} if name.startswith("__") else {name: value}
+        for path, part in sorted(found.items()):
+            if (description := _description(part, function.__module__)) is not None:
+                parts.append(f"{path}={description}")
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
+
+
+def _names_in(code: CodeType) -> list[str]:
+    """Return the names of globals and attributes that a function uses, those of nested functions included."""
+    nested = (constant for constant in code.co_consts if isinstance(constant, CodeType))
+    return sorted({*code.co_names, *(name for part in nested for name in _names_in(part))})
+
+
+def _description(value: object, module: str) -> str | None:
+    """Return what a global adds to the stamp of a module's function; None if machine code cannot hold it."""
+    if isinstance(value, CPUDispatcher):
+        return None if value.py_func.__module__ == module else str(value._cache.stamp)
+    if isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields"):
+        defined_in = getattr(sys.modules.get(value.__module__), "__file__", None)
+        return f"{value._fields} {_file_digest(defined_in) if defined_in else value.__module__}"
+    if isinstance(value, tuple):
+        return f"({', '.join(str(_description(item, module)) for item in value)})"
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
+    return repr(value) if isinstance(value, (bool, int, float, complex, str, np.generic)) else None
 
 
 @cache

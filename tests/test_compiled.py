@@ -5,28 +5,69 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 CALLEE = """
+from typing import NamedTuple
+
+import numpy as np
+
 from coop_drake.compiled import compiled
+
+CONSTANT = {constant}
+TABLE = np.array([0.0, {entry}])
+
+class {name}(NamedTuple):
+    {fields[0]}: float
+    {fields[1]}: float
+
+Pair = {name}
 
 @compiled
 def slope(x):
     return {factor} * x
 """
 
-CALLER = """
-from callee import slope
+BETWEEN = """
+from callee import CONSTANT, TABLE, Pair, slope  # passed on by a file without compiled functions
+"""
+
+BY_NAME = """
+from between import CONSTANT, TABLE, Pair, slope
+from coop_drake.compiled import compiled
+
+@compiled
+def line(pair, x):
+    return slope(x) + CONSTANT + TABLE[1] + pair.first
+
+print(line(Pair(0.25, 0.5), 2.0), slope(2.0), sum(line.stats.cache_hits.values()))
+"""
+
+BY_MODULE = """
+import between
 from coop_drake.compiled import compiled
 
 @compiled
 def line(x):
-    return slope(x) + 1.0
+    return between.slope(x) + between.CONSTANT + between.TABLE[1]
 
-print(line(2.0), slope(2.0), sum(line.stats.cache_hits.values()))
+print(line(2.0), between.slope(2.0), sum(line.stats.cache_hits.values()))
 """
 
+ORIGINAL = {"name": "Original", "factor": 3.0, "constant": 1.0, "entry": 10.0, "fields": ("first", "second")}
 
-def run(folder: Path) -> list[str]:
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+
+def write_callee(folder: Path, **changes: object) -> None:
+    (folder / "callee.py").write_text(CALLEE.format(**{**ORIGINAL, **changes}))
+
+
+def run(folder: Path, **more: str) -> list[str]:
+    environment = {
+        **os.environ,
+        **more,
+        "NUMBA_CACHE_DIR": str(folder / "cache"),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
     environment["PYTHONPATH"] = os.pathsep.join([str(folder), *sys.path])
     done = subprocess.run(
         [sys.executable, folder / "caller.py"], env=environment, capture_output=True, text=True, check=True
@@ -34,33 +75,42 @@ def run(folder: Path) -> list[str]:
     return done.stdout.split()
 
 
-def test_an_edited_callee_compiles_its_callers_anew(tmp_path):
-    (tmp_path / "caller.py").write_text(CALLER)
-    (tmp_path / "callee.py").write_text(CALLEE.format(factor=3.0))
-    assert run(tmp_path) == ["7.0", "6.0", "0"]
-    assert run(tmp_path) == ["7.0", "6.0", "1"]
-    (tmp_path / "callee.py").write_text(CALLEE.format(factor=5.0))
-    assert run(tmp_path) == ["11.0", "10.0", "0"]
+@pytest.mark.parametrize(
+    ("caller", "first", "edits"),
+    [
+        (
+            BY_NAME,
+            "17.25",
+            [
+                ({"factor": 5.0}, "21.25"),
+                ({"constant": 2.0}, "22.25"),
+                ({"entry": 20.0}, "32.25"),
+                ({"fields": ("second", "first")}, "32.5"),
+                ({"name": "Renamed"}, "32.5"),
+            ],
+        ),
+        (
+            BY_MODULE,
+            "17.0",
+            [({"factor": 5.0}, "21.0"), ({"constant": 2.0}, "22.0"), ({"entry": 20.0}, "32.0")],
+        ),
+    ],
+    ids=["imported by name", "attributes of a module"],
+)
+def test_an_edit_in_another_file_compiles_its_users_anew(tmp_path, caller, first, edits):
+    (tmp_path / "caller.py").write_text(caller)
+    (tmp_path / "between.py").write_text(BETWEEN)
+    values = dict(ORIGINAL)
+    write_callee(tmp_path, **values)
+    assert run(tmp_path) == [first, "6.0", "0"]
+    assert run(tmp_path) == [first, "6.0", "1"]
+    for edit, result in edits:
+        values |= edit
+        write_callee(tmp_path, **values)
+        assert run(tmp_path) == [result, str(2.0 * values["factor"]), "0"], edit
 
 
-PAIR = """
-from typing import NamedTuple
-from coop_drake.compiled import compiled
-
-class {name}(NamedTuple):
-    x: float
-
-@compiled
-def first(pair):
-    return pair.x
-
-print(first({name}(4.0)), sum(first.stats.cache_hits.values()))
-"""
-
-
-def test_a_class_that_an_older_version_had_is_no_error(tmp_path):
-    (tmp_path / "caller.py").write_text("import pairs")
-    for name in ("Pair", "Couple"):
-        (tmp_path / "pairs.py").write_text(PAIR.format(name=name))
-        assert run(tmp_path) == ["4.0", "0"]
-    assert run(tmp_path) == ["4.0", "1"]
+def test_nothing_is_compiled_where_numba_is_told_so(tmp_path):
+    (tmp_path / "caller.py").write_text("from callee import slope\nprint(type(slope).__name__, slope(2.0))")
+    write_callee(tmp_path)
+    assert run(tmp_path, NUMBA_DISABLE_JIT="1") == ["function", "6.0"]
