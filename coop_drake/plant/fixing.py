@@ -5,7 +5,8 @@ from fnmatch import fnmatchcase
 from math import pi
 
 import numpy as np
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.common.eigen_geometry import AngleAxis
+from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Joint, WeldJoint
 
@@ -98,14 +99,7 @@ def _moved(joint: Joint, value: float) -> RigidTransform:
         quarters = round(value / (0.5 * pi))
         if abs(value - quarters * 0.5 * pi) <= _ROUNDING:  # 1.570796 in a file means a right angle.
             value = quarters * 0.5 * pi
-        return RigidTransform(_turn(np.asarray(joint.revolute_axis(), dtype=float), value), np.zeros(3))
+        return RigidTransform(AngleAxis(value, joint.revolute_axis()), np.zeros(3))
     if joint.type_name() == "prismatic":
         return RigidTransform(value * np.asarray(joint.translation_axis(), dtype=float))
     return RigidTransform()
-
-
-def _turn(axis: np.ndarray, angle: float) -> RotationMatrix:
-    """Rotation by Rodrigues' formula, exact at zero."""
-    x, y, z = axis
-    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return RotationMatrix(np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * (K @ K))

@@ -1,4 +1,4 @@
-"""Drake's reader of models, with what it says on the way: an error, or warnings that amount to one."""
+"""Runs Drake's reader of models, and collects its errors and the warnings that are errors to us."""
 
 import logging
 import re
@@ -7,7 +7,6 @@ from contextlib import contextmanager
 
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.parsing import (
-    ModelDirective,
     ModelDirectives,
     PackageMap,
     Parser,
@@ -15,7 +14,6 @@ from pydrake.multibody.parsing import (
 )
 from pydrake.multibody.plant import MultibodyPlant
 
-from coop_drake.plant.read_together import read_together
 from coop_drake.scenario import Assembly
 
 _REPLACED = re.compile(r"invalid inertia|inertia matrix|central inertia|Using default value")
@@ -25,49 +23,34 @@ _REPLACED = re.compile(r"invalid inertia|inertia matrix|central inertia|Using de
 def process(
     assembly: Assembly, indices: Sequence[int], plant: MultibodyPlant, scene_graph: SceneGraph | None
 ) -> str:
-    """Process directives; what Drake complained about, or nothing.
+    """Process directives; return what Drake reported as an error, or an empty text.
 
-    Warnings that are no complaints are passed on to Drake's logger.
+    Warnings by which Drake says that it replaced a mass or a size count as errors; all others are passed on
+    to Drake's logger.
+
+    Args:
+        assembly: The directives and the packages that they refer to.
+        indices: Which of the directives.
+        plant: Receives the models.
+        scene_graph: Receives the geometry, if any is wanted.
     """
-    directives = [assembly.directives[index] for index in indices]
-    complaint, done = _process(assembly, directives, plant, scene_graph, together=True)
-    if complaint and done:
-        # Drake's words about the files themselves, not about the document that they were read in.
-        scratch, geometry = MultibodyPlant(0.0), SceneGraph() if scene_graph else None
-        if geometry:
-            scratch.RegisterAsSourceForSceneGraph(geometry)
-        complaint = _process(assembly, directives, scratch, geometry, together=False)[0] or complaint
-    return complaint
-
-
-def _process(
-    assembly: Assembly,
-    directives: Sequence[ModelDirective],
-    plant: MultibodyPlant,
-    scene_graph: SceneGraph | None,
-    *,
-    together: bool,
-) -> tuple[str, bool]:
-    """The complaint, and whether it is about models that were read together."""
+    directives = ModelDirectives(directives=[assembly.directives[index] for index in indices])
     parser = Parser(plant, scene_graph) if scene_graph else Parser(plant)
     parser.package_map().AddMap(_missing(assembly, parser))
-    done = together
     try:
         with _warnings() as records:
-            done = together and read_together(directives, parser)
-            if not done:
-                ProcessModelDirectives(ModelDirectives(directives=list(directives)), parser)
+            ProcessModelDirectives(directives, parser)
     except (RuntimeError, ValueError, SystemExit) as error:  # pydrake exits where Drake's C++ would abort
-        return " ".join(str(error).split()), done
+        return " ".join(str(error).split())
     messages = [" ".join(record.getMessage().split()) for record in records]
     replaced = [message for message in messages if _REPLACED.search(message)]
     if not replaced:
         _pass_on(records)
-    return "; ".join(dict.fromkeys(replaced)), done
+    return "; ".join(dict.fromkeys(replaced))
 
 
 def _missing(assembly: Assembly, parser: Parser) -> PackageMap:
-    """The scenario's packages without those that the parser has already."""
+    """The scenario's packages without those that the parser knows already."""
     packages = PackageMap(assembly.packages)
     for name in packages.GetPackageNames():
         if parser.package_map().Contains(name):
@@ -77,7 +60,7 @@ def _missing(assembly: Assembly, parser: Parser) -> PackageMap:
 
 @contextmanager
 def _warnings() -> Iterator[list[logging.LogRecord]]:
-    """Collect what Drake warns about meanwhile, also while its logger keeps silent or is switched off."""
+    """Collect Drake's warnings in a block, whether or not its logger is silenced or switched off."""
     records: list[logging.LogRecord] = []
 
     class Collector(logging.Handler):
@@ -95,7 +78,7 @@ def _warnings() -> Iterator[list[logging.LogRecord]]:
         yield records
     finally:
         vars(logger).update(theirs)
-        logging.disable(switched_off)  # This lets Drake know of the level put back, too.
+        logging.disable(switched_off)  # This also makes Drake notice the level that was put back.
 
 
 def _pass_on(records: Sequence[logging.LogRecord]) -> None:

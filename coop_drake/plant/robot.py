@@ -1,4 +1,4 @@
-"""One robot alone on the floor: what it knows of its own dynamics."""
+"""The model that a robot has of itself: alone on the floor, with nothing in its hand."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from pydrake.multibody.parsing import GetScopedFrameByName
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     Frame,
-    JacobianWrtVariable,
     Joint,
     ModelInstanceIndex,
     MultibodyForces,
@@ -27,16 +26,10 @@ from coop_drake.plant.parsing import add_models, bodies_of, finalize, set_actuat
 from coop_drake.scenario import Scenario, assemble
 from coop_drake.tree.pose import FloatArray
 
-_PLANAR = [3, 4, 2]
-"""Drake's spatial order is rotation first; the plane's is (x, y, rotation)."""
-
 
 @dataclass(frozen=True)
 class RobotPlant:
-    """A robot's own model: z_k = (x, y, yaw, q_k...), its base on a planar joint, nothing in its hand.
-
-    All matrices and vectors are ordered like z_k; wrenches and twists are planar, (x, y, rotation), in W.
-    ``set_state`` first, then ask.
+    """A robot's own model with the coordinates z_k = (x, y, yaw, q_k...); its base has a planar joint to W.
 
     Attributes:
         plant: Finalized, continuous time, without gravity or geometry.
@@ -44,7 +37,7 @@ class RobotPlant:
         base_joint: Moves Bk against the world.
         joints: In the order of q_k.
         gripper_frame: Ek.
-        context: The state that the answers are about.
+        context: Its state, see ``set_state``, and its masses.
         position_index: Where z_k's entries stand in the plant's positions, shape (3 + n_k,), integers.
         velocity_index: Where their rates stand in the plant's velocities, shape (3 + n_k,), integers.
     """
@@ -66,7 +59,7 @@ class RobotPlant:
         self.plant.SetPositionsAndVelocities(self.context, state)
 
     def scale_masses(self, factor: float) -> None:
-        """Multiply mass and inertia of every body by a factor, as a model that is wrong about them has it."""
+        """Multiply mass and inertia of every body by a factor, to model a robot that errs about them."""
         for body in bodies_of(self.plant, self._models):
             inertia = body.CalcSpatialInertiaInBodyFrame(self.context)
             scaled = SpatialInertia(
@@ -80,50 +73,12 @@ class RobotPlant:
         return [self.plant.GetModelInstanceName(ModelInstanceIndex(i)) for i in models]
 
     @cached_property
-    def _order(self) -> Any:
-        """Index that reorders the last axis; a slice, and so free, where Drake's order is z_k's already."""
-        in_order = bool((self.velocity_index == np.arange(len(self.velocity_index))).all())
-        return slice(None) if in_order else self.velocity_index
-
-    @cached_property
-    def _grasp_arguments(self) -> tuple[Any, ...]:
-        world = self.plant.world_frame()
-        return (JacobianWrtVariable.kV, self.gripper_frame, np.zeros(3), world, world)
-
-    def mass_matrix(self) -> FloatArray:
-        """M of (22), shape (3 + n_k, 3 + n_k) [kg, kg m, kg m^2]."""
-        return self.plant.CalcMassMatrix(self.context)[self._order][:, self._order]
-
-    def bias(self) -> FloatArray:
-        """C z' + G of (22) with the joints' damping, shape (3 + n_k,) [N, N m]."""
-        return self._inverse_dynamics(np.zeros(len(self.velocity_index)))
-
-    def inertial_effort(self, acceleration: FloatArray) -> FloatArray:
-        """M z'' + C z' + G with the joints' damping, without any wrench at the grasp.
-
-        Args:
-            acceleration: z'', shape (3 + n_k,).
-
-        Returns:
-            Base wrench in W and joint torques, shape (3 + n_k,) [N, N m].
-        """
-        ordered = np.empty(len(self.velocity_index))
-        ordered[self.velocity_index] = acceleration
-        return self._inverse_dynamics(ordered)
-
-    def _inverse_dynamics(self, ordered_acceleration: FloatArray) -> FloatArray:
-        forces = MultibodyForces(self.plant)
-        self.plant.CalcForceElementsContribution(self.context, forces)
-        effort: FloatArray = self.plant.CalcInverseDynamics(self.context, ordered_acceleration, forces)
-        return effort[self._order]
-
-    @cached_property
     def has_springs(self) -> bool:
-        """Whether the model has force elements; gravity, which is zero, is one always."""
+        """Whether the model has force elements other than gravity, which every plant has."""
         return self.plant.num_force_elements() > 1
 
     def spring_effort(self) -> FloatArray:
-        """What holds the model's force elements, the joints' damping aside, shape (3 + n_k,) [N, N m]."""
+        """Effort that balances the force elements without the joints' damping, shape (3 + n_k,) [N, N m]."""
         forces = MultibodyForces(self.plant)
         self.plant.CalcForceElementsContribution(self.context, forces)
         rest = np.zeros(len(self.velocity_index))
@@ -132,26 +87,9 @@ class RobotPlant:
         without = self.plant.CalcInverseDynamics(self.context, rest, forces)
         damping = [joint.GetDampingVector(self.context)[0] for joint in self.joints]
         rates = self.plant.GetVelocities(self.context)[self.velocity_index[3:]]
-        effort: FloatArray = (with_them - without)[self._order]
+        effort: FloatArray = (with_them - without)[self.velocity_index]
         effort[3:] -= damping * rates
         return effort
-
-    def grasp_jacobian(self) -> FloatArray:
-        """J of E_k: planar twist of the grasp in W per rate of z_k, shape (3, 3 + n_k)."""
-        return self.plant.CalcJacobianSpatialVelocity(self.context, *self._grasp_arguments)[_PLANAR][
-            :, self._order
-        ]
-
-    def grasp_bias(self) -> FloatArray:
-        """J' z' of E_k, planar in W, shape (3,) [m/s^2, rad/s^2]."""
-        bias = self.plant.CalcBiasSpatialAcceleration(self.context, *self._grasp_arguments)
-        return bias.get_coeffs()[_PLANAR]
-
-    def grasp_pose(self) -> FloatArray:
-        """Pose (x, y, angle) of E_k in W, shape (3,) [m, rad]."""
-        X_WE = self.gripper_frame.CalcPoseInWorld(self.context)
-        R, p = X_WE.rotation().matrix(), X_WE.translation()
-        return np.array([p[0], p[1], np.arctan2(R[1, 0], R[0, 0])])
 
 
 def build_robot_plant(scenario: Scenario, k: int) -> RobotPlant:

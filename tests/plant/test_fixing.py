@@ -7,9 +7,9 @@ import pytest
 
 from coop_drake.cli.task import read_task
 from coop_drake.errors import ScenarioError
-from coop_drake.plant import build_robot_plant
 from coop_drake.scenario import load_scenario
 from tests.support.edited_scenario import exchanged, team_of, write_with_robot
+from tests.support.robot_dynamics import robot_dynamics
 from tests.support.robot_models import Arm, urdf_arm
 
 UP, ACROSS, LIFT = ("revolute", "0 0 1", ""), ("revolute", "0 1 0", ""), ("prismatic", "0 0 1", "")
@@ -60,7 +60,7 @@ def test_patterns_fix_all_but_what_is_named_null(tmp_path):
 
 def test_the_robots_own_plant_has_the_same_joints_and_masses(tmp_path):
     scenario = load_scenario(fixing(tmp_path, Arm(joints=(UP, LIFT)), "{joint_1: 0.1}"))
-    alone = build_robot_plant(scenario, 0)
+    alone = robot_dynamics(scenario, 0)
     assert [joint.name() for joint in alone.joints] == ["joint_0"]
     alone.set_state(np.zeros(4), np.zeros(4))
     assert alone.mass_matrix().shape == (4, 4)

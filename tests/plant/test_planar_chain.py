@@ -5,9 +5,10 @@ import pytest
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.laws.robot_dynamics import frame_twist, read_robot, robot_effort
-from coop_drake.plant import base_chain, build_robot_plant, build_team_plant, robot_chain
+from coop_drake.plant import base_chain, build_team_plant, robot_chain
 from coop_drake.systems import RobotEffort
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
+from tests.support.robot_dynamics import robot_dynamics
 from tests.support.robot_matrices import robot_acceleration
 from tests.support.system_checks import evaluate
 
@@ -21,7 +22,7 @@ def scenario(tmp_path_factory):
 
 @pytest.mark.parametrize("k", range(len(ARMS)))
 def test_an_end_effector_moves_and_is_moved_as_in_drake(scenario, k):
-    robot, n = build_robot_plant(scenario, k), len(ARMS[k])
+    robot, n = robot_dynamics(scenario, k), len(ARMS[k])
     robot.scale_masses(1.3)
     for joint in robot.joints:
         joint.SetDampingVector(robot.context, [0.7])
@@ -68,7 +69,7 @@ def test_springs_of_a_model_are_held(tmp_path):
         "<damping>0.3</damping><spring_stiffness>2</spring_stiffness><spring_reference>0.4</spring_reference>"
     )
     more = f"<limit><lower>-1</lower><upper>1</upper></limit><dynamics>{dynamics}</dynamics>"
-    robot = build_robot_plant(ring_team(tmp_path, [[("revolute", "0 0 1", more)], [REVOLUTE]]), 0)
+    robot = robot_dynamics(ring_team(tmp_path, [[("revolute", "0 0 1", more)], [REVOLUTE]]), 0)
     assert robot.has_springs
     state, hand, joints = np.linspace(0.1, 0.8, 8), np.linspace(-1.0, 1.0, 6), np.array([0.5])
     inputs = {"robot_state": state, "hand_command": hand, "axis_acceleration": [9.0, *joints]}

@@ -6,9 +6,10 @@ from pydrake.common.value import Value
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 
-from coop_drake.plant import base_poses, build_robot_plant, set_configuration
+from coop_drake.plant import base_poses, set_configuration
 from coop_drake.scenario import load_scenario
 from tests.support.edited_scenario import shipped, team_of, write_with_robot
+from tests.support.robot_dynamics import robot_dynamics
 from tests.support.robot_models import Arm
 
 PLANAR = [3, 4, 2]
@@ -39,7 +40,7 @@ def test_kinetic_energies_of_object_and_robots_add_up_to_the_team_s(scenario, te
     speed = z_rate[:2] + z_rate[2] * np.array([-arm[1], arm[0]])
     energy = 0.5 * inertia.mass * speed @ speed + 0.5 * inertia.inertia_about_com * z_rate[2] ** 2
     for robot in team.robots:
-        own = build_robot_plant(scenario, robot.index)
+        own = robot_dynamics(scenario, robot.index)
         own.set_state(*own_state(team, robot, context, z, z_rate))
         rate = own_state(team, robot, context, z, z_rate)[1]
         energy += 0.5 * rate @ own.mass_matrix() @ rate
@@ -50,7 +51,7 @@ def test_grasp_moves_in_both_plants_alike(scenario, team):
     context = team.plant.CreateDefaultContext()
     z, z_rate = moving(team, context)
     for robot in team.robots:
-        own = build_robot_plant(scenario, robot.index)
+        own = robot_dynamics(scenario, robot.index)
         own.set_state(*(state := own_state(team, robot, context, z, z_rate)))
         X_WE = robot.gripper_frame.CalcPoseInWorld(context)
         assert own.grasp_pose()[:2] == pytest.approx(X_WE.translation()[:2], abs=1e-7)
@@ -62,7 +63,7 @@ def test_grasp_bias_is_the_derivative_of_the_jacobian_times_the_rates(scenario, 
     context = team.plant.CreateDefaultContext()
     z, z_rate = moving(team, context)
     for robot in team.robots:
-        own = build_robot_plant(scenario, robot.index)
+        own = robot_dynamics(scenario, robot.index)
         pose, rate = own_state(team, robot, context, z, z_rate)
         step, ends = 1e-6, []
         for sign in (-1.0, 1.0):
@@ -91,7 +92,7 @@ def test_effort_is_what_moves_the_robot_and_what_its_hand_gives_away(scenario):
     spatial = plant.get_body_spatial_accelerations_output_port().Eval(context)
     on_object = team.grasps.wrenches(context, wrenches)
     for robot in team.robots:
-        own = build_robot_plant(scenario, robot.index)
+        own = robot_dynamics(scenario, robot.index)
         own.set_state(*own_state(team, robot, context, z, z_rate))
         base = spatial[int(robot.base_body.index())].get_coeffs()[PLANAR]
         joints = acceleration[[joint.velocity_start() for joint in robot.joints]]
@@ -111,7 +112,7 @@ def _at_base(robot, wrench):
 
 
 def test_effort_is_mass_times_acceleration_and_bias():
-    own = build_robot_plant(shipped("elbow"), 1)
+    own = robot_dynamics(shipped("elbow"), 1)
     rng = np.random.default_rng(6)
     z, rate, acceleration = rng.uniform(-1.0, 1.0, (3, 5))
     own.set_state(z, rate)
@@ -121,7 +122,7 @@ def test_effort_is_mass_times_acceleration_and_bias():
 
 def test_mass_matrix_of_a_shipped_robot_by_hand():
     """Straight arm: 8 kg; base, link 1 and link 2 at 0, 0.175 and 0.56 m from the base."""
-    own = build_robot_plant(shipped("base"), 0)
+    own = robot_dynamics(shipped("base"), 0)
     own.set_state(np.zeros(4), np.zeros(4))
     matrix = own.mass_matrix()
     link_1, link_2 = (0.35**2 + 0.1**2) / 12.0, (0.42**2 + 0.1**2) / 12.0
@@ -135,9 +136,9 @@ def test_mass_matrix_of_a_shipped_robot_by_hand():
 def test_bias_holds_the_damping_of_the_joints(tmp_path):
     damped = "<dynamics><damping>0.7</damping></dynamics><limit><lower>-1</lower><upper>1</upper></limit>"
     scenario = load_scenario(write_with_robot(tmp_path, Arm(joints=(("revolute", "0 0 1", damped),)).text()))
-    own = build_robot_plant(scenario, 0)
+    own = robot_dynamics(scenario, 0)
     own.set_state(np.array([0.0, 0.0, 0.0, 0.3]), np.array([0.0, 0.0, 0.0, 2.0]))
-    undamped = build_robot_plant(
+    undamped = robot_dynamics(
         load_scenario(
             write_with_robot(
                 tmp_path,

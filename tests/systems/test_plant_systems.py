@@ -4,6 +4,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.plant import base_poses, build_robot_plant, build_team_plant, set_configuration
 from coop_drake.systems import ObjectEstimator, RobotEffort, TeamSensor
+from tests.support.robot_dynamics import robot_dynamics
 from tests.support.robot_matrices import robot_acceleration, robot_torque
 from tests.support.small_scenario import small_scenario
 from tests.support.system_checks import (
@@ -85,7 +86,7 @@ def test_the_effort_is_the_law_with_the_robots_own_dynamics(rig):
     generator = np.random.default_rng(5)
     for robot in rig.team.robots:
         k, n = robot.index, len(robot.joints)
-        model = build_robot_plant(rig.scenario, k)
+        model = robot_dynamics(rig.scenario, k)
         system = RobotEffort(model)
         inputs = {
             "robot_state": rig.robot_state(k),
