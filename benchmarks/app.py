@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from benchmarks.commands import bench_commands, bench_help
+from benchmarks.commands import bench_commands
 from benchmarks.contents import TOPICS, WHOLE, show_contents
 from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.ledger import Ledger, LedgerError
@@ -23,6 +23,7 @@ from benchmarks.planner.head_to_head import Effort, head_to_head_tasks
 from benchmarks.planner.ompl_peer import has_ompl
 from benchmarks.planner.ours import compile_kernels
 from benchmarks.simulating import simulating_tasks
+from benchmarks.starting import starting_tasks
 from benchmarks.table import show
 from benchmarks.tasks import Task, chosen, worked
 
@@ -93,7 +94,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *ablation_tasks(min(effort.limit, _ABLATION_LIMIT)),
         *growth_tasks(effort.limit),
         *contradiction_tasks(),
-        Task("command/help", lambda rows: bench_help(), alone=True),
+        *starting_tasks(),
         *(_command_task(scenario) for scenario in _COMMANDED),
         *mapping_tasks(),
         *simulating_tasks(),

@@ -13,6 +13,7 @@ __all__ = ["TOPICS", "WHOLE", "show_contents"]
 
 TOPICS = {
     "planner": "plans and proofs beside OMPL and beside the planner without its parts; how work grows",
+    "starting": "commands from start to end beside the import of all of Drake; their memory",
     "command": "whole commands in processes of their own",
     "mapping": "harmonic maps: accuracy, speed, how both grow",
     "simulating": "the closed loop beside the bare plant; memory of repeated runs",

@@ -14,8 +14,8 @@ def quickstart() -> str:
     return code
 
 
-def test_the_quickstart_has_at_most_twelve_lines():
-    assert len([line for line in quickstart().splitlines() if line.strip()]) <= 12
+def test_the_quickstart_has_at_most_six_lines():
+    assert len([line for line in quickstart().splitlines() if line.strip()]) <= 6
 
 
 def test_the_quickstart_runs_and_arrives(monkeypatch, capsys):
