@@ -18,20 +18,21 @@ from coop_drake.cli.task import Task, read_task
 from coop_drake.tuning import (
     CRITERIA,
     TUNED,
-    Knob,
+    GainTrial,
     Limit,
     Objective,
-    Outcome,
+    Parameter,
+    RunOutcome,
     Search,
-    Trial,
-    Workbench,
+    TrialRunner,
     Workers,
-    knobs_of,
     read_weights,
     search,
+    tunable_parameters,
     write_gains,
     write_trials,
 )
+from coop_drake.tuning.search import load_optimizer
 from coop_drake.viz.tuning_figure import write_tuning_figure
 
 __all__ = ["Request", "tune"]
@@ -65,31 +66,32 @@ def tune(
     scenario: Path, gains: str | None, request: Request, out: Path | None, reporter: Reporter
 ) -> ExitCode:
     """Search better gains for a scenario's plan, verify them by simulation, and write them."""
+    load_optimizer()
     weights, limits = read_weights(request.criteria), tuple(map(Limit.parse, request.limits))
     task = read_task(scenario, gains)
     start = task.scenario.gain_sets[task.scenario.selected_gains]
-    knobs = knobs_of(start, request.vary)
+    parameters = tunable_parameters(start, request.vary)
     folder = ResultFolder.of(task.name, out, TUNED)
     result = search_and_write(task, folder, reporter)
     if not isinstance(result, Found):
         return report_no_plan(task, result, folder, reporter)
-    bench = Workbench(task.scenario, result.plan, map_cells(task, result.plan, reporter))
+    runner = TrialRunner(task.scenario, result.plan, map_cells(task, result.plan, reporter))
     with reporter.stage("before"):
-        before = bench.try_gains(start)
+        before = runner.try_gains(start)
     objective = Objective(weights, limits, before.outcome.values)
-    found = _search(task, bench, before, knobs, objective, request, reporter)
+    found = _search(task, runner, before, parameters, objective, request, reporter)
     write_trials(found, folder.path / "trials.json")
     write_tuning_figure(found, folder.path / "tuning.png")
     if found.interrupted:
         return _interrupted(found, request, folder.path, reporter)
-    return _verified(task, bench, found, request, folder.path, reporter)
+    return _verified(task, runner, found, request, folder.path, reporter)
 
 
 def _search(
     task: Task,
-    bench: Workbench,
-    before: Trial,
-    knobs: tuple[Knob, ...],
+    runner: TrialRunner,
+    before: GainTrial,
+    parameters: tuple[Parameter, ...],
     objective: Objective,
     request: Request,
     reporter: Reporter,
@@ -100,11 +102,11 @@ def _search(
     count = min(request.workers or os.cpu_count() or 1, request.budget)
     with (
         reporter.stage("searching", "search") as progress,
-        Workers(task.scenario.path, bench.plan, bench.maps, longest=longest, count=count) as workers,
+        Workers(task.scenario.path, runner.plan, runner.maps, longest=longest, count=count) as workers,
     ):
         return search(
             before,
-            knobs,
+            parameters,
             objective,
             workers.try_all,
             budget=request.budget,
@@ -124,13 +126,13 @@ def _interrupted(found: Search, request: Request, folder: Path, reporter: Report
 
 
 def _verified(
-    task: Task, bench: Workbench, found: Search, request: Request, folder: Path, reporter: Reporter
+    task: Task, runner: TrialRunner, found: Search, request: Request, folder: Path, reporter: Reporter
 ) -> ExitCode:
     """Simulate the whole plan with the best gains, and a plan that is made anew with them."""
     best = found.best.gains
     with reporter.stage("verifying"):
-        after = bench.try_gains(best).outcome
-        anew = bench.planned_anew(task.problem, best)
+        after = runner.try_gains(best).outcome
+        anew = runner.replan(task.problem, best)
     kept = found.objective.kept(after)
     state = (
         "Verified: arrives, keeps all limits." if kept else "Not good: a limit is broken or the run failed."
@@ -157,7 +159,7 @@ def _write(found: Search, request: Request, folder: Path, reporter: Reporter, st
     reporter.say(f"The gain set is in {escape(str(path))}; use it with --gains {escape(str(path))}")
 
 
-def _show(reporter: Reporter, title: str, found: Search, after: Outcome, anew: Outcome | None) -> None:
+def _show(reporter: Reporter, title: str, found: Search, after: RunOutcome, anew: RunOutcome | None) -> None:
     """Show every criterion before and after, and note the values."""
     before = found.objective.before
     rows = []

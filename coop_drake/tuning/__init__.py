@@ -1,10 +1,10 @@
-"""Gain advice: an optimiser chooses a scenario's gains against named criteria, judged by the closed loop."""
+"""Tuning: an optimiser chooses a scenario's gains by named criteria, measured in simulated runs."""
 
 from coop_drake.tuning.criteria import CRITERIA, Criterion
-from coop_drake.tuning.knobs import Knob, knobs_of
 from coop_drake.tuning.objective import Limit, Objective, read_weights
+from coop_drake.tuning.parameters import Parameter, tunable_parameters
 from coop_drake.tuning.search import Search, search
-from coop_drake.tuning.trial import Outcome, Trial, Workbench
+from coop_drake.tuning.trial import GainTrial, RunOutcome, TrialRunner
 from coop_drake.tuning.workers import Workers
 from coop_drake.tuning.writing import TUNED, write_gains, write_trials
 
@@ -12,17 +12,17 @@ __all__ = [
     "CRITERIA",
     "TUNED",
     "Criterion",
-    "Knob",
+    "GainTrial",
     "Limit",
     "Objective",
-    "Outcome",
+    "Parameter",
+    "RunOutcome",
     "Search",
-    "Trial",
-    "Workbench",
+    "TrialRunner",
     "Workers",
-    "knobs_of",
     "read_weights",
     "search",
+    "tunable_parameters",
     "write_gains",
     "write_trials",
 ]

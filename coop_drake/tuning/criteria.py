@@ -1,4 +1,4 @@
-"""What a transport may be judged by: time, effort, smoothness and margins, by name."""
+"""Criteria by which runs are compared: time, effort, smoothness and margins."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ __all__ = ["CRITERIA", "Criterion"]
 
 @dataclass(frozen=True)
 class Criterion:
-    """One number that says how a run went.
+    """One number by which runs are compared.
 
     Attributes:
-        name: As commands know it.
-        label: In words.
-        unit: Of the number.
-        measure: Reads it from a run.
+        name: Name on the command line and in files.
+        label: Name in tables and figures.
+        unit: Unit of the number.
+        measure: Computes the number from the log of a run.
         more_is_better: Whether larger numbers are better, as for margins.
     """
 
@@ -32,18 +32,18 @@ class Criterion:
 
 
 def _base_forces(log: SimulationLog) -> np.ndarray:
-    """Force of every base on every accepted step, shape (T, N) [N]."""
+    """Return the force of every base at every accepted step, shape (T, N) [N]."""
     return np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1])
 
 
 def _mean_force(log: SimulationLog) -> float:
-    """Root of the mean square over time and bases: accepted steps are not evenly spread [N]."""
+    """Return the root mean square force over time and bases; steps differ in length and are weighted [N]."""
     squares = (_base_forces(log) ** 2).mean(axis=1)
     return float(np.sqrt(np.trapezoid(squares, log.times) / log.times[-1]))
 
 
 def _turning(log: SimulationLog) -> float:
-    """Largest angular acceleration of the object between accepted steps [rad/s^2]."""
+    """Return the largest mean angular acceleration of the object over an accepted step [rad/s^2]."""
     steps = np.diff(log.times)
     moved = steps > 0.0
     return float(np.abs(np.diff(log.object_twist[:, 2])[moved] / steps[moved]).max(initial=0.0))

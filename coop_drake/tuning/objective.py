@@ -1,4 +1,4 @@
-"""What is sought: criteria with weights, within limits; one number for each run, smaller is better."""
+"""The objective of tuning: weighted criteria within limits, as one score for each run; smaller is better."""
 
 from __future__ import annotations
 
@@ -9,19 +9,24 @@ from math import inf
 
 from coop_drake.errors import TuningError
 from coop_drake.tuning.criteria import CRITERIA
-from coop_drake.tuning.trial import Outcome
+from coop_drake.tuning.trial import RunOutcome
 
 __all__ = ["Limit", "Objective", "read_weights"]
 
-_LIMITS_BROKEN, _RUN_FAILED = 1e3, 1e6  # What broken limits and failed runs start at; scores stay below.
+_LIMITS_BROKEN = 1e3
+"""Smallest score of a run that breaks a limit; runs that keep all limits stay below [-]."""
+
+_RUN_FAILED = 1e6
+"""Smallest score of a run that fails; runs that arrive stay below [-]."""
+
 _LIMIT = re.compile(r"\s*(\w+)\s*(<=|>=)\s*([0-9.eE+-]+)\s*(x?)\s*")
 
 
 def read_weights(texts: Sequence[str]) -> dict[str, float]:
-    """Read criteria such as ``peak_force`` or ``time=0.5``; a criterion without a weight counts once.
+    """Read criteria such as ``peak_force`` or ``time=0.5``; the weight is 1 where none is given.
 
     Raises:
-        TuningError: A name is no criterion, or a weight no positive number.
+        TuningError: A name is no criterion, or a weight is no positive number.
     """
     weights = {}
     for text in texts:
@@ -49,8 +54,8 @@ class Limit:
 
     Attributes:
         criterion: Name of the criterion.
-        at_most: Whether it bounds from above; else from below.
-        value: The bound, in the criterion's unit or as a multiple of the value before.
+        at_most: Whether it is an upper bound; else it is a lower one.
+        value: The bound, in the criterion's unit or as a multiple of the value before tuning.
         relative: Whether it is such a multiple.
     """
 
@@ -61,7 +66,7 @@ class Limit:
 
     @classmethod
     def parse(cls, text: str) -> Limit:
-        """Read ``time<=16``, ``clearance>=0.1`` or ``time<=1.1x``, which is 1.1 times the value before.
+        """Read ``time<=16``, ``clearance>=0.1`` or ``time<=1.1x`` (1.1 times the value before tuning).
 
         Raises:
             TuningError: The text is none of these.
@@ -77,11 +82,11 @@ class Limit:
         return cls(name, sense == "<=", _number(number, f"--limit {text}"), bool(relative))
 
     def bound(self, before: Mapping[str, float]) -> float:
-        """The bound in the criterion's unit."""
+        """Return the bound in the criterion's unit."""
         return self.value * before[self.criterion] if self.relative else self.value
 
     def excess(self, values: Mapping[str, float], before: Mapping[str, float]) -> float:
-        """By how much it is broken, as a share of the bound; 0 if it is kept [-]."""
+        """Return by which fraction of the bound it is broken, 0 if it is kept [-]."""
         bound, value = self.bound(before), values[self.criterion]
         beyond = value - bound if self.at_most else bound - value
         return max(0.0, beyond) / max(abs(bound), 1e-9)
@@ -89,30 +94,30 @@ class Limit:
 
 @dataclass(frozen=True)
 class Objective:
-    """How runs are compared with the run before.
+    """Compares runs with the run before tuning.
 
     Attributes:
         weights: Weight of every criterion that counts.
-        limits: What every run must keep.
-        before: Criteria of the run with the gains there were.
+        limits: Bounds that every run must keep.
+        before: Value of every criterion in the run before tuning.
     """
 
     weights: Mapping[str, float]
     limits: tuple[Limit, ...]
     before: Mapping[str, float]
 
-    def kept(self, outcome: Outcome) -> bool:
-        """Whether a run arrived, violated nothing and kept every limit."""
+    def kept(self, outcome: RunOutcome) -> bool:
+        """Whether a run arrived and kept every limit."""
         return outcome.arrived and not any(limit.excess(outcome.values, self.before) for limit in self.limits)
 
-    def score(self, outcome: Outcome) -> float:
-        """Weighted mean of all criteria over their values before: 1 for the run before.
+    def score(self, outcome: RunOutcome) -> float:
+        """Return the weighted mean of all criteria, each divided by its value before tuning.
 
-        Runs that break a limit count as worse than all that keep them, failed ones as worse than those;
-        the less they broke and the further they came, the better.
+        The run before tuning scores 1. A run that breaks a limit scores more than all that keep them, a
+        failed run more than those. A smaller excess, and a larger fraction of the transport, score less.
         """
         if not outcome.arrived:
-            return _RUN_FAILED + 1.0 - outcome.share_done
+            return _RUN_FAILED + 1.0 - outcome.fraction_done
         excess = sum(limit.excess(outcome.values, self.before) for limit in self.limits)
         if excess > 0.0:
             return _LIMITS_BROKEN + excess
@@ -121,7 +126,7 @@ class Objective:
         return min(sum(self.weights[name] * ratios[name] for name in ratios) / total, _LIMITS_BROKEN)
 
     def _ratio(self, name: str, value: float) -> float:
-        """How much worse than before: below 1 is better."""
+        """Return the ratio of a criterion to its value before tuning; below 1 is better."""
         worse, better = (
             (self.before[name], value) if CRITERIA[name].more_is_better else (value, self.before[name])
         )

@@ -1,62 +1,64 @@
 """The search for gains by the covariance matrix adaptation evolution strategy (CMA-ES).
 
-It looks at the order of scores alone, so limits and failed runs need no tuned penalties, and it begins around
-the gains there are. A generation of about a dozen runs learns more than one of a population that must cover
-every gain's whole range first.
+It uses the order of the scores alone, so that limits and failed runs need no tuned penalties, and it begins
+around the current gains. A generation has about a dozen runs; strategies that first sample the whole range of
+every gain need many more.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
+from typing import Any
 
-import cma
 import numpy as np
 
+from coop_drake.errors import TuningError
 from coop_drake.laws import GainSet
-from coop_drake.tuning.knobs import Knob, decoded, encoded
 from coop_drake.tuning.objective import Objective
-from coop_drake.tuning.trial import Trial
+from coop_drake.tuning.parameters import Parameter, to_fractions, with_fractions
+from coop_drake.tuning.trial import GainTrial
 
-__all__ = ["Search", "search"]
+__all__ = ["Search", "load_optimizer", "search"]
 
 _FIRST_STEP = 0.15
-"""How far the first generation spreads, as a share of every knob's logarithmic range [-]."""
+"""Standard deviation of the first generation, as a fraction of every gain's logarithmic range [-]."""
 
-TryAll = Callable[[Sequence[GainSet]], Iterable[Trial]]
+TryAll = Callable[[Sequence[GainSet]], Iterable[GainTrial]]
 
 
 @dataclass
 class Search:
-    """All that was tried, in order; the first is what there was before.
+    """All trials in order; the first is the run before tuning.
 
     Attributes:
-        objective: How trials are compared.
-        trials: What was tried.
+        objective: Gives the score of a trial.
+        trials: The trials.
         scores: Score of every trial.
-        interrupted: Whether the search was ended by Ctrl-C.
+        interrupted: Whether Ctrl-C ended the search.
     """
 
     objective: Objective
-    trials: list[Trial] = field(default_factory=list)
+    trials: list[GainTrial] = field(default_factory=list)
     scores: list[float] = field(default_factory=list)
     interrupted: bool = False
 
-    def add(self, trial: Trial) -> float:
-        """Keep a trial; return its score."""
+    def add(self, trial: GainTrial) -> float:
+        """Append a trial, and return its score."""
         self.trials.append(trial)
         self.scores.append(self.objective.score(trial.outcome))
         return self.scores[-1]
 
     @property
-    def best(self) -> Trial:
-        """The first of the best trials."""
+    def best(self) -> GainTrial:
+        """The trial with the smallest score; the first one if several have it."""
         return self.trials[int(np.argmin(self.scores))]
 
 
 def search(
-    before: Trial,
-    knobs: Sequence[Knob],
+    before: GainTrial,
+    parameters: Sequence[Parameter],
     objective: Objective,
     try_all: TryAll,
     *,
@@ -64,28 +66,33 @@ def search(
     seed: int,
     progress: Callable[[str, float], None] | None = None,
 ) -> Search:
-    """Look for gains with a smaller score.
+    """Search gains with a smaller score.
 
-    The result depends on the seed and the budget, not on how trials are spread over processes: a generation
-    is tried as a whole before the next is asked for. Ctrl-C ends the search with what was found.
+    The result depends on the seed and the budget, not on the number of processes: every generation is
+    simulated as a whole before the next is made. Ctrl-C ends the search and keeps the trials so far.
 
     Args:
-        before: The gains there are, tried.
-        knobs: Gains that may be turned.
-        objective: What is sought.
-        try_all: Tries gain sets; gives results in their order.
-        budget: How many trials at most, besides ``before``.
+        before: Trial of the current gains.
+        parameters: Gains that may change.
+        objective: Gives the score of a trial.
+        try_all: Simulates gain sets; yields their trials in the same order.
+        budget: Largest number of trials, besides ``before``.
         seed: Seed of the search.
-        progress: Told the best score so far and the share of the budget that is spent.
+        progress: Called with the best score so far and the fraction of the budget that is spent.
+
+    Raises:
+        TuningError: The package ``cma`` is not installed.
     """
     found = Search(objective)
     found.add(before)
-    strategy = _strategy(encoded(before.gains, knobs), budget, seed)
+    strategy = _strategy(to_fractions(before.gains, parameters), budget, seed)
     try:
         while len(found.trials) <= budget and not strategy.stop():
             asked = strategy.ask()[: budget + 1 - len(found.trials)]
             scores = []
-            for trial in try_all([decoded(before.gains, knobs, shares) for shares in asked]):
+            for trial in try_all(
+                [with_fractions(before.gains, parameters, fractions) for fractions in asked]
+            ):
                 scores.append(found.add(trial))
                 if progress is not None:
                     progress(f"best score {min(found.scores):.3f}", (len(found.trials) - 1) / budget)
@@ -96,13 +103,29 @@ def search(
     return found
 
 
-def _strategy(start: np.ndarray, budget: int, seed: int) -> cma.CMAEvolutionStrategy:
+def load_optimizer() -> Any:
+    """Import and return the package ``cma``, which is not installed with coop_drake itself.
+
+    Raises:
+        TuningError: It is not installed.
+    """
+    try:
+        return import_module("cma")
+    except ImportError as error:
+        remedy = "pip install 'coop-drake[tune]'"
+        raise TuningError(
+            f"tuning needs the package cma, which is not installed; expected {remedy}"
+        ) from error
+
+
+def _strategy(start: np.ndarray, budget: int, seed: int) -> Any:
+    """Return the strategy, ready for its first generation."""
     random = np.random.default_rng(seed)
     options = {
         "bounds": [0.0, 1.0],
-        "seed": np.nan,  # It would seed numpy's global generator; it draws from ours instead.
+        "seed": np.nan,  # A number would seed numpy's global generator; `randn` is used instead.
         "randn": lambda *shape: random.standard_normal(shape),
         "maxfevals": budget,
         "verbose": -9,
     }
-    return cma.CMAEvolutionStrategy(start, _FIRST_STEP, options)
+    return load_optimizer().CMAEvolutionStrategy(start, _FIRST_STEP, options)

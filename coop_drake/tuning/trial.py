@@ -1,4 +1,4 @@
-"""One trial: the plan's cells with other gains through the closed loop, and what came of it."""
+"""Trials of gain sets: a plan is simulated with other gains, and the run is measured by every criterion."""
 
 from __future__ import annotations
 
@@ -16,41 +16,41 @@ from coop_drake.scenario import Scenario
 from coop_drake.simulation import SimulationLog, build_maps, simulate
 from coop_drake.tuning.criteria import CRITERIA
 
-__all__ = ["Outcome", "Trial", "Workbench", "outcome_of", "quickest_blocks"]
+__all__ = ["GainTrial", "RunOutcome", "TrialRunner", "fastest_blocks", "outcome_of"]
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What a run came to.
+class RunOutcome:
+    """Result of a simulated run.
 
     Attributes:
-        arrived: Whether the object came to rest at the goal and nothing was violated.
-        share_done: Share of the cells that were passed [-].
-        values: Every criterion by name.
-        violation: What was violated; empty if nothing was.
+        arrived: Whether the object came to rest at the goal and no invariant was violated.
+        fraction_done: Fraction of the plan's cells that were passed [-].
+        values: Value of every criterion by name.
+        violation: The invariant that was violated; empty if none was.
     """
 
     arrived: bool
-    share_done: float
+    fraction_done: float
     values: Mapping[str, float]
     violation: str
 
 
 @dataclass(frozen=True)
-class Trial:
-    """A gain set that was tried.
+class GainTrial:
+    """A gain set and the result of its run.
 
     Attributes:
         gains: The gain set.
-        outcome: What came of it.
+        outcome: Result of the run.
     """
 
     gains: GainSet
-    outcome: Outcome
+    outcome: RunOutcome
 
 
-def quickest_blocks(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> Blocks:
-    """Fused blocks where they know all that the scenario wants, else named ones."""
+def fastest_blocks(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> Blocks:
+    """Return ``fused`` if the fused block can do all that the scenario asks for, else ``named``."""
     try:
         build_closed_loop(scenario, plan, maps, blocks="fused").release()
     except ScenarioError:
@@ -58,15 +58,15 @@ def quickest_blocks(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap])
     return "fused"
 
 
-class Workbench:
-    """Tries gain sets on one plan: cells and maps stay, for neither depends on gains.
+class TrialRunner:
+    """Simulates one plan with different gain sets; its cells and maps do not depend on gains.
 
     Args:
-        scenario: What is carried, by whom.
+        scenario: The scenario.
         plan: Its plan.
         maps: The harmonic map of every transition.
         longest: Runs that last longer count as failed [s].
-        blocks: What drives the team: named blocks, or one fused block that is quicker.
+        blocks: Blocks of the controllers: named ones, or one fused block that is faster.
     """
 
     def __init__(
@@ -85,12 +85,12 @@ class Workbench:
             settings = replace(settings, max_time=min(longest, settings.max_time))
         self._scenario = replace(scenario, simulator=settings)
 
-    def try_gains(self, gains: GainSet) -> Trial:
-        """Carry the plan out with other gains."""
-        return Trial(gains, outcome_of(self.run(gains), len(self.plan.cells)))
+    def try_gains(self, gains: GainSet) -> GainTrial:
+        """Simulate the plan with other gains, and measure the run."""
+        return GainTrial(gains, outcome_of(self.run(gains), len(self.plan.cells)))
 
-    def planned_anew(self, problem: PlanningProblem, gains: GainSet) -> Outcome | None:
-        """Plan with other gains, which may lead to other cells, and carry that out; None without a plan."""
+    def replan(self, problem: PlanningProblem, gains: GainSet) -> RunOutcome | None:
+        """Plan again with other gains, which may give other cells, and simulate; None if no plan is found."""
         result = plan(problem, gains, gain_set_name="trial")
         if not isinstance(result, Found):
             return None
@@ -98,19 +98,19 @@ class Workbench:
         return outcome_of(simulate(self._scenario, result.plan, maps), len(result.plan.cells))
 
     def run(self, gains: GainSet) -> SimulationLog:
-        """The same, with all that happened."""
+        """Simulate the plan with other gains, and return the log of the run."""
         made = reschedule(self.plan, gains, "trial")
         return simulate(self._scenario, made, self.maps, blocks=self._blocks)
 
 
-def outcome_of(log: SimulationLog, cells: int) -> Outcome:
-    """Judge a run by every criterion.
+def outcome_of(log: SimulationLog, cells: int) -> RunOutcome:
+    """Measure a run by every criterion.
 
     Args:
         log: The run.
-        cells: How many cells the plan has.
+        cells: Number of the plan's cells.
     """
     arrived = log.reached and not log.violation
     done = 1.0 if arrived else float(log.cell_index[-1]) / cells
     values = {name: criterion.measure(log) for name, criterion in CRITERIA.items()}
-    return Outcome(arrived, done, values, log.violation)
+    return RunOutcome(arrived, done, values, log.violation)

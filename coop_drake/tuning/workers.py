@@ -1,4 +1,7 @@
-"""Trials in processes of their own, side by side: Drake's Diagrams with Python parts leak a little each."""
+"""Worker processes for trials: runs are simulated in parallel, and memory that Diagrams leak is freed.
+
+Drake does not free a Diagram that contains blocks written in Python.
+"""
 
 from __future__ import annotations
 
@@ -13,25 +16,25 @@ from coop_drake.answers import Plan
 from coop_drake.fields import HarmonicMap
 from coop_drake.laws import GainSet
 from coop_drake.scenario import load_scenario
-from coop_drake.tuning.trial import Trial, Workbench, quickest_blocks
+from coop_drake.tuning.trial import GainTrial, TrialRunner, fastest_blocks
 
 __all__ = ["Workers"]
 
 _TRIALS_EACH = 100
-"""A process is replaced after so many trials, which keeps memory flat."""
+"""Trials after which a process is replaced, so that memory does not grow."""
 
-_bench: Workbench | None = None
+_runner: TrialRunner | None = None
 
 
 class Workers:
-    """Processes that try gain sets; as a context they end with it, also at Ctrl-C.
+    """Processes that simulate gain sets. As a context manager they end with the context, also after Ctrl-C.
 
     Args:
-        scenario: The scenario file; processes read it for themselves.
+        scenario: The scenario file; every process reads it.
         plan: Its plan.
         maps: The plan's maps.
         longest: Runs that last longer count as failed [s].
-        count: How many processes.
+        count: Number of processes.
     """
 
     def __init__(
@@ -49,22 +52,22 @@ class Workers:
         return self
 
     def __exit__(self, *_: object) -> None:
-        # Shutting down alone would wait for trials that are under way; there is no public way to end them.
-        # They end first, and nothing is cancelled: the pool trips over cancelled trials of dead processes.
+        # `shutdown` alone would wait for running trials, and there is no public way to end them. Nothing is
+        # cancelled, because the pool fails on cancelled trials of processes that have ended.
         for process in list((self._pool._processes or {}).values()):
             process.terminate()
         self._pool.shutdown()
 
-    def try_all(self, gain_sets: Sequence[GainSet]) -> Iterator[Trial]:
-        """Try gain sets side by side; results come in their order, whichever is ready first."""
-        with _interrupts_held_back():
+    def try_all(self, gain_sets: Sequence[GainSet]) -> Iterator[GainTrial]:
+        """Simulate gain sets in parallel; trials come in the order of the gain sets."""
+        with _interrupts_blocked():
             trials = [self._pool.submit(_try, gains) for gains in gain_sets]
         return (trial.result() for trial in trials)
 
 
 @contextmanager
-def _interrupts_held_back() -> Iterator[None]:
-    """Ctrl-C waits until the processes have begun; they inherit that it is held back, and never see it."""
+def _interrupts_blocked() -> Iterator[None]:
+    """Block Ctrl-C until the processes have started; they inherit the blocked signal and never get it."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -73,12 +76,12 @@ def _interrupts_held_back() -> Iterator[None]:
 
 
 def _prepare(scenario: Path, plan: Plan, maps: tuple[HarmonicMap, ...], longest: float) -> None:
-    """Set a process up."""
-    global _bench
+    """Prepare a process: read the scenario and make its runner of trials."""
+    global _runner
     task = load_scenario(scenario)
-    _bench = Workbench(task, plan, maps, longest=longest, blocks=quickest_blocks(task, plan, maps))
+    _runner = TrialRunner(task, plan, maps, longest=longest, blocks=fastest_blocks(task, plan, maps))
 
 
-def _try(gains: GainSet) -> Trial:
-    assert _bench is not None
-    return _bench.try_gains(gains)
+def _try(gains: GainSet) -> GainTrial:
+    assert _runner is not None
+    return _runner.try_gains(gains)

@@ -1,4 +1,4 @@
-"""What a search leaves: the gain set as YAML that ``--gains`` reads, and every trial as JSON."""
+"""Writes the results of tuning: the gain set as YAML for ``--gains``, and every trial as JSON."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from coop_drake.tuning.search import Search
 __all__ = ["TUNED", "write_gains", "write_trials"]
 
 TUNED = "tuned"
-"""What the gain set is called."""
+"""Name of the gain set that tuning writes."""
 
 
 def write_gains(gains: GainSet, remarks: Sequence[str], path: Path) -> Path:
-    """Write a gain set, with what is to be known about it in front.
+    """Write a gain set with comments before it.
 
     Args:
         gains: The gain set.
-        remarks: Lines without line breaks.
+        remarks: The comments, one line each.
         path: The file.
     """
     comments = "".join(f"# {remark}\n" for remark in remarks)
@@ -31,11 +31,12 @@ def write_gains(gains: GainSet, remarks: Sequence[str], path: Path) -> Path:
 
 
 def write_trials(found: Search, path: Path) -> Path:
-    """Write every trial in the order of the search, the gains there were before first."""
-    rows = [
-        {"score": score, **asdict(trial.outcome), "gains": asdict(trial.gains)}
-        for trial, score in zip(found.trials, found.scores, strict=True)
-    ]
+    """Write every trial in the order of the search, the run before tuning first."""
+    rows = []
+    for trial, score in zip(found.trials, found.scores, strict=True):
+        outcome = asdict(trial.outcome)
+        outcome["share_done"] = outcome.pop("fraction_done")
+        rows.append({"score": score, **outcome, "gains": asdict(trial.gains)})
     document = {
         "weights": dict(found.objective.weights),
         "limits": [asdict(limit) for limit in found.objective.limits],

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from coop_drake.errors import TuningError
-from coop_drake.tuning import CRITERIA, Limit, Objective, Outcome, read_weights
+from coop_drake.tuning import CRITERIA, Limit, Objective, RunOutcome, read_weights
 from coop_drake.tuning.trial import outcome_of
 from tests.support.cases import case
 from tests.support.synthetic_log import SECONDS, synthetic_log
@@ -16,8 +16,8 @@ from tests.support.synthetic_log import SECONDS, synthetic_log
 BEFORE = {"time": 20.0, "peak_force": 100.0, "clearance": 0.1}
 
 
-def outcome(*, arrived=True, share_done=1.0, **values):
-    return Outcome(arrived, share_done, {**BEFORE, **values}, "" if arrived else "stalled")
+def outcome(*, arrived=True, fraction_done=1.0, **values):
+    return RunOutcome(arrived, fraction_done, {**BEFORE, **values}, "" if arrived else "stalled")
 
 
 def test_criteria_are_read_from_the_run():
@@ -50,7 +50,7 @@ def test_a_run_that_broke_off_counts_the_cells_it_passed():
     log = synthetic_log(case("base"))
     broken = outcome_of(replace(log, violation="a wall"), 5)
     assert not broken.arrived
-    assert broken.share_done == pytest.approx(0.8)
+    assert broken.fraction_done == pytest.approx(0.8)
 
 
 def test_the_run_before_scores_one_and_weights_are_shares():
@@ -69,8 +69,8 @@ def test_failed_runs_are_worse_than_broken_limits_and_those_than_any_that_keeps_
         outcome(peak_force=5000.0, time=19.0),
         outcome(peak_force=10.0, time=22.1),
         outcome(peak_force=10.0, time=22.1, clearance=0.01),
-        outcome(arrived=False, share_done=0.9),
-        outcome(arrived=False, share_done=0.2, peak_force=1.0),
+        outcome(arrived=False, fraction_done=0.9),
+        outcome(arrived=False, fraction_done=0.2, peak_force=1.0),
     ]
     scores = [objective.score(one) for one in ranked]
     assert scores == sorted(scores)

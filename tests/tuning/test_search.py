@@ -10,8 +10,8 @@ import pytest
 
 from coop_drake.errors import TuningError
 from coop_drake.laws import FixedGains, ScheduledGains
-from coop_drake.tuning import Objective, Outcome, Trial, knobs_of, search
-from coop_drake.tuning.knobs import decoded, encoded
+from coop_drake.tuning import GainTrial, Objective, RunOutcome, search, tunable_parameters
+from coop_drake.tuning.parameters import to_fractions, with_fractions
 
 SETS = [ScheduledGains(), FixedGains()]
 
@@ -20,7 +20,7 @@ def bowl(gains):
     """A make-believe run: forces are least at a rate gain of 12 and a funnel acceleration of 10."""
     away = log(gains.rate_gain / 12.0) ** 2 + log(gains.funnel_acceleration / 10.0) ** 2
     values = {"time": 10.0, "peak_force": 100.0 * (1.0 + away)}
-    return Trial(gains, Outcome(True, 1.0, values, ""))
+    return GainTrial(gains, RunOutcome(True, 1.0, values, ""))
 
 
 def one_by_one(gain_sets):
@@ -34,31 +34,33 @@ def at_once(gain_sets):
 def searched(try_all=one_by_one, *, budget=60, seed=0, names=("rate_gain", "funnel_acceleration")):
     before = bowl(ScheduledGains())
     objective = Objective({"peak_force": 1.0}, (), before.outcome.values)
-    return search(before, knobs_of(before.gains, names), objective, try_all, budget=budget, seed=seed)
+    return search(
+        before, tunable_parameters(before.gains, names), objective, try_all, budget=budget, seed=seed
+    )
 
 
 @pytest.mark.parametrize("gain_set", SETS, ids=lambda gains: type(gains).__name__)
 def test_every_corner_of_the_bounds_is_a_valid_gain_set(gain_set):
-    knobs = knobs_of(gain_set)
-    for corner in product((0.0, 1.0), repeat=len(knobs)):
-        turned = decoded(gain_set, knobs, np.array(corner))
-        assert type(turned) is type(gain_set)
+    parameters = tunable_parameters(gain_set)
+    for corner in product((0.0, 1.0), repeat=len(parameters)):
+        changed = with_fractions(gain_set, parameters, np.array(corner))
+        assert type(changed) is type(gain_set)
 
 
 @pytest.mark.parametrize("gain_set", SETS, ids=lambda gains: type(gains).__name__)
 def test_the_search_begins_where_the_gains_are(gain_set):
-    knobs = knobs_of(gain_set)
-    assert decoded(gain_set, knobs, encoded(gain_set, knobs)) == gain_set
+    parameters = tunable_parameters(gain_set)
+    assert with_fractions(gain_set, parameters, to_fractions(gain_set, parameters)) == gain_set
 
 
 def test_bounds_reach_to_gains_beyond_them():
-    (knob,) = knobs_of(ScheduledGains(rate_gain=200.0), ["rate_gain"])
-    assert (knob.upper, knob.value(1.0)) == (200.0, 200.0)
+    (parameter,) = tunable_parameters(ScheduledGains(rate_gain=200.0), ["rate_gain"])
+    assert (parameter.upper, parameter.value(1.0)) == (200.0, 200.0)
 
 
 def test_a_gain_that_cannot_be_turned_is_refused():
     with pytest.raises(TuningError, match="expected one of stiffness, damping"):
-        knobs_of(FixedGains(), ["funnel"])
+        tunable_parameters(FixedGains(), ["funnel"])
 
 
 @pytest.mark.parametrize("names", [("rate_gain", "funnel_acceleration"), ()])
