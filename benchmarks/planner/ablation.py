@@ -1,9 +1,8 @@
-"""What our planner's own parts are worth: without samples, by cells alone, and split by other rules.
+"""What the parts of the search are worth: without samples, by cells alone, and as the paper prints it.
 
 Every variant is asked at margin zero for a free channel or a proof that there is none: only searches are
 compared. ``everything`` is the planner's own, up to its first certified plan; ``proofs`` leaves the sampled
-ladder out; ``cells_strong`` leaves the relaxations out, too; ``cells_blame`` and ``cells_longest`` split by
-other rules; ``paper`` is the paper's Algorithms 1 and 2.
+paths out; ``cells`` leaves the relaxations out, too; ``paper`` is the paper's Algorithms 1 and 2.
 """
 
 from __future__ import annotations
@@ -21,7 +20,6 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.planning import find_channel
 from coop_drake.planning.boxes.channel import Channel
 from coop_drake.planning.cells.exploration import Verdict
-from coop_drake.planning.cells.split_rules import SplitRule
 from coop_drake.planning.proofs.proofs import Proofs, explorer
 
 __all__ = ["VARIANTS", "Answered", "ablation_rows", "ablation_tasks", "answer"]
@@ -119,12 +117,9 @@ def _proved(problem: PlanningProblem) -> Came:
     return _word(verdict), proofs.slices, None
 
 
-def _explored(split: SplitRule) -> Callable[[PlanningProblem], Came]:
-    def ask(problem: PlanningProblem) -> Came:
-        outcome = explorer(problem, split=split).run(problem.settings.max_slices)
-        return _word(outcome.verdict), outcome.slices, None
-
-    return ask
+def _explored(problem: PlanningProblem) -> Came:
+    outcome = explorer(problem).run(problem.settings.max_slices)
+    return _word(outcome.verdict), outcome.slices, None
 
 
 def _word(verdict: Verdict) -> str:
@@ -135,8 +130,6 @@ def _word(verdict: Verdict) -> str:
 VARIANTS: dict[str, Callable[[PlanningProblem], Came]] = {
     "everything": _searched("portfolio"),
     "proofs": _proved,
-    "cells_strong": _explored("strong"),
-    "cells_blame": _explored("blame"),
-    "cells_longest": _explored("longest"),
+    "cells": _explored,
     "paper": _searched("paper"),
 }

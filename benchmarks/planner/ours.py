@@ -25,7 +25,7 @@ class Planned:
         cpu_seconds: From the question to a plan that can be executed, or to the verdict [CPU s].
         first_plan_cpu_seconds: To the first certified plan, or to the verdict [CPU s].
         slices: Compound slices swept.
-        cells: Cells of the plan, or left undecided.
+        cells: Cells of the plan, 0 if there is no plan.
         margin_m: Margin of the plan's cores, 0 if there is no plan [m].
         transport_seconds: Estimated duration of the transport, 0 if there is no plan [s].
     """
@@ -83,7 +83,7 @@ def _planned(ask: Callable[[], PlanningResult]) -> Planned:
         cpu_seconds=seconds,
         first_plan_cpu_seconds=seconds if first is None else first,
         slices=report.slices,
-        cells=report.mixed_cells if found is None else len(found.cells),
+        cells=0 if found is None else len(found.cells),
         margin_m=0.0 if found is None else found.margin,
         transport_seconds=0.0 if found is None else sum(t.estimated_time for t in found.transitions),
     )

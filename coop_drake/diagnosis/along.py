@@ -30,7 +30,7 @@ def is_free_along(problem: PlanningProblem, way: FloatArray) -> tuple[bool, int]
     try:
         workspace, scale = marginal_workspace(problem, 0.0), configuration_scale(problem.tree)
         certifier = Certifier(swept, BodyPairs(swept), workspace, scale, 0.0)
-        proved = certifier.boxes(way, quick=True, last=True) is not None
+        proved = certifier.boxes(way, longest=True, smallest=True) is not None
     except GeometryError:
         return False, 0
     return proved, certifier.trials

@@ -6,7 +6,13 @@ import numpy as np
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.trials import Answer, Trial, Trials
-from coop_drake.planning.sampling.narrow_passages import Varied, amount_needed, are_free, drawn, drawn_closer
+from coop_drake.planning.sampling.narrow_passages import (
+    Eased,
+    amount_needed,
+    are_free,
+    ease_less,
+    with_larger_least_clearance,
+)
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["relieved", "squeezed"]
@@ -18,7 +24,7 @@ _WINDOW = 40
 
 
 def squeezed(
-    varied: Varied, amount: float, trial: Trial, trials: Trials, resolution: float
+    varied: Eased, amount: float, trial: Trial, trials: Trials, resolution: float
 ) -> tuple[float, Trial]:
     """Look for a smaller change that is enough for a way near the one found.
 
@@ -35,7 +41,7 @@ def squeezed(
     for _ in range(_ROUNDS):
         if trial.way is None or amount <= resolution:
             break
-        way, needed = drawn_closer(varied, trial.way, amount, 0.25 * resolution)
+        way, needed = ease_less(varied, trial.way, amount, 0.25 * resolution)
         better = None
         for share in _SLACKS:
             less = needed + share * (amount - needed)
@@ -48,7 +54,7 @@ def squeezed(
     return amount, trial
 
 
-def relieved(varied: Varied, way: FloatArray, enough: float) -> FloatArray:
+def relieved(varied: Eased, way: FloatArray, enough: float) -> FloatArray:
     """Draw a way out of the walls wherever it need not stick out of the floor; its worst place stays.
 
     Args:
@@ -68,7 +74,9 @@ def relieved(varied: Varied, way: FloatArray, enough: float) -> FloatArray:
         here = slice(first, last + 1)
         for number in range(_DRAWINGS):
             needed, _ = amount_needed(varied, way[here], enough)
-            part = drawn(varied(needed), way[here], number, free_end=last == len(way) - 1)
+            part = with_larger_least_clearance(
+                varied(needed), way[here], number, free_end=last == len(way) - 1
+            )
             if amount_needed(varied, part, enough)[0] <= needed:
                 way = np.concatenate((way[:first], part, way[last + 1 :]))
             if are_free(floor, way[here]).all():

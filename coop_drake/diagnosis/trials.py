@@ -8,13 +8,14 @@ from enum import Enum
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.along import is_free_along
-from coop_drake.diagnosis.way import way_through
+from coop_drake.diagnosis.way import path_through
 from coop_drake.errors import GeometryError
 from coop_drake.planning import Channel
+from coop_drake.planning.boxes.boxes import explored_channel
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.proofs.proofs import Proofs
 from coop_drake.planning.sampling.sampler import densified
-from coop_drake.planning.search.attempts import SampledAttempts
+from coop_drake.planning.search.sampled_search import SampledSearch
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
@@ -75,31 +76,31 @@ class Trials:
             return Trial(problem, Answer.UNDECIDED)
         self.asked += 1
         question = replace(problem, settings=replace(problem.settings, margin=0.0, max_slices=self._slices))
-        attempts, proofs = SampledAttempts(question), Proofs(question)
-        trial = self._asked(question, attempts, proofs, stage)
-        self.spent += max(1, attempts.slices // _BOXES_PER_SLICE + proofs.slices)
+        samples, proofs = SampledSearch(question), Proofs(question)
+        trial = self._asked(question, samples, proofs, stage)
+        self.spent += max(1, samples.slices // _BOXES_PER_SLICE + proofs.slices)
         return trial
 
-    def _asked(
-        self, question: PlanningProblem, attempts: SampledAttempts, proofs: Proofs, stage: str
-    ) -> Trial:
+    def _asked(self, question: PlanningProblem, samples: SampledSearch, proofs: Proofs, stage: str) -> Trial:
         """Sample some paths and explore once: a part of what the planner does, hence as sound."""
         for _ in range(_PATHS):
-            chain = attempts.first(lambda _: self._tell(stage))
-            if chain is not None:
-                way = densified(chain.path, configuration_scale(question.tree), _STEP)
+            found = samples.attempt(lambda _: self._tell(stage))
+            if found is not None:
+                way = densified(found.path, configuration_scale(question.tree), _STEP)
                 return Trial(question, Answer.FOUND, way)
         verdict = proofs.run(self._slices, progress=lambda _: self._tell(stage))
         if verdict is Verdict.INFEASIBLE:
             return Trial(question, Answer.INFEASIBLE)
         if verdict is Verdict.FOUND:
-            return Trial(question, Answer.FOUND, self._way(question, attempts.channel_of(proofs.boxes())))
+            return Trial(
+                question, Answer.FOUND, self._way(question, explored_channel(question, proofs.boxes()))
+            )
         return Trial(question, Answer.UNDECIDED)
 
     @staticmethod
     def _way(problem: PlanningProblem, channel: Channel) -> FloatArray | None:
         try:
-            return way_through(problem, channel, _STEP)
+            return path_through(problem, channel, _STEP)
         except GeometryError:  # A cell with a cusp: the channel is proved all the same.
             return None
 

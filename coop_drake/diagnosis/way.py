@@ -15,10 +15,10 @@ from coop_drake.planning.sampling.sampler import densified
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["way_through"]
+__all__ = ["path_through"]
 
 
-def way_through(problem: PlanningProblem, channel: Channel, step: float) -> FloatArray:
+def path_through(problem: PlanningProblem, channel: Channel, step: float) -> FloatArray:
     """Configurations from start to goal, each of them inside a box of the channel.
 
     It is the path that the boxes were laid along, if there is one. Else, inside a box, the position follows

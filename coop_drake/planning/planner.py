@@ -1,4 +1,4 @@
-"""The planner: search a way, make it a plan; three answers."""
+"""The planner: search for a path and make a plan of it, or prove that none exists."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from coop_drake.laws import GainSet
 from coop_drake.planning.boxes.channel import NoChannel
 from coop_drake.planning.execution.transitions import Progress
 from coop_drake.planning.improvement.quickest import quickest_plan
-from coop_drake.planning.search.search import find_way
+from coop_drake.planning.search.search import find_path
 
 __all__ = ["plan"]
 
 FINER_ATTEMPTS = 2
-"""How often a way that cannot be executed is searched again, each time with half the margin."""
+"""Number of further searches after a path that cannot be executed, each with half the margin."""
 
 
 def plan(
@@ -27,22 +27,22 @@ def plan(
 ) -> PlanningResult:
     """Find a plan, or prove that none exists.
 
-    A way that is found but cannot be executed (a passage of less than a millimetre, or of minutes)
-    proves nothing: the search begins again at a smaller margin, which gives other cells; if that does not
-    help the answer is Undecided.
+    A path may be found that cannot be executed, because a passage is less than a millimetre wide or takes
+    minutes. The search is then repeated with a smaller margin, which gives other cells. If that does not
+    help, the answer is Undecided.
 
     Args:
         problem: What is asked.
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
-        progress: Called with a stage and the share of it that is done.
+        progress: Called with a phase and the fraction of it that is done.
 
     Returns:
         Found with the plan, Infeasible with the reason, or Undecided with what stood in the way.
     """
-    question, report, stall = problem, SearchReport(0, 0, 0, ()), ""
+    question, report, stall = problem, SearchReport(0), ""
     for _ in range(1 + FINER_ATTEMPTS):
-        answer, latest = find_way(question, progress)
+        answer, latest = find_path(question, progress)
         report = _added(report, latest)
         if isinstance(answer, NoChannel):
             if answer.proved:
@@ -51,7 +51,7 @@ def plan(
         try:
             made = quickest_plan(question, answer, gain_set, gain_set_name=gain_set_name, progress=progress)
         except (GeometryError, PlanError, StallError, ShapelyError) as error:
-            stall = f"a channel exists but cannot be executed: {error}"
+            stall = f"a free path exists, but a plan along it cannot be executed: {error}"
             if answer.margin == 0.0:
                 break
             question = replace(question, settings=replace(question.settings, margin=0.5 * answer.margin))
@@ -66,6 +66,5 @@ def _added(before: SearchReport, latest: SearchReport) -> SearchReport:
     return replace(
         latest,
         slices=before.slices + latest.slices,
-        margins=before.margins + latest.margins,
         first_plan_cpu_seconds=latest.first_plan_cpu_seconds if first is None else first,
     )

@@ -1,4 +1,4 @@
-"""Compile the planner's kernels once, into numba's cache: ``python -m coop_drake.planning.warm_up``."""
+"""Compile the planner's kernels into the cache on disk: ``python -m coop_drake.planning.warm_up``."""
 
 from __future__ import annotations
 
@@ -14,11 +14,15 @@ from coop_drake.planning.proofs.proofs import Proofs
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 
-_SLICES = 8
+SLICES = 8
+"""Slices of an exploration: its kernels are called in the first one."""
 
 
 def main() -> None:
-    """Plan a square with one arm across an empty floor, and pass a corner: this calls every kernel."""
+    """Plan for a square with one arm on an empty floor, and find a passage around a corner.
+
+    Together these call every kernel.
+    """
     square = Body("object", None, (ConvexShape(0.2 * normals(np.array([0.0, 0.5, 1.0, 1.5]) * np.pi)),))
     base = Body("base", 0, (ConvexShape(np.zeros((1, 2)), 0.1),))
     joint = TreeJoint("arm", "revolute", 0, 0, PlanarPose(0.5), 1.0, (1.0, 0.0), -1.0, 1.0)
@@ -34,7 +38,7 @@ def main() -> None:
         settings=PlannerSettings(margin=0.1),
     )
     plan(question, ScheduledGains(), gain_set_name="scheduled")
-    Proofs(question).run(_SLICES)
+    Proofs(question).run(SLICES)
     bent = Polygon([(0.0, 0.0), (3.0, 0.0), (3.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)])
     PassageFinder(bent).find((2.5, 0.5), (0.5, 2.5))
 

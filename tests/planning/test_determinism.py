@@ -15,7 +15,7 @@ from tests.support.passages import FoldingArm
 problem = FoldingArm().problem(0.6)
 result = planner.plan(problem, ScheduledGains(), gain_set_name="scheduled")
 save_plan(result.plan, Path(sys.argv[1]))
-print(result.report.slices, result.report.margins)
+print(result.report.slices)
 """
 
 

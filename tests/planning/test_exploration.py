@@ -4,11 +4,11 @@ import networkx as nx
 import numpy as np
 import pytest
 
+from coop_drake.planning.boxes.boxes import explored_channel
 from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.proofs.proofs import explorer
 from coop_drake.planning.questions.relaxation import relaxed
-from coop_drake.planning.search.attempts import SampledAttempts
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case
 from tests.support.soundness import assert_channel_is_sound
@@ -23,7 +23,7 @@ def test_exploration_alone_finds_a_sound_channel() -> None:
     for one, other in pairwise(outcome.path):
         assert other.slice in exploration.slices.all[one.slice].neighbours
         assert one.region.meets(other.region)
-    channel = SampledAttempts(problem).channel_of(exploration.boxes(outcome.path))
+    channel = explored_channel(problem, exploration.boxes(outcome.path))
     assert_channel_is_sound(problem, channel)
 
 

@@ -10,7 +10,7 @@ from manifold3d import CrossSection
 
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.cells.cell_graph import Cell, CellGraph, Kind
+from coop_drake.planning.cells.cell_graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.events import ChannelSearched, Event, SliceAdded, SliceSplit
 from coop_drake.planning.cells.exploration import Outcome, Verdict
@@ -105,12 +105,12 @@ def cells_of(slices: Slices, *regions_by_slice: list[Region]) -> CellGraph:
 
 
 @pytest.fixture
-def path() -> list[Cell]:
+def path() -> list[GraphCell]:
     """Over-cells of four slices, side by side."""
-    return [Cell(i, i, Kind.MIXED, region(float(i)), 1.0) for i in range(4)]
+    return [GraphCell(i, i, Kind.MIXED, region(float(i)), 1.0) for i in range(4)]
 
 
-def test_refine_returns_the_first_pair_that_does_not_connect(path: list[Cell]) -> None:
+def test_refine_returns_the_first_pair_that_does_not_connect(path: list[GraphCell]) -> None:
     slices = Slices(team_tree(), 0.25)
     under = cells_of(slices, [region(0.0)], [region(1.0)], [region(2.3, 0.5)], [region(3.0)])
     source, goal = under.by_slice[0], under.by_slice[3]
@@ -119,12 +119,12 @@ def test_refine_returns_the_first_pair_that_does_not_connect(path: list[Cell]) -
     assert refine(path, joined.by_slice[0], joined.by_slice[3], joined) == [2, 3]
 
 
-def test_refine_of_a_single_cell_is_its_slice(path: list[Cell]) -> None:
+def test_refine_of_a_single_cell_is_its_slice(path: list[GraphCell]) -> None:
     under = cells_of(Slices(team_tree(), 0.25), [region(0.0)])
     assert refine(path[:1], under.by_slice[0], under.by_slice[0], under) == [0]
 
 
-def test_refine_accepts_no_cell_of_the_last_slice_but_the_goals(path: list[Cell]) -> None:
+def test_refine_accepts_no_cell_of_the_last_slice_but_the_goals(path: list[GraphCell]) -> None:
     under = cells_of(Slices(team_tree(), 0.25), [region(0.0)], [region(1.0), region(1.9, 0.1)])
     source, (near, far) = under.by_slice[0], under.by_slice[1]
     assert refine(path[:2], source, [far], under) == [0, 1]

@@ -11,7 +11,7 @@ from coop_drake.planning import planner
 from coop_drake.planning.boxes.channel import NoChannel
 from tests.support.channels import bent_channel
 
-REPORT = SearchReport(10, 4, 2, ((0.1, "found"),))
+REPORT = SearchReport(10)
 
 
 @pytest.fixture
@@ -22,11 +22,11 @@ def asked(monkeypatch):
     def play(*answers):
         left = list(answers)
 
-        def find_way(problem, progress=None):
+        def find_path(problem, progress=None):
             questions.append(problem)
             return left.pop(0), REPORT
 
-        monkeypatch.setattr(planner, "find_way", find_way)
+        monkeypatch.setattr(planner, "find_path", find_path)
         return questions
 
     return play
@@ -77,7 +77,7 @@ def test_channels_that_all_stall_are_undecided_with_the_passage_named(asked):
     result = ask(problem)
     assert isinstance(result, Undecided)
     assert len(questions) == 3
-    assert "cannot be executed: cell 2: the object's passage through (5.000," in result.reason
+    assert "plan along it cannot be executed: cell 2: the object's passage through (5.000," in result.reason
 
 
 def test_a_stall_at_no_margin_is_not_asked_again(asked):

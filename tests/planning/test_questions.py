@@ -122,10 +122,9 @@ def test_the_margin_grows_and_shrinks_with_the_scene(kind, scale: float) -> None
     assert isinstance(found, Channel)
     moved = Similarity(scale=scale).question(problem)
     for settings in (moved.settings, problem.settings):
-        channel, report = find_channel(replace(moved, settings=settings))
+        channel, _ = find_channel(replace(moved, settings=settings))
         assert isinstance(channel, Channel)
         assert 0.5 * found.margin < channel.margin / scale < 2.0 * found.margin
-        assert report.margins[-1] == (channel.margin, "found")
 
 
 @pytest.mark.parametrize("scale", [0.1, 1000.0])

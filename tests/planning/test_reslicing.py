@@ -14,8 +14,8 @@ from coop_drake.planning.cells.cells import CellMaker
 from coop_drake.planning.execution.channel_ends import turned_to_start
 from coop_drake.planning.execution.estimate import speed_per_clearance
 from coop_drake.planning.improvement.box_crossing import cross_box
-from coop_drake.planning.improvement.path_covering import resliced
-from coop_drake.planning.improvement.quickest import quickest_plan, way_through
+from coop_drake.planning.improvement.path_covering import cover_path
+from coop_drake.planning.improvement.quickest import path_through, quickest_plan
 from coop_drake.planning.search.search import find_channel
 from tests.support.cases import case
 from tests.support.free_positions import FreePositions
@@ -67,7 +67,7 @@ def test_the_same_channel_gives_the_same_boxes(base, quick):
 
 def test_targets_lie_in_the_cores_of_both_boxes_and_cores_inside(base):
     problem, channel = base
-    found = resliced(problem, channel.path, channel.margin, ScheduledGains())
+    found = cover_path(problem, channel.path, channel.margin, ScheduledGains())
     assert found is not None
     assert 0.0 < found.channel.margin < channel.margin
     for index, (here, after) in enumerate(zip(found.channel.boxes, found.channel.boxes[1:], strict=False)):
@@ -80,7 +80,7 @@ def test_targets_lie_in_the_cores_of_both_boxes_and_cores_inside(base):
 
 def test_a_way_can_be_had_from_the_boxes_alone(base):
     problem, channel = base
-    way = way_through(problem, channel)
+    way = path_through(problem, channel)
     np.testing.assert_array_equal(way[0], problem.start)
     np.testing.assert_allclose(way[-1, :3], [*problem.goal_pose[:2], channel.goal_angle])
     plan = quickest_plan(problem, replace(channel, path=None), ScheduledGains(), gain_set_name="scheduled")
@@ -92,7 +92,7 @@ def test_a_way_can_be_had_from_the_boxes_alone(base):
 def test_what_cannot_be_proved_is_not_used(base, monkeypatch):
     own = make_plan(*base, ScheduledGains(), gain_set_name="scheduled")
     monkeypatch.setattr(CellMaker, "under_cells", lambda self, expanded: [])
-    assert resliced(base[0], base[1].path, base[1].margin, ScheduledGains()) is None
+    assert cover_path(base[0], base[1].path, base[1].margin, ScheduledGains()) is None
     plan = quickest_plan(*base, ScheduledGains(), gain_set_name="scheduled")
     assert [cell.safe.wkb for cell in plan.cells] == [cell.safe.wkb for cell in own.cells]
 

@@ -11,9 +11,9 @@ from coop_drake.planning import Channel, find_channel
 from coop_drake.planning.sampling.narrow_passages import (
     amount_needed,
     are_free,
-    drawn_closer,
-    fitted,
-    widened,
+    ease_less,
+    repaired,
+    widened_floor,
 )
 from tests.planning.test_search import rod_problem
 from tests.support.cases import transport
@@ -32,17 +32,17 @@ def tilted(angle: float = 0.05) -> np.ndarray:
 def test_the_amount_that_a_way_needs_is_what_its_tightest_sample_sticks_out():
     problem = rod_problem(0.15)
 
-    def varied(amount):
+    def eased(amount):
         return replace(problem, workspace=problem.workspace.buffer(amount, join_style="mitre"))
 
     way = tilted(0.0)
-    needed, worst = amount_needed(varied, way, 0.1)
+    needed, worst = amount_needed(eased, way, 0.1)
     assert needed == pytest.approx(0.025, abs=2e-4)
     assert abs(way[worst, 0]) < 1.6
-    assert are_free(varied(needed), way).all()
-    assert not are_free(varied(needed - 5e-4), way).all()
-    closer, less = drawn_closer(varied, tilted(), 0.1)
-    assert less < amount_needed(varied, tilted(), 0.1)[0]
+    assert are_free(eased(needed), way).all()
+    assert not are_free(eased(needed - 5e-4), way).all()
+    closer, less = ease_less(eased, tilted(), 0.1)
+    assert less < amount_needed(eased, tilted(), 0.1)[0]
     assert less >= 0.025 - 2e-4
     assert np.array_equal(closer[[0, -1]], tilted()[[0, -1]])
 
@@ -50,7 +50,7 @@ def test_the_amount_that_a_way_needs_is_what_its_tightest_sample_sticks_out():
 @pytest.mark.parametrize(("corridor", "fits"), [(0.21, True), (0.19, False)])
 def test_a_way_fits_where_it_can_only(corridor, fits):
     problem = rod_problem(corridor)
-    way = fitted(problem, tilted(), 0.06)
+    way = repaired(problem, tilted(), 0.06)
     assert (way is not None) == fits
     if way is not None:
         assert are_free(problem, way).all()
@@ -58,8 +58,8 @@ def test_a_way_fits_where_it_can_only(corridor, fits):
 
 def test_a_wider_floor_holds_the_floor():
     floor = rod_problem(0.2).workspace
-    assert widened(floor, 0.05).contains(floor)
-    assert widened(floor, 0.05).contains(Point(0.0, 0.14))
+    assert widened_floor(floor, 0.05).contains(floor)
+    assert widened_floor(floor, 0.05).contains(Point(0.0, 0.14))
 
 
 def test_a_corridor_too_narrow_for_samples_is_found_and_sound():

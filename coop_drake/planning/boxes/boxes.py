@@ -1,4 +1,4 @@
-"""From free boxes along a path to a channel: unwrapped theta, full polygons, cores at the margin."""
+"""From free boxes to a channel: all free positions of every box, and those that keep the margin."""
 
 from __future__ import annotations
 
@@ -15,14 +15,17 @@ from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.swept_tree import Interval, Intervals, SweptTree
 from coop_drake.planning.boxes.certify import PathBox
 from coop_drake.planning.boxes.channel import Channel, FreeBox
-from coop_drake.planning.boxes.shortcuts import without_detours
 from coop_drake.planning.cells.cells import CellMaker, Region, regions_of
 from coop_drake.planning.cells.slices import nearest_turn
 from coop_drake.planning.questions.margins import disc_polygon, is_patched, marginal_workspace
 from coop_drake.tree.pose import FloatArray
 
-_MANY_VERTICES = 150
-_ELBOW_ROOM = 1.0
+MANY_COORDINATES = 150
+"""On a floor with more corners only the part near a box is looked at, because Minkowski differences of the
+whole floor would take most of the time."""
+
+EXTRA_FLOOR = 1.0
+"""The part of a floor near a path reaches this much further than the team [m]: wide cells are faster."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class Box:
 
 
 class Regions:
-    """Finds the positions of boxes along a path.
+    """Computes the free positions of boxes along a path.
 
     Args:
         problem: The question.
@@ -55,14 +58,14 @@ class Regions:
         self._floor: Polygon | MultiPolygon = problem.workspace
         patched = margin > 0.0 and is_patched(problem, margin)
         self._narrow = marginal_workspace(problem, margin) if patched else None
-        self._large = shapely.get_num_coordinates(problem.workspace) > _MANY_VERTICES
+        self._large = shapely.get_num_coordinates(problem.workspace) > MANY_COORDINATES
         self._full = None if self._large else self._maker(self._floor)
         self._core = None if self._large or self._narrow is None else self._maker(self._narrow)
 
     def around(self, box: PathBox) -> Box | None:
-        """The positions that are joined to those of a box's way; None if geometry fails.
+        """The free positions that are connected to a box's positions; None if geometry fails.
 
-        On a large floor only the part near the way is looked at: a smaller set is as free.
+        On a large floor only the part near the box is looked at: the result is smaller, but as free.
         """
         full = _joined(self._cells(self._full, self._floor, box), box)
         if full is None:
@@ -80,7 +83,7 @@ class Regions:
         self, maker: CellMaker | None, floor: Polygon | MultiPolygon, box: PathBox
     ) -> Sequence[Region]:
         if maker is None:
-            near = nearby(floor, box.way, self._swept.tree.reach)
+            near = nearby(floor, box.positions, self._swept.tree.reach)
             maker = None if near.is_empty else self._maker(near)
         return [] if maker is None else maker.under_cells(box.intervals)
 
@@ -88,26 +91,26 @@ class Regions:
         return CellMaker(self._swept, self._pairs, floor)
 
 
-def nearby(floor: Polygon | MultiPolygon, way: FloatArray, reach: float) -> MultiPolygon:
-    """The part of a floor that a team on its way can touch, and some more to both sides.
+def nearby(floor: Polygon | MultiPolygon, positions: FloatArray, reach: float) -> MultiPolygon:
+    """The part of a floor that a team at some positions can touch, and ``EXTRA_FLOOR`` around it.
 
     Args:
         floor: Polygons with holes [m].
-        way: Positions p_WL, shape (k, 2) [m].
+        positions: Positions p_WL, shape (k, 2) [m].
         reach: Distance of the team's furthest point from p_WL [m].
     """
-    lower, upper = way.min(axis=0) - reach - _ELBOW_ROOM, way.max(axis=0) + reach + _ELBOW_ROOM
+    lower, upper = positions.min(axis=0) - reach - EXTRA_FLOOR, positions.max(axis=0) + reach + EXTRA_FLOOR
     parts = shapely.get_parts(floor.intersection(shapely.box(*lower, *upper)))
     return MultiPolygon([part for part in parts if isinstance(part, Polygon)])
 
 
 def _joined(regions: Sequence[Region], box: PathBox) -> Region | None:
-    ends = box.way[[0, -1]]
+    ends = box.positions[[0, -1]]
     return next((region for region in regions if region.depths(ends).min() > 0.0), None)
 
 
 def unwrapped(intervals: Sequence[Intervals], start_angle: float) -> list[Intervals]:
-    """Shift every theta interval by whole turns so that neighbours lie next to each other."""
+    """Shift every theta interval by whole turns so that consecutive ones lie next to each other."""
     result: list[Intervals] = []
     near = start_angle
     for box in intervals:
@@ -123,13 +126,13 @@ def unwrapped(intervals: Sequence[Intervals], start_angle: float) -> list[Interv
 def make_channel(
     problem: PlanningProblem, boxes: Sequence[Box], margin: float, path: FloatArray | None
 ) -> Channel:
-    """Join boxes to a channel and leave out those that are detours.
+    """Make a channel of free boxes.
 
     Args:
         problem: The question.
-        boxes: Free boxes, consecutive ones overlap.
+        boxes: Free boxes, of which consecutive ones overlap.
         margin: The margin that the cores keep [m].
-        path: The path that they were laid along, if any, shape (m, 3 + n).
+        path: The path that they were laid along, shape (m, 3 + n); None if there is none.
     """
     turned = unwrapped([box.intervals for box in boxes], float(problem.start[2]))
     free = tuple(
@@ -143,4 +146,14 @@ def make_channel(
     )
     middle = 0.5 * (free[-1].lower[0] + free[-1].upper[0])
     goal = float(middle + nearest_turn(float(problem.goal_pose[2]) - middle))
-    return without_detours(Channel(free, margin, goal, path))
+    return Channel(free, margin, goal, path)
+
+
+def explored_channel(problem: PlanningProblem, boxes: Sequence[tuple[Intervals, Region]]) -> Channel:
+    """The channel of boxes that an exploration found at margin zero.
+
+    Args:
+        problem: The question.
+        boxes: Expanded intervals and region of every box.
+    """
+    return make_channel(problem, [Box(*box, core=box[1]) for box in boxes], 0.0, None)

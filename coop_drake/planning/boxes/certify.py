@@ -1,4 +1,4 @@
-"""Turn a candidate path into a chain of boxes that are proved free: over-swept, overlapping, greedy."""
+"""Cover a path with boxes that are proved free by over-sweeps; consecutive boxes overlap."""
 
 from __future__ import annotations
 
@@ -16,11 +16,24 @@ from coop_drake.planning.sampling.obstacle_grid import Walls, walls_under
 from coop_drake.planning.sampling.sampler import densified
 from coop_drake.tree.pose import FloatArray
 
-_LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.0003))
-_LAST_LEVELS = (*_LEVELS, (0.0003, 0.0001))
-_RESOLUTION = 0.02
-_FINEST, _LAST_FINEST = 0.002, 0.0005
-_FINER = 4
+LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.0003))
+"""Padding of a box in every angle and joint [rad or m], and clearance that it needs at both ends [m]; the
+widest comes first, because wide boxes are crossed faster."""
+
+SMALLEST_LEVELS = (*LEVELS, (0.0003, 0.0001))
+"""The same with a level for passages of a millimetre."""
+
+SPACING = 0.02
+"""Distance between samples of a path in any scaled axis [m]: a box ends at a sample."""
+
+FINEST_SPACING, SMALLEST_SPACING = 0.002, 0.0005
+"""Samples closer than this are not refined any more [m]; the second one belongs to ``SMALLEST_LEVELS``."""
+
+REFINEMENT = 4
+"""Where no box holds two consecutive samples, so many intervals take the place of one."""
+
+FIRST_REACH = 4
+"""Samples by which the first box reaches out before its length is known."""
 
 
 @dataclass(frozen=True)
@@ -29,19 +42,20 @@ class PathBox:
 
     Attributes:
         intervals: Intervals of (theta, q...).
-        way: Positions along which the team is free for all of them, joined by straight lines, shape (k, 2).
+        positions: Positions p_WL; on the straight lines between them the team is free for all angles of the
+            intervals, shape (k, 2) [m].
     """
 
     intervals: Intervals
-    way: FloatArray
+    positions: FloatArray
 
 
 class Certifier:
-    """Lays boxes along paths in one workspace.
+    """Covers paths with boxes in one workspace.
 
-    A box is sound whatever path it was laid for: its over-swept footprint touches no wall along its way and
-    no two bodies touch. Consecutive boxes share a sample of the path, padded in every angle. Where no box
-    holds two samples, closer ones are taken.
+    Every box is proved free: its over-swept footprint touches no wall along the path, and no bodies touch.
+    Consecutive boxes share a sample of the path, padded in every angle. Where no box holds two consecutive
+    samples, the path is sampled more closely.
 
     Args:
         swept: Sweeps of the team's pieces.
@@ -65,7 +79,7 @@ class Certifier:
         self._boxes = box_arrays(swept, pairs)
         self._walls: Walls = walls_under(workspace, swept.tree.reach)
         self._scale, self._margin = scale, margin
-        self._guess = 4
+        self._reach = FIRST_REACH
         self.trials = 0
 
     def boxes(
@@ -73,48 +87,51 @@ class Certifier:
         path: FloatArray,
         progress: Callable[[float], None] | None = None,
         *,
-        quick: bool = False,
-        last: bool = False,
+        longest: bool = False,
+        smallest: bool = False,
     ) -> list[PathBox] | None:
-        """Chain of boxes from the path's first to its last configuration, or None if one is missing.
+        """Cover a path with boxes, from its first to its last configuration.
 
         Args:
             path: Configurations with theta unwrapped, the first one free, shape (m, 3 + n).
-            progress: Called with the share of the path that is covered.
-            quick: Whether to take the longest boxes instead of those that are passed quickest.
-            last: Whether boxes may be as small as a millimetre of room asks for, too narrow to be executed
-                in good time.
+            progress: Called with the fraction of the path that is covered.
+            longest: Whether to take the longest boxes, instead of those with the highest average speed.
+            smallest: Whether boxes may be as small as a passage of a millimetre needs; a transport through
+                them takes long.
+
+        Returns:
+            The boxes, or None if a part of the path cannot be covered.
         """
-        samples = densified(path, self._scale, _RESOLUTION)
-        chain: list[PathBox] = []
+        levels = SMALLEST_LEVELS if smallest else LEVELS
+        finest = SMALLEST_SPACING if smallest else FINEST_SPACING
+        samples = densified(path, self._scale, SPACING)
+        boxes: list[PathBox] = []
         i = 0
         while i < len(samples) - 1:
-            found = self._longest(samples, i, quick, _LAST_LEVELS if last else _LEVELS)
+            found = self._next_box(samples, i, longest, levels)
             if found is None:
-                if np.abs((samples[i + 1] - samples[i]) * self._scale).max() < (
-                    _LAST_FINEST if last else _FINEST
-                ):
+                if np.abs((samples[i + 1] - samples[i]) * self._scale).max() < finest:
                     return None
                 samples = _finer(samples, i)
                 continue
             i, box = found
-            chain.append(box)
+            boxes.append(box)
             if progress is not None:
                 progress(i / (len(samples) - 1))
-        return chain
+        return boxes
 
-    def _longest(
-        self, samples: FloatArray, i: int, quick: bool, levels: tuple[tuple[float, float], ...]
+    def _next_box(
+        self, samples: FloatArray, i: int, longest: bool, levels: tuple[tuple[float, float], ...]
     ) -> tuple[int, PathBox] | None:
-        """Sample that one box holds together with sample i, and that box."""
-        for pad, room in levels:
-            quickest, longest, trials = longest_box(
-                self._boxes, self._walls, samples, i, self._guess, pad, room, self._margin
+        """The box that begins at sample i, and the sample at which it ends; None if there is none."""
+        for pad, clearance in levels:
+            fastest, furthest, trials = longest_box(
+                self._boxes, self._walls, samples, i, self._reach, pad, clearance, self._margin
             )
             self.trials += trials
-            j = longest if quick else quickest
+            j = furthest if longest else fastest
             if j > i:
-                self._guess = max(1, (longest - i) // 2)
+                self._reach = max(1, (furthest - i) // 2)
                 part = samples[i : j + 1]
                 lower, upper = padded(self._boxes, part, pad)
                 intervals = tuple((float(a), float(b)) for a, b in zip(lower, upper, strict=True))
@@ -123,14 +140,14 @@ class Certifier:
 
 
 def _finer(samples: FloatArray, i: int) -> FloatArray:
-    """Samples with more of them between one and the next."""
-    share = np.arange(1, _FINER)[:, None] / _FINER
-    between = samples[i] + share * (samples[i + 1] - samples[i])
+    """Samples with more of them between sample i and the next one."""
+    fraction = np.arange(1, REFINEMENT)[:, None] / REFINEMENT
+    between = samples[i] + fraction * (samples[i + 1] - samples[i])
     return np.concatenate((samples[: i + 1], between, samples[i + 1 :]))
 
 
 def box_arrays(swept: SweptTree, pairs: BodyPairs) -> BoxArrays:
-    """Lay a team out for the compiled boxes; every piece that a pair needs is swept once."""
+    """Arrays of a team for the compiled boxes; a piece that several collision pairs need is swept once."""
     frames: dict[tuple[int, int], int] = {}
     rows: list[tuple[int, int]] = []
     for i, j, first_stages, second_stages in pairs.pieces.tolist():

@@ -1,4 +1,4 @@
-"""What a search returns: a channel, the chain of free boxes before it is made ready to execute, or none."""
+"""What a search returns: a channel (a sequence of free boxes), a path that boxes cover, or neither."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class FreeBox:
     Attributes:
         polygon: Positions p_WL, one connected component of the under-approximation at margin zero [m].
         core: The same at the plan's margin, inside ``polygon``, one connected component [m].
-        lower: Lower ends of (theta, q...), expanded by the overlap, theta unwrapped, shape (1 + n,).
+        lower: Lower ends of (theta, q...), expanded by the overlap, theta unwrapped, shape (1 + n,) [rad, m].
         upper: Upper ends, shape (1 + n,).
     """
 
@@ -31,14 +31,14 @@ class FreeBox:
 
 @dataclass(frozen=True)
 class Channel:
-    """Consecutive boxes overlap with interior: their cores in the plane, their intervals in every angle.
+    """A sequence of free boxes; the cores and the intervals of consecutive boxes overlap with interior.
 
     Attributes:
-        boxes: From the box that holds the start to the one that holds the goal.
+        boxes: From the box that holds the start to the box that holds the goal.
         margin: The margin rho that the cores keep [m].
         goal_angle: The goal's theta, unwrapped along the boxes [rad].
-        path: The path that the boxes were laid along, theta unwrapped like theirs, shape (m, 3 + n); None if
-            they were not laid along any.
+        path: The path that the boxes were laid along, theta unwrapped like theirs, shape (m, 3 + n) [m, rad];
+            None if they were found without a path.
     """
 
     boxes: tuple[FreeBox, ...]
@@ -48,19 +48,17 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class Way:
-    """A path that is covered with boxes proved free; their polygons are made where they are asked for.
+class CoveredPath:
+    """A path that is covered with boxes proved free; the boxes' polygons are made on request.
 
     Attributes:
-        path: From start to goal, theta unwrapped, shape (m, 3 + n).
+        path: From start to goal, theta unwrapped, shape (m, 3 + n) [m, rad].
         margin: The margin rho that the path keeps in every box [m].
-        boxes: How many boxes cover it.
-        channel: Makes the channel of these boxes; raises a GeometryError where geometry fails.
+        channel: Makes the channel of these boxes; raises a GeometryError if geometry fails.
     """
 
     path: FloatArray
     margin: float
-    boxes: int
     channel: Callable[[], Channel]
 
 
@@ -69,10 +67,10 @@ class NoChannel:
     """No channel was found.
 
     Attributes:
-        proved: True if none exists, False if the work or the resolution ended first.
+        proved: True if none exists; False if the budget was spent or the resolution was reached before.
         reason: Why, in a sentence.
-        proof: The proof in a form that can be checked again, where there is one.
-        mixed: Where nothing was proved: what the last exploration left undecided, the widest first.
+        proof: The proof in a form that can be checked again, if there is one.
+        mixed: If nothing was proved, the cells that the last exploration left undecided, the widest first.
     """
 
     proved: bool

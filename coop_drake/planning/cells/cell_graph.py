@@ -28,17 +28,17 @@ class Kind(IntEnum):
 
 
 @dataclass(eq=False)
-class Cell:
-    """A node: a region of positions over a slice.
+class GraphCell:
+    """A node of the graph: a region of positions over a slice.
 
     Attributes:
         index: Its number in the graph.
         slice: Id of its slice.
         kind: What is known about it.
         region: Positions p_WL.
-        weight: Cost of passing through.
-        beside: Cells of neighbouring slices whose bounds meet this one's, None until a search asks.
-        tested: By index, whether this region meets that of a cell, as far as a search had to know.
+        weight: Cost of passing through it.
+        beside: Cells of neighbouring slices whose bounds meet this cell's; None until a search needs them.
+        tested: For the cells that a search has tested, by index, whether their regions meet this one's.
     """
 
     index: int
@@ -46,34 +46,35 @@ class Cell:
     kind: Kind
     region: Region
     weight: float
-    beside: list[Cell] | None = None
+    beside: list[GraphCell] | None = None
     tested: dict[int, bool] = field(default_factory=dict)
 
 
 class CellGraph:
-    """Cells by slice, with edges tested when a search first asks for them.
+    """Cells by slice; edges are tested when a search first needs them.
 
     Args:
-        slices: The subdivision that the cells stand over.
+        slices: The subdivision that the cells belong to.
     """
 
     def __init__(self, slices: Slices) -> None:
         self._slices = slices
-        self.cells: list[Cell] = []
-        self.by_slice: dict[int, list[Cell]] = {}
+        self.cells: list[GraphCell] = []
+        self.by_slice: dict[int, list[GraphCell]] = {}
 
     def add(self, index: int, members: Sequence[tuple[Kind, Region, float]]) -> None:
         """Put the cells (kind, region, weight) of a new leaf into the graph."""
         self._unsettle(index)
         first = len(self.cells)
         made = [
-            Cell(first + i, index, kind, region, weight) for i, (kind, region, weight) in enumerate(members)
+            GraphCell(first + i, index, kind, region, weight)
+            for i, (kind, region, weight) in enumerate(members)
         ]
         self.cells += made
         self.by_slice[index] = made
 
     def remove(self, index: int) -> None:
-        """Forget the cells of a slice that is about to be halved."""
+        """Remove the cells of a slice that is about to be halved."""
         self._unsettle(index)
         for cell in self.by_slice.pop(index):
             for other in cell.tested:
@@ -81,16 +82,16 @@ class CellGraph:
             cell.beside, cell.tested = None, {}
 
     def _unsettle(self, index: int) -> None:
-        """Let the cells around a slice look for their neighbours anew."""
+        """Discard the neighbour lists of the cells around a slice, which changes."""
         for other in self._slices.all[index].neighbours:
             for cell in self.by_slice.get(other, ()):
                 cell.beside = None
 
-    def neighbours(self, cell: Cell) -> list[Cell]:
+    def neighbours(self, cell: GraphCell) -> list[GraphCell]:
         """Cells of neighbouring slices whose regions meet this one's, in a fixed order."""
         return [other for other in self._beside(cell) if self._meet(cell, other)]
 
-    def _beside(self, cell: Cell) -> list[Cell]:
+    def _beside(self, cell: GraphCell) -> list[GraphCell]:
         if cell.beside is None:
             west, south, east, north = cell.region.bounds
             cell.beside = [
@@ -105,25 +106,26 @@ class CellGraph:
         return cell.beside
 
     @staticmethod
-    def _meet(cell: Cell, other: Cell) -> bool:
+    def _meet(cell: GraphCell, other: GraphCell) -> bool:
         meets = cell.tested.get(other.index)
         if meets is None:
-            # What fails is no blockage; but a free channel is proved from every cell to the next.
+            # If geometry fails, cells count as joined, so that nothing is called blocked wrongly; two FREE
+            # cells count as apart, because a path of FREE cells is a proof.
             meets = cell.region.meets(
                 other.region, otherwise=(cell.kind, other.kind) != (Kind.FREE, Kind.FREE)
             )
             cell.tested[other.index] = other.tested[cell.index] = meets
         return meets
 
-    def cheapest(self, starts: Sequence[Cell], goals: set[int]) -> list[Cell] | None:
-        """Path of least total weight by Dijkstra's algorithm; ties go to the lower index.
+    def cheapest(self, starts: Sequence[GraphCell], goals: set[int]) -> list[GraphCell] | None:
+        """Path of least total weight by Dijkstra's algorithm; of equal costs the lower index comes first.
 
         Args:
             starts: Cells that hold the start.
             goals: Indices of the cells that hold the goal.
 
         Returns:
-            Cells from a start to a goal, or None where no path joins them.
+            Cells from a start to a goal, or None if no path joins them.
         """
         best = {cell.index: cell.weight for cell in starts}
         back: dict[int, int] = {}
@@ -143,7 +145,7 @@ class CellGraph:
                     heapq.heappush(queue, (through, other.index))
         return None
 
-    def _trace(self, back: dict[int, int], index: int) -> list[Cell]:
+    def _trace(self, back: dict[int, int], index: int) -> list[GraphCell]:
         path = [index]
         while path[-1] in back:
             path.append(back[path[-1]])
@@ -151,7 +153,7 @@ class CellGraph:
 
     def as_networkx(self) -> nx.Graph[int]:
         """The whole graph; nodes carry ``slice``, ``kind``, ``intervals`` and ``region``."""
-        import networkx as nx  # The planner does without it, and its plans need not wait for it.
+        import networkx as nx  # The search does not need it, and its import takes time.
 
         graph: nx.Graph[int] = nx.Graph()
         for index in sorted(self.by_slice):

@@ -17,7 +17,8 @@ from coop_drake.geometry.safeguards import components, meet, shared
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.tree.pose import FloatArray
 
-_NEGLIGIBLE_AREA = 1e-9
+NEGLIGIBLE_AREA = 1e-9
+"""Under-cells with less area are dropped: they are remnants of rounding [m^2]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +47,7 @@ class Region:
 
     @cached_property
     def breadth(self) -> float:
-        """Area over perimeter [m]: half the width of a strip."""
+        """Area over perimeter; for a long strip that is half its width [m]."""
         perimeter = sum(float(np.hypot(*(following(ring) - ring).T).sum()) for ring in self.rings)
         return self.area / perimeter
 
@@ -71,8 +72,8 @@ class Region:
             along = following(ring) - ring
             ax, ay = x - ring[:, 0], y - ring[:, 1]
             length = np.maximum((along**2).sum(axis=1), 1e-18)
-            share = np.clip((along[:, 0] * ax + along[:, 1] * ay) / length, 0.0, 1.0)
-            away = np.hypot(ax - share * along[:, 0], ay - share * along[:, 1])
+            fraction = np.clip((along[:, 0] * ax + along[:, 1] * ay) / length, 0.0, 1.0)
+            away = np.hypot(ax - fraction * along[:, 0], ay - fraction * along[:, 1])
             nearest = np.minimum(nearest, away.min(axis=1))
             spans = (ay < 0.0) != (ay - along[:, 1] < 0.0)
             slope = along[:, 0] / np.where(along[:, 1] == 0.0, 1.0, along[:, 1])
@@ -80,7 +81,12 @@ class Region:
         return np.where(inside, nearest, -nearest)
 
     def meets(self, other: Region, *, otherwise: bool = True) -> bool:
-        """Whether both sets share more than their boundary; ``otherwise`` where geometry fails."""
+        """Whether both sets share more than their boundary.
+
+        Args:
+            other: The other set.
+            otherwise: The answer if geometry fails.
+        """
         a, b = self.bounds, other.bounds
         if a[0] > b[2] or b[0] > a[2] or a[1] > b[3] or b[1] > a[3]:
             return False
@@ -88,7 +94,7 @@ class Region:
 
 
 class CellMaker:
-    """Builds the cells of slices; footprints and their differences are cached by the ancestors' slices.
+    """Makes the cells of slices; positions of a component are cached by the intervals that move it.
 
     Args:
         swept: Sweeps of the team's pieces.
@@ -109,7 +115,7 @@ class CellMaker:
         self._over: dict[tuple[object, ...], CrossSection | None] = {}
 
     def _positions(self, workspace: Polygon | MultiPolygon) -> CrossSection:
-        """A box that holds every position worth asking about."""
+        """A box that holds every position at which the team can be inside the workspace."""
         x_min, y_min, x_max, y_max = workspace.bounds
         reach = self._swept.tree.reach + 1.0
         size = (x_max - x_min + 2.0 * reach, y_max - y_min + 2.0 * reach)
@@ -126,16 +132,16 @@ class CellMaker:
         if self._pairs.touching(expanded) is not None:
             return []
         regions = regions_of(self.under_region(expanded), over=False)
-        return [region for region in regions if region.area > _NEGLIGIBLE_AREA]
+        return [region for region in regions if region.area > NEGLIGIBLE_AREA]
 
     def guide_cells(self, intervals: Intervals) -> list[Region]:
-        """Free regions of the slice's middle configuration: a hint for the search, never a proof."""
+        """Free regions of the slice's middle configuration; they guide the search and prove nothing."""
         middle = tuple((0.5 * (lower + upper), 0.5 * (lower + upper)) for lower, upper in intervals)
         return self.under_cells(middle)
 
     @property
     def moving_axes(self) -> list[tuple[int, ...]]:
-        """Axes (theta, q...) that move each component; none of one without bodies."""
+        """For each component the axes (theta, q...) that move it; empty if it has no bodies."""
         return self._axes
 
     def places_for(self, component: int, angles: Sequence[float]) -> list[Region]:
@@ -143,16 +149,16 @@ class CellMaker:
         section = self._under_component(component, tuple((angle, angle) for angle in angles))
         return [] if section is None else regions_of(section, over=False)
 
-    def blocked_pair(self, expanded: Intervals) -> BodyPair | None:
-        """A pair of bodies that may touch somewhere in the expanded slice, None if there is none."""
+    def touching_pair(self, expanded: Intervals) -> BodyPair | None:
+        """A pair of bodies that may touch somewhere in the expanded slice; None if there is no such pair."""
         return self._pairs.touching(expanded)
 
     def under_region(self, expanded: Intervals) -> CrossSection:
-        """Positions at which the over-footprint fits, self-collision aside."""
+        """Positions at which the over-footprint touches no wall; contacts among bodies are not tested."""
         return self._common(expanded, over=False)
 
     def _common(self, intervals: Intervals, *, over: bool) -> CrossSection:
-        """What the positions for all components share; everywhere if none says anything."""
+        """Positions allowed by all components; all positions if no component restricts them."""
         region: CrossSection | None = None
         for component in reversed(range(len(self._members))):
             one = (self._over_component if over else self._under_component)(component, intervals)
@@ -185,7 +191,7 @@ class CellMaker:
 
 
 def _shared(first: CrossSection | None, second: CrossSection | None, over: bool) -> CrossSection | None:
-    """What two regions share; None stands for everywhere."""
+    """Intersection of two regions; None stands for all positions."""
     if first is None or second is None:
         return second if first is None else first
     return shared(first, second, over=over)
@@ -196,6 +202,6 @@ def regions_of(section: CrossSection, *, over: bool) -> list[Region]:
 
     Args:
         section: A region.
-        over: Whether nothing outside it is free; else all of it is.
+        over: Whether the section is an over-approximation of the free positions; else an under-approximation.
     """
     return sorted(map(Region.of, components(section, over=over)), key=lambda region: region.bounds)

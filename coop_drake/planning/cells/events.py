@@ -1,4 +1,4 @@
-"""What an exploration tells whoever watches it: frozen events, one per step."""
+"""Events of an exploration, one for each step, for displays of the search."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.planning.cells.cell_graph import Cell, Kind
+from coop_drake.planning.cells.cell_graph import GraphCell, Kind
 from coop_drake.planning.cells.cells import Region
 
 
 @dataclass(frozen=True, eq=False)
 class SeenCell:
-    """A cell as a watcher sees it.
+    """A cell of the graph, as events show it.
 
     Attributes:
         slice: Id of its slice.
@@ -40,10 +40,10 @@ class ExplorationBegan:
 
 @dataclass(frozen=True, eq=False)
 class ExplorationResumed:
-    """An exploration goes on after others have had their turn.
+    """An exploration continues after other explorations had their turn.
 
     Attributes:
-        question: What is explored, as it was told when the exploration began.
+        question: What is explored, as in ``ExplorationBegan``.
     """
 
     question: str
@@ -56,7 +56,7 @@ class SliceAdded:
     Attributes:
         slice: Its id.
         intervals: Nominal interval of every axis (theta, q...) [rad, m].
-        cells: Its cells: FREE ones, then GUIDE ones, then MIXED ones; none where all of it is blocked.
+        cells: Its cells, ordered FREE, GUIDE, MIXED; empty where the whole slice is blocked.
     """
 
     slice: int
@@ -66,7 +66,7 @@ class SliceAdded:
 
 @dataclass(frozen=True, eq=False)
 class SliceSplit:
-    """A leaf is halved; its two halves are added next.
+    """A leaf is halved; two events ``SliceAdded`` for its halves follow.
 
     Attributes:
         slice: Its id.
@@ -79,11 +79,11 @@ class SliceSplit:
 
 @dataclass(frozen=True, eq=False)
 class ChannelSearched:
-    """The cheapest chain of cells from start to goal was searched.
+    """The cheapest path of cells from start to goal was searched.
 
     Attributes:
-        cells: The chain; empty where none exists, which is the proof of infeasibility.
-        cost: Its total weight, 0 for an empty one.
+        cells: The path; empty if none exists, which proves infeasibility.
+        cost: Its total weight, 0 for an empty path.
     """
 
     cells: tuple[SeenCell, ...]
@@ -95,7 +95,7 @@ class ExplorationEnded:
     """A run of the exploration stopped.
 
     Attributes:
-        verdict: Value of its ``Verdict``; "budget spent" may be followed by more slices.
+        verdict: Value of its ``Verdict``; after "budget spent" the exploration may be resumed.
         slices: Compound slices made so far.
     """
 
@@ -107,6 +107,6 @@ Event = ExplorationBegan | ExplorationResumed | SliceAdded | SliceSplit | Channe
 Watch = Callable[[Event], None]
 
 
-def seen(cells: Sequence[Cell]) -> tuple[SeenCell, ...]:
-    """Cells as a watcher sees them."""
+def seen(cells: Sequence[GraphCell]) -> tuple[SeenCell, ...]:
+    """Cells of the graph, as events show them."""
     return tuple(SeenCell(cell.slice, cell.kind, cell.region) for cell in cells)

@@ -1,4 +1,4 @@
-"""One exploration of the free configuration space at one margin: Algorithm 1 with better split rules."""
+"""One exploration of the configuration space at one margin: Algorithm 1 with our order of splits."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.cells.cell_graph import Cell, CellGraph, Kind
+from coop_drake.planning.cells.cell_graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.events import (
     ChannelSearched,
@@ -27,14 +27,25 @@ from coop_drake.planning.cells.events import (
 from coop_drake.planning.cells.halves import Halves
 from coop_drake.planning.cells.mixed_cells import mixed_cells
 from coop_drake.planning.cells.slices import Slices, holds
-from coop_drake.planning.cells.split_rules import Refinement, SplitRule
+from coop_drake.planning.cells.split_rules import SplitOrder
 
-_FREE_TIME = 0.6
-_NARROW_TIME = 0.03
-_NARROWEST = 1e-3
-_GUIDE_WEIGHT = 10.0
-_MIXED_WEIGHT = 100.0
-_UNSPLITTABLE_WEIGHT = 1e4
+SETTLING_TIME = 0.6
+"""Weight of every FREE cell: the time that angles need to settle when cells are handed over [s]."""
+
+TIME_PER_INVERSE_BREADTH = 0.03
+"""Weight of a FREE cell for its narrowness, times its breadth (area over perimeter) [s m]."""
+
+LEAST_BREADTH = 1e-3
+"""Breadths are counted as at least this, so that weights stay finite [m]."""
+
+GUIDE_WEIGHT = 10.0
+"""Weight of a GUIDE cell [s]: above that of FREE cells, below that of MIXED cells, which may be blocked."""
+
+MIXED_WEIGHT = 100.0
+"""Weight of a MIXED cell [s]: paths avoid it wherever a longer path through likely free cells exists."""
+
+FINEST_WEIGHT = 1e4
+"""Weight of a MIXED cell that cannot be halved any more [s]: it is passed only if nothing else is left."""
 
 
 class Verdict(Enum):
@@ -52,26 +63,25 @@ class Outcome:
 
     Attributes:
         verdict: How it ended.
-        path: Cells of the last channel; all FREE if found, empty if infeasible.
+        path: Cells from start to goal that were found last; all FREE if found, empty if infeasible.
         slices: Compound slices made.
     """
 
     verdict: Verdict
-    path: tuple[Cell, ...]
+    path: tuple[GraphCell, ...]
     slices: int
 
 
 class Exploration:
-    """Slices, cells and graph of one attempt.
+    """Slices, cells and their graph for one question at one margin.
 
     Args:
         problem: The question.
         workspace: Floor with the margin taken off [m].
-        swept: Sweeps of the problem's tree, shared among attempts.
-        pairs: Self-collision of the problem's tree, shared among attempts.
-        watch: Called with every event, in order; None costs nothing.
-        question: What is explored, in words, for whoever watches.
-        split: Which axis of a slice is halved.
+        swept: Sweeps of the problem's tree.
+        pairs: Self-collision of the problem's tree.
+        watch: Called with every event, in order.
+        question: What is explored, in words, for the events.
     """
 
     def __init__(
@@ -82,7 +92,6 @@ class Exploration:
         pairs: BodyPairs,
         watch: Watch | None = None,
         question: str = "the whole team",
-        split: SplitRule = "strong",
     ) -> None:
         self._problem, self._watch = problem, watch
         self._question, self._paused = question, False
@@ -90,8 +99,8 @@ class Exploration:
         self.maker = CellMaker(swept, pairs, workspace)
         self.graph = CellGraph(self.slices)
         self._halves = Halves(self.slices, self.maker)
-        self.refinement = Refinement(problem, self.slices, self.maker, self._halves, split)
-        self._starts: dict[int, list[Cell]] = {}
+        self.order = SplitOrder(problem, self.slices, self.maker, self._halves)
+        self._starts: dict[int, list[GraphCell]] = {}
         self._goals: dict[int, list[int]] = {}
         if watch is not None:
             robots = sorted({joint.robot for joint in problem.tree.joints})
@@ -102,9 +111,13 @@ class Exploration:
     def run(self, budget: int, progress: Callable[[int], None] | None = None) -> Outcome:
         """Search and split until there is an answer or the budget of slices is spent.
 
-        The cheapest channel of FREE and undecided cells is searched, and slices on it are halved as the
-        split rule says. No channel at all is a proof that none exists. A spent budget may be raised: call
-        again, and the exploration goes on where it stopped.
+        The path of least weight through FREE and undecided cells is searched, and slices on it are halved in
+        the order of ``SplitOrder``. If no path exists at all, the question is infeasible. Call again with a
+        larger budget to continue where the exploration stopped.
+
+        Args:
+            budget: Compound slices that may exist in all.
+            progress: Called with the number of slices after every round of splits.
         """
         if self._watch is not None and self._paused:
             self._watch(ExplorationResumed(self._question))
@@ -116,7 +129,7 @@ class Exploration:
 
     def _explored(self, budget: int, progress: Callable[[int], None] | None) -> Outcome:
         while True:
-            path = self._channel()
+            path = self._cheapest_path()
             if self._watch is not None:
                 cost = sum(cell.weight for cell in path or ())
                 self._watch(ChannelSearched(seen(path or ()), cost))
@@ -127,7 +140,7 @@ class Exploration:
                 return Outcome(Verdict.FOUND, tuple(path), made)
             if made >= budget:
                 return Outcome(Verdict.BUDGET, tuple(path), made)
-            splits = self.refinement.splits(path)
+            splits = self.order.splits(path)
             if not splits:
                 return Outcome(Verdict.RESOLUTION, tuple(path), made)
             for index, axis in splits:
@@ -135,30 +148,25 @@ class Exploration:
             if progress is not None:
                 progress(len(self.slices.all))
 
-    def _channel(self) -> list[Cell] | None:
+    def _cheapest_path(self) -> list[GraphCell] | None:
         starts = [cell for index in sorted(self._starts) for cell in self._starts[index]]
         goals = {cell for cells in self._goals.values() for cell in cells}
         return self.graph.cheapest(starts, goals)
 
-    def boxes(self, path: Sequence[Cell]) -> list[tuple[Intervals, Region]]:
+    def boxes(self, path: Sequence[GraphCell]) -> list[tuple[Intervals, Region]]:
         """Expanded intervals and region of every cell of a free path."""
         return [(self.slices.expanded(self.slices.all[cell.slice].intervals), cell.region) for cell in path]
 
-    def counts(self) -> tuple[int, int]:
-        """Numbers of FREE and of MIXED cells of the leaves."""
-        kinds = [cell.kind for cells in self.graph.by_slice.values() for cell in cells]
-        return kinds.count(Kind.FREE), kinds.count(Kind.MIXED)
-
     def over_leaves(self) -> dict[int, list[Region]]:
-        """Over-cells of every leaf by its id; none where all of it is blocked."""
+        """Over-cells of every leaf by its id; an empty list where the whole leaf is blocked."""
         return {
             index: [cell.region for cell in self.graph.by_slice[index] if cell.kind is Kind.MIXED]
             for index in self.slices.leaves()
         }
 
-    def undecided(self, path: Sequence[Cell]) -> tuple[MixedCell, ...]:
-        """Cells of a channel that are not free, the widest first."""
-        return mixed_cells(self._problem, self.slices, self.refinement.finest, path)
+    def undecided(self, path: Sequence[GraphCell]) -> tuple[MixedCell, ...]:
+        """Cells of a path that are not proved free, the widest first."""
+        return mixed_cells(self._problem, self.slices, self.order.finest, path)
 
     def _split(self, index: int, axis: int) -> None:
         if self._watch is not None:
@@ -174,10 +182,10 @@ class Exploration:
         intervals = self.slices.all[index].intervals
         free = self.maker.under_cells(self.slices.expanded(intervals)) if mixed else []
         guide = self.maker.guide_cells(intervals) if mixed else []
-        final = not self.refinement.splittable(intervals)
+        final = not self.order.splittable(intervals)
         members = [(Kind.FREE, region, _free_weight(region)) for region in free]
-        members += [(Kind.GUIDE, region, _GUIDE_WEIGHT) for region in guide if not final]
-        weight = _UNSPLITTABLE_WEIGHT if final else _MIXED_WEIGHT
+        members += [(Kind.GUIDE, region, GUIDE_WEIGHT) for region in guide if not final]
+        weight = FINEST_WEIGHT if final else MIXED_WEIGHT
         members += [(Kind.MIXED, region, weight) for region in mixed]
         self.graph.add(index, members)
         self._note_ends(index, intervals)
@@ -185,7 +193,7 @@ class Exploration:
             self._watch(SliceAdded(index, intervals, seen(self.graph.by_slice[index])))
 
     def _note_ends(self, index: int, intervals: Intervals) -> None:
-        """Remember which cells of a new leaf hold the start and which hold the goal."""
+        """Record which cells of a new leaf hold the start and which hold the goal."""
         cells = self.graph.by_slice[index]
         start, goal = self._problem.start, self._problem.goal_pose
         if holds(intervals, [float(angle) for angle in start[2:]]):
@@ -195,5 +203,5 @@ class Exploration:
 
 
 def _free_weight(region: Region) -> float:
-    """Time to pass a free cell: a share for its angles and one for its narrowness [s]."""
-    return _FREE_TIME + _NARROW_TIME / max(region.breadth, _NARROWEST)
+    """Estimated time to cross a FREE cell: settling of the angles, and more the narrower the cell is [s]."""
+    return SETTLING_TIME + TIME_PER_INVERSE_BREADTH / max(region.breadth, LEAST_BREADTH)

@@ -1,4 +1,4 @@
-"""Over-cells of the halves that slices might get: made for a trial, and used if that halving is chosen."""
+"""Over-cells of halves of slices: computed for a trial split, and used again if that split is chosen."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class Half:
 
 
 class Halves:
-    """Keeps what trials found until the slice is halved.
+    """Keeps the halves of every slice until the slice is split.
 
     Args:
         slices: The subdivision.
-        maker: Cells of slices.
+        maker: Makes the cells of slices.
     """
 
     def __init__(self, slices: Slices, maker: CellMaker) -> None:
@@ -43,7 +43,7 @@ class Halves:
         return tried[axis]
 
     def taken(self, index: int, axis: int) -> tuple[Half, Half]:
-        """The same for a leaf that is about to be halved: nothing is kept."""
+        """Return the halves of a leaf that is split now, and forget all trial splits of that leaf."""
         chosen = self.of(index, axis)
         del self._tried[index]
         return chosen

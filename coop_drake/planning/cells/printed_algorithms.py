@@ -10,7 +10,7 @@ from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.cells.cell_graph import Cell, CellGraph, Kind
+from coop_drake.planning.cells.cell_graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.events import (
     ChannelSearched,
@@ -32,18 +32,18 @@ End = tuple[list[float | None], FloatArray]
 
 
 class PaperExploration:
-    """Under- and over-approximation cells of one subdivision, and the paper's way to refine it.
+    """Under- and over-approximation cells of one subdivision, refined as the paper prints it.
 
-    Each search halves one slice: the longest simple slice of the first two compound slices on the path of
-    over-approximation cells whose under-approximation cells do not connect. The paper does not say when to
-    give up (erratum EA1): here, when the slice to halve is below the resolution.
+    Every round halves one slice: the longest simple slice of the first two compound slices on the path of
+    over-approximation cells whose under-approximation cells do not connect. The paper does not say when the
+    algorithm gives up (erratum EA1); here it stops when the slice to halve is below the resolution.
 
     Args:
         problem: The question.
         workspace: The floor [m].
         swept: Sweeps of the problem's tree.
         pairs: Self-collision of the problem's tree.
-        watch: Called with every event; None costs nothing.
+        watch: Called with every event, in order.
 
     Attributes:
         slices: The subdivision; it begins with one slice of everything.
@@ -73,7 +73,7 @@ class PaperExploration:
         self._add(0)
 
     def run(self, budget: int, progress: Callable[[int], None] | None = None) -> Outcome:
-        """Go through Algorithm 1 until it returns or the budget of slices is spent; call again to go on."""
+        """Run Algorithm 1 until it returns or the budget of slices is spent; call again to continue."""
         if self._watch is not None and self._paused:
             self._watch(ExplorationResumed("the whole team"))
         self._paused = True
@@ -87,7 +87,7 @@ class PaperExploration:
                 progress(len(self.slices.all))
 
     def _once(self, budget: int) -> Outcome | None:
-        """The body of Algorithm 1's loop; None where the loop goes on."""
+        """One pass of Algorithm 1's loop; None if the loop continues."""
         start = self._find_enclosing(self._start, budget)
         if isinstance(start, Outcome):
             return start
@@ -106,8 +106,8 @@ class PaperExploration:
         failing = refine(path, [under_start], [under_goal], self.under)
         return None if self._subdivide_longest(failing) else self._outcome(Verdict.RESOLUTION, path)
 
-    def _find_enclosing(self, end: End, budget: int) -> tuple[Cell, Cell] | Outcome:
-        """The over- and the under-cell of one slice that hold an end, subdividing until there are such."""
+    def _find_enclosing(self, end: End, budget: int) -> tuple[GraphCell, GraphCell] | Outcome:
+        """Subdivide until one slice has an over-cell and an under-cell that hold an end; return both."""
         angles, position = end
         while True:
             held = [
@@ -127,17 +127,17 @@ class PaperExploration:
             if not self._subdivide_longest([held[0].slice]):
                 return self._outcome(Verdict.RESOLUTION, held[:1])
 
-    def _connect(self, graph: CellGraph, first: Cell, last: Cell) -> list[Cell]:
-        """Path through the cells of one kind that prefers large slices; empty where there is none."""
+    def _connect(self, graph: CellGraph, first: GraphCell, last: GraphCell) -> list[GraphCell]:
+        """Path through the cells of one kind that prefers large slices; empty if there is no path."""
         path = graph.cheapest([first], {last.index}) or []
         if self._watch is not None and (path or graph is self.over):
             self._watch(ChannelSearched(seen(path), sum(cell.weight for cell in path)))
         return path
 
     def _subdivide_longest(self, indices: Sequence[int]) -> bool:
-        """Halve the longest simple slice of some compound slices; False where it is below the resolution.
+        """Halve the longest simple slice of some compound slices; return False if it is below the resolution.
 
-        Lengths are compared as they are, radians with metres.
+        Lengths are compared as numbers, radians with metres, because the paper does not weigh them.
         """
         widths = {
             (index, axis): upper - lower
@@ -166,31 +166,28 @@ class PaperExploration:
             cells = [*self.under.by_slice[index], *self.over.by_slice[index]]
             self._watch(SliceAdded(index, part.intervals, seen(cells)))
 
-    def _outcome(self, verdict: Verdict, path: Sequence[Cell]) -> Outcome:
+    def _outcome(self, verdict: Verdict, path: Sequence[GraphCell]) -> Outcome:
         return Outcome(verdict, tuple(path), len(self.slices.all))
 
-    def boxes(self, path: Sequence[Cell]) -> list[tuple[Intervals, Region]]:
+    def boxes(self, path: Sequence[GraphCell]) -> list[tuple[Intervals, Region]]:
         """Expanded intervals and region of every cell of a path of under-approximation cells."""
         return [(self.slices.expanded(self.slices.all[cell.slice].intervals), cell.region) for cell in path]
 
     def over_leaves(self) -> dict[int, list[Region]]:
-        """Over-cells of every leaf by its id; none where all of it is blocked."""
+        """Over-cells of every leaf by its id; an empty list where the whole leaf is blocked."""
         return {index: [cell.region for cell in self.over.by_slice[index]] for index in self.slices.leaves()}
 
-    def undecided(self, path: Sequence[Cell]) -> tuple[MixedCell, ...]:
+    def undecided(self, path: Sequence[GraphCell]) -> tuple[MixedCell, ...]:
         """Cells of a path that are not free, the widest first."""
         return mixed_cells(self._problem, self.slices, self._finest, path)
 
-    def counts(self) -> tuple[int, int]:
-        """Numbers of under- and of over-approximation cells of the leaves."""
-        free, mixed = (sum(map(len, graph.by_slice.values())) for graph in (self.under, self.over))
-        return free, mixed
 
+def refine(
+    path: Sequence[GraphCell], source: Sequence[GraphCell], goal: Sequence[GraphCell], under: CellGraph
+) -> list[int]:
+    """Algorithm 2: follow a path of over-cells with the under-cells inside them until these do not connect.
 
-def refine(path: Sequence[Cell], source: Sequence[Cell], goal: Sequence[Cell], under: CellGraph) -> list[int]:
-    """Algorithm 2: follow a path of over-cells with the under-cells inside them until they do not connect.
-
-    As printed all under-cells of a slice would do, also those beside the path (erratum EA2).
+    The printed algorithm accepts all under-cells of a slice, also those outside the path (erratum EA2).
 
     Args:
         path: Over-approximation cells.
@@ -199,8 +196,8 @@ def refine(path: Sequence[Cell], source: Sequence[Cell], goal: Sequence[Cell], u
         under: All under-approximation cells.
 
     Returns:
-        The slices of which the longest simple slice is to be halved: a pair that does not connect, or the
-        only one that is left.
+        The slices of which the longest simple slice is to be halved: the first pair that does not connect,
+        or the last slice of the path.
     """
     if len(path) == 1:
         return [path[0].slice]

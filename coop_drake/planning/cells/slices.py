@@ -9,8 +9,11 @@ from math import pi
 from coop_drake.geometry.swept_tree import Interval, Intervals
 from coop_drake.tree.component_tree import ComponentTree
 
-_TOUCH = 1e-9
-_FIRST_THETA_SLICES = 4
+TOUCH = 1e-9
+"""Intervals that overlap or miss each other by no more than this touch [rad or m]: it absorbs rounding."""
+
+FIRST_THETA_SLICES = 4
+"""Slices of theta at the beginning: with fewer, two slices would touch at both ends of their intervals."""
 
 
 @dataclass
@@ -19,7 +22,7 @@ class Slice:
 
     Attributes:
         intervals: Nominal interval of every axis (theta, q...).
-        depth: How many halvings led to it.
+        depth: Number of halvings that led to it.
         neighbours: Ids of the leaves that share a facet with it.
         halves: Ids of the two slices that replaced it, None for a leaf.
     """
@@ -33,21 +36,21 @@ class Slice:
 class Slices:
     """A cover of all angles by slices, each split on its own.
 
-    Theta is periodic: its first four slices are centred at 0, pi/2, pi, 3 pi/2, so that walls along the axes
-    do not fall between slices and no two slices meet at both ends.
+    Theta is periodic. Its first four slices are centred at 0, pi/2, pi and 3 pi/2, because the team often
+    moves along walls that are parallel to the axes: these angles then lie inside slices, not between them.
 
     Args:
         tree: Gives the joints' limits.
         overlap: Overlap of neighbours as a fraction of their width, used for under-cells only.
-        printed: Whether to begin with one slice of everything and to call slices neighbours that meet in a
-            corner or an edge too, as the paper does.
+        printed: Whether to begin with one slice of everything, and to call slices neighbours that share only
+            a corner or an edge, as the paper does.
     """
 
     def __init__(self, tree: ComponentTree, overlap: float, *, printed: bool = False) -> None:
         self._overlap, self._printed = overlap, printed
         self._limits = tuple((joint.lower, joint.upper) for joint in tree.joints)
         self.axis_widths = (2.0 * pi, *(upper - lower for lower, upper in self._limits))
-        count = 1 if printed else _FIRST_THETA_SLICES
+        count = 1 if printed else FIRST_THETA_SLICES
         part = 2.0 * pi / count
         self.all: list[Slice] = [
             Slice((((i - 0.5) * part, (i + 0.5) * part), *self._limits), 0) for i in range(count)
@@ -81,9 +84,9 @@ class Slices:
         return touches is not None and (self._printed or touches <= 1)
 
     def expanded(self, intervals: Intervals) -> Intervals:
-        """Intervals with the overlap that under-cells keep, joints clipped at their limits."""
-        share = 0.5 * self._overlap
-        grown = [(a - share * (b - a), b + share * (b - a)) for a, b in intervals]
+        """Intervals grown by the overlap of under-cells; those of joints are clipped at the joint limits."""
+        growth = 0.5 * self._overlap
+        grown = [(a - growth * (b - a), b + growth * (b - a)) for a, b in intervals]
         clipped = [
             (max(a, lower), min(b, upper))
             for (a, b), (lower, upper) in zip(grown[1:], self._limits, strict=True)
@@ -91,7 +94,7 @@ class Slices:
         return (grown[0], *clipped)
 
     def holding(self, angles: Sequence[float | None]) -> list[int]:
-        """Leaves whose closed nominal intervals hold the angles (theta, q...); None holds anywhere."""
+        """Leaves whose closed nominal intervals hold the angles (theta, q...); None is not tested."""
         return [i for i in self.leaves() if holds(self.all[i].intervals, angles)]
 
 
@@ -104,13 +107,13 @@ def halves(intervals: Intervals, axis: int) -> tuple[Intervals, Intervals]:
 
 
 def holds(intervals: Intervals, angles: Sequence[float | None]) -> bool:
-    """Whether intervals hold (theta, q...), theta modulo 2 pi; None is held by any interval."""
+    """Whether intervals hold (theta, q...), theta modulo 2 pi; an angle None is not tested."""
     for axis, (angle, (lower, upper)) in enumerate(zip(angles, intervals, strict=True)):
         if angle is None:
             continue
         centre, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
         offset = nearest_turn(angle - centre) if axis == 0 else angle - centre
-        if abs(offset) > half + _TOUCH:
+        if abs(offset) > half + TOUCH:
             return False
     return True
 
@@ -121,24 +124,30 @@ def nearest_turn(angle: float) -> float:
 
 
 def interval_overlap(first: Interval, second: Interval, periodic: bool = False) -> float:
-    """Length that two intervals share; negative if there is a gap [rad or m]."""
+    """Length of the overlap of two intervals, negative for a gap [rad or m].
+
+    Args:
+        first: One interval.
+        second: The other interval.
+        periodic: Whether they are intervals of theta, modulo 2 pi.
+    """
     halves = 0.5 * (first[1] - first[0] + second[1] - second[0])
     offset = 0.5 * (first[0] + first[1] - second[0] - second[1])
     return halves - abs(nearest_turn(offset) if periodic else offset)
 
 
 def share_facet(first: Intervals, second: Intervals) -> bool:
-    """Whether two boxes touch in every axis and merely touch in at most one: paths cross facets only."""
+    """Whether two boxes share a facet: they overlap in all axes but at most one, in which they touch."""
     touches = _touches(first, second)
     return touches is not None and touches <= 1
 
 
 def _touches(first: Intervals, second: Intervals) -> int | None:
-    """In how many axes two boxes merely touch, None if there is a gap in one."""
+    """Number of axes in which two boxes touch without overlap; None if there is a gap in some axis."""
     touches = 0
     for axis, (a, b) in enumerate(zip(first, second, strict=True)):
         shared = interval_overlap(a, b, periodic=axis == 0)
-        if shared < -_TOUCH:
+        if shared < -TOUCH:
             return None
-        touches += shared <= _TOUCH
+        touches += shared <= TOUCH
     return touches

@@ -1,138 +1,128 @@
-"""Which slices of a channel to halve, and along which axis: by strong branching, blame or length."""
+"""The order of splits: which slices of a path are halved next, and along which axis (strong branching).
+
+1. Slices: those of MIXED cells first. Only if the path has none, those of GUIDE cells.
+2. Axes: those wider than the resolution. In a MIXED cell where one component alone blocks the path in the
+   middle of the slice, only the axes that move this component.
+3. Every such axis is halved on trial, but for those along which the team sweeps far less than along others.
+4. An axis whose halving disconnects the path wins; on a path with such slices, only these are halved.
+5. Otherwise an axis that may separate two bodies that touch wins; otherwise the axis that leaves the smallest
+   area of over-cells; if these areas are equal, the axis along which the team sweeps furthest.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.planning.cells.branching import StrongBranching, Trial
-from coop_drake.planning.cells.cell_graph import Cell, Kind
+from coop_drake.planning.cells.branching import StrongBranching, TrialSplit
+from coop_drake.planning.cells.cell_graph import GraphCell, Kind
 from coop_drake.planning.cells.cells import CellMaker
 from coop_drake.planning.cells.halves import Halves
-from coop_drake.planning.cells.refine import Blame
 from coop_drake.planning.cells.slices import Slices
 from coop_drake.tree.levers import axis_levers
 
-SplitRule = Literal["strong", "blame", "longest"]
+__all__ = ["SplitOrder", "finest_widths"]
 
-_BALANCE = 16.0
-_DECIDED = 1e-3
-_CHARGED = 2.0
+LARGEST_SWEEP_RATIO = 16.0
+"""An axis is not tried if another axis of the slice sweeps the team this many times as far [-]: halving it
+would make slices so thin that its own halvings show no effect."""
+
+EQUAL_AREA_FRACTION = 1e-3
+"""Trials whose areas differ by less than this fraction of the cell's area are called equal [-]."""
+
+LARGEST_CONTACT_SWEEP_RATIO = 2.0
+"""An axis that may separate two bodies is preferred unless another axis sweeps more than twice as far [-]."""
 
 
-class Refinement:
-    """Chooses halvings for one exploration.
-
-    What is surely in doubt goes first: as long as a channel passes cells of which not even the middle
-    configuration is free, only these are halved; then those that a guide calls free.
+class SplitOrder:
+    """Chooses the splits of one exploration.
 
     Args:
         problem: The question.
         slices: The subdivision.
-        maker: Cells of slices.
+        maker: Makes the cells of slices.
         halves: Over-cells of halves.
-        rule: How an axis is chosen.
 
     Attributes:
-        finest: Resolution of every axis.
+        finest: Resolution of every axis [rad or m].
     """
 
-    def __init__(
-        self,
-        problem: PlanningProblem,
-        slices: Slices,
-        maker: CellMaker,
-        halves: Halves,
-        rule: SplitRule = "strong",
-    ) -> None:
-        self._slices, self._maker, self._rule = slices, maker, rule
+    def __init__(self, problem: PlanningProblem, slices: Slices, maker: CellMaker, halves: Halves) -> None:
+        self._slices, self._maker = slices, maker
         self._levers = axis_levers(problem.tree)
-        self._blame = Blame(maker, slices, self._levers)
         self._branching = StrongBranching(problem, slices, maker, halves)
         self.finest = finest_widths(problem)
 
     def splittable(self, intervals: Intervals) -> list[int]:
-        """Axes that are still wider than the resolution."""
+        """Axes of a slice that are wider than the resolution."""
         return [
             axis
             for axis, ((lower, upper), finest) in enumerate(zip(intervals, self.finest, strict=True))
             if upper - lower > finest
         ]
 
-    def splits(self, channel: Sequence[Cell]) -> list[tuple[int, int]]:
-        """Slices of a channel to halve, each with its axis; none where all of them are below resolution."""
-        places = self._doubtful(channel)
-        if self._rule == "strong":
-            return self._strong(channel, places)
-        return [(channel[place].slice, self._axis(channel[place])) for place in places]
+    def splits(self, path: Sequence[GraphCell]) -> list[tuple[int, int]]:
+        """Choose the slices to halve, each with its axis.
 
-    def _doubtful(self, channel: Sequence[Cell]) -> list[int]:
-        """Places of the cells to halve, one for each slice."""
-        open_places: dict[Kind, dict[int, int]] = {Kind.MIXED: {}, Kind.GUIDE: {}}
-        for place, cell in enumerate(channel):
-            if cell.kind is not Kind.FREE and self.splittable(self._slices.all[cell.slice].intervals):
-                open_places[cell.kind].setdefault(cell.slice, place)
-        return list((open_places[Kind.MIXED] or open_places[Kind.GUIDE]).values())
+        Args:
+            path: Cells from the start to the goal.
 
-    def _axis(self, cell: Cell) -> int:
-        intervals = self._slices.all[cell.slice].intervals
-        axes = self.splittable(intervals)
-        if self._rule == "blame":
-            return self._blame.axis(intervals, cell.region, axes)
-        return max(axes, key=lambda axis: (intervals[axis][1] - intervals[axis][0], -axis))
-
-    def _strong(self, channel: Sequence[Cell], places: Sequence[int]) -> list[tuple[int, int]]:
-        """Where a halving cuts the channel, such halvings alone; else for every place the best one."""
-        best = [(channel[place].slice, self._best(channel, place)) for place in places]
-        cutting = [(index, trial.axis) for index, trial in best if trial.cuts]
-        return cutting or [(index, trial.axis) for index, trial in best]
-
-    def _best(self, channel: Sequence[Cell], place: int) -> Trial:
-        """The halving that cuts; else one that may part bodies in each other's way; else what leaves least.
-
-        Where one component alone is in the way at the middle, only its own axes are tried.
-
-        Where no halving takes anything of the cell it is the widest.
+        Returns:
+            Slice ids and axes; empty if every undecided slice of the path is below the resolution.
         """
-        cell = channel[place]
+        best = [(path[place].slice, self._best(path, place)) for place in self._undecided(path)]
+        separating = [(index, trial.axis) for index, trial in best if trial.disconnects]
+        return separating or [(index, trial.axis) for index, trial in best]
+
+    def _undecided(self, path: Sequence[GraphCell]) -> list[int]:
+        """Places on the path of the cells to halve, one for each slice."""
+        places: dict[Kind, dict[int, int]] = {Kind.MIXED: {}, Kind.GUIDE: {}}
+        for place, cell in enumerate(path):
+            if cell.kind is not Kind.FREE and self.splittable(self._slices.all[cell.slice].intervals):
+                places[cell.kind].setdefault(cell.slice, place)
+        return list((places[Kind.MIXED] or places[Kind.GUIDE]).values())
+
+    def _best(self, path: Sequence[GraphCell], place: int) -> TrialSplit:
+        """Halve the cell at a place along every useful axis on trial and return the best trial."""
+        cell = path[place]
         intervals = self._slices.all[cell.slice].intervals
         sweeps = {
             axis: (intervals[axis][1] - intervals[axis][0]) * self._levers[axis]
             for axis in self.splittable(intervals)
         }
         if cell.kind is Kind.MIXED:
-            blamed = [axis for axis in self._branching.blamed(channel, place) if axis in sweeps]
-            sweeps = {axis: sweeps[axis] for axis in blamed} or sweeps
-        widest = max(sweeps.values())
+            blocking = [axis for axis in self._branching.blocking_axes(path, place) if axis in sweeps]
+            sweeps = {axis: sweeps[axis] for axis in blocking} or sweeps
+        furthest = max(sweeps.values())
         trials = [
-            self._branching.trial(channel, place, axis)
+            self._branching.trial(path, place, axis)
             for axis, sweep in sweeps.items()
-            if sweep * _BALANCE >= widest
+            if sweep * LARGEST_SWEEP_RATIO >= furthest
         ]
-        cutting = [trial for trial in trials if trial.cuts]
-        charged = None if cutting else self._charged(cell, intervals, sweeps)
-        if charged is not None:
-            return self._branching.trial(channel, place, charged)
-        trials = cutting or trials
+        separating = [trial for trial in trials if trial.disconnects]
+        contact = None if separating else self._contact_axis(cell, intervals, sweeps)
+        if contact is not None:
+            return self._branching.trial(path, place, contact)
+        trials = separating or trials
         areas = [trial.area for trial in trials]
-        if max(areas) - min(areas) <= _DECIDED * cell.region.area:
+        if max(areas) - min(areas) <= EQUAL_AREA_FRACTION * cell.region.area:
             return max(trials, key=lambda trial: (sweeps[trial.axis], -trial.axis))
         return min(trials, key=lambda trial: (trial.area, trial.axis))
 
-    def _charged(self, cell: Cell, intervals: Intervals, sweeps: dict[int, float]) -> int | None:
-        """Axis to halve because two bodies are in each other's way; None if none are, or it is narrow.
+    def _contact_axis(self, cell: GraphCell, intervals: Intervals, sweeps: dict[int, float]) -> int | None:
+        """Return the axis that may separate two bodies in contact, or None if there is no such axis.
 
-        In a cell without a free middle that is so if they touch in the middle: walls may be to blame as well.
-        In one with a free middle it is so if they touch anywhere, for then no under-cell comes of the slice.
+        In a MIXED cell the contact counts if it is at the slice's middle, because walls may block the rest.
+        In a GUIDE cell, whose middle is free, it counts anywhere: the slice has no under-cell because of it.
         """
         middle = tuple((0.5 * (lower + upper), 0.5 * (lower + upper)) for lower, upper in intervals)
         probe = self._slices.expanded(intervals) if cell.kind is Kind.GUIDE else middle
-        pair = self._maker.blocked_pair(probe)
+        pair = self._maker.touching_pair(probe)
         involved = [axis for axis in pair.axes if axis in sweeps] if pair is not None else []
         axis = max(involved, key=lambda axis: (sweeps[axis], -axis), default=None)
-        return None if axis is None or _CHARGED * sweeps[axis] < max(sweeps.values()) else axis
+        too_fine = axis is None or LARGEST_CONTACT_SWEEP_RATIO * sweeps[axis] < max(sweeps.values())
+        return None if too_fine else axis
 
 
 def finest_widths(problem: PlanningProblem) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""The ends of a channel: turned to the start, checked, and what must be reached in each of its boxes."""
+"""The ends of a channel: checked, turned to the start; and the goal intervals of each of its boxes."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from coop_drake.tree.pose import FloatArray
 
 __all__ = ["check_ends", "final_intervals", "goal_intervals", "turned_to_start"]
 
-GOAL_SHARE = 0.9
-"""Share of a tolerance that a goal interval takes: arriving in it is arriving within tolerance [-]."""
+GOAL_FRACTION = 0.9
+"""Fraction of a tolerance that a goal interval takes, so that its edges are within tolerance [-]."""
 
 Intervals = tuple[FloatArray, FloatArray]
 
 
 def final_intervals(problem: PlanningProblem, goal_angle: float) -> Intervals:
-    """Intervals of (theta, q...) in which the goal is reached, infinite where a joint is free.
+    """Intervals of (theta, q...) in which the goal is reached; infinite for joints that are free there.
 
     Args:
         problem: What was asked.
@@ -30,13 +30,17 @@ def final_intervals(problem: PlanningProblem, goal_angle: float) -> Intervals:
     """
     goals: list[tuple[float | None, float]] = [(goal_angle, problem.angle_tolerance)]
     goals += [(goal, problem.joint_tolerance) for goal in problem.goal_joints]
-    lower = [-inf if goal is None else goal - GOAL_SHARE * tolerance for goal, tolerance in goals]
-    upper = [inf if goal is None else goal + GOAL_SHARE * tolerance for goal, tolerance in goals]
+    lower = [-inf if goal is None else goal - GOAL_FRACTION * tolerance for goal, tolerance in goals]
+    upper = [inf if goal is None else goal + GOAL_FRACTION * tolerance for goal, tolerance in goals]
     return np.array(lower), np.array(upper)
 
 
 def goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Intervals:
-    """Intervals of (theta, q...) that must be reached in a box: those of the next box too, or the goal's."""
+    """Intervals of (theta, q...) to reach in a box: its overlap with the next box or with the goal.
+
+    Raises:
+        PlanError: If they do not overlap; names the box and the axis.
+    """
     lower, upper = channel.boxes[index].lower.copy(), channel.boxes[index].upper.copy()
     if index + 1 < len(channel.boxes):
         following = channel.boxes[index + 1]

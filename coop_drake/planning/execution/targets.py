@@ -1,4 +1,4 @@
-"""Where to hand over from cell to cell: a point in every overlap of cores, so that the whole way is quick."""
+"""Targets: points in the overlaps of consecutive cores, chosen such that the estimated time is short."""
 
 from __future__ import annotations
 
@@ -19,17 +19,18 @@ from coop_drake.tree.pose import FloatArray
 __all__ = ["choose_targets"]
 
 LARGEST_PARTS = 3
-"""Of an overlap in several parts only so many are considered, those with the most room first."""
+"""Of an overlap in several parts only this many are considered, those with the largest inscribed disc."""
 
-ROOM_TO_STAY = 0.7
-"""A target may serve the next overlap too if it has this share of the room that overlap's own target has."""
+SHARED_FRACTION = 0.7
+"""A target serves another overlap too if its clearance there is this fraction of the clearance of that
+overlap's own target [-]."""
 
 
 def choose_targets(channel: Channel, start: FloatArray, goal: FloatArray) -> tuple[FloatArray, ...]:
     """Choose a target for every box: poles of inaccessibility of overlapping cores, the last one the goal.
 
-    An overlap may have several parts, and a target may serve several overlaps in a row (then only angles
-    move): of all chains the one with the least estimated time is taken.
+    An overlap may have several parts, and a target may serve several overlaps in a row, in which case only
+    angles move. The sequence of targets with the shortest estimated time is chosen.
 
     Args:
         channel: Boxes whose cores overlap.
@@ -37,7 +38,7 @@ def choose_targets(channel: Channel, start: FloatArray, goal: FloatArray) -> tup
         goal: Goal position, in the last box, shape (2,) [m].
 
     Returns:
-        As many points as boxes, each of shape (2,) [m].
+        A point for every box, each of shape (2,) [m].
 
     Raises:
         PlanError: If consecutive cores do not overlap, or a box does not join its ends.
@@ -58,7 +59,7 @@ def choose_targets(channel: Channel, start: FloatArray, goal: FloatArray) -> tup
 
 
 def _crossing_times(box: FreeBox, entries: Sequence[FloatArray], exits: Sequence[FloatArray]) -> FloatArray:
-    """Estimated time from every entry to every exit, infinite where none joins them, (entries, exits) [s]."""
+    """Estimated time from every entry to every exit, infinite without a passage, (entries, exits) [s]."""
     if len(entries) == 1 and len(exits) == 1:
         return np.zeros((1, 1))
     finder = PassageFinder(box.polygon)
@@ -74,33 +75,41 @@ def _crossing_times(box: FreeBox, entries: Sequence[FloatArray], exits: Sequence
 
 
 def _candidates(boxes: Sequence[FreeBox]) -> list[list[FloatArray]]:
-    """For every overlap its own poles, and those of the neighbouring overlaps that fit into it too."""
+    """For every overlap its own poles, and the poles of neighbouring overlaps that fit into it."""
     overlaps = [_parts(first, second, index) for index, (first, second) in enumerate(pairwise(boxes))]
     own = [[pole(part) for part in parts] for parts in overlaps]
     layers = [[point for point, _ in poles] for poles in own]
     for order in (range(1, len(overlaps)), range(len(overlaps) - 2, -1, -1)):
         before = 1 if order.step == -1 else -1
         for index in order:
-            _adopt(layers[index], layers[index + before], overlaps[index], [room for _, room in own[index]])
+            _adopt(
+                layers[index],
+                layers[index + before],
+                overlaps[index],
+                [clearance for _, clearance in own[index]],
+            )
     return layers
 
 
 def _adopt(
-    layer: list[FloatArray], others: Sequence[FloatArray], parts: Sequence[Polygon], rooms: Sequence[float]
+    layer: list[FloatArray],
+    others: Sequence[FloatArray],
+    parts: Sequence[Polygon],
+    clearances: Sequence[float],
 ) -> None:
-    """Add those points of a neighbouring overlap that have enough room in one of the parts."""
+    """Add those points of a neighbouring overlap that have enough clearance in one of the parts."""
     for point in others:
         known = any(np.array_equal(point, mine) for mine in layer)
         fits = any(
-            BoundaryDistance(part)(point) >= ROOM_TO_STAY * room
-            for part, room in zip(parts, rooms, strict=True)
+            BoundaryDistance(part)(point) >= SHARED_FRACTION * clearance
+            for part, clearance in zip(parts, clearances, strict=True)
         )
         if fits and not known:
             layer.append(point)
 
 
 def _parts(first: FreeBox, second: FreeBox, index: int) -> list[Polygon]:
-    """Parts of the overlap of two cores that have the most room."""
+    """Parts of the overlap of two cores, those with the largest inscribed disc first."""
     overlap = first.core.intersection(second.core)
     parts = [part for part in shapely.get_parts(overlap) if isinstance(part, Polygon) and part.area > 0.0]
     if not parts:

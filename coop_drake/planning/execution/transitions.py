@@ -1,4 +1,4 @@
-"""From a channel of free boxes to a plan: tidied cells, targets, goal intervals and gains, (10)-(12)."""
+"""From a channel of free boxes to a plan: tidied cells, targets, goal intervals and gains, eqs. (10)-(12)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from coop_drake.geometry.slits import component_at
 from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.laws import GainSet, TransitionGains, transition_gains
 from coop_drake.planning.boxes.channel import Channel, FreeBox
-from coop_drake.planning.boxes.shortcuts import without_detours
 from coop_drake.planning.execution.channel_ends import check_ends, goal_intervals, turned_to_start
 from coop_drake.planning.execution.estimate import timed, travel_time
 from coop_drake.planning.execution.targets import choose_targets
@@ -29,17 +28,17 @@ from coop_drake.tree.usual_unit import usual_unit
 __all__ = ["make_plan", "reschedule"]
 
 NARROWEST = 1e-3
-"""Necks and goal regions below this clearance are refused, of a team of the usual size: the governor would
-crawl [m]."""
+"""Necks and goal regions with less clearance are refused, because the governor would need minutes there [m];
+for teams of another size it is scaled."""
 
-ENOUGH = 0.9
-"""The region of the goal need not be wider than this share of the position tolerance [-]."""
+GOAL_REGION_FRACTION = 0.9
+"""The region of the goal need not be wider than this fraction of the position tolerance [-]."""
 
 DISC_VERTICES = 32
-"""Vertices of the last goal region, inscribed in the disc of the position tolerance."""
+"""Vertices of the last goal region, a polygon inside the disc of the position tolerance."""
 
 SAME_PLACE = 1e-9
-"""Targets closer than this to where a cell is entered leave only angles to move [m]."""
+"""A target this close to where its cell is entered leaves only angles to move [m]: it absorbs rounding."""
 
 Progress = Callable[[str, float], None]
 Intervals = tuple[FloatArray, FloatArray]
@@ -54,16 +53,15 @@ def make_plan(
     targets: Sequence[FloatArray] | None = None,
     progress: Progress | None = None,
 ) -> Plan:
-    """Make a channel ready to be executed.
+    """Make a plan of a channel.
 
     Args:
         problem: What was asked.
-        channel: The boxes that a search found.
+        channel: Free boxes from start to goal.
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
-        targets: Where to hand over from each box to the next, the last one the goal; if not given, they are
-            chosen, and boxes that are detours are left out.
-        progress: Called with a stage and the share of it that is done.
+        targets: Points at which each box is left, the last one the goal; chosen if not given.
+        progress: Called with a phase and the fraction of it that is done.
 
     Raises:
         PlanError: If the channel does not join the start to the goal.
@@ -73,7 +71,6 @@ def make_plan(
     start, goal = problem.start[:2], problem.goal_pose[:2]
     check_ends(problem, channel)
     if targets is None:
-        channel = without_detours(channel)
         targets = choose_targets(channel, start, goal)
     entries = (start, *targets[:-1])
     cells = []
@@ -81,11 +78,11 @@ def make_plan(
         cells.append(_cell(box, entry, target, index))
         if progress is not None:
             progress("tidying", (index + 1) / len(targets))
-    ways, transitions, resting = [], [], problem.start[2:]
+    routes, transitions, resting = [], [], problem.start[2:]
     for index, (entry, target) in enumerate(zip(entries, targets, strict=True)):
         goals = goal_intervals(problem, channel, index)
-        ways.append(_way(problem, cells[index : index + 2], entry, target, index))
-        transitions.append(_transition(gain_set, cells[index], ways[-1], goals, resting))
+        routes.append(_route(problem, cells[index : index + 2], entry, target, index))
+        transitions.append(_transition(gain_set, cells[index], routes[-1], goals, resting))
         resting = 0.5 * (goals[0] + goals[1])
     made = Plan(
         cells=tuple(cells),
@@ -98,11 +95,11 @@ def make_plan(
         gain_set=gain_set_name,
         problem=problem_digest(problem),
     )
-    return _timed(problem, made, ways)
+    return _timed(problem, made, routes)
 
 
 def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
-    """Give a plan the gains of another gain set.
+    """A plan with the gains of another gain set.
 
     Args:
         plan: The plan.
@@ -120,8 +117,8 @@ def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
 
 
 @dataclass(frozen=True)
-class _Way:
-    """What a transition knows about positions."""
+class _Route:
+    """The positions of one transition: its target, its goal region with its inradius, and its passage."""
 
     target: FloatArray
     region: Polygon
@@ -129,61 +126,63 @@ class _Way:
     passage: Passage
 
 
-def _way(
+def _route(
     problem: PlanningProblem, cells: Sequence[Cell], entry: FloatArray, target: FloatArray, index: int
-) -> _Way:
-    """The way from entry to target in the first cell; the second one, if any, is entered there."""
+) -> _Route:
+    """The route from entry to target in the first cell; the second cell, if any, is entered there."""
     here = cells[0].tidied
     if len(cells) > 1:
         region = component_at(here.intersection(cells[1].tidied), Point(target))
     else:
         region = component_at(_disc(target, problem.position_tolerance).intersection(here), Point(target))
     inradius = 0.0 if region.is_empty else BoundaryDistance(region)(target)
-    way = _Way(target, region, inradius, PassageFinder(here).find(entry, target))
+    route = _Route(target, region, inradius, PassageFinder(here).find(entry, target))
     narrowest = NARROWEST * usual_unit(problem.tree)
-    wanted = narrowest if len(cells) > 1 else min(narrowest, ENOUGH * problem.position_tolerance)
-    if inradius < wanted or way.passage.neck < narrowest:
-        seconds = travel_time(way.passage.length, way.passage.neck)
-        raise StallError(_stall(problem, index, way, seconds))
-    return way
+    wanted = (
+        narrowest if len(cells) > 1 else min(narrowest, GOAL_REGION_FRACTION * problem.position_tolerance)
+    )
+    if inradius < wanted or route.passage.neck < narrowest:
+        seconds = travel_time(route.passage.length, route.passage.neck)
+        raise StallError(_stall(problem, index, route, seconds))
+    return route
 
 
-def _timed(problem: PlanningProblem, plan: Plan, ways: Sequence[_Way]) -> Plan:
-    """The plan with estimated times, if all of them are accepted."""
-    plan = timed(plan, [way.passage.path for way in ways])
-    for index, (way, transition) in enumerate(zip(ways, plan.transitions, strict=True)):
+def _timed(problem: PlanningProblem, plan: Plan, routes: Sequence[_Route]) -> Plan:
+    """The plan with estimated times; raises a StallError if one of them is too long."""
+    plan = timed(plan, [route.passage.path for route in routes])
+    for index, (route, transition) in enumerate(zip(routes, plan.transitions, strict=True)):
         if transition.estimated_time > problem.settings.max_transition_time:
-            raise StallError(_stall(problem, index, way, transition.estimated_time))
+            raise StallError(_stall(problem, index, route, transition.estimated_time))
     return plan
 
 
 def _transition(
-    gain_set: GainSet, cell: Cell, way: _Way, goals: Intervals, resting: FloatArray
+    gain_set: GainSet, cell: Cell, route: _Route, goals: Intervals, resting: FloatArray
 ) -> Transition:
-    """A transition whose time is not estimated yet."""
+    """A transition without its estimated time."""
     return Transition(
-        target=way.target,
-        goal_region=way.region,
+        target=route.target,
+        goal_region=route.region,
         goal_lower=goals[0],
         goal_upper=goals[1],
-        inradius=way.inradius,
-        neck=way.passage.neck,
-        length=way.passage.length,
+        inradius=route.inradius,
+        neck=route.passage.neck,
+        length=route.passage.length,
         estimated_time=0.0,
-        only_angles=bool(way.passage.length <= SAME_PLACE),
-        gains=_gains(gain_set, cell, way.passage.neck, goals, resting),
+        only_angles=bool(route.passage.length <= SAME_PLACE),
+        gains=_gains(gain_set, cell, route.passage.neck, goals, resting),
     )
 
 
-def _stall(problem: PlanningProblem, index: int, way: _Way, seconds: float) -> str:
-    passage = way.passage
+def _stall(problem: PlanningProblem, index: int, route: _Route, seconds: float) -> str:
+    passage = route.passage
     x, y = passage.narrowest
     narrowest = NARROWEST * usual_unit(problem.tree)
     return (
         f"cell {index}: the object's passage through ({x:.3f}, {y:.3f}) is {2e3 * passage.neck:.1f} mm "
         f"wide and {passage.length:.2f} m long, about {seconds:.0f} s, and its target "
-        f"({way.target[0]:.3f}, {way.target[1]:.3f}) has {1e3 * way.inradius:.1f} mm around it; expected "
-        f"at least {2e3 * narrowest:g} mm and {1e3 * narrowest:g} mm, and at most "
+        f"({route.target[0]:.3f}, {route.target[1]:.3f}) has {1e3 * route.inradius:.1f} mm around it; "
+        f"expected at least {2e3 * narrowest:g} mm and {1e3 * narrowest:g} mm, and at most "
         f"{problem.settings.max_transition_time:.0f} s"
     )
 

@@ -1,4 +1,4 @@
-"""Other boxes for a channel: along the same way, but such that the transport takes less time."""
+"""Covering a path again: other boxes along it, with which the transport takes less time."""
 
 from __future__ import annotations
 
@@ -26,37 +26,37 @@ from coop_drake.planning.sampling.obstacle_grid import Walls, walls_under
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.usual_unit import usual_unit
 
-__all__ = ["Resliced", "resliced"]
+__all__ = ["PathCovering", "cover_path"]
 
 LENGTH_STEP, ANGLE_STEP = 0.3, 0.15
-"""Waypoints lie no farther apart than this [m, rad or m]."""
-
+"""Waypoints are no farther apart than this in position [m] and in every angle or joint [rad or m]: twice as
+many would make the choice of boxes four times as slow."""
 
 HALVINGS = 6
-"""So often the stretch between two waypoints is halved until a box holds both."""
+"""Times that the path between two waypoints is halved until one box holds both."""
 
 PADS = (0.005, 0.015, 0.03, 0.06)
 """Boxes are padded by one of these in every angle and joint [rad or m]."""
 
 NARROW_PADS = (0.001, 0.003, 0.01, 0.03)
-"""And by one of these where a box padded by the least of the others does not hold two waypoints."""
+"""Paddings for narrow passages, where the smallest of the others is too wide [rad or m]."""
 
 LEVELS = ((0.3, PADS), (0.1, PADS), (0.1, NARROW_PADS))
-"""Shares of the margin that was found that waypoints keep [-], and paddings; tried in this order."""
+"""Fractions of the margin that waypoints keep [-], and paddings; tried in this order until one works."""
 
-LEAST = 2e-3
-"""Waypoints keep at least this clearance, of a team of the usual size [m]."""
+LEAST_CLEARANCE = 2e-3
+"""Waypoints keep at least this clearance [m]; for teams of another size it is scaled."""
 
-CORE_SHARE = 0.9
-"""Share of the waypoints' clearance that cores keep, so that waypoints lie well inside [-]."""
+CORE_FRACTION = 0.9
+"""Fraction of the waypoints' clearance that cores keep, so that waypoints lie inside them [-]."""
 
 REPAIRS = 3
-"""So often a chain is chosen again because boxes of it could not be proved."""
+"""Times that boxes are chosen again because some of them could not be proved free."""
 
 
 @dataclass(frozen=True)
-class Resliced:
-    """Boxes, and where to hand over from each to the next.
+class PathCovering:
+    """Boxes along a path, and the points at which each of them is left.
 
     Attributes:
         channel: The boxes.
@@ -67,31 +67,33 @@ class Resliced:
     targets: tuple[FloatArray, ...]
 
 
-def resliced(problem: PlanningProblem, way: FloatArray, margin: float, gain_set: GainSet) -> Resliced | None:
-    """Lay boxes along a way anew: merged where that saves hand-overs, narrow where clearance saves time.
+def cover_path(
+    problem: PlanningProblem, path: FloatArray, margin: float, gain_set: GainSet
+) -> PathCovering | None:
+    """Cover a path with boxes such that the transport is fast: few boxes, and narrow ones in narrow passages.
 
-    Which boxes is decided by a compiled simulation of the closed loop; whether they are free is proved as in
-    the search, by over-sweeps and Minkowski differences at margin zero, and a box that is not is not used.
+    The boxes are chosen by a compiled simulation of the closed loop. Every box is then proved free as in the
+    search, by over-sweeps and Minkowski differences at margin zero; a box that is not proved is not used.
 
     Args:
         problem: What was asked.
-        way: Free configurations from start to goal, theta unwrapped, shape (m, 3 + n).
-        margin: The margin that was found [m].
+        path: Free configurations from start to goal, theta unwrapped, shape (m, 3 + n) [m, rad].
+        margin: The margin that the path keeps [m].
         gain_set: Gains, fixed or to be scheduled.
 
     Returns:
-        The boxes, or None where no chain of such boxes exists.
+        The boxes, or None if no sequence of such boxes was found.
     """
     swept = SweptTree(problem.tree)
     pairs = BodyPairs(swept)
     floor = shrunk(problem.workspace, 0.0)
     boxes, walls = box_arrays(swept, pairs), walls_under(floor, problem.tree.reach)
-    angle = float(way[-1, 2] + nearest_turn(float(problem.goal_pose[2] - way[-1, 2])))
+    angle = float(path[-1, 2] + nearest_turn(float(problem.goal_pose[2] - path[-1, 2])))
     goals = np.array(final_intervals(problem, angle))
-    smallest = LEAST * usual_unit(problem.tree)
-    # At a small margin levels are the same: each is tried once.
-    for least, pads in dict.fromkeys((max(share * margin, smallest), pads) for share, pads in LEVELS):
-        points = _waypoints(boxes, walls, way, least, pads[0])
+    smallest = LEAST_CLEARANCE * usual_unit(problem.tree)
+    # At a small margin some levels are equal; each is tried once.
+    for least, pads in dict.fromkeys((max(fraction * margin, smallest), pads) for fraction, pads in LEVELS):
+        points = _waypoints(boxes, walls, path, least, pads[0])
         if points is None:
             continue
         places = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
@@ -99,30 +101,30 @@ def resliced(problem: PlanningProblem, way: FloatArray, margin: float, gain_set:
             boxes, walls, points, places, np.array(pads), goals, schedule_of(gain_set), least,
             problem.position_tolerance,
         )  # fmt: skip
-        found = _chain(course, Regions(problem, swept, pairs, CORE_SHARE * least))
+        found = _quickest_boxes(course, Regions(problem, swept, pairs, CORE_FRACTION * least))
         if found is not None:
             free, ends = found
             targets = (*(points[j, :2] for j in ends[:-1]), problem.goal_pose[:2])
-            return Resliced(Channel(tuple(free), CORE_SHARE * least, angle), targets)
+            return PathCovering(Channel(tuple(free), CORE_FRACTION * least, angle), targets)
     return None
 
 
 def _waypoints(
-    boxes: BoxArrays, walls: Walls, way: FloatArray, least: float, pad: float
+    boxes: BoxArrays, walls: Walls, path: FloatArray, least: float, pad: float
 ) -> FloatArray | None:
-    """Waypoints evenly along a way, closer where that is needed for boxes to hold neighbours, (n, 3 + m).
+    """Waypoints along a path, so close that one box holds each of them with the next, shape (n, 3 + m).
 
-    None if some two neighbours are not held by a box however close they are.
+    None if no box holds two waypoints after ``HALVINGS`` halvings.
     """
-    moves = np.abs(np.diff(way, axis=0))
+    moves = np.abs(np.diff(path, axis=0))
     paces = np.hypot(moves[:, 0], moves[:, 1]) / LENGTH_STEP, moves[:, 2:].max(axis=1) / ANGLE_STEP
     at = np.concatenate([[0.0], np.cumsum(np.maximum(*paces))])
 
     def configuration(s: float) -> FloatArray:
-        return np.array([np.interp(s, at, column) for column in way.T])
+        return np.array([np.interp(s, at, column) for column in path.T])
 
     def between(first: float, last: float, halvings: int) -> list[FloatArray] | None:
-        """Waypoints after the first place up to the last."""
+        """Waypoints after the first place, the last one at the last place."""
         pair = np.stack([configuration(first), configuration(last)])
         lower, upper = padded(boxes, pair, pad)
         if fits(boxes, walls, lower, upper, pair[:, :2].copy(), least):
@@ -135,7 +137,7 @@ def _waypoints(
         return None if one is None or other is None else one + other
 
     stops = np.linspace(0.0, at[-1], max(1, ceil(at[-1])) + 1)
-    points = [way[0]]
+    points = [path[0]]
     for first, last in pairwise(stops.tolist()):
         held = between(first, last, HALVINGS)
         if held is None:
@@ -144,8 +146,8 @@ def _waypoints(
     return np.array(points)
 
 
-def _chain(course: Course, regions: Regions) -> tuple[list[FreeBox], list[int]] | None:
-    """The quickest chain of which every box is proved, and the waypoint where each ends."""
+def _quickest_boxes(course: Course, regions: Regions) -> tuple[list[FreeBox], list[int]] | None:
+    """The quickest boxes that are all proved free, and for each of them the waypoint at which it ends."""
     n = len(course.way)
     banned = np.zeros((n, n, len(course.pads)))
     for _ in range(1 + REPAIRS):
@@ -162,7 +164,7 @@ def _chain(course: Course, regions: Regions) -> tuple[list[FreeBox], list[int]] 
 
 
 def _proved(course: Course, regions: Regions, first: int, last: int, pad: int) -> FreeBox | None:
-    """The box of a stretch of the way if over-sweeps prove a region free that holds both its ends."""
+    """The box of some waypoints, if over-sweeps prove a region free that holds the first and the last one."""
     part, width = course.way[first : last + 1], course.pads[pad]
     lower = np.maximum(course.boxes.lower, part[:, 2:].min(axis=0) - width)
     upper = np.minimum(course.boxes.upper, part[:, 2:].max(axis=0) + width)

@@ -1,4 +1,4 @@
-"""Goals at which the team collides whatever its free joints: refuted before any search."""
+"""Goal poses at which the team is in collision for all values of its free joints."""
 
 from __future__ import annotations
 
@@ -12,19 +12,20 @@ from coop_drake.planning.proofs.proof_making import blocked_goal_proof
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.questions.relaxation import relaxed
 
-_BUDGET = 128
+BUDGET = 128
+"""Slices of joint intervals that are swept at most for each part of the team: milliseconds of work."""
 
 
 def blocked_goal(problem: PlanningProblem) -> tuple[BlockedGoalProof | None, int]:
-    """Whether no values of the free joints put the team freely at its goal; a proof, by under-sweeps.
+    """Prove by under-sweeps that the team is in collision at its goal pose, whatever its free joints are.
 
-    The object goes first, then each robot alone, then all: what is blocked for some is blocked for the team.
+    The object is tested first, then each robot alone, then the team: a collision of some is one of the team.
 
     Args:
         problem: The question, whose margin is zero.
 
     Returns:
-        The proof that the goal is in collision, None if there is none, and the slices swept for it.
+        The proof, None if there is none, and the slices swept for it.
     """
     robots = sorted({joint.robot for joint in problem.tree.joints})
     slices = 0
@@ -37,9 +38,10 @@ def blocked_goal(problem: PlanningProblem) -> tuple[BlockedGoalProof | None, int
 
 
 def _blocked(question: PlanningProblem) -> tuple[list[Intervals], int]:
-    """Boxes of all free joints' values in which the team collides at the goal; none if it does not in all.
+    """Boxes that cover all values of the free joints, in each of which the team is in collision at the goal.
 
-    Halve the free joints' intervals until all are blocked, one is free, or the budget is spent.
+    The free joints' intervals are halved until all are blocked, one is free, or the budget is spent; only in
+    the first case boxes are returned. The second result is the number of slices swept.
     """
     swept = SweptTree(question.tree)
     maker = CellMaker(swept, BodyPairs(swept), shrunk(question.workspace, 0.0))
@@ -50,7 +52,7 @@ def _blocked(question: PlanningProblem) -> tuple[list[Intervals], int]:
     ]
     left: list[Intervals] = [((angle, angle), *joints)]
     blocked: list[Intervals] = []
-    for made in range(1, _BUDGET + 1):
+    for made in range(1, BUDGET + 1):
         intervals = left.pop()
         if _held(maker.over_cells(intervals), question):
             widths = [upper - lower for lower, upper in intervals]
@@ -62,7 +64,7 @@ def _blocked(question: PlanningProblem) -> tuple[list[Intervals], int]:
             blocked.append(intervals)
         if not left:
             return blocked, made
-    return [], _BUDGET
+    return [], BUDGET
 
 
 def _held(regions: list[Region], question: PlanningProblem) -> bool:

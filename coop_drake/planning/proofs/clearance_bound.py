@@ -1,4 +1,4 @@
-"""How much room a way can have at most: proofs at margins above zero, for questions that stay undecided."""
+"""An upper bound on the clearance of any path: proofs at margins above zero, for undecided questions."""
 
 from __future__ import annotations
 
@@ -13,20 +13,25 @@ from coop_drake.planning.questions.relaxation import relaxed
 CLEARANCES = (0.08, 0.04, 0.02, 0.01)
 """Clearances that are tried, largest first [m]."""
 
-_OCTAGON = 0.92  # Workspaces are shrunk by an octagon that reaches 1 / cos(pi / 8) as far as the disc in it.
-_BUDGET = 128
+INSIDE_OCTAGON = 0.92
+"""Workspaces are shrunk by an octagon about a disc; a disc of this fraction of the clearance has its octagon
+inside the disc of the clearance, because cos(pi / 8) is 0.924 [-]."""
+
+BUDGET = 128
+"""Slices of each exploration: enough for a clear case, and little beside the search that went before."""
 
 
 def clearance_bound(problem: PlanningProblem) -> tuple[float | None, int]:
-    """Least of some clearances that no way keeps from the walls, proved for the object with one robot.
+    """The smallest of some clearances of which it is proved that no path keeps it from the walls.
 
-    Start and goal may stand closer to a wall themselves: near them the clearance is not asked for.
+    The proofs are for the object with at most one robot. The start and the goal may stand closer to a wall:
+    near them the clearance is not required.
 
     Args:
         problem: The question.
 
     Returns:
-        The clearance [m], None if none was refuted, and the slices made for it.
+        The clearance [m], None if none was refuted, and the slices made for the proofs.
     """
     bound, slices = None, 0
     parts: list[tuple[int, ...]] = [(), *[(r,) for r in sorted({j.robot for j in problem.tree.joints})]]
@@ -36,10 +41,10 @@ def clearance_bound(problem: PlanningProblem) -> tuple[float | None, int]:
             question, _ = relaxed(problem, chosen)
             swept = SweptTree(question.tree)
             try:
-                workspace = marginal_workspace(problem, _OCTAGON * clearance)
+                workspace = marginal_workspace(problem, INSIDE_OCTAGON * clearance)
             except GeometryError:
                 return bound, slices
-            outcome = Exploration(question, workspace, swept, BodyPairs(swept)).run(_BUDGET)
+            outcome = Exploration(question, workspace, swept, BodyPairs(swept)).run(BUDGET)
             slices += outcome.slices
             refuted = outcome.verdict is Verdict.INFEASIBLE
             if refuted:

@@ -1,4 +1,4 @@
-"""The free-flyer relaxation: where a disc inside the team cannot get from start to goal, nobody can."""
+"""The inscribed-disc relaxation: if a disc inside the team cannot get from start to goal, the team cannot."""
 
 from __future__ import annotations
 
@@ -22,22 +22,27 @@ from coop_drake.tree.component_tree import ComponentTree, ConvexShape
 from coop_drake.tree.pose import FloatArray
 
 _DIRECTIONS = normals(np.arange(0.0, 32.0) * (pi / 16.0))
-_INSIDE = 1.0 - 1e-9
+
+INSIDE = 1.0 - 1e-9
+"""Discs are shrunk by this factor, so that rounding leaves them inside the team [-]."""
+
+POLE_TOLERANCE = 1e-4
+"""A larger inscribed disc may be larger by this much [m]."""
 
 
 def disc_refuted(problem: PlanningProblem) -> DiscProof | None:
-    """Look for a disc of the team whose centre start and goal put into different parts of the floor.
+    """Look for a disc of the team whose centre lies in different parts of the floor at start and goal.
 
     Args:
         problem: The question, whose margin is zero.
 
     Returns:
-        The proof, or None where every disc gets through.
+        The proof, or None if no disc is separated from its goal.
     """
     space = FreeSpace.over(problem.workspace)
     for component, disc in _discs(problem.tree):
         centre, radius = disc.vertices[0], disc.radius
-        regions = regions_of(space.minus(radius * _INSIDE * _DIRECTIONS), over=True)
+        regions = regions_of(space.minus(radius * INSIDE * _DIRECTIONS), over=True)
         start = problem.tree.poses(problem.start)[component].apply(disc.vertices)[0]
         goals = _places(problem, component, centre)
         reached = [to_polygon(region.section) for region in regions if region.holds(start)]
@@ -49,7 +54,7 @@ def disc_refuted(problem: PlanningProblem) -> DiscProof | None:
 
 
 def _discs(tree: ComponentTree) -> Iterator[tuple[int, ConvexShape]]:
-    """The largest disc inside every convex piece, with its component."""
+    """For every convex piece its component and the largest disc inside the piece."""
     for index, component in enumerate(tree.components):
         for body in component.bodies:
             for shape in body.shapes:
@@ -59,17 +64,17 @@ def _discs(tree: ComponentTree) -> Iterator[tuple[int, ConvexShape]]:
 
 
 def inscribed_disc(shape: ConvexShape) -> ConvexShape:
-    """A disc inside a convex shape, as large as one fits; of radius 0 where there is none."""
+    """The largest disc inside a convex shape; of radius zero for a shape without interior."""
     if len(shape.vertices) < 3:
         return ConvexShape(shape.vertices.mean(axis=0, keepdims=True), shape.radius)
     ring = Polygon(shape.vertices)
-    pole = shapely.maximum_inscribed_circle(ring, tolerance=1e-4)
+    pole = shapely.maximum_inscribed_circle(ring, tolerance=POLE_TOLERANCE)
     centre = np.asarray(pole.coords[0])
     return ConvexShape(centre[None, :], float(ring.exterior.distance(Point(centre))) + shape.radius)
 
 
 def _places(problem: PlanningProblem, component: int, centre: FloatArray) -> BaseGeometry:
-    """All places in W where a point of a component may be at the goal, enclosed."""
+    """A convex polygon that holds all places in W where a point of a component can be at the goal."""
     tree = problem.tree
     chain = tree.ancestors[component]
     joints = [tree.components[i].joint for i in chain]

@@ -1,4 +1,4 @@
-"""From an exploration that ended without a channel to a proof that can be checked again."""
+"""Proofs of infeasibility, written down such that the verifier can check them."""
 
 from __future__ import annotations
 
@@ -31,16 +31,15 @@ Found = TypeVar("Found")
 __all__ = ["blocked_goal_proof", "disc_proof", "slices_proof"]
 
 GROWTHS = (1e-3, 1e-4, 1e-5, 0.0, -5e-7)
-"""Cells are grown by the first of these that keeps start and goal apart: the more, the quicker the check [m].
-
-The last one takes back half of the hair by which the planner grows them, for cells that merely touch.
-"""
+"""Cells are grown by the first of these that keeps start and goal apart [m]: the more they are grown, the
+faster the check. The last one takes back half of the tolerance by which the planner grows cells, for cells
+that merely touch."""
 
 
 def slices_proof(
     question: PlanningProblem, robots: Sequence[int], slices: Slices, regions: Mapping[int, Sequence[Region]]
 ) -> SlicesProof | None:
-    """State an exploration's leaves and over-cells as a proof.
+    """Write an exploration's leaves and over-cells down as a proof.
 
     Args:
         question: The question that was explored, with the kept robots only.
@@ -49,7 +48,7 @@ def slices_proof(
         regions: Over-cells of every leaf by its id.
 
     Returns:
-        The proof, or None where none can be stated: the cells all but touch, or geometry fails.
+        The proof, or None if it fails because cells almost touch, or because geometry fails.
     """
     leaves = slices.leaves()
     joined = {
@@ -85,7 +84,7 @@ def disc_proof(
     start: FloatArray,
     goals: BaseGeometry,
 ) -> DiscProof | None:
-    """State the regions between which a disc cannot pass as a proof.
+    """Write the regions between which a disc cannot pass down as a proof.
 
     Args:
         component: The component that the disc lies in.
@@ -96,7 +95,7 @@ def disc_proof(
         goals: All places where the centre may be at the goal.
 
     Returns:
-        The proof, or None where the regions touch so closely that none can be stated.
+        The proof, or None if it fails because regions almost touch.
     """
 
     def separated(growth: float) -> list[OverCell] | None:
@@ -111,11 +110,11 @@ def disc_proof(
 
 
 def blocked_goal_proof(robots: Sequence[int], boxes: Sequence[Intervals]) -> BlockedGoalProof:
-    """State boxes of angles at the goal, in all of which the team collides, as a proof.
+    """Write boxes of angles at the goal, in all of which the team is in collision, down as a proof.
 
     Args:
         robots: Robots that are kept.
-        boxes: They cover the free joints' limits, with the goal's theta and joints on the other axes.
+        boxes: Boxes that cover the free joints' limits, with the goal's theta and joints on the other axes.
     """
     return BlockedGoalProof(tuple(robots), tuple(AngleBox(*_ends(intervals)) for intervals in sorted(boxes)))
 
@@ -137,7 +136,7 @@ def _ends(intervals: Intervals) -> tuple[FloatArray, FloatArray]:
 
 
 def _grown(regions: Sequence[Region], growth: float) -> list[Polygon]:
-    """Components of some regions grown by a length, in a fixed order."""
+    """Connected parts of some regions grown by a length, in a fixed order."""
     polygons = [shapely.make_valid(to_polygon(region.section)) for region in regions]
     grown = shapely.union_all([polygon.buffer(growth, join_style="mitre") for polygon in polygons])
     parts = [part for part in shapely.get_parts(grown) if isinstance(part, Polygon) and part.area > 0.0]
@@ -150,7 +149,7 @@ def _reached(
     starts: set[int],
     start: Point,
 ) -> dict[int, list[bool]]:
-    """Which cells a chain of touching cells of neighbouring leaves joins to the start."""
+    """Which cells a sequence of touching cells of neighbouring leaves connects to the start."""
     flat = [(leaf, i) for leaf in cells for i in range(len(cells[leaf]))]
     place = {entry: k for k, entry in enumerate(flat)}
     pairs = np.array(

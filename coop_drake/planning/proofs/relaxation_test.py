@@ -1,20 +1,23 @@
-"""Which relaxations are worth a proof: those for which sampling finds no path. Sampling proves nothing."""
+"""The relaxation test: which relaxations are worth a proof, because sampling finds no path for them."""
 
 from __future__ import annotations
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.questions.relaxation import relaxed
-from coop_drake.planning.sampling.sampler import Ladder, Sampler
+from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
 
-_SAMPLES = 8_000
-_SEED = 101
+__all__ = ["RelaxationTest"]
+
+SAMPLES = 8_000
+"""Samples for every subsystem: twice those of a first attempt, because a failure costs an exploration."""
+
+SEED = 101
+"""Seed of the samples, other than those of the search, which have failed already."""
 
 
-class Doubts:
-    """Tries to find paths for parts of a team.
-
-    A path answers for its robots and for fewer of them: nobody need look for a proof that there is none.
+class RelaxationTest:
+    """Tests by sampling whether a part of the team has a path; a path makes a proof for that part impossible.
 
     Args:
         problem: The question.
@@ -23,12 +26,12 @@ class Doubts:
     def __init__(self, problem: PlanningProblem) -> None:
         self._problem = problem
         self._workspace = shrunk(problem.workspace, 0.0)
-        self._doubted: dict[tuple[int, ...], bool] = {}
+        self._failed: dict[tuple[int, ...], bool] = {}
 
-    def about(self, robots: tuple[int, ...]) -> bool:
-        """Whether no path was found for the object with some robots."""
-        if robots not in self._doubted:
+    def finds_no_path(self, robots: tuple[int, ...]) -> bool:
+        """Whether sampling finds no path for the object with some robots, which proves nothing."""
+        if robots not in self._failed:
             question, _ = relaxed(self._problem, robots)
-            sampler = Sampler(Ladder(question), self._workspace, 0.0, _SEED)
-            self._doubted[robots] = len(sampler.path(_SAMPLES)) == 0
-        return self._doubted[robots]
+            sampler = Sampler(SubsystemHierarchy(question), self._workspace, 0.0, SEED)
+            self._failed[robots] = len(sampler.path(SAMPLES)) == 0
+        return self._failed[robots]

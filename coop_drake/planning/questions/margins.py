@@ -1,4 +1,4 @@
-"""Workspaces shrunk by a margin, with room left at the start and at the goal (rule 1)."""
+"""Workspaces shrunk by a margin, except near a start or goal that stands close to a wall (rule 1)."""
 
 from __future__ import annotations
 
@@ -19,24 +19,35 @@ from coop_drake.tree.component_tree import Component, ComponentTree
 from coop_drake.tree.pose import FloatArray
 
 SMALLEST_MARGIN = 0.005
-"""Below this a margin is not worth an attempt of its own [m]."""
+"""Smaller margins are not tried: they are within the accuracy of a real floor [m]."""
 
 _OCTAGON = normals(np.arange(0.5, 8.0, dtype=np.float64) * (pi / 4.0)) / np.cos(pi / 8.0)
-_SHARE = 0.2
-_CLOSE = 1.1
-_NEXT_SHARE = 0.7
+END_FRACTION = 0.2
+"""Around a start or goal close to a wall the floor is shrunk by this fraction of its own clearance [-]."""
+
+CLOSE_FACTOR = 1.1
+"""A start or goal with less clearance than this many margins counts as close to a wall [-]."""
+
+NEXT_FRACTION = 0.7
+"""After a margin failed, this fraction of it is tried [-]."""
+
+PATCH_FACTOR = 2.0
+"""The floor around a start or goal that is shrunk less reaches this many margins beyond its footprint [-]."""
+
+ARC_SEGMENTS = 32
+"""Segments of a quarter circle in exact footprints: a disc's polygon is right to 3e-4 of its radius."""
 
 
 def margins(first: float) -> Iterator[float]:
-    """The margins to try: the first, then seven tenths of each while worth it [m]."""
+    """The margins to try: the first, then seven tenths of each, down to ``SMALLEST_MARGIN`` [m]."""
     margin = first
     while margin >= SMALLEST_MARGIN:
         yield margin
-        margin *= _NEXT_SHARE
+        margin *= NEXT_FRACTION
 
 
 def shrunk(workspace: Polygon, margin: float) -> MultiPolygon:
-    """Workspace without its points nearer than the margin to a wall, corners by an octagon about the disc.
+    """Workspace without its points nearer to a wall than the margin; an octagon about the disc is used.
 
     Raises:
         GeometryError: If geometry fails.
@@ -57,44 +68,44 @@ def disc_polygon(radius: float) -> FloatArray:
 
 
 def marginal_workspace(problem: PlanningProblem, margin: float) -> MultiPolygon:
-    """Workspace shrunk by the margin except where start or goal themselves stand closer to a wall.
+    """Workspace shrunk by the margin, but less near a start or goal that stands close to a wall.
 
-    There a patch around the footprint is shrunk by a fifth of the footprint's own clearance only, so that a
+    There the floor around the footprint is shrunk by a fifth of the footprint's own clearance only, so that a
     start near a wall does not forbid a margin everywhere else.
     """
     result = shrunk(problem.workspace, margin)
     for footprint, clearance in _close_ends(problem, margin):
-        own = shrunk(problem.workspace, _SHARE * clearance)
-        patch = own.intersection(footprint.buffer(2.0 * margin, quad_segs=2))
+        own = shrunk(problem.workspace, END_FRACTION * clearance)
+        patch = own.intersection(footprint.buffer(PATCH_FACTOR * margin, quad_segs=2))
         result = _areas(shapely.union(result, patch))
     return result
 
 
 def is_patched(problem: PlanningProblem, margin: float) -> bool:
-    """Whether start or goal stand closer to a wall than a margin allows, so that they get a patch."""
+    """Whether the floor near the start or goal is shrunk by less than the margin."""
     return bool(_close_ends(problem, margin))
 
 
 def _close_ends(problem: PlanningProblem, margin: float) -> list[tuple[BaseGeometry, float]]:
-    """Footprints at start and goal that stand closer to a wall than a margin allows, and how close [m]."""
+    """Footprints at start and goal that are too close to a wall for a margin, and their clearances [m]."""
     boundary = problem.workspace.boundary
     close = []
     for configuration, components in _ends(problem):
         pieces, radii = _pieces(problem.tree, configuration, components)
-        # No end is farther from the walls than its pieces: most questions end here.
-        if (shapely.distance(boundary, pieces) - radii).min() >= _CLOSE * margin:
+        # The footprint has the clearance of its nearest piece; for most questions that is enough.
+        if (shapely.distance(boundary, pieces) - radii).min() >= CLOSE_FACTOR * margin:
             continue
         footprint = exact_footprint(problem.tree, configuration, components)
         clearance = float(boundary.distance(footprint))
-        if clearance < _CLOSE * margin and problem.workspace.contains(footprint):
+        if clearance < CLOSE_FACTOR * margin and problem.workspace.contains(footprint):
             close.append((footprint, clearance))
     return close
 
 
 def _ends(problem: PlanningProblem) -> list[tuple[FloatArray, int | None]]:
-    """Configurations at start and goal, and how many components are known there.
+    """Configurations at start and goal, and the number of components whose pose is known there.
 
-    At the goal that is all of them if every joint has a goal, else the object's alone.
+    None stands for all. At the goal only the object's pose is known unless every joint has a goal.
     """
     joints = [0.0 if value is None else value for value in problem.goal_joints]
     free = any(value is None for value in problem.goal_joints)
@@ -110,21 +121,21 @@ def _areas(shape: BaseGeometry) -> MultiPolygon:
 def exact_footprint(
     tree: ComponentTree, configuration: FloatArray, components: int | None = None
 ) -> BaseGeometry:
-    """Footprint of the first components at a configuration, eq. (3), discs by fine polygons.
+    """Footprint of the first components at a configuration, eq. (3), with fine polygons for discs.
 
     Args:
         tree: The team.
         configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
-        components: How many components to take; None for all.
+        components: Number of components to take; None for all.
     """
     pieces, radii = _pieces(tree, configuration, components)
-    return shapely.union_all(shapely.buffer(pieces, radii, quad_segs=32))
+    return shapely.union_all(shapely.buffer(pieces, radii, quad_segs=ARC_SEGMENTS))
 
 
 def _pieces(
     tree: ComponentTree, configuration: FloatArray, components: int | None
 ) -> tuple[list[BaseGeometry], FloatArray]:
-    """Hulls of the pieces of the first components at a configuration, and by how much they are grown [m]."""
+    """Hulls of the pieces of the first components at a configuration, and the radii they are grown by [m]."""
     chosen: list[Component] = list(tree.components[:components])
     placed = [
         (shapely.MultiPoint(X_WC.apply(shape.vertices)).convex_hull, shape.radius)

@@ -1,4 +1,4 @@
-"""What a question must satisfy before it is searched: numbers that mean something, joints within limits."""
+"""Checks of a question before the search: finite numbers of the right count, joints within their limits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["check_question", "goal_beyond_limits"]
 
 
 def check_question(problem: PlanningProblem) -> None:
-    """Refuse a question that cannot be meant.
+    """Refuse a question without meaning.
 
     Raises:
         PlanError: Names the entry, its value and what is allowed.
@@ -46,7 +46,7 @@ def check_question(problem: PlanningProblem) -> None:
 
 
 def goal_beyond_limits(problem: PlanningProblem) -> str | None:
-    """Which joint has a goal beyond its limits, in words; None if all can get there."""
+    """A sentence that names the joint whose goal is beyond its limits; None if there is no such joint."""
     for joint in problem.tree.joints:
         goal = problem.goal_joints[joint.index]
         if goal is not None and not _within(goal, joint):

@@ -1,4 +1,4 @@
-"""Relaxations: the same question with fewer robots; what is infeasible for them is infeasible for all."""
+"""Relaxations: the same question with fewer robots. If a relaxation is infeasible, the question is too."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from coop_drake.tree.component_tree import Component, ComponentTree
 
 
 def relaxed(problem: PlanningProblem, robots: Collection[int]) -> tuple[PlanningProblem, tuple[int, ...]]:
-    """Leave out what moves against the object of every other robot.
+    """The question with only some of the robots.
 
     Args:
         problem: The whole question.
-        robots: Robots whose arms and bases stay; what is welded to the object stays in any case.
+        robots: Robots whose arms and bases are kept; bodies welded to the object are kept in any case.
 
     Returns:
         The relaxed question, and for each of its joints the index of that joint in the whole q.

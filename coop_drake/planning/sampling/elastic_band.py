@@ -1,4 +1,4 @@
-"""Straighten a candidate path and draw it away from the walls, so that long boxes fit around it."""
+"""Elastic-band smoothing: a path becomes shorter and moves away from the walls, so that long boxes fit."""
 
 from __future__ import annotations
 
@@ -14,46 +14,55 @@ from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["PRICE", "drawn_tight", "likely_time", "room_along"]
+__all__ = ["CLEARANCE_PRICE", "estimated_duration", "path_clearance", "smoothed"]
 
-PRICE = 0.12
-"""Price per length of the path, times the clearance there [m]."""
+CLEARANCE_PRICE = 0.12
+"""Cost of a unit length of the path for its narrowness, times the clearance there [m]."""
 
-LEAST_ROOM = 0.005
-"""Clearance that is added to what a path has before it is priced [m]."""
+CLEARANCE_OFFSET = 0.005
+"""It is added to clearances before they are divided by, so that costs stay finite [m]."""
 
 SPACING = 0.1
-"""Distance between samples of a path in any scaled axis, where nothing else is said [m]."""
+"""Distance between samples of a path in any scaled axis, unless another one is asked for [m]."""
 
-SLOWNESS, SOME_ROOM = 0.25, 0.02
-"""What narrowness costs candidates: time per length, times clearance and some room [s], [m]."""
+MOVES = 4_000
+"""Changes of a path that are tried, unless another number is asked for."""
 
-NEAR_END = 2.0
-"""Over so many clearances from the start or the goal there may be less room: where they stand close to a
-wall themselves [-]."""
+NARROWNESS_TIME, DURATION_OFFSET = 0.25, 0.02
+"""Estimated duration of a unit length for its narrowness, times the clearance plus an offset [s], [m]."""
+
+EXEMPT_DISTANCE = 2.0
+"""Samples nearer to the start or goal than this many clearances may have less clearance than others, because
+the start or goal may stand close to a wall [-]."""
 
 
-def drawn_tight(
+def smoothed(
     problem: PlanningProblem,
     path: FloatArray,
     clearance: float,
     margin: float,
     gap: float,
     spacing: float = SPACING,
-    moves: int = 4_000,
-    price: float = PRICE,
+    moves: int = MOVES,
+    price: float = CLEARANCE_PRICE,
 ) -> FloatArray:
-    """Improve a path; start and goal stay, joints that are free at the goal may end elsewhere.
+    """Make a path shorter and move it away from the walls.
+
+    Start and goal stay, but joints that are free at the goal may end elsewhere.
 
     Args:
         problem: The question.
         path: Configurations that keep the clearance, theta unwrapped, shape (m, 3 + n).
-        clearance: Distance from the walls that the path keeps and will keep [m].
-        margin: Margin that the boxes must keep; clearance above it is what they can use [m].
+        clearance: Distance from the walls that the path keeps before and after [m].
+        margin: Margin that the boxes must keep; only clearance above it makes them wide [m].
         gap: Distance that pairs of bodies keep [m].
         spacing: Distance between samples of the path in any scaled axis [m].
         moves: Changes that are tried.
-        price: What a length of the path costs, times the clearance there: the more, the wider it runs [m].
+        price: Cost of a unit length, times the clearance there; a larger one keeps the path further from
+            the walls [m].
+
+    Returns:
+        The path, shape (k, 3 + n) [m, rad].
     """
     tree = problem.tree
     scale = configuration_scale(tree)
@@ -63,7 +72,7 @@ def drawn_tight(
     better: FloatArray = improve(
         team,
         walls,
-        np.array([price * spacing, max(clearance - margin, 0.0) + LEAST_ROOM, FAR]),
+        np.array([price * spacing, max(clearance - margin, 0.0) + CLEARANCE_OFFSET, FAR]),
         densified(path, scale, spacing),
         np.concatenate((-unbounded, tree.joint_lower)),
         np.concatenate((unbounded, tree.joint_upper)),
@@ -76,8 +85,8 @@ def drawn_tight(
     return better
 
 
-def likely_time(problem: PlanningProblem, path: FloatArray) -> float:
-    """About how long a transport along a path takes, to tell candidates apart: the less room, the slower [s].
+def estimated_duration(problem: PlanningProblem, path: FloatArray) -> float:
+    """Rough duration of a transport along a path, to compare candidates [s].
 
     Args:
         problem: The question.
@@ -85,16 +94,18 @@ def likely_time(problem: PlanningProblem, path: FloatArray) -> float:
     """
     scale, team = configuration_scale(problem.tree), team_arrays(problem.tree)
     samples = densified(path, scale, SPACING)
-    rooms = np.maximum(clearances(team, walls_for(problem.workspace, team), samples, FAR), 0.0)
+    clear = np.maximum(clearances(team, walls_for(problem.workspace, team), samples, FAR), 0.0)
     moved = np.abs(np.diff(samples, axis=0))
     shifted = np.hypot(moved[:, 0], moved[:, 1])
-    hurried = np.maximum(shifted / SPEED, (moved[:, 2:] / _speeds(problem.tree)[2:]).max(axis=1))
+    shortest = np.maximum(shifted / SPEED, (moved[:, 2:] / _speeds(problem.tree)[2:]).max(axis=1))
     swept = shifted + 0.5 * (moved[:, 2:] * scale[2:]).max(axis=1)
-    return float((hurried + SLOWNESS * swept / (np.minimum(rooms[1:], rooms[:-1]) + SOME_ROOM)).sum())
+    return float(
+        (shortest + NARROWNESS_TIME * swept / (np.minimum(clear[1:], clear[:-1]) + DURATION_OFFSET)).sum()
+    )
 
 
-def room_along(problem: PlanningProblem, path: FloatArray, most: float) -> float:
-    """Clearance of a path's samples, but for those near an end where the end itself has less.
+def path_clearance(problem: PlanningProblem, path: FloatArray, most: float) -> float:
+    """Smallest clearance of a path's samples, without those near an end that stands close to a wall itself.
 
     Args:
         problem: The question.
@@ -102,21 +113,21 @@ def room_along(problem: PlanningProblem, path: FloatArray, most: float) -> float
         most: Clearances above this one do not matter [m].
 
     Returns:
-        The clearance; a measure of samples, and no proof [m].
+        The clearance; it is measured at samples and proves nothing [m].
     """
     scale, team = configuration_scale(problem.tree), team_arrays(problem.tree)
     samples = densified(path, scale, 0.5 * SPACING)
-    rooms = clearances(team, walls_for(problem.workspace, team), samples, FAR)
+    clear = clearances(team, walls_for(problem.workspace, team), samples, FAR)
     moved = [(np.abs(samples - samples[end]) * scale).sum(axis=1) for end in (0, -1)]
-    excused = np.minimum(*moved) / NEAR_END
-    room = most
+    exempt = np.minimum(*moved) / EXEMPT_DISTANCE
+    least = most
     while True:
-        short = rooms[(rooms < room) & (excused > room)]
-        if not len(short):
-            return max(room, 0.0)
-        room = float(short.min())
+        below = clear[(clear < least) & (exempt > least)]
+        if not len(below):
+            return max(least, 0.0)
+        least = float(below.min())
 
 
 def _speeds(tree: ComponentTree) -> FloatArray:
-    """Speeds of all axes of z at their best, shape (3 + n,)."""
+    """Highest average speed of every axis of z, shape (3 + n,) [m/s, rad/s]."""
     return np.array([SPEED, SPEED, TURN_RATE, *[JOINT_RATE] * len(tree.joints)])

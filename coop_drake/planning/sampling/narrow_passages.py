@@ -1,4 +1,4 @@
-"""A way for an easier question, drawn tight while the question grows as hard as it is."""
+"""Narrow-passage repair: a path for an easier question is moved until it answers the original one."""
 
 from __future__ import annotations
 
@@ -18,62 +18,95 @@ from coop_drake.planning.sampling.team_arrays import team_arrays
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
-_GAP = 0.002
-_PRICES = (0.04, 5e-4, 0.1)
-"""A sample with clearance c costs [0] / ([1] + min(c, [2])): steep, so that the tightest place counts."""
+__all__ = [
+    "Eased",
+    "amount_needed",
+    "are_free",
+    "ease_less",
+    "repaired",
+    "widened_floor",
+    "with_larger_least_clearance",
+]
 
-_SPACING = 0.05
-_MOVES = 2_000
-_WINDOW = 40
-_HALVINGS = 10
-_DRAWINGS = 6
-_ROUNDS = 3
-_ROOM = 0.001
-_MITRE = 5.0
+BODY_GAP = 0.002
+"""Distance that bodies of the team keep from each other [m]."""
 
-Varied = Callable[[float], PlanningProblem]
+PRICES = (0.04, 5e-4, 0.1)
+"""A sample with clearance c costs [0] / ([1] + min(c, [2])) [m]: steep, so the narrowest place counts."""
+
+SPACING = 0.05
+"""Distance between samples of a path in any scaled axis [m]."""
+
+MOVES = 2_000
+"""Changes of a path that are tried at a time."""
+
+WINDOW = 40
+"""Samples to both sides of the narrowest one that later changes are confined to: two metres of path."""
+
+HALVINGS = 10
+"""Bisections of an amount: the result is exact to a thousandth of the amount."""
+
+ROUNDS_OF_MOVES = 6
+"""Times that a path is moved before it is given up."""
+
+REPAIRS = 3
+"""Times that this is repeated while it helps."""
+
+LEAST_CLEARANCE = 0.001
+"""Walls are moved in by this, so that boxes around the repaired path have a width [m]."""
+
+MITRE_LIMIT = 5.0
+"""Corners of a widened floor are cut at this many times the widening [-]."""
+
+SOLVED_FRACTION = 0.1
+"""A path is repaired when it needs less than this fraction of ``LEAST_CLEARANCE`` [-]."""
+
+PROGRESS_FRACTION = 0.8
+"""Repairs go on while the amount needed falls below this fraction of the amount before [-]."""
+
+Eased = Callable[[float], PlanningProblem]
 """The question made easier by an amount; what is free for one amount is free for every larger one."""
 
 
-def drawn_closer(
-    varied: Varied, way: FloatArray, amount: float, enough: float = 0.0
-) -> tuple[FloatArray, float]:
-    """Draw a way away from what it touches while the question gets harder.
+def ease_less(eased: Eased, path: FloatArray, amount: float, enough: float = 0.0) -> tuple[FloatArray, float]:
+    """Move a path such that it is free for a smaller amount of easing.
 
-    The first drawing straightens all of the way, the others work in a window where it is tightest.
+    The first moves are anywhere on the path, later ones near the place that needs the largest amount.
 
     Args:
-        varied: The question made easier by an amount.
-        way: A way that is free with ``amount``, theta unwrapped, shape (m, 3 + n).
+        eased: The question made easier by an amount.
+        path: A path that is free with ``amount``, theta unwrapped, shape (m, 3 + n).
         amount: The amount.
-        enough: Amount at which it may end.
+        enough: Amount at which it may stop.
 
     Returns:
-        The way, and the amount with which all its samples are free: a measure, and no proof.
+        The path, and the amount with which all its samples are free; this is measured and proves nothing.
     """
-    way = densified(way, configuration_scale(varied(amount).tree), _SPACING)
-    needed, worst = amount_needed(varied, way, amount)
-    for number in range(_DRAWINGS):
+    path = densified(path, configuration_scale(eased(amount).tree), SPACING)
+    needed, worst = amount_needed(eased, path, amount)
+    for number in range(ROUNDS_OF_MOVES):
         if needed <= enough:
             break
-        here = slice(max(0, worst - _WINDOW), worst + _WINDOW + 1) if number else slice(None)
-        last = here.stop is None or here.stop >= len(way)
-        part = drawn(varied(needed), way[here], number, free_end=last)
-        tight = np.concatenate((way[: here.start or 0], part, way[len(way) if last else here.stop :]))
-        less, at = amount_needed(varied, tight, needed)
+        here = slice(max(0, worst - WINDOW), worst + WINDOW + 1) if number else slice(None)
+        last = here.stop is None or here.stop >= len(path)
+        part = with_larger_least_clearance(eased(needed), path[here], number, free_end=last)
+        moved = np.concatenate((path[: here.start or 0], part, path[len(path) if last else here.stop :]))
+        less, at = amount_needed(eased, moved, needed)
         if less <= needed:
-            way, needed, worst = tight, less, at
-    return way, needed
+            path, needed, worst = moved, less, at
+    return path, needed
 
 
-def drawn(problem: PlanningProblem, way: FloatArray, seed: int, *, free_end: bool) -> FloatArray:
-    """Draw a free way so that it has more room where it has least.
+def with_larger_least_clearance(
+    problem: PlanningProblem, path: FloatArray, seed: int, *, free_end: bool
+) -> FloatArray:
+    """Move a free path such that its smallest clearance becomes larger.
 
     Args:
         problem: The question.
-        way: Samples, close together, shape (m, 3 + n).
-        seed: Other random moves for every seed.
-        free_end: Whether the way ends at the goal, where free joints may move.
+        path: Samples, close together, shape (m, 3 + n).
+        seed: Seed of the random moves.
+        free_end: Whether the path ends at the goal, where free joints may move.
     """
     tree = problem.tree
     team, scale = team_arrays(tree), configuration_scale(tree)
@@ -81,25 +114,25 @@ def drawn(problem: PlanningProblem, way: FloatArray, seed: int, *, free_end: boo
     better: FloatArray = improve(
         team,
         walls_for(problem.workspace, team),
-        np.array(_PRICES),
-        way,
+        np.array(PRICES),
+        path,
         np.concatenate((-unbounded, tree.joint_lower)),
         np.concatenate((unbounded, tree.joint_upper)),
         scale,
         scale,
-        _GAP,
+        BODY_GAP,
         free_end and all(value is None for value in problem.goal_joints),
-        np.random.default_rng(seed).random((_MOVES, 5)),
+        np.random.default_rng(seed).random((MOVES, 5)),
     )
     return better
 
 
-def amount_needed(varied: Varied, way: FloatArray, most: float) -> tuple[float, int]:
-    """Least amount, up to ``most``, with which all samples are free, and the sample that needs most."""
+def amount_needed(eased: Eased, path: FloatArray, most: float) -> tuple[float, int]:
+    """Smallest amount, up to ``most``, with which all samples are free, and the sample that needs it."""
     lower, upper, worst = 0.0, most, 0
-    for _ in range(_HALVINGS):
+    for _ in range(HALVINGS):
         middle = 0.5 * (lower + upper)
-        blocked = np.flatnonzero(~are_free(varied(middle), way))
+        blocked = np.flatnonzero(~are_free(eased(middle), path))
         if len(blocked):
             lower, worst = middle, int(blocked[0])
         else:
@@ -107,24 +140,24 @@ def amount_needed(varied: Varied, way: FloatArray, most: float) -> tuple[float, 
     return upper, worst
 
 
-def are_free(problem: PlanningProblem, way: FloatArray) -> NDArray[np.bool_]:
-    """Whether each sample keeps within limits and walls, and bodies apart; exact, shape (m,)."""
+def are_free(problem: PlanningProblem, path: FloatArray) -> NDArray[np.bool_]:
+    """Whether each sample is within limits and free of collisions; exact, shape (m,)."""
     tree = problem.tree
     team = team_arrays(tree)
     walls = walls_for(problem.workspace, team)
-    within = np.all((way[:, 3:] >= tree.joint_lower) & (way[:, 3:] <= tree.joint_upper), axis=1)
-    free: NDArray[np.bool_] = within & np.array([is_free(team, walls, z, 0.0) for z in way])
+    within = np.all((path[:, 3:] >= tree.joint_lower) & (path[:, 3:] <= tree.joint_upper), axis=1)
+    free: NDArray[np.bool_] = within & np.array([is_free(team, walls, z, 0.0) for z in path])
     return free
 
 
-def widened(workspace: Polygon, amount: float) -> MultiPolygon:
-    """Workspace with all walls moved back, thin ones broken through: for samples, not for answers."""
-    grown = workspace.buffer(amount, join_style="mitre", mitre_limit=_MITRE)
+def widened_floor(workspace: Polygon, amount: float) -> MultiPolygon:
+    """Workspace with all walls moved back by an amount [m]; walls thinner than twice as much disappear."""
+    grown = workspace.buffer(amount, join_style="mitre", mitre_limit=MITRE_LIMIT)
     return MultiPolygon([part for part in getattr(grown, "geoms", [grown]) if isinstance(part, Polygon)])
 
 
-def fitted(problem: PlanningProblem, path: FloatArray, growth: float) -> FloatArray | None:
-    """Draw a path for a larger floor until all its samples are free on the floor as it is.
+def repaired(problem: PlanningProblem, path: FloatArray, growth: float) -> FloatArray | None:
+    """Move a path for a larger floor until all its samples are free on the original floor.
 
     Args:
         problem: The question.
@@ -132,17 +165,17 @@ def fitted(problem: PlanningProblem, path: FloatArray, growth: float) -> FloatAr
         growth: How far walls were moved back for it [m].
 
     Returns:
-        The path, None if it does not get there. Samples prove nothing: boxes have to cover it.
+        The path, None if that fails. Samples prove nothing: boxes have to cover it.
     """
 
-    def varied(amount: float) -> PlanningProblem:
-        # Boxes need some room: the walls end up nearer than they are.
-        return replace(problem, workspace=problem.workspace.buffer(amount - _ROOM, join_style="mitre"))
+    def eased(amount: float) -> PlanningProblem:
+        floor = problem.workspace.buffer(amount - LEAST_CLEARANCE, join_style="mitre")
+        return replace(problem, workspace=floor)
 
-    needed = growth + _ROOM
-    for _ in range(_ROUNDS):
+    needed = growth + LEAST_CLEARANCE
+    for _ in range(REPAIRS):
         before = needed
-        path, needed = drawn_closer(varied, path, needed, enough=0.1 * _ROOM)
-        if needed <= 0.1 * _ROOM or needed > 0.8 * before:
+        path, needed = ease_less(eased, path, needed, enough=SOLVED_FRACTION * LEAST_CLEARANCE)
+        if needed <= SOLVED_FRACTION * LEAST_CLEARANCE or needed > PROGRESS_FRACTION * before:
             break
-    return path if needed <= _ROOM else None
+    return path if needed <= LEAST_CLEARANCE else None

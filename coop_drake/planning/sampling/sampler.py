@@ -1,4 +1,4 @@
-"""Candidate paths by sampling: a disc, the object, each robot alone, and robots added hardest first."""
+"""Candidate paths by sampling a hierarchy of subsystems: a disc, the object, single robots, more robots."""
 
 from __future__ import annotations
 
@@ -18,39 +18,57 @@ from coop_drake.tree.component_tree import Body, Component, ComponentTree, Conve
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
-_STEP = 0.03
-_SPREAD_POSITION = 0.3
-_SPREAD_ANGLE = 0.5
-_ROOTS = 24
-_SHORTCUTS = 60
-_DISC_SHARE = 2
-_SPACING = 0.1
-_SAMPLED_LENGTH = 20.0
-"""Length of a guide that one budget of samples is meant for [m]."""
+COLLISION_STEP = 0.03
+"""Between two collision checks of a motion no axis moves the team further than this [m]."""
+
+POSITION_SPREAD, ANGLE_SPREAD = 0.3, 0.5
+"""How far samples lie from the guide path, in position [m] and in every angle or joint [rad or m]: about half
+the width of a passage, and a quarter of a right angle on both sides."""
+
+GOALS = 24
+"""Goal configurations that a tree may end in, with different values of the free joints."""
+
+GOAL_SAMPLES = 40 * GOALS
+"""Values of the free joints that are drawn for them."""
+
+SHORTCUTS = 60
+"""Shortcuts that are tried on a new path."""
+
+DISC_SAMPLES_FACTOR = 2
+"""The disc gets this many times the samples of the others, because it has no guide path."""
+
+SPACING = 0.1
+"""Distance between samples of guide paths, and of paths before shortcuts, in any scaled axis [m]."""
+
+SAMPLED_LENGTH = 20.0
+"""Length of a guide path for which one budget of samples is meant [m]; longer ones get a multiple."""
 
 SPEED, TURN_RATE, JOINT_RATE = 1.2, 0.5, 0.6
-"""Speeds of position, theta and joints with which transports go at their best [m/s, rad/s]."""
+"""Highest average speeds of position, theta and joints in simulated transports [m/s, rad/s]."""
+
+DISC_TOLERANCE, DISC_SHRINKAGE = 1e-3, 0.98
+"""Accuracy of an inscribed disc over its piece's perimeter, and the factor by which it is shrunk [-]."""
 
 _NO_PATH = np.empty((0, 3))
 
 
 @dataclass(frozen=True)
-class Guide:
-    """A path of some of the robots to sample around.
+class GuidePath:
+    """A path of a smaller subsystem, around which a larger subsystem is sampled.
 
     Attributes:
         path: Configurations, shape (m, 3 + k).
         joints: For each of its joints the index of that joint in the whole q.
-        turned: Whether theta means anything along it.
+        has_theta: Whether its theta is to be followed; that of a disc is not.
     """
 
     path: FloatArray
     joints: tuple[int, ...]
-    turned: bool = True
+    has_theta: bool = True
 
 
-class Stage:
-    """A question laid out for the kernels.
+class Subsystem:
+    """The object with some of the robots: a relaxation of the question, as arrays for the kernels.
 
     Args:
         question: The whole question or a relaxation of it.
@@ -64,31 +82,39 @@ class Stage:
         self.start = question.start.astype(float)
 
 
-class Ladder:
-    """Stages of one question, made once for all samplers."""
+class SubsystemHierarchy:
+    """The subsystems of one question, from a disc to the whole team; made once for all samplers.
+
+    Args:
+        problem: The question.
+
+    Attributes:
+        robots: All robots, ascending.
+        disc: The largest disc inside one piece of the object.
+    """
 
     def __init__(self, problem: PlanningProblem) -> None:
         self.robots = tuple(sorted({joint.robot for joint in problem.tree.joints}))
         self._problem = problem
-        self._stages: dict[tuple[int, ...], Stage] = {}
-        self.disc = Stage(_disc_question(relaxed(problem, ())[0]), ())
+        self._subsystems: dict[tuple[int, ...], Subsystem] = {}
+        self.disc = Subsystem(_disc_question(relaxed(problem, ())[0]), ())
 
-    def stage(self, robots: tuple[int, ...]) -> Stage:
-        """The stage with some of the robots, in ascending order."""
-        if robots not in self._stages:
-            self._stages[robots] = Stage(*relaxed(self._problem, robots))
-        return self._stages[robots]
+    def subsystem(self, robots: tuple[int, ...]) -> Subsystem:
+        """The object with some of the robots, given in ascending order."""
+        if robots not in self._subsystems:
+            self._subsystems[robots] = Subsystem(*relaxed(self._problem, robots))
+        return self._subsystems[robots]
 
 
 class Sampler:
-    """Looks for a path of configurations that stay in a workspace; deterministic for a seed.
+    """Looks for a path of free configurations in a workspace; the same seed gives the same path.
 
     Args:
-        ladder: The question.
+        hierarchy: The subsystems of the question.
         workspace: Floor with the wanted clearance taken off [m].
         gap: Distance that pairs of bodies keep [m].
         seed: Seed of the samples.
-        progress: Called with the share of the ladder that is done.
+        progress: Called with the fraction of the subsystems that are done.
 
     Attributes:
         object_blocked: Whether no path was found even for the object alone.
@@ -96,44 +122,48 @@ class Sampler:
 
     def __init__(
         self,
-        ladder: Ladder,
+        hierarchy: SubsystemHierarchy,
         workspace: MultiPolygon,
         gap: float,
         seed: int,
         progress: Callable[[float], None] | None = None,
     ) -> None:
-        self._ladder, self._gap = ladder, gap
-        self._walls: Walls = walls_for(workspace, ladder.stage(ladder.robots).team)
+        self._hierarchy, self._gap = hierarchy, gap
+        self._walls: Walls = walls_for(workspace, hierarchy.subsystem(hierarchy.robots).team)
         self._bounds = workspace.bounds
         self._random = np.random.default_rng(seed)
-        self._tell = progress
+        self._progress = progress
         self.object_blocked = False
 
     def path(self, samples: int, choices: int = 1) -> FloatArray:
-        """Path from start to goal, theta unwrapped, shape (m, 3 + n); no rows if none was found.
+        """Find a path from start to goal.
 
-        A disc inside the object goes first, then the object around the disc's path, then each robot around
-        the object's; the more samples it takes the harder the robot. Robots are added hardest first, around
-        the path of those before.
+        A disc inside the object comes first, then the object around the disc's path, then the object with
+        each single robot around the object's path. Robots are then added one by one, around the path found
+        before; the robot that needed most samples comes first.
 
         Args:
-            samples: Samples drawn at most for each stage.
-            choices: Paths of the object among which the quickest is taken, for it decides how all turn.
+            samples: Samples drawn at most for each subsystem.
+            choices: Number of paths of the object, of which the one with the shortest duration is followed;
+                it decides in which directions the team turns.
+
+        Returns:
+            Configurations with theta unwrapped, shape (m, 3 + n) [m, rad]; no rows if no path was found.
         """
-        robots, stage = self._ladder.robots, self._ladder.stage
+        robots, subsystem = self._hierarchy.robots, self._hierarchy.subsystem
         steps = 2 + 2 * len(robots)
-        disc, _ = self._guide(self._ladder.disc, None, _DISC_SHARE * samples)
-        disc = None if disc is None else replace(disc, turned=False)
-        self._told(1 / steps)
-        found = (self._guide(stage(()), disc, samples)[0] for _ in range(choices))
-        best = min((guide for guide in found if guide is not None), key=_hurried, default=None)
+        disc, _ = self._guide(self._hierarchy.disc, None, DISC_SAMPLES_FACTOR * samples)
+        disc = None if disc is None else replace(disc, has_theta=False)
+        self._report(1 / steps)
+        found = (self._guide(subsystem(()), disc, samples)[0] for _ in range(choices))
+        best = min((guide for guide in found if guide is not None), key=_least_duration, default=None)
         self.object_blocked = best is None
-        alone: list[tuple[int, int, Guide]] = []
+        alone: list[tuple[int, int, GuidePath]] = []
         for robot in robots if best is not None else ():
-            self._told((2 + len(alone)) / steps)
-            guide, effort = self._guide(stage((robot,)), best, samples)
+            self._report((2 + len(alone)) / steps)
+            guide, effort = self._guide(subsystem((robot,)), best, samples)
             if guide is None:
-                guide, more = self._guide(stage((robot,)), disc, samples)
+                guide, more = self._guide(subsystem((robot,)), disc, samples)
                 effort += more
             if guide is None:
                 return _NO_PATH
@@ -142,102 +172,106 @@ class Sampler:
         added: tuple[int, ...] = ()
         for _, robot, guide in alone:
             added = tuple(sorted((*added, robot)))
-            self._told((1 + len(robots) + len(added)) / steps)
-            best = guide if len(added) == 1 else self._guide(stage(added), best, samples)[0]
+            self._report((1 + len(robots) + len(added)) / steps)
+            best = guide if len(added) == 1 else self._guide(subsystem(added), best, samples)[0]
             if best is None:
                 return _NO_PATH
         return _NO_PATH if best is None else best.path
 
-    def _guide(self, stage: Stage, around: Guide | None, samples: int) -> tuple[Guide | None, int]:
-        """Path of a stage, sampled around another one's, and the samples drawn for it."""
-        guide, spread = _corridor(stage, around)
-        if not is_free(stage.team, self._walls, stage.start, self._gap):
+    def _guide(
+        self, subsystem: Subsystem, around: GuidePath | None, samples: int
+    ) -> tuple[GuidePath | None, int]:
+        """Path of a subsystem, sampled around a guide path, and the number of samples drawn for it."""
+        guide, spread = _sampling_region(subsystem, around)
+        if not is_free(subsystem.team, self._walls, subsystem.start, self._gap):
             return None, 0
-        roots = self._goals(stage)
+        roots = self._goals(subsystem)
         if len(roots) == 0:
             return None, 0
         length = 0.0 if around is None else np.hypot(*np.diff(around.path[:, :2], axis=0).T).sum()
-        samples *= max(1, int(length / _SAMPLED_LENGTH))
-        path, drawn = self._connect(stage, roots, guide, spread, samples)
-        return (Guide(self._shortened(stage, path), stage.joints) if len(path) else None), drawn
+        samples *= max(1, int(length / SAMPLED_LENGTH))
+        path, drawn = self._connect(subsystem, roots, guide, spread, samples)
+        return (GuidePath(self._shortened(subsystem, path), subsystem.joints) if len(path) else None), drawn
 
     def _connect(
-        self, stage: Stage, roots: FloatArray, guide: FloatArray, spread: FloatArray, samples: int
+        self, subsystem: Subsystem, roots: FloatArray, guide: FloatArray, spread: FloatArray, samples: int
     ) -> tuple[FloatArray, int]:
-        tree = stage.question.tree
+        tree = subsystem.question.tree
         lower = np.array([*self._bounds[:2], -np.pi, *tree.joint_lower])
         upper = np.array([*self._bounds[2:], np.pi, *tree.joint_upper])
         uniforms = self._random.random((samples, 2 + len(lower)))
         path, drawn = connect(
-            stage.team,
+            subsystem.team,
             self._walls,
-            stage.start,
+            subsystem.start,
             roots,
             guide,
             spread,
             lower,
             upper,
-            stage.scale,
+            subsystem.scale,
             self._gap,
-            _STEP,
+            COLLISION_STEP,
             uniforms,
         )
         return path, drawn
 
-    def _goals(self, stage: Stage) -> FloatArray:
-        """Free goal configurations: fixed joints as asked, free ones at random."""
-        question = stage.question
+    def _goals(self, subsystem: Subsystem) -> FloatArray:
+        """Free goal configurations: joints with a goal have that value, the others random values."""
+        question = subsystem.question
         lower, upper = question.tree.joint_lower, question.tree.joint_upper
         roots: list[FloatArray] = []
         free = [i for i, value in enumerate(question.goal_joints) if value is None]
         fixed = [0.0 if value is None else value for value in question.goal_joints]
-        for _ in range(40 * _ROOTS if free else 1):
+        for _ in range(GOAL_SAMPLES if free else 1):
             joints = np.array(fixed)
             if free:
                 joints[free] = lower[free] + self._random.random(len(free)) * (upper - lower)[free]
             z = np.concatenate((question.goal_pose, joints))
-            if is_free(stage.team, self._walls, z, self._gap):
+            if is_free(subsystem.team, self._walls, z, self._gap):
                 roots.append(z)
-            if len(roots) == _ROOTS:
+            if len(roots) == GOALS:
                 break
         return np.array(roots).reshape(-1, 3 + len(lower))
 
-    def _shortened(self, stage: Stage, path: FloatArray) -> FloatArray:
-        uniforms = self._random.random((_SHORTCUTS, 3))
-        path = densified(path, stage.scale, _SPACING)
-        better: FloatArray = shortened(stage.team, self._walls, path, stage.scale, self._gap, _STEP, uniforms)
+    def _shortened(self, subsystem: Subsystem, path: FloatArray) -> FloatArray:
+        uniforms = self._random.random((SHORTCUTS, 3))
+        path = densified(path, subsystem.scale, SPACING)
+        better: FloatArray = shortened(
+            subsystem.team, self._walls, path, subsystem.scale, self._gap, COLLISION_STEP, uniforms
+        )
         return better
 
-    def _told(self, share: float) -> None:
-        if self._tell is not None:
-            self._tell(share)
+    def _report(self, fraction: float) -> None:
+        if self._progress is not None:
+            self._progress(fraction)
 
 
-def _hurried(guide: Guide) -> float:
-    """Least time that a path of the object may take, walls aside [s]."""
+def _least_duration(guide: GuidePath) -> float:
+    """Duration of a path of the object at the highest average speeds, however near the walls are [s]."""
     moved = np.abs(np.diff(guide.path[:, :3], axis=0))
     return float(np.maximum(np.hypot(moved[:, 0], moved[:, 1]) / SPEED, moved[:, 2] / TURN_RATE).sum())
 
 
-def _corridor(stage: Stage, around: Guide | None) -> tuple[FloatArray, FloatArray]:
-    """Configurations to sample around and how far, zero for axes that the guide does not know."""
-    size = 3 + len(stage.joints)
+def _sampling_region(subsystem: Subsystem, around: GuidePath | None) -> tuple[FloatArray, FloatArray]:
+    """Configurations to sample around, and how far in every axis; zero for axes without a guide."""
+    size = 3 + len(subsystem.joints)
     spread = np.zeros(size)
     if around is None:
         return np.zeros((0, size)), spread
-    dense = densified(around.path, np.ones(around.path.shape[1]), _SPACING)
+    dense = densified(around.path, np.ones(around.path.shape[1]), SPACING)
     guide = np.zeros((len(dense), size))
-    columns = [0, 1, 2, *[3 + stage.joints.index(joint) for joint in around.joints]]
+    columns = [0, 1, 2, *[3 + subsystem.joints.index(joint) for joint in around.joints]]
     guide[:, columns] = dense
-    if not around.turned:
+    if not around.has_theta:
         columns.remove(2)
-    spread[columns] = _SPREAD_ANGLE
-    spread[:2] = _SPREAD_POSITION
+    spread[columns] = ANGLE_SPREAD
+    spread[:2] = POSITION_SPREAD
     return guide, spread
 
 
 def _disc_question(question: PlanningProblem) -> PlanningProblem:
-    """The question for the largest disc inside one piece of the object: what blocks it blocks the team."""
+    """The question for the largest disc inside one piece of the object, a relaxation of the team."""
     bodies = [body for body in question.tree.components[0].bodies if body.robot is None]
     discs = [_inscribed(shape) for body in bodies for shape in body.shapes]
     body = Body("disc", None, (max(discs, key=lambda disc: disc.radius),))
@@ -246,21 +280,30 @@ def _disc_question(question: PlanningProblem) -> PlanningProblem:
 
 
 def _inscribed(shape: ConvexShape) -> ConvexShape:
-    """A disc inside a convex piece."""
+    """A disc inside a convex piece, a little smaller than the largest one."""
     hull = MultiPoint(shape.vertices).convex_hull
     if not isinstance(hull, Polygon):
         return ConvexShape(shape.vertices.mean(axis=0, keepdims=True), shape.radius)
-    line = maximum_inscribed_circle(hull, tolerance=1e-3 * hull.length)
-    return ConvexShape(np.array(line.coords[:1]), 0.98 * line.length + shape.radius)
+    line = maximum_inscribed_circle(hull, tolerance=DISC_TOLERANCE * hull.length)
+    return ConvexShape(np.array(line.coords[:1]), DISC_SHRINKAGE * line.length + shape.radius)
 
 
 def densified(path: FloatArray, scale: FloatArray, step: float) -> FloatArray:
-    """The same path with no two neighbours further apart than a step in any scaled axis; shape (m, d)."""
+    """A path with samples added, so that neighbours are at most a step apart in every scaled axis.
+
+    Args:
+        path: Configurations, shape (k, d).
+        scale: How far a unit of each axis moves the team, shape (d,).
+        step: The distance [m].
+
+    Returns:
+        Configurations, shape (m, d), those of the path among them.
+    """
     if len(path) < 2:
         return path.copy()
     moved = np.abs(np.diff(path, axis=0) * scale).max(axis=1)
     parts = np.maximum(1, np.ceil(moved / step)).astype(int)
     rows = np.repeat(np.arange(len(parts)), parts)
-    share = (np.arange(len(rows)) - np.repeat(np.cumsum(parts) - parts, parts) + 1.0) / parts[rows]
-    dense: FloatArray = path[rows] + share[:, None] * (path[rows + 1] - path[rows])
+    fraction = (np.arange(len(rows)) - np.repeat(np.cumsum(parts) - parts, parts) + 1.0) / parts[rows]
+    dense: FloatArray = path[rows] + fraction[:, None] * (path[rows + 1] - path[rows])
     return np.concatenate((path[:1], dense))

@@ -1,4 +1,4 @@
-"""Teams much larger or smaller than usual are planned for at the usual size: lengths change their unit."""
+"""A change of the unit of length, so that teams much larger or smaller than usual are planned like others."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ from coop_drake.answers.proof import (
     OverCell,
     OverSlice,
 )
-from coop_drake.answers.search_report import SearchReport
 from coop_drake.geometry.swept_tree import Intervals
-from coop_drake.planning.boxes.channel import Channel, NoChannel, Way
+from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.events import ChannelSearched, Event, SeenCell, SliceAdded, Watch
 from coop_drake.planning.questions.margins import SMALLEST_MARGIN
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
-_USUAL_MARGINS = (SMALLEST_MARGIN, 0.4)
+USUAL_MARGINS = (SMALLEST_MARGIN, 0.4)
+"""Margins that make sense for a team of the usual size, smallest and largest [m]."""
 
 
 @dataclass(frozen=True)
 class Rescaling:
-    """A question in another unit, and its answers back in metres.
+    """Expresses a question in another unit, and its answers in metres.
 
     Attributes:
         problem: The question in metres.
@@ -61,11 +61,11 @@ class Rescaling:
             settings=_settings(problem.settings, scale),
         )
 
-    def answer(self, found: Way | Channel | NoChannel) -> Way | Channel | NoChannel:
+    def answer(self, found: CoveredPath | Channel | NoChannel) -> CoveredPath | Channel | NoChannel:
         """An answer with all lengths in metres."""
         if isinstance(found, Channel):
             return self._channel(found)
-        if isinstance(found, Way):
+        if isinstance(found, CoveredPath):
             path = found.path * self._configuration_units()
             channel = found.channel
             return replace(
@@ -94,14 +94,8 @@ class Rescaling:
         path = None if found.path is None else found.path * self._configuration_units()
         return replace(found, boxes=boxes, margin=self.unit * found.margin, path=path)
 
-    def report(self, found: SearchReport) -> SearchReport:
-        """A report with all lengths in metres."""
-        return replace(
-            found, margins=tuple((self.unit * margin, verdict) for margin, verdict in found.margins)
-        )
-
     def watched(self, watch: Watch | None) -> Watch | None:
-        """Somebody who watches the question in metres."""
+        """A function that expresses every event in metres before it is passed on."""
         if watch is None:
             return None
         robots: tuple[int, ...] = ()
@@ -161,8 +155,8 @@ class Rescaling:
 
 
 def _settings(settings: PlannerSettings, scale: float) -> PlannerSettings:
-    """Settings in another unit; a margin that no team of usual size could mean is the usual one."""
-    margin, (least, most) = scale * settings.margin, _USUAL_MARGINS
+    """Settings in another unit; a margin that makes no sense for the usual size becomes the default."""
+    margin, (least, most) = scale * settings.margin, USUAL_MARGINS
     if settings.margin > 0.0 and not least <= margin <= most:
         margin = PlannerSettings().margin
     return replace(settings, margin=margin, length_resolution=scale * settings.length_resolution)

@@ -1,0 +1,228 @@
+"""Search by sampled paths: a path is sampled, smoothed and covered with boxes that are proved free."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from shapely.errors import ShapelyError
+
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.errors import GeometryError
+from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.planning.boxes.boxes import Regions, make_channel
+from coop_drake.planning.boxes.certify import Certifier, PathBox
+from coop_drake.planning.boxes.channel import Channel, CoveredPath
+from coop_drake.planning.questions.margins import exact_footprint, marginal_workspace
+from coop_drake.planning.sampling.clear_paths import best_candidate, margins_to_try, moved_from_obstacles
+from coop_drake.planning.sampling.elastic_band import smoothed
+from coop_drake.planning.sampling.narrow_passages import repaired, widened_floor
+from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
+from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.pose import FloatArray
+
+__all__ = ["BoxSequence", "SampledSearch", "luby"]
+
+CLEARANCES = (0.015, 0.002)
+"""Clearances from the walls with which paths are sampled, in turns [m]: the larger one leaves space for long
+boxes, the smaller one lets narrow passages through."""
+
+SAMPLES = 4_000
+"""Samples for every subsystem in the first attempt; enough for most floors, at a tenth of a second."""
+
+BODY_GAP = 0.01
+"""Distance that sampled paths keep between bodies of the team [m], so that boxes around them have a width."""
+
+FLOOR_GROWTHS, SEEDS_PER_GROWTH = (0.1, 0.06, 0.03), 2
+"""Amounts by which walls are moved back for paths through narrow passages [m], largest first because these
+are the easiest to sample, and random seeds for each of them."""
+
+FIRST_SMOOTHINGS = (0.05, 600), (0.05, 3_000)
+"""Spacing of samples [m] and number of moves with which a new path is smoothed; the longer smoothing follows
+only if boxes cannot cover the path after the shorter one."""
+
+LIGHT_ATTEMPTS = 4
+"""Attempts with few samples, before those with many begin."""
+
+MANY_SAMPLES = 32_000
+"""Samples for every subsystem in later attempts: about a second each."""
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class BoxSequence:
+    """Boxes along a path that are proved free; a channel without its polygons.
+
+    Attributes:
+        boxes: From the start's box to the goal's box.
+        path: The path that they cover, theta unwrapped, shape (m, 3 + n) [m, rad].
+        margin: The margin that the path's positions keep in every box [m].
+    """
+
+    boxes: tuple[PathBox, ...]
+    path: FloatArray
+    margin: float
+
+
+class SampledSearch:
+    """Finds a box sequence at margin zero first, then looks for a larger margin near it.
+
+    What it finds is proved by the boxes, whatever was sampled. That it finds nothing proves nothing.
+
+    Args:
+        problem: The question.
+
+    Attributes:
+        slices: Boxes tried so far.
+        object_blocked: Number of attempts in a row in which no path was found even for the object alone.
+    """
+
+    def __init__(self, problem: PlanningProblem) -> None:
+        self._problem = problem
+        self._swept = SweptTree(problem.tree)
+        self._pairs = BodyPairs(self._swept)
+        self._scale = configuration_scale(problem.tree)
+        self._hierarchy = SubsystemHierarchy(problem)
+        self._start_inside = problem.workspace.contains(exact_footprint(problem.tree, problem.start))
+        self._attempts = 0
+        self.slices = 0
+        self.object_blocked = 0
+
+    def attempt(self, progress: Progress | None = None) -> BoxSequence | None:
+        """Sample one path and cover it at margin zero; every call uses other samples.
+
+        Args:
+            progress: Called with the fraction of the sampling that is done.
+
+        Returns:
+            The boxes, or None if no path was found or covered.
+        """
+        self._attempts += 1
+        try:
+            return self._attempt(self._attempts, progress) if self._start_inside else None
+        except (GeometryError, ShapelyError):
+            return None
+
+    def _attempt(self, number: int, progress: Progress | None) -> BoxSequence | None:
+        clearance = CLEARANCES[(number - 1) % len(CLEARANCES)]
+        workspace = marginal_workspace(self._problem, clearance)
+        sampler = Sampler(self._hierarchy, workspace, BODY_GAP, number - 1, progress)
+        path = sampler.path(_samples(number))
+        self.object_blocked = self.object_blocked + 1 if sampler.object_blocked else 0
+        if len(path) == 0:
+            return None
+        for spacing, moves in FIRST_SMOOTHINGS:
+            path = smoothed(self._problem, path, clearance, 0.0, BODY_GAP, spacing, moves)
+            found = self._covered(path, 0.0, longest=True)
+            if found is not None:
+                return found
+        return None
+
+    def narrow_attempt(self, progress: Progress | None = None) -> BoxSequence | None:
+        """Sample paths on larger floors, repair them until they fit the floor, and cover them at margin zero.
+
+        This finds passages that are too narrow for samples.
+
+        Args:
+            progress: Called with the fraction of the sampling that is done.
+
+        Returns:
+            The boxes, or None if no path was found or covered.
+        """
+        try:
+            fitting: list[FloatArray] = []
+            for seed, growth in product(range(SEEDS_PER_GROWTH), FLOOR_GROWTHS if self._start_inside else ()):
+                larger = widened_floor(self._problem.workspace, growth)
+                path = Sampler(self._hierarchy, larger, BODY_GAP, seed, progress).path(SAMPLES)
+                fit = repaired(self._problem, path, growth) if len(path) else None
+                if fit is not None:
+                    fitting.append(fit)
+                    found = self._covered(fit, 0.0, longest=True)
+                    if found is not None:
+                        return found
+            # The smallest boxes come last, because a transport through them takes long.
+            covered = (self._covered(fit, 0.0, longest=True, smallest=True) for fit in fitting)
+            return next((found for found in covered if found is not None), None)
+        except (GeometryError, ShapelyError):
+            return None
+
+    def with_margin(self, first: BoxSequence, progress: Callable[[float, float], None]) -> BoxSequence:
+        """Move the best path away from the walls, and cover it at the largest margin that it keeps.
+
+        Args:
+            first: Boxes at margin zero.
+            progress: Called with a margin [m] and the fraction of the path that is covered.
+
+        Returns:
+            Boxes at a margin; at margin zero if no other margin is kept.
+        """
+        progress(0.0, 0.0)
+        near = best_candidate(self._problem, self._hierarchy, first.path, BODY_GAP)
+        path = moved_from_obstacles(self._problem, near, BODY_GAP)
+        for margin in margins_to_try(self._problem, path):
+            progress(margin, 0.0)
+            try:
+                found = self._covered(path, margin, progress)
+            except (GeometryError, ShapelyError):
+                found = None
+            if found is not None:
+                return found
+        return self._covered(path, 0.0) or self._covered(first.path, 0.0) or first
+
+    def _covered(
+        self,
+        path: FloatArray,
+        margin: float,
+        progress: Callable[[float, float], None] | None = None,
+        *,
+        longest: bool = False,
+        smallest: bool = False,
+    ) -> BoxSequence | None:
+        """Cover a path with boxes that keep a margin."""
+        workspace = marginal_workspace(self._problem, margin)
+        certifier = Certifier(self._swept, self._pairs, workspace, self._scale, margin)
+        report = None if progress is None else (lambda fraction: progress(margin, fraction))
+        boxes = certifier.boxes(path, report, longest=longest, smallest=smallest)
+        self.slices += certifier.trials
+        return None if boxes is None else BoxSequence(tuple(boxes), path, margin)
+
+    def covered_path(self, found: BoxSequence, spare: BoxSequence) -> CoveredPath:
+        """The path of some boxes, whose polygons are made on request.
+
+        Args:
+            found: The boxes.
+            spare: Boxes to use if the polygons of the others cannot be made.
+        """
+
+        def channel() -> Channel:
+            made = self._channel(found) or self._channel(spare)
+            if made is None:
+                raise GeometryError("the free positions of the boxes along a path cannot be computed")
+            return made
+
+        return CoveredPath(found.path, found.margin, channel)
+
+    def _channel(self, found: BoxSequence) -> Channel | None:
+        """Boxes with all positions that are free for them; None if geometry fails."""
+        regions = Regions(self._problem, self._swept, self._pairs, found.margin)
+        boxes = [regions.around(box) for box in found.boxes]
+        made = [box for box in boxes if box is not None]
+        complete = len(made) == len(boxes)
+        return make_channel(self._problem, made, found.margin, found.path) if complete else None
+
+
+def _samples(number: int) -> int:
+    """Samples for every subsystem in an attempt, counted from 1: few at first, then many."""
+    if number <= LIGHT_ATTEMPTS:
+        return SAMPLES * luby(number)
+    return MANY_SAMPLES * luby(number - LIGHT_ATTEMPTS)
+
+
+def luby(number: int) -> int:
+    """Luby's sequence of budgets for restarts, 1 1 2 1 1 2 4 and so on, counted from 1."""
+    size = int(np.log2(number + 1))
+    return 1 << size - 1 if number + 1 == 1 << size else luby(number + 1 - (1 << size))
