@@ -7,7 +7,6 @@ from math import pi
 
 import numpy as np
 import shapely
-from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem
@@ -18,6 +17,7 @@ from coop_drake.geometry.sweep_kernels import over_piece
 from coop_drake.geometry.swept_tree import Piece, sweep_arrays
 from coop_drake.planning.cells.cells import regions_of
 from coop_drake.planning.proofs.proof_making import disc_proof
+from coop_drake.planning.questions.relaxation import inscribed_disc
 from coop_drake.tree.component_tree import ComponentTree, ConvexShape
 from coop_drake.tree.pose import FloatArray
 
@@ -25,9 +25,6 @@ _DIRECTIONS = normals(np.arange(0.0, 32.0) * (pi / 16.0))
 
 INSIDE = 1.0 - 1e-9
 """Discs are shrunk by this factor, so that rounding leaves them inside the team [-]."""
-
-POLE_TOLERANCE = 1e-4
-"""A larger inscribed disc may be larger by this much [m]."""
 
 
 def disc_refuted(problem: PlanningProblem) -> DiscProof | None:
@@ -61,16 +58,6 @@ def _discs(tree: ComponentTree) -> Iterator[tuple[int, ConvexShape]]:
                 disc = inscribed_disc(shape)
                 if disc.radius > 0.0:
                     yield index, disc
-
-
-def inscribed_disc(shape: ConvexShape) -> ConvexShape:
-    """The largest disc inside a convex shape; of radius zero for a shape without interior."""
-    if len(shape.vertices) < 3:
-        return ConvexShape(shape.vertices.mean(axis=0, keepdims=True), shape.radius)
-    ring = Polygon(shape.vertices)
-    pole = shapely.maximum_inscribed_circle(ring, tolerance=POLE_TOLERANCE)
-    centre = np.asarray(pole.coords[0])
-    return ConvexShape(centre[None, :], float(ring.exterior.distance(Point(centre))) + shape.radius)
 
 
 def _places(problem: PlanningProblem, component: int, centre: FloatArray) -> BaseGeometry:

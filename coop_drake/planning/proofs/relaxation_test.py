@@ -5,7 +5,8 @@ from __future__ import annotations
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.questions.relaxation import relaxed
-from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
+from coop_drake.planning.sampling.sampler import Sampler
+from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
 
 __all__ = ["RelaxationTest"]
 

@@ -1,4 +1,4 @@
-"""Relaxations: the same question with fewer robots. If a relaxation is infeasible, the question is too."""
+"""Relaxations: the same question with fewer robots or a disc; if one is infeasible, the question is too."""
 
 from __future__ import annotations
 
@@ -6,9 +6,16 @@ from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
+import shapely
+from shapely import Point, Polygon
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.tree.component_tree import Component, ComponentTree
+from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape
+
+__all__ = ["inscribed_disc", "relaxed"]
+
+POLE_TOLERANCE = 1e-4
+"""Accuracy of the radius of an inscribed disc, unless another one is asked for [m]."""
 
 
 def relaxed(problem: PlanningProblem, robots: Collection[int]) -> tuple[PlanningProblem, tuple[int, ...]]:
@@ -43,3 +50,18 @@ def _renumbered(component: Component, kept: list[int], joints: list[int]) -> Com
         return component
     joint = replace(component.joint, index=joints.index(component.joint.index))
     return replace(component, parent=kept.index(component.parent), joint=joint)
+
+
+def inscribed_disc(shape: ConvexShape, tolerance: float = POLE_TOLERANCE) -> ConvexShape:
+    """The largest disc inside a convex shape; of radius zero for a shape without interior.
+
+    Args:
+        shape: The shape.
+        tolerance: A larger disc may be larger by this much [m].
+    """
+    if len(shape.vertices) < 3:
+        return ConvexShape(shape.vertices.mean(axis=0, keepdims=True), shape.radius)
+    ring = Polygon(shape.vertices)
+    pole = shapely.maximum_inscribed_circle(ring, tolerance=tolerance)
+    centre = np.asarray(pole.coords[0])
+    return ConvexShape(centre[None, :], float(ring.exterior.distance(Point(centre))) + shape.radius)

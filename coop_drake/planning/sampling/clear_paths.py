@@ -8,7 +8,8 @@ from itertools import takewhile
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.questions.margins import SMALLEST_MARGIN, marginal_workspace
 from coop_drake.planning.sampling.elastic_band import estimated_duration, path_clearance, smoothed
-from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
+from coop_drake.planning.sampling.sampler import Sampler
+from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["best_candidate", "margins_to_try", "moved_from_obstacles"]

@@ -6,16 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from shapely import MultiPoint, MultiPolygon, Polygon, maximum_inscribed_circle
+from shapely import MultiPolygon
 
-from coop_drake.answers.problem import PlanningProblem
-from coop_drake.planning.questions.relaxation import relaxed
 from coop_drake.planning.sampling.collision_kernels import is_free
 from coop_drake.planning.sampling.obstacle_grid import Walls, walls_for
 from coop_drake.planning.sampling.random_trees import connect, shortened
-from coop_drake.planning.sampling.team_arrays import TeamArrays, team_arrays
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape
-from coop_drake.tree.levers import configuration_scale
+from coop_drake.planning.sampling.subsystems import Subsystem, SubsystemHierarchy
 from coop_drake.tree.pose import FloatArray
 
 COLLISION_STEP = 0.03
@@ -46,9 +42,6 @@ SAMPLED_LENGTH = 20.0
 SPEED, TURN_RATE, JOINT_RATE = 1.2, 0.5, 0.6
 """Highest average speeds of position, theta and joints in simulated transports [m/s, rad/s]."""
 
-DISC_TOLERANCE, DISC_SHRINKAGE = 1e-3, 0.98
-"""Accuracy of an inscribed disc over its piece's perimeter, and the factor by which it is shrunk [-]."""
-
 _NO_PATH = np.empty((0, 3))
 
 
@@ -65,45 +58,6 @@ class GuidePath:
     path: FloatArray
     joints: tuple[int, ...]
     has_theta: bool = True
-
-
-class Subsystem:
-    """The object with some of the robots: a relaxation of the question, as arrays for the kernels.
-
-    Args:
-        question: The whole question or a relaxation of it.
-        joints: For each of its joints the index of that joint in the whole q.
-    """
-
-    def __init__(self, question: PlanningProblem, joints: tuple[int, ...]) -> None:
-        self.question, self.joints = question, joints
-        self.team: TeamArrays = team_arrays(question.tree)
-        self.scale = configuration_scale(question.tree)
-        self.start = question.start.astype(float)
-
-
-class SubsystemHierarchy:
-    """The subsystems of one question, from a disc to the whole team; made once for all samplers.
-
-    Args:
-        problem: The question.
-
-    Attributes:
-        robots: All robots, ascending.
-        disc: The largest disc inside one piece of the object.
-    """
-
-    def __init__(self, problem: PlanningProblem) -> None:
-        self.robots = tuple(sorted({joint.robot for joint in problem.tree.joints}))
-        self._problem = problem
-        self._subsystems: dict[tuple[int, ...], Subsystem] = {}
-        self.disc = Subsystem(_disc_question(relaxed(problem, ())[0]), ())
-
-    def subsystem(self, robots: tuple[int, ...]) -> Subsystem:
-        """The object with some of the robots, given in ascending order."""
-        if robots not in self._subsystems:
-            self._subsystems[robots] = Subsystem(*relaxed(self._problem, robots))
-        return self._subsystems[robots]
 
 
 class Sampler:
@@ -268,24 +222,6 @@ def _sampling_region(subsystem: Subsystem, around: GuidePath | None) -> tuple[Fl
     spread[columns] = ANGLE_SPREAD
     spread[:2] = POSITION_SPREAD
     return guide, spread
-
-
-def _disc_question(question: PlanningProblem) -> PlanningProblem:
-    """The question for the largest disc inside one piece of the object, a relaxation of the team."""
-    bodies = [body for body in question.tree.components[0].bodies if body.robot is None]
-    discs = [_inscribed(shape) for body in bodies for shape in body.shapes]
-    body = Body("disc", None, (max(discs, key=lambda disc: disc.radius),))
-    tree = ComponentTree((Component("disc", None, None, (body,)),), frozenset())
-    return replace(question, tree=tree)
-
-
-def _inscribed(shape: ConvexShape) -> ConvexShape:
-    """A disc inside a convex piece, a little smaller than the largest one."""
-    hull = MultiPoint(shape.vertices).convex_hull
-    if not isinstance(hull, Polygon):
-        return ConvexShape(shape.vertices.mean(axis=0, keepdims=True), shape.radius)
-    line = maximum_inscribed_circle(hull, tolerance=DISC_TOLERANCE * hull.length)
-    return ConvexShape(np.array(line.coords[:1]), DISC_SHRINKAGE * line.length + shape.radius)
 
 
 def densified(path: FloatArray, scale: FloatArray, step: float) -> FloatArray:

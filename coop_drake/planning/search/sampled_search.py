@@ -20,7 +20,8 @@ from coop_drake.planning.questions.margins import exact_footprint, marginal_work
 from coop_drake.planning.sampling.clear_paths import best_candidate, margins_to_try, moved_from_obstacles
 from coop_drake.planning.sampling.elastic_band import smoothed
 from coop_drake.planning.sampling.narrow_passages import repaired, widened_floor
-from coop_drake.planning.sampling.sampler import Sampler, SubsystemHierarchy
+from coop_drake.planning.sampling.sampler import Sampler
+from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
