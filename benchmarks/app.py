@@ -22,6 +22,7 @@ from benchmarks.planner.growth import growth_tasks
 from benchmarks.planner.head_to_head import Effort, head_to_head_tasks
 from benchmarks.planner.ompl_peer import has_ompl
 from benchmarks.planner.ours import compile_kernels
+from benchmarks.planner.stages import stage_tasks
 from benchmarks.simulating import simulating_tasks
 from benchmarks.starting import starting_tasks
 from benchmarks.table import show
@@ -48,7 +49,7 @@ def main(
     only: Annotated[
         list[str] | None,
         typer.Option(
-            help="A case, peer or group: base, ompl, growth, robots, ablation, no_way; may be repeated."
+            help="A case, peer or group: base, ompl, growth, ablation, stages, no_way; may be repeated."
         ),
     ] = None,
     seeds: Annotated[int, typer.Option(min=1, help="Runs of every peer.")] = 10,
@@ -92,6 +93,7 @@ def _tasks(effort: Effort) -> list[Task]:
     return [
         *head_to_head_tasks(effort),
         *ablation_tasks(min(effort.limit, _ABLATION_LIMIT)),
+        *stage_tasks(effort.limit),
         *growth_tasks(effort.limit),
         *contradiction_tasks(),
         *starting_tasks(),

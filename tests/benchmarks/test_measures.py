@@ -6,6 +6,7 @@ from benchmarks.planner import growth
 from benchmarks.planner.ablation import VARIANTS, answer
 from benchmarks.planner.family import first_question
 from benchmarks.planner.ours import plan_repeatedly
+from benchmarks.planner.stages import STAGES, stage_rows, without_stage
 
 EASY = first_question()
 
@@ -15,6 +16,21 @@ def test_every_variant_answers_an_easy_question(variant):
     answered = answer(EASY, variant)
     assert answered.answer == "found"
     assert answered.slices > 0
+
+
+@pytest.mark.parametrize("variant", STAGES)
+def test_a_plan_is_found_without_any_one_stage(variant):
+    replaced = [(part.module, part.name, getattr(part.module, part.name)) for part in STAGES[variant]]
+    planned = without_stage(EASY, variant)
+    assert planned.answer == "found"
+    assert planned.transport_seconds > 0.0
+    assert all(getattr(module, name) is value for module, name, value in replaced)
+
+
+def test_stages_are_rows_of_every_variant():
+    rows = stage_rows("planner/stages/easy", EASY, limit=120)
+    assert {row.item for row in rows} == set(STAGES)
+    assert {row.figure for row in rows} == {"answer", "transport", "margin", "cells", "cpu_seconds"}
 
 
 def test_growth_is_told_in_rows():

@@ -1,0 +1,138 @@
+"""What each stage of path improvement is worth: plans with one stage switched off at a time.
+
+A stage is switched off in the process that measures it, by replacing the function or the constant that makes
+it work. Each variant is compared with ``everything``: estimated transport time, margin and planning time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+from unittest.mock import patch
+
+from benchmarks.isolated import in_own_process
+from benchmarks.planner.cases import Case
+from benchmarks.planner.family import first_question
+from benchmarks.planner.ours import Planned, plan_repeatedly
+from benchmarks.rows import Row
+from benchmarks.tasks import Task
+from coop_drake.answers import PlanningProblem
+from coop_drake.planning.improvement import path_covering, quickest
+from coop_drake.planning.sampling import clear_paths
+from coop_drake.planning.sampling.elastic_band import smoothed
+from coop_drake.planning.search import sampled_search
+
+__all__ = ["CASES", "STAGES", "Replacement", "stage_rows", "stage_tasks", "without_stage"]
+
+CASES = ("base", "tight", "three", "elbow", "warehouse")
+"""Shipped scenarios that have a plan."""
+
+REPEATS = 2
+"""Plans of every variant; the shortest planning time counts, for the machine is never idle."""
+
+PATIENCE = 10.0
+"""A variant that took longer is not repeated [CPU s]."""
+
+
+@dataclass(frozen=True)
+class Replacement:
+    """What stands in for a part of the planner.
+
+    Attributes:
+        module: The module whose name is replaced.
+        name: The name.
+        value: What replaces it.
+    """
+
+    module: Any
+    name: str
+    value: Any
+
+
+def _known_path(problem: PlanningProblem, hierarchy: object, known: Any, gap: float) -> Any:
+    """Smooth the known path only, as it is smoothed before candidates are compared."""
+    moves = clear_paths.COMPARED_MOVES
+    return smoothed(problem, known, clear_paths.LEAST_CLEARANCE, 0.0, gap, moves=moves)
+
+
+def _same_path(problem: PlanningProblem, path: Any, gap: float) -> Any:
+    """Leave the path as it is."""
+    return path
+
+
+STAGES: dict[str, tuple[Replacement, ...]] = {
+    "everything": (),
+    "no_candidates": (Replacement(sampled_search, "best_candidate", _known_path),),
+    "no_widening": (Replacement(clear_paths, "WIDE_MOVES", 0),),
+    "no_straightening": (Replacement(clear_paths, "STRAIGHTENINGS", ()),),
+    "no_centring": (Replacement(clear_paths, "NARROW_REPEATS", 0),),
+    "no_improved_path": (
+        Replacement(sampled_search, "moved_from_obstacles", lambda problem, path, gap: path),
+    ),
+    "no_covering": (Replacement(quickest, "cover_path", lambda *asked: None),),
+    "one_covering_level": (Replacement(path_covering, "LEVELS", path_covering.LEVELS[:1]),),
+    "no_box_repairs": (Replacement(path_covering, "REPAIRS", 0),),
+}
+"""For every variant what is replaced; the name says which stage is missing."""
+
+
+def stage_tasks(limit: float) -> list[Task]:
+    """One task for every case.
+
+    Args:
+        limit: CPU time of all variants of a case together [s].
+    """
+    return [_task(name, limit) for name in CASES]
+
+
+def _task(name: str, limit: float) -> Task:
+    def measure(rows: Sequence[Row]) -> Sequence[Row]:
+        return stage_rows(f"planner/stages/{name}", Case(name).problem(), limit)
+
+    return Task(f"planner/stages/{name}", measure)
+
+
+def stage_rows(name: str, problem: PlanningProblem, limit: float) -> list[Row]:
+    """Plan with every stage switched off in turn, in one process of its own.
+
+    Args:
+        name: What the rows' names begin with.
+        problem: The question.
+        limit: CPU time of all variants together [s].
+    """
+    done = in_own_process(plan_variants, problem, limit=limit).value
+    if done is None:
+        return [Row(f"{name}/everything/answer", 0.0, f"none within {limit:g} CPU s")]
+    rows = []
+    for variant, planned in done.items():
+        what = f"{name}/{variant}"
+        rows.append(Row(f"{what}/answer", float(planned.answer == "found"), planned.answer))
+        if planned.answer == "found":
+            rows += [
+                Row(f"{what}/transport", planned.transport_seconds, "s"),
+                Row(f"{what}/margin", 1e3 * planned.margin_m, "mm"),
+                Row(f"{what}/cells", planned.cells, "cells"),
+                Row(f"{what}/cpu_seconds", planned.cpu_seconds, "s"),
+            ]
+    return rows
+
+
+def plan_variants(problem: PlanningProblem) -> dict[str, Planned]:
+    """Plan with every stage switched off in turn, after a small question has loaded the compiled kernels."""
+    plan_repeatedly(first_question(), 1, PATIENCE)
+    return {variant: without_stage(problem, variant) for variant in STAGES}
+
+
+def without_stage(problem: PlanningProblem, variant: str) -> Planned:
+    """Plan with one stage switched off; the quickest of some repetitions.
+
+    Args:
+        problem: The question.
+        variant: One of ``STAGES``.
+    """
+    with ExitStack() as stack:
+        for replaced in STAGES[variant]:
+            stack.enter_context(patch.object(replaced.module, replaced.name, replaced.value))
+        return min(plan_repeatedly(problem, REPEATS, PATIENCE), key=lambda planned: planned.cpu_seconds)
