@@ -1,28 +1,31 @@
-"""The scene: what is known about positions and theta over the floor, keyframe by keyframe, in Meshcat."""
+"""The scene: the channel that the search follows, over the floor and theta, keyframe by keyframe."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import groupby
 from math import pi
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from manifold3d import CrossSection
 from meshcat.animation import Animation
 
 from coop_drake.drawing import colours
 from coop_drake.drawing.solids import TriangleMesh, extruded_section, joined, tube_mesh
 from coop_drake.files import write_atomically
+from coop_drake.geometry.swept_tree import Interval
 from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.channel_path import PathPiece
 from coop_drake.watching.keyframes import Keyframe
 from coop_drake.watching.offline_page import offline_visualizer
+from coop_drake.watching.projections import union
 from coop_drake.watching.recording import SearchRecording
 from coop_drake.watching.scene_coordinates import SceneCoordinates
 from coop_drake.watching.scene_surroundings import Surface, put_mesh, put_surroundings, scene_labels
-from coop_drake.watching.theta_layers import THETA, Knowledge, Slab, on_turn, slabs_of
+from coop_drake.watching.theta_layers import THETA, layers, on_turn
 
 __all__ = ["scene_page", "write_scene"]
 
@@ -40,26 +43,28 @@ _OUTLINE_TOLERANCE = 0.004
 _LINE = 0.06
 """Radius of the line through the channel [units]."""
 
-_SURFACES = {
-    Knowledge.FREE: Surface(colours.PROVED_FREE, 0.9),
-    Knowledge.UNDECIDED: Surface(colours.UNDECIDED, 0.05, lit=False),
-    Knowledge.CHANNEL: Surface(colours.PROVED_FREE, 0.55),
-    Knowledge.REACHED: Surface(colours.REACHED, 0.5),
-    Knowledge.OTHERS: Surface(colours.UNREACHED, 0.5),
-}
+_CELLS = 0.35
+"""Opacity of cells, through which others and the line are to be seen."""
+
+_CHANNEL = (
+    (True, colours.PROVED_FREE, colours.CHANNEL),
+    (False, colours.UNDECIDED, colours.UNDECIDED_CHANNEL),
+)
+"""Colours of cells that are proved free and of undecided ones, and of the line through them."""
+
 _KEY = (
-    (colours.PROVED_FREE, "proved free for some choice of the joints"),
-    (colours.UNDECIDED, "undecided"),
-    (colours.CHANNEL, "channel, proved; frame: halved now"),
-    (colours.UNDECIDED_CHANNEL, "channel, undecided"),
+    (colours.PROVED_FREE, "cell of the channel, proved free"),
+    (colours.UNDECIDED, "cell of the channel, undecided"),
+    (colours.CHANNEL, "path through cells that are proved free; frame: halved now"),
+    (colours.UNDECIDED_CHANNEL, "path through undecided cells"),
 )
 _COMPONENTS_KEY = (
     (colours.REACHED, "at the end: may be reached from the start"),
     (colours.UNREACHED, "at the end: cannot be reached"),
 )
 _NOTE = (
-    "The floor lies below, the object's angle θ points upwards. Joints have no direction here: "
-    "a position is drawn free, or undecided, if any of their values makes it so."
+    "The floor lies below, the object's angle θ points upwards: each cell of the channel that the search "
+    "follows is as high as its interval of θ. Joints have no direction here."
 )
 
 
@@ -73,7 +78,7 @@ def write_scene(
 def scene_page(
     recording: SearchRecording, frames: Sequence[Keyframe], progress: Progress | None = None
 ) -> str:
-    """Return the page: positions and theta in space, with play, pause and a slider over the keyframes.
+    """Return the page: the channel in space, with play, pause and a slider over the keyframes.
 
     Args:
         recording: The recorded search.
@@ -93,21 +98,16 @@ def scene_page(
     vis = offline_visualizer("Watching the planner search", content)["/think"]
     put_surroundings(vis, recording.problem, scene)
     shown = _Shown(len(frames))
-    groups = [list(group) for _, group in groupby(sorted(slabs_of(frames), key=_object), key=_object)]
-    for number, slabs in enumerate(groups):
+    for number, (_, group) in enumerate(groupby(range(len(frames)), key=lambda k: id(frames[k].path))):
         if progress is not None:
-            progress("layers", number / len(groups))
-        _put_slabs(vis, slabs, scene, shown)
-    _put_channels(vis, frames, scene, shown)
+            progress("channel", number / len(frames))
+        during = list(group)
+        _put_channel(vis, frames[during[0]], (during[0], during[-1]), scene, shown)
     _put_halved_layers(vis, frames, scene, shown)
+    _put_components(vis, frames, scene, shown)
     vis.set_animation(shown.animation)
     page: str = vis.static_html()
     return page
-
-
-def _object(slab: Slab) -> tuple[str, int, int]:
-    """Return what slabs of one object of the scene have in common."""
-    return slab.knowledge.value, slab.first, slab.last
 
 
 class _Shown:
@@ -130,32 +130,39 @@ class _Shown:
             self.animation.at_frame(vis, frame).set_property("visible", "boolean", value)
 
 
-def _put_slabs(vis: Any, slabs: Sequence[Slab], scene: SceneCoordinates, shown: _Shown) -> None:
-    """Put up the slabs that are shown during the same keyframes, as one object."""
+def _put_channel(
+    vis: Any, frame: Keyframe, during: tuple[int, int], scene: SceneCoordinates, shown: _Shown
+) -> None:
+    """Put up the cells of a channel and the path through it, proved and undecided ones apart."""
+    for proved, fill, line in _CHANNEL:
+        name = "proved" if proved else "undecided"
+        cells = [cell for cell in frame.state.channel if (cell.kind is Kind.FREE) == proved]
+        slabs = [(theta, cell.region.section) for cell in cells for theta in on_turn(cell.intervals[0])]
+        _put(vis, f"cells/{name}", during, _slabs(slabs, scene), Surface(fill, _CELLS), shown)
+        pieces = [piece for piece in frame.path if (piece.kind is Kind.FREE) == proved]
+        tubes = joined(tube_mesh(_line(piece, scene), _LINE) for piece in pieces)
+        _put(vis, f"path/{name}", during, tubes, Surface(line, lit=False, hidden=False), shown)
+
+
+def _put(
+    vis: Any, path: str, during: tuple[int, int], mesh: TriangleMesh, surface: Surface, shown: _Shown
+) -> None:
+    """Put up a mesh that is shown from the first to the last of some keyframes, unless it is empty."""
+    if len(mesh.faces):
+        own = vis[f"{path}/{during[0] + 1:03d}-{during[1] + 1:03d}"]
+        put_mesh(own, mesh, surface)
+        shown.during(own, *during)
+
+
+def _slabs(slabs: Iterable[tuple[Interval, CrossSection]], scene: SceneCoordinates) -> TriangleMesh:
+    """Return positions over intervals of theta as one mesh."""
     tolerance = _OUTLINE_TOLERANCE * scene.extent
     mesh = joined(
-        extruded_section(slab.section, *scene.heights(slab.theta, _GAP), tolerance) for slab in slabs
+        extruded_section(section, *scene.heights(theta, _GAP), tolerance)
+        for theta, section in slabs
+        if not section.is_empty()
     )
-    knowledge, first, last = _object(slabs[0])
-    own = vis[f"{knowledge}/{first + 1:03d}-{last + 1:03d}"]
-    put_mesh(own, TriangleMesh(scene.vertices(mesh.vertices), mesh.faces), _SURFACES[slabs[0].knowledge])
-    shown.during(own, first, last)
-
-
-def _put_channels(vis: Any, frames: Sequence[Keyframe], scene: SceneCoordinates, shown: _Shown) -> None:
-    """Put up the line through every channel, its proved and its undecided stretches apart."""
-    for _, group in groupby(range(len(frames)), key=lambda number: id(frames[number].path)):
-        during = list(group)
-        for name, proved, colour in (
-            ("proved", True, colours.CHANNEL),
-            ("undecided", False, colours.UNDECIDED_CHANNEL),
-        ):
-            pieces = [piece for piece in frames[during[0]].path if (piece.kind is Kind.FREE) == proved]
-            mesh = joined(tube_mesh(_line(piece, scene), _LINE) for piece in pieces)
-            if len(mesh.faces):
-                own = vis[f"channel/{name}/{during[0] + 1:03d}-{during[-1] + 1:03d}"]
-                put_mesh(own, mesh, Surface(colour, lit=False, hidden=False))
-                shown.during(own, during[0], during[-1])
+    return TriangleMesh(scene.vertices(mesh.vertices), mesh.faces)
 
 
 def _line(piece: PathPiece, scene: SceneCoordinates) -> FloatArray:
@@ -174,7 +181,19 @@ def _put_halved_layers(vis: Any, frames: Sequence[Keyframe], scene: SceneCoordin
         heights = scene.heights(on_turn(frame.state.splits[-1][0].intervals[0])[0], 0.0)
         rings = [np.column_stack([scene.outline, np.full(len(scene.outline), height)]) for height in heights]
         posts = [np.array([[*corner, height] for height in heights]) for corner in scene.outline[:-1]]
-        own = vis[f"halved/{number + 1:03d}-{number + 1:03d}"]
         lines = joined(tube_mesh(line, 0.25 * _LINE) for line in (*rings, *posts))
-        put_mesh(own, lines, Surface(colours.HALVED))
-        shown.during(own, number, number)
+        _put(vis, "halved", (number, number), lines, Surface(colours.HALVED), shown)
+
+
+def _put_components(vis: Any, frames: Sequence[Keyframe], scene: SceneCoordinates, shown: _Shown) -> None:
+    """Put up what start and goal lie in where they are proved to be apart, united over the joints."""
+    for number, frame in enumerate(frames):
+        if frame.components is None:
+            continue
+        for name, cells, colour in (
+            ("reached", frame.components.reached, colours.REACHED),
+            ("others", frame.components.others, colours.UNREACHED),
+        ):
+            found = layers((leaf.intervals[0], region) for leaf, region in cells)
+            slabs = _slabs(((theta, union(regions)) for theta, regions in found), scene)
+            _put(vis, name, (number, number), slabs, Surface(colour, 0.5), shown)

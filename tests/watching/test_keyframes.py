@@ -16,7 +16,7 @@ from coop_drake.watching import Strategy, keyframes, record_search
 from coop_drake.watching.angle_panels import cut
 from coop_drake.watching.projections import Projections
 from coop_drake.watching.recording import BOXES
-from coop_drake.watching.theta_layers import THETA, Knowledge, on_turn, slabs_of
+from coop_drake.watching.theta_layers import THETA, layers, on_turn
 from tests.watching.rods import NARROW, WIDE, jointed_rod, rod_recording
 
 
@@ -103,40 +103,18 @@ def test_kept_projections_are_those_made_anew(found):
         assert area(frame.projection.mixed) == area(anew.mixed)
 
 
-def test_every_keyframe_shows_the_whole_turn_and_the_last_one_its_answer(found, apart):
-    for (_, frames), answers in (
-        (found, {Knowledge.CHANNEL}),
-        (apart, {Knowledge.REACHED, Knowledge.OTHERS}),
-    ):
-        slabs = slabs_of(frames)
-        last = len(frames) - 1
-        assert {slab.knowledge for slab in slabs if slab.last == last} == answers
-        for number in range(last):
-            shown = [slab for slab in slabs if slab.first <= number <= slab.last]
-            assert {slab.knowledge for slab in shown} <= {Knowledge.FREE, Knowledge.UNDECIDED}
-            layers = sorted({slab.theta for slab in shown})
-            assert layers[0][0] == pytest.approx(THETA[0])
-            assert layers[-1][1] == pytest.approx(THETA[1])
-            for below, above in pairwise(layers):
-                assert below[1] == above[0]
-
-
-def test_a_layer_shows_what_some_slice_in_it_knows(found):
+def test_layers_fill_the_turn_and_hold_what_meets_them(found):
     _, frames = found
-    number = len(frames) // 2
-    leaves = frames[number].state.leaves.values()
-    for slab in slabs_of(frames):
-        if slab.knowledge is not Knowledge.FREE or not slab.first <= number <= slab.last:
-            continue
-        met = [
-            to_polygon(region.section)
-            for leaf in leaves
-            for lower, upper in on_turn(leaf.intervals[0])
-            if min(upper, slab.theta[1]) - max(lower, slab.theta[0]) > 1e-9
-            for region in leaf.regions(Kind.FREE)
-        ]
-        exact = union_all(met)
-        assert area(slab.section) == pytest.approx(exact.area, abs=0.01 * exact.length)
+    leaves = frames[len(frames) // 2].state.leaves.values()
+    stacked = layers((leaf.intervals[0], leaf) for leaf in leaves)
+    assert (stacked[0][0][0], stacked[-1][0][1]) == pytest.approx(THETA)
+    for (below, _), (above, _) in pairwise(stacked):
+        assert below[1] == pytest.approx(above[0], abs=1e-9)
+    for (lower, upper), met in stacked:
+        middle = 0.5 * (lower + upper)
+        assert {leaf.slice for leaf in met} == {
+            leaf.slice for leaf in leaves if any(a < middle < b for a, b in on_turn(leaf.intervals[0]))
+        }
 
 
 @pytest.mark.parametrize(
@@ -202,13 +180,3 @@ def test_the_same_question_gives_the_same_storyboard(found):
         for piece, other in zip(first.path, second.path, strict=True):
             np.testing.assert_array_equal(piece.positions, other.positions)
             np.testing.assert_array_equal(piece.angles, other.angles)
-    for slab, other in zip(slabs_of(frames), slabs_of(again), strict=True):
-        assert (slab.knowledge, slab.theta, slab.first, slab.last) == (
-            other.knowledge,
-            other.theta,
-            other.first,
-            other.last,
-        )
-        assert [ring.tolist() for ring in slab.section.to_polygons()] == [
-            ring.tolist() for ring in other.section.to_polygons()
-        ]

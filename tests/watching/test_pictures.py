@@ -78,11 +78,21 @@ def test_the_page_holds_surroundings_slabs_channel_and_halved_layers_by_name(sho
     names = {command["path"] for command in commands(page) if command["type"] == "set_object"}
     for name in ("floor", "walls", "theta", "start/footprint", "start/pole", "goal/footprint", "goal/pole"):
         assert f"/think/{name}" in names
-    assert any(name.startswith("/think/undecided/") for name in names)
+    assert any(name.startswith("/think/cells/undecided/") for name in names)
+    assert any(name.startswith("/think/path/undecided/") for name in names)
     assert any(name.startswith("/think/halved/") for name in names)
     last = f"{len(frames):03d}-{len(frames):03d}"
-    assert f"/think/channel/{last}" in names
-    assert f"/think/channel/proved/{last}" in names
+    assert {f"/think/cells/proved/{last}", f"/think/path/proved/{last}"} <= names
+    assert not names & {f"/think/cells/undecided/{last}", f"/think/path/undecided/{last}"}
+
+
+def test_the_scene_of_a_proof_ends_with_the_two_components():
+    recorded = rod_recording(NARROW)
+    frames = keyframes(recorded, 3)
+    page = scene_page(recorded, frames)
+    names = {command["path"] for command in commands(page) if command["type"] == "set_object"}
+    assert {"/think/reached/003-003", "/think/others/003-003"} <= names
+    assert "cannot be reached" in page
 
 
 def test_what_a_keyframe_shows_is_visible_then_and_never_else(shown):
