@@ -1,4 +1,4 @@
-"""What a verification looked at: one line for every kind of claim."""
+"""The record of a verification: one entry for every kind of statement that was checked."""
 
 from __future__ import annotations
 
@@ -8,16 +8,17 @@ from dataclasses import dataclass
 __all__ = ["Check", "Progress", "Verified"]
 
 Progress = Callable[[str, float], None]
+"""Called with the name of a phase and the fraction of it that is done."""
 
 
 @dataclass(frozen=True)
 class Check:
-    """One kind of claim that was found to hold.
+    """One kind of statement that was found to hold.
 
     Attributes:
-        name: What holds, in words.
-        count: How often it was checked.
-        tightest: The figure closest to a refusal, None where there is none.
+        name: The statement, in words.
+        count: How many times it was checked.
+        tightest: The value that came closest to a refusal, None where there is none.
         unit: Its unit, with what it measures.
     """
 
@@ -29,12 +30,12 @@ class Check:
 
 @dataclass(frozen=True)
 class Verified:
-    """A certificate that holds.
+    """An answer of the planner that holds.
 
     Attributes:
         answer: ``found`` or ``infeasible``.
         subject: What was verified, in words.
-        checks: What was looked at.
+        checks: The statements that were checked.
     """
 
     answer: str

@@ -1,4 +1,4 @@
-"""Whether a disc inside one component cannot get from the start to the goal."""
+"""Check that a disc inside one component cannot get from the start to the goal, nor can the team then."""
 
 from __future__ import annotations
 
@@ -14,42 +14,45 @@ from coop_drake.tree.component_tree import ConvexShape
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.covers import uncovered
+from coop_drake.verification.floor_edges import floor_edges
+from coop_drake.verification.free_positions import fitting_positions, without_slivers
 from coop_drake.verification.inner_sweeps import inscribed_circle
-from coop_drake.verification.labels import check_spread
-from coop_drake.verification.may_be_free import fitting_positions, without_slivers
 from coop_drake.verification.outer_sweeps import outer_sweep
+from coop_drake.verification.problem_match import goal_box
+from coop_drake.verification.reachability import check_labels
 from coop_drake.verification.solids import Solid, component_stages
-from coop_drake.verification.walls import wall_edges
 
 __all__ = ["check_disc"]
 
 ROUNDING = 1e-9
-"""A disc may stand out of its body by this, and is taken smaller by as much [m]."""
+"""A disc may leave its body by this, and is made smaller by twice as much [m]."""
 
 SWEEP = 1e-6
-"""How far the goal's places may be taken too wide where a joint is free there [m]."""
+"""How far the region of the centre at the goal may be too large, where a joint is free there [m]."""
 
 
 def check_disc(proof: DiscProof, problem: PlanningProblem) -> tuple[Check, ...]:
     """Check a proof by one disc.
 
+    Wherever the team is free, the disc, a part of one of its bodies, lies on the floor. The positions of its
+    centre at which it does are covered by the cells; touching ones do not lead from start to goal.
+
     Args:
         proof: The proof.
-        problem: The question.
+        problem: The problem.
 
     Raises:
         RefusalError: The disc leaves its body, a free position is not covered, or start and goal are joined.
     """
     centre, radius = proof.centre, proof.radius
-    room = _check_inside(proof, problem)
-    walls = wall_edges(problem.workspace)
-
+    clearance = _check_inside(proof, problem)
+    edges = floor_edges(problem.workspace)
     cells = [cell.polygon for cell in proof.cells]
     cover = shapely.union_all(cells)
 
     def outside(tolerance: float) -> BaseGeometry:
         circle = inscribed_circle(radius - 2.0 * ROUNDING, tolerance)
-        fits = fitting_positions(walls, circle, problem.workspace.envelope)
+        fits = fitting_positions(edges, circle, problem.workspace.envelope)
         return without_slivers(fits.difference(cover), cover, ROUNDING)
 
     rest, tolerance = uncovered(outside)
@@ -57,28 +60,26 @@ def check_disc(proof: DiscProof, problem: PlanningProblem) -> tuple[Check, ...]:
         point = rest.representative_point()
         raise RefusalError("cells", f"none covers ({point.x:.6f}, {point.y:.6f}), where the disc may fit")
     start = _places(proof, problem, problem.start[2:], problem.start[2:], problem.start[:2])
-    goal = _goal(proof, problem)
+    goal = _places(proof, problem, *goal_box(problem), problem.goal_pose[:2])
     names = [f"cells[{k}]" for k in range(len(cells))]
     pairs = np.array([(i, j) for j in range(len(cells)) for i in range(j) if cells[i].intersects(cells[j])])
     at_start, at_goal = ({k for k, cell in enumerate(cells) if cell.intersects(end)} for end in (start, goal))
     labels = [cell.reached for cell in proof.cells]
-    check_spread(labels, names, pairs.reshape(-1, 2), at_start, at_goal)
     where = f"({centre[0]:.4f}, {centre[1]:.4f})"
     return (
-        Check(f"the disc about {where} lies inside its body", 1, room, "m to the body's boundary"),
+        Check(f"the disc about {where} lies inside its body", 1, clearance, "m to the body's boundary"),
         Check("cells hold all places where the disc may fit", len(cells), tolerance, "m, finest disc needed"),
-        Check("the start is in reached cells, the goal in none", len(at_start) + len(at_goal)),
+        check_labels(labels, names, pairs.reshape(-1, 2), at_start, at_goal),
     )
 
 
 def _check_inside(proof: DiscProof, problem: PlanningProblem) -> float:
-    """Room between the disc and the boundary of the one shape that holds it best [m]."""
+    """Clearance between the disc and the boundary of that shape which holds it best [m]."""
     components = problem.tree.components
     if proof.component >= len(components):
         raise RefusalError("component", f"{proof.component} is not below {len(components)}")
     shapes = [shape for body in components[proof.component].bodies for shape in body.shapes]
-    rooms = [_depth(shape, proof.centre) - proof.radius for shape in shapes]
-    best = max(rooms, default=-np.inf)
+    best = max((_depth(shape, proof.centre) - proof.radius for shape in shapes), default=-np.inf)
     if best < -ROUNDING:
         raise RefusalError("radius", f"the disc leaves every shape of its component by {-best} m or more")
     return best
@@ -93,23 +94,10 @@ def _depth(shape: ConvexShape, point: FloatArray) -> float:
     return shape.radius - float(hull.distance(place))
 
 
-def _goal(proof: DiscProof, problem: PlanningProblem) -> BaseGeometry:
-    """All places where the centre may be at the goal, free joints anywhere in their limits."""
-    ends = [(float(problem.goal_pose[2]),) * 2]
-    for joint, goal in zip(problem.tree.joints, problem.goal_joints, strict=True):
-        ends.append((joint.lower, joint.upper) if goal is None else (goal, goal))
-    lower, upper = np.array(ends).T
-    return _places(proof, problem, lower, upper, problem.goal_pose[:2])
-
-
 def _places(
-    proof: DiscProof,
-    problem: PlanningProblem,
-    lower: FloatArray,
-    upper: FloatArray,
-    position: FloatArray,
+    proof: DiscProof, problem: PlanningProblem, lower: FloatArray, upper: FloatArray, position: FloatArray
 ) -> BaseGeometry:
-    """Hull of the places in W where the centre may be over intervals of (theta, q...)."""
+    """Convex region of W that holds the centre at all (theta, q...) between two ends, shape (1 + n,) each."""
     stages = component_stages(problem.tree, proof.component)
     point = Solid("", proof.component, 0, proof.centre[None, :], 0.0, stages)
     places: BaseGeometry = MultiPoint(position + outer_sweep(point, lower, upper, SWEEP)).convex_hull

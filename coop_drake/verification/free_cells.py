@@ -1,4 +1,9 @@
-"""Whether a cell lies in free space: outer sweeps against walls and among bodies, as sharp as need be."""
+"""Check that a cell lies in free space: outer sweeps of all bodies keep clear of walls and of each other.
+
+An outer sweep of a body is a polygon that holds the body at every angle of the slice, in directions of W
+about the object's origin. The cell is free if at none of its positions the polygon meets a wall or that of
+another body.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +15,18 @@ from shapely import Point, Polygon
 
 from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
+from coop_drake.verification.floor_edges import FloorEdges, edge_obstacles
+from coop_drake.verification.halving import first_failure
 from coop_drake.verification.outer_sweeps import outer_sweep
 from coop_drake.verification.solids import Solid
-from coop_drake.verification.walls import Walls, wall_sums
 
 __all__ = ["check_apart", "check_clear_of_walls"]
 
 TOLERANCES = (1e-3, 3e-5, 2e-7)
-"""How far outer sweeps may stand out, coarse first: most walls are far away [m]."""
+"""How much too large outer sweeps may be, tried in this order: most walls are far away [m]."""
 
 HALVINGS = 8
-"""A slice whose sweeps are not sharp enough is halved so often before it is refused."""
-
-Test = Callable[[FloatArray, FloatArray, float], str]
+"""How many times a slice is halved where even its sharpest sweep meets something [-]."""
 
 
 def check_clear_of_walls(
@@ -30,50 +34,49 @@ def check_clear_of_walls(
     lower: FloatArray,
     upper: FloatArray,
     solid: Solid,
-    walls: Walls,
+    edges: FloorEdges,
     where: str,
-    room: float = 0.0,
+    clearance: float = 0.0,
 ) -> int:
-    """Make sure that a solid stays inside the floor at every position of a cell and all angles of its slice.
+    """Check that a solid lies inside the floor at every position of a cell and all angles of its slice.
 
-    A connected solid lies inside a floor if it meets none of its edges and one of its points is inside; as
-    the cell is connected too, the point needs to be looked at for one position only.
+    A connected solid lies inside the floor if it meets none of its edges and one of its points is inside. As
+    the cell is connected too, the point needs to be inside at one position and one angle only.
 
     Args:
         cell: Positions p_WL [m].
         lower: Lower ends of (theta, q...), shape (1 + n,) [rad, m].
         upper: Upper ends, shape (1 + n,).
         solid: The solid.
-        walls: The floor and its edges.
+        edges: The floor and those of its edges from which to keep clear.
         where: Name of the cell, for the message.
-        room: Clearance to keep from the walls [m].
+        clearance: Distance to keep from the edges [m].
 
     Returns:
-        How many sums of an edge with a sweep were tested.
+        How many times an edge was tested against a sweep.
 
     Raises:
         RefusalError: Names the cell, the body and the wall.
     """
-    tested, radius = 0, solid.radius + room
+    tested, radius = 0, solid.radius + clearance
 
-    def meets(low: FloatArray, high: FloatArray, tolerance: float) -> str:
+    def met(low: FloatArray, high: FloatArray, tolerance: float) -> str:
         nonlocal tested
         ring = outer_sweep(solid, low, high, tolerance)
-        reach = np.concatenate((ring.min(axis=0), ring.max(axis=0)))
-        reach += radius * np.array([-1.0, -1.0, 1.0, 1.0])
-        near = walls.near(np.array(cell.bounds) + reach)
-        starts, ends = walls.starts[near], walls.ends[near]
-        sums = wall_sums(starts, ends, ring)
-        tested += len(sums)
-        met = shapely.dwithin(cell, sums, radius)
-        return "" if not met.any() else _wall(starts[met][0], ends[met][0])
+        reach = np.concatenate((ring.min(axis=0) - radius, ring.max(axis=0) + radius))
+        near = edges.near(np.array(cell.bounds) + reach)
+        starts, ends = edges.starts[near], edges.ends[near]
+        hit = shapely.dwithin(cell, edge_obstacles(starts, ends, ring), radius)
+        tested += len(starts)
+        return f"the wall from {_text(starts[hit][0])} to {_text(ends[hit][0])}" if hit.any() else ""
 
-    wall = _unresolved(meets, lower, upper, solid)
+    axes = {stage.axis for stage in solid.stages}
+    wall = first_failure(_sharpest(met), lower, upper, axes, HALVINGS)
     if wall:
-        raise RefusalError(where, f"{solid.name} may touch {wall}, or come nearer than {room} m")
+        raise RefusalError(where, f"{solid.name} may touch {wall}, or come nearer than {clearance} m")
     middle = 0.5 * (lower + upper)
     point = np.array(cell.representative_point().coords[0]) + outer_sweep(solid, middle, middle, 1.0)[0]
-    if not walls.floor.contains(Point(point)):
+    if not edges.floor.contains(Point(point)):
         raise RefusalError(where, f"{solid.name} stands outside the floor, at {_text(point)}")
     return tested
 
@@ -81,75 +84,56 @@ def check_clear_of_walls(
 def check_apart(
     lower: FloatArray, upper: FloatArray, pair: tuple[Solid, Solid, int, int], where: str
 ) -> float:
-    """Make sure that two solids never touch at any angles of a slice.
+    """Check that two solids never touch at any angles of a slice.
 
     Args:
         lower: Lower ends of (theta, q...), shape (1 + n,) [rad, m].
         upper: Upper ends, shape (1 + n,).
-        pair: The solids and their stages up to the component that both hang from.
+        pair: The solids, and how many stages of each lead to the component that carries both.
         where: Name of the cell, for the message.
 
     Returns:
-        A distance that they keep, not the largest [m].
+        A lower bound of their distance [m].
 
     Raises:
         RefusalError: Names the cell and the bodies.
     """
-    first, second, *stages = pair
+    first, second, *counts = pair
+    moved = list(zip((first, second), counts, strict=True))
     least = np.inf
 
-    def meets(low: FloatArray, high: FloatArray, tolerance: float) -> str:
+    def met(low: FloatArray, high: FloatArray, tolerance: float) -> str:
         nonlocal least
         one, other = (
             shapely.convex_hull(shapely.multipoints(outer_sweep(solid, low, high, tolerance, count)))
-            for solid, count in zip((first, second), stages, strict=True)
+            for solid, count in moved
         )
         gap = float(shapely.distance(one, other)) - first.radius - second.radius
         if gap > 0.0:
             least = min(least, gap)
         return "" if gap > 0.0 else second.name
 
-    name = _unresolved(meets, lower, upper, first, second, stages=stages)
+    axes = {stage.axis for solid, count in moved for stage in solid.stages[:count]}
+    name = first_failure(_sharpest(met), lower, upper, axes, HALVINGS)
     if name:
         raise RefusalError(where, f"{first.name} may touch {name}")
     return float(least)
 
 
-def _unresolved(
-    meets: Test, lower: FloatArray, upper: FloatArray, *solids: Solid, stages: list[int] | None = None
-) -> str:
-    """What the sweeps meet even when they are sharp and the slice is halved; empty where it is nothing."""
-    counts = stages if stages is not None else [len(solid.stages) for solid in solids]
-    axes = sorted(
-        {stage.axis for solid, count in zip(solids, counts, strict=True) for stage in solid.stages[:count]}
-    )
-    left = [(lower, upper, 0)]
-    while left:
-        low, high, depth = left.pop()
+def _sharpest(
+    met: Callable[[FloatArray, FloatArray, float], str],
+) -> Callable[[FloatArray, FloatArray], str]:
+    """What the sharpest sweeps of a slice meet, after coarser ones met something as well."""
+
+    def failure(low: FloatArray, high: FloatArray) -> str:
         found = ""
         for tolerance in TOLERANCES:
-            found = meets(low, high, tolerance)
+            found = met(low, high, tolerance)
             if not found:
                 break
-        if not found:
-            continue
-        middle = 0.5 * (low + high)
-        if depth == HALVINGS or meets(middle, middle, TOLERANCES[-1]):
-            return found
-        axis = max(axes, key=lambda axis: (high[axis] - low[axis], -axis))
-        left += [(low, _with(high, axis, middle[axis]), depth + 1)]
-        left += [(_with(low, axis, middle[axis]), high, depth + 1)]
-    return ""
+        return found
 
-
-def _with(ends: FloatArray, axis: int, value: float) -> FloatArray:
-    changed = ends.copy()
-    changed[axis] = value
-    return changed
-
-
-def _wall(start: FloatArray, end: FloatArray) -> str:
-    return f"the wall from {_text(start)} to {_text(end)}"
+    return failure
 
 
 def _text(point: FloatArray) -> str:

@@ -1,4 +1,4 @@
-"""Whether a plan's cells hang together: regions nested, targets shared by neighbours, both ends inside."""
+"""Check that a plan's regions are nested, its consecutive cells overlap, and its ends are start and goal."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from coop_drake.verification.checks import Check
 __all__ = ["check_ends", "check_handovers", "check_nesting"]
 
 ROUNDING = 1e-9
-"""Regions that share a boundary may differ by so much [m]; safe regions contain them all the same."""
+"""Boundaries that goal region and tidied cell share may differ by this; the safe region holds both [m]."""
 
 
 def check_nesting(plan: Plan) -> Check:
-    """Core and tidied cell inside the safe region, the goal region inside both, all exactly in the safe one.
+    """Check that core and tidied cell lie inside the safe region, and goal regions inside both their cells.
 
     Raises:
         RefusalError: Names the region that leaves the other.
@@ -36,16 +36,16 @@ def check_nesting(plan: Plan) -> Check:
 
 
 def check_handovers(plan: Plan) -> tuple[Check, Check, Check]:
-    """Consecutive cells share room in the plane and in every axis, and every transition ends in both.
+    """Check that consecutive cells overlap in the plane and on every axis, and that transitions end in both.
 
     Raises:
         RefusalError: Names the cell or transition, the axis and the value.
     """
-    rooms, widths, depths = [], [], []
+    distances, widths, areas = [], [], []
     for k, transition in enumerate(plan.transitions):
         for m in range(k, min(k + 2, len(plan.cells))):
             _require_intervals(transition, plan.cells[m], f"transitions[{k}]", f"cells[{m}]")
-        rooms.append(_room(transition.target, transition.goal_region, f"transitions[{k}].target"))
+        distances.append(_inside(transition.target, transition.goal_region, f"transitions[{k}].target"))
         if k + 1 < len(plan.cells):
             here, onwards = plan.cells[k], plan.cells[k + 1]
             shared = np.minimum(here.upper, onwards.upper) - np.maximum(here.lower, onwards.lower)
@@ -55,25 +55,25 @@ def check_handovers(plan: Plan) -> tuple[Check, Check, Check]:
                     f"do not overlap on axis {int(np.argmin(shared))}: {shared.min()} are shared",
                 )
             widths.append(float(shared.min()))
-            depths.append(_overlap(here.core, onwards.core, f"cells[{k}].core, cells[{k + 1}].core"))
+            areas.append(_overlap(here.core, onwards.core, f"cells[{k}].core, cells[{k + 1}].core"))
     return (
-        Check("targets inside their goal regions", len(rooms), min(rooms), "m to the boundary"),
-        Check("neighbours overlap in every axis", len(widths), min(widths, default=None), "rad or m"),
-        Check("cores of neighbours overlap", len(depths), min(depths, default=None), "m² shared"),
+        Check("targets inside their goal regions", len(distances), min(distances), "m to the boundary"),
+        Check("consecutive cells overlap on every axis", len(widths), min(widths, default=None), "rad or m"),
+        Check("cores of consecutive cells overlap", len(areas), min(areas, default=None), "m² shared"),
     )
 
 
 def check_ends(plan: Plan, problem: PlanningProblem) -> Check:
-    """The start lies in the first cell; the last transition ends at the goal within the tolerances.
+    """Check that the start lies in the first cell, and that the last transition ends within the tolerances.
 
     Raises:
         RefusalError: Names the entry and the value.
     """
     first, last, final = plan.cells[0], plan.cells[-1], plan.transitions[-1]
     where = f"transitions[{len(plan.transitions) - 1}]"
-    _room(plan.start[:2], first.tidied, "start")
+    _inside(plan.start[:2], first.tidied, "start")
     _require_held(plan.start[2:], first.lower, first.upper, "start", "cells[0]")
-    _room(plan.goal_pose[:2], last.tidied, "goal_pose")
+    _inside(plan.goal_pose[:2], last.tidied, "goal_pose")
     if not np.array_equal(final.target, plan.goal_pose[:2]):
         raise RefusalError(f"{where}.target", f"{final.target.tolist()} is not the goal's position")
     corners = shapely.get_coordinates(final.goal_region) - plan.goal_pose[:2]
@@ -119,12 +119,12 @@ def _require_held(values: FloatArray, lower: FloatArray, upper: FloatArray, wher
         )
 
 
-def _room(point: FloatArray, region: Polygon, where: str) -> float:
-    """Distance of a point inside a region from its boundary [m]."""
-    room = float(region.boundary.distance(Point(point)))
-    if not region.contains(Point(point)) or room <= 0.0:
+def _inside(point: FloatArray, region: Polygon, where: str) -> float:
+    """Distance of a point from the boundary of the region that it must lie inside [m]."""
+    distance = float(region.boundary.distance(Point(point)))
+    if not region.contains(Point(point)) or distance <= 0.0:
         raise RefusalError(where, f"{point.tolist()} is not inside its region")
-    return room
+    return distance
 
 
 def _overlap(first: Polygon, second: Polygon, where: str) -> float:

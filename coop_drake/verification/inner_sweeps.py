@@ -1,4 +1,7 @@
-"""What a solid covers at every configuration of a slice: cutting planes, checked vertex by vertex."""
+"""Inner sweeps: convex polygons that a solid covers at every configuration of a slice.
+
+They are found by cutting planes, and correct because each of their vertices is checked in the end.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +16,11 @@ from coop_drake.verification.solids import Solid, Stage
 
 __all__ = ["inner_sweep", "inscribed_circle"]
 
-HAIR = 1e-8
-"""Inner sweeps stay this far inside, so that rounding never carries them out [m]."""
+INSET = 1e-8
+"""Inner sweeps stay this far inside, which is far more than rounding [m]."""
 
 ROUNDS = 60
-"""Rounds of cutting after which a sweep counts as empty."""
+"""Rounds of cutting after which a sweep counts as empty, which is always correct [-]."""
 
 
 def inner_sweep(
@@ -29,47 +32,49 @@ def inner_sweep(
         solid: The solid.
         lower: Lower ends of (theta, q...), shape (1 + n,) [rad, m].
         upper: Upper ends, shape (1 + n,).
-        tolerance: About how much of what is covered may be left out [m].
-        stages: How many joints to sweep, as in ``outer_sweep``.
+        tolerance: How far the polygon may stay inside the region that is covered, about [m].
+        stages: How many stages to sweep, as in ``outer_sweep``.
 
     Returns:
         Vertices, counter-clockwise, shape (m, 2) [m], or None where nothing was found.
     """
     moving = solid.stages[:stages]
-    share = tolerance / (len(moving) + 1)
+    part = tolerance / (len(moving) + 1)  # One part for every stage and one for the rounding by the radius.
     if len(solid.vertices) == 1:
-        centres = outer_sweep(solid, lower, upper, share, stages)
-        return _common_to_discs(centres, solid.radius - HAIR, share)
-    ring: FloatArray | None = solid.vertices if solid.radius == 0.0 else _rounded(solid, share)
+        centres = outer_sweep(solid, lower, upper, part, stages)
+        return _common_to_discs(centres, solid.radius - INSET, part)
+    ring: FloatArray | None = solid.vertices if solid.radius == 0.0 else _rounded(solid, part)
     for stage in moving:
-        if ring is None or Polygon(ring).area <= HAIR**2:
+        if ring is None or Polygon(ring).area <= INSET**2:
             return None
-        ring = _kept(ring, stage, lower[stage.axis], upper[stage.axis], share)
+        ring = _kept(ring, stage, lower[stage.axis], upper[stage.axis], part)
         ring = None if ring is None else hull_vertices(stage.X_PJ.apply(ring))
     return ring
 
 
 def _kept(ring: FloatArray, stage: Stage, first: float, last: float, tolerance: float) -> FloatArray | None:
-    """Points that every copy of a convex ring covers which one joint makes of it."""
+    """Points that a convex ring covers at all values of one joint."""
     first, last = sorted((stage.scale * first, stage.scale * last))
     normals, offsets = _half_planes(ring)
     if stage.kind == "prismatic":
         kept: FloatArray | None = ring + first * stage.direction
         slides = normals @ stage.direction
         for normal, offset in zip(normals, offsets + np.minimum(first * slides, last * slides), strict=True):
-            kept = None if kept is None else _cut(kept, normal, offset - HAIR)
+            kept = None if kept is None else _cut(kept, normal, offset - INSET)
         return kept
-    return _common_to_turns(normals, offsets - HAIR, ring, (first, last), tolerance)
+    return _common_to_turns(normals, offsets - INSET, ring, (first, last), tolerance)
 
 
 def _common_to_turns(
     normals: FloatArray, offsets: FloatArray, ring: FloatArray, turn: tuple[float, float], tolerance: float
 ) -> FloatArray | None:
-    """Points x with n(a + t) . x <= h for every half-plane (a, h) and every t of the turn.
+    """Points x that lie in a ring turned by any angle t of an interval.
 
-    The left side is largest where a + t is nearest to the bearing of x, which gives it in closed form. The
-    set is convex: a polygon lies in it as soon as its vertices do. Wherever one does not, the half-plane
-    that it violates most cuts it off, a little deeper than needed.
+    Each edge of the ring, whose outward normal has the bearing a, demands n(a + t) . x <= h for all t. The
+    left     side is largest where a + t is nearest to the bearing of x: this gives the maximum in closed
+    form. As the set of such x is convex, a polygon lies in it if its vertices do. A vertex that does not is
+    cut off along the half-plane that it violates most, deeper by the tolerance, so that few rounds are
+    enough.
     """
     bearings = np.arctan2(normals[:, 1], normals[:, 0])
     middle, half = 0.5 * (turn[0] + turn[1]), 0.5 * (turn[1] - turn[0])
@@ -95,7 +100,7 @@ def _common_to_turns(
 
 
 def _cut(ring: FloatArray, normal: FloatArray, offset: float) -> FloatArray | None:
-    """The part of a convex ring with n . x <= offset, None where no more than a corner is left."""
+    """The part of a convex ring with n . x <= offset, None where nothing or one corner is left."""
     height = ring @ normal - offset
     inside = height <= 0.0
     if inside.all():
@@ -123,14 +128,14 @@ def _half_planes(ring: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def inscribed_circle(radius: float, tolerance: float) -> FloatArray:
-    """Points on a circle whose polygon leaves out no more than the tolerance, shape (k, 2)."""
+    """Vertices of a regular polygon inside a circle, no further from it than the tolerance, shape (k, 2)."""
     count = max(8, ceil(2.0 * pi / sqrt(8.0 * tolerance / max(radius, tolerance))))
     return radius * turned(np.array([[1.0, 0.0]]), 2.0 * pi * np.arange(count) / count)
 
 
 def _rounded(solid: Solid, tolerance: float) -> FloatArray:
-    """Polygon inside a hull grown by a radius; it has the corners where arcs meet straight sides."""
-    radius, ring = solid.radius - HAIR, solid.vertices
+    """Polygon inside a solid that has a radius, with vertices where its arcs meet its straight sides."""
+    radius, ring = solid.radius - INSET, solid.vertices
     arcs = ring[:, None, :] + inscribed_circle(radius, tolerance)
     sides = np.roll(ring, -1, axis=0) - ring
     outward = radius * np.stack((sides[:, 1], -sides[:, 0]), axis=1) / np.hypot(*sides.T)[:, None]
@@ -139,29 +144,30 @@ def _rounded(solid: Solid, tolerance: float) -> FloatArray:
 
 
 def _common_to_discs(centres: FloatArray, radius: float, tolerance: float) -> FloatArray | None:
-    """Polygon inside every disc of one radius about the points of a convex set.
+    """Polygon inside all discs of one radius about the points of a convex polygon.
 
-    Its vertices are where rays from the middle leave the first disc, and where two neighbouring circles
-    cross; a point is near enough to all of the set if it is to its vertices.
+    A point is near enough to all points of a convex polygon if it is to the vertices. Candidates are the
+    points where rays from the middle leave the first disc and where circles about neighbouring centres cross;
+    those that lie in all discs are kept.
     """
     middle = 0.5 * (centres.min(axis=0) + centres.max(axis=0))
     away = middle - centres
-    room = radius**2 - np.einsum("ij,ij->i", away, away)
-    if (room <= 0.0).any():
+    inside = radius**2 - np.einsum("ij,ij->i", away, away)
+    if (inside <= 0.0).any():
         return None
     rays = inscribed_circle(1.0, tolerance / max(radius, tolerance))
     along = rays @ away.T
-    reach = np.sqrt(along**2 + room) - along
+    reach = np.sqrt(along**2 + inside) - along
     nearest = np.argmin(reach, axis=1)
     after = np.roll(nearest, -1)
     crossings = _crossings(centres[nearest[nearest != after]], centres[after[nearest != after]], radius)
     candidates = np.concatenate((middle + rays * reach.min(axis=1)[:, None], crossings))
     distances = np.hypot(*(candidates[:, None, :] - centres).transpose(2, 0, 1)).max(axis=1)
-    return hull_vertices(candidates[distances <= radius + 0.1 * HAIR])
+    return hull_vertices(candidates[distances <= radius + 0.1 * INSET])
 
 
 def _crossings(first: FloatArray, second: FloatArray, radius: float) -> FloatArray:
-    """Both points where circles of one radius about two centres each cross; shapes (k, 2) to (2 k, 2)."""
+    """Both points in which the circles about two centres meet; shapes (k, 2) to (2 k, 2)."""
     across = second - first
     square = np.einsum("ij,ij->i", across, across)
     height = np.sqrt(np.maximum(radius**2 / square - 0.25, 0.0))[:, None]

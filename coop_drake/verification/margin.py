@@ -1,4 +1,4 @@
-"""Which walls the cores of a plan keep its margin from."""
+"""Which edges of the floor the cores of a plan must keep clear of by the margin."""
 
 from __future__ import annotations
 
@@ -11,53 +11,46 @@ from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.tree.pose import FloatArray
+from coop_drake.verification.floor_edges import FloorEdges
 from coop_drake.verification.outer_sweeps import outer_sweep
 from coop_drake.verification.solids import Solid
-from coop_drake.verification.walls import Walls
 
-__all__ = ["walls_to_keep_off"]
+__all__ = ["edges_to_keep_clear_of"]
 
 CLOSE = 1.1
-"""An end of the transport that stands nearer to a wall than so many margins is let off there [-]."""
+"""A start or goal nearer to a wall than so many margins cannot keep the margin there [-]."""
 
-LET_OFF = 3.5
-"""The margin is not promised from walls nearer than so many margins to such an end [-]."""
+EXEMPT = 3.5
+"""Walls nearer to such a start or goal than so many margins are exempt: the planner keeps less there [-]."""
 
 
-def walls_to_keep_off(
-    problem: PlanningProblem, solids: tuple[Solid, ...], walls: Walls, margin: float
-) -> Walls:
-    """Leave out the walls beside a start or a goal that has less room than the margin itself.
+def edges_to_keep_clear_of(
+    problem: PlanningProblem, solids: tuple[Solid, ...], edges: FloorEdges, margin: float
+) -> FloorEdges:
+    """Leave out the walls beside a start or a goal that has less clearance than the margin itself.
 
     Args:
-        problem: The question.
+        problem: The problem.
         solids: The team.
-        walls: All walls.
+        edges: All edges.
         margin: The margin [m].
     """
-    edges: Any = shapely.linestrings(np.stack((walls.starts, walls.ends), axis=1))
-    for end in (_at_start(problem, solids), _at_goal(problem, solids)):
+    # Of the team at its goal only the object is known where a joint is free.
+    joints = [0.0 if goal is None else goal for goal in problem.goal_joints]
+    known = tuple(solid for solid in solids if solid.component == 0 or None not in problem.goal_joints)
+    start = _footprint(solids, problem.start[:2], problem.start[2:])
+    goal = _footprint(known, problem.goal_pose[:2], np.array([problem.goal_pose[2], *joints]))
+    lines: Any = shapely.linestrings(np.stack((edges.starts, edges.ends), axis=1))
+    for end in (start, goal):
         if float(end.distance(problem.workspace.boundary)) < CLOSE * margin:
-            edges = shapely.difference(edges, end.buffer(LET_OFF * margin))
-    pieces = shapely.get_coordinates([part for part in shapely.get_parts(edges) if not part.is_empty])
+            lines = shapely.difference(lines, end.buffer(EXEMPT * margin))
+    pieces = shapely.get_coordinates([part for part in shapely.get_parts(lines) if not part.is_empty])
     ends = pieces.reshape(-1, 2, 2)
-    return Walls(walls.floor, ends[:, 0], ends[:, 1])
-
-
-def _at_start(problem: PlanningProblem, solids: tuple[Solid, ...]) -> BaseGeometry:
-    return _footprint(solids, problem.start[:2], problem.start[2:])
-
-
-def _at_goal(problem: PlanningProblem, solids: tuple[Solid, ...]) -> BaseGeometry:
-    """What is known of the team at its goal: the object where a joint is free, else all."""
-    known = [0.0 if goal is None else goal for goal in problem.goal_joints]
-    free = any(goal is None for goal in problem.goal_joints)
-    kept = tuple(solid for solid in solids if solid.component == 0) if free else solids
-    return _footprint(kept, problem.goal_pose[:2], np.array([problem.goal_pose[2], *known]))
+    return FloorEdges(edges.floor, ends[:, 0], ends[:, 1])
 
 
 def _footprint(solids: tuple[Solid, ...], position: FloatArray, angles: FloatArray) -> BaseGeometry:
-    """What some solids cover at one configuration."""
+    """What some solids cover in W at one configuration."""
     rings = [position + outer_sweep(solid, angles, angles, 1.0) for solid in solids]
     shapes = [
         MultiPoint(ring).convex_hull.buffer(solid.radius) for ring, solid in zip(rings, solids, strict=True)

@@ -1,4 +1,4 @@
-"""The convex solids of a team with the joints that carry them, from the solid outwards to the object."""
+"""The convex solids of a team, each with the joints that move it, from its own joint to the object."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ __all__ = ["Solid", "Stage", "colliding_pairs", "component_stages", "team_solids
 
 @dataclass(frozen=True)
 class Stage:
-    """One motion that carries a solid: a joint, or theta of the object.
+    """One joint that moves a solid, or theta of the object.
 
     Attributes:
         axis: Index into (theta, q...).
         kind: ``revolute`` (also theta) or ``prismatic``.
-        scale: What an axis value is multiplied by: the sign of a turn, 1 for a slide.
-        direction: Direction in J of a slide, shape (2,).
-        X_PJ: Pose of the joint's frame in the parent; the identity for theta.
+        scale: Factor from the axis value to the motion: the sign of a revolute joint, 1 for a prismatic one.
+        direction: Direction of a prismatic joint in its frame J, shape (2,).
+        X_PJ: Pose of J in the parent component; the identity for theta.
     """
 
     axis: int
@@ -42,7 +42,7 @@ class Solid:
         component: Index of its component.
         body: Index of its body in the component.
         vertices: Vertices in the component's frame, counter-clockwise, shape (n, 2) [m].
-        radius: Growth of their hull [m].
+        radius: The solid is the hull of its vertices, grown by this [m].
         stages: What moves it: its own joint first, theta last.
     """
 
@@ -76,14 +76,14 @@ def team_solids(tree: ComponentTree, robots: Collection[int] | None = None) -> t
 
 
 def component_stages(tree: ComponentTree, index: int) -> tuple[Stage, ...]:
-    """What moves a component: its own joint first, theta last."""
+    """The stages that move a component: its own joint first, theta last."""
     return (*[_stage(joint) for joint in _joints_to_object(tree, index)], _THETA)
 
 
 def colliding_pairs(
     tree: ComponentTree, solids: Collection[Solid]
 ) -> tuple[tuple[Solid, Solid, int, int], ...]:
-    """Pairs of solids that must never overlap, each with its stages up to the component both hang from.
+    """Pairs of solids that must never overlap, with how many stages of each lead to what carries both.
 
     Args:
         tree: The team.
@@ -114,10 +114,10 @@ def _stage(joint: TreeJoint) -> Stage:
 
 def _components_to_object(tree: ComponentTree, index: int) -> list[int]:
     """The component itself, its parent and so on, the object's last."""
-    way = [index]
-    while (parent := tree.components[way[-1]].parent) is not None:
-        way.append(parent)
-    return way
+    path = [index]
+    while (parent := tree.components[path[-1]].parent) is not None:
+        path.append(parent)
+    return path
 
 
 def _joints_to_object(tree: ComponentTree, index: int) -> list[TreeJoint]:

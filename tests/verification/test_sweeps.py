@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from shapely import MultiPoint, Polygon
 
 from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import PlanarPose
 from coop_drake.verification.inner_sweeps import inner_sweep
-from coop_drake.verification.outer_sweeps import outer_sweep
-from coop_drake.verification.solids import colliding_pairs, team_solids
+from coop_drake.verification.outer_sweeps import outer_sweep, turned
+from coop_drake.verification.solids import Solid, Stage, colliding_pairs, team_solids
 from tests.support.cases import team_tree
 from tests.support.trees import configurations, placed_shape, slices_of, trees
 
@@ -55,6 +56,19 @@ def test_inner_sweeps_lie_in_every_copy(team, tolerance):
             points = shapely.points(ring)
             # Copies with arcs are inscribed polygons of 128 vertices, that much smaller.
             assert max(shapely.distance(copy, points).max() for copy in copies) <= 4e-4 * solid.radius
+
+
+def test_joints_that_turn_about_the_same_point_do_not_multiply_the_vertices():
+    stages = tuple(Stage(axis, "revolute", 1.0, np.zeros(2), PlanarPose()) for axis in (2, 1, 0))
+    solid = Solid("arm", 1, 0, np.array([[0.2, 0.0], [1.0, 0.0], [1.0, 0.1]]), 0.0, stages)
+    lower, upper = np.array([0.3, -0.2, 0.1]), np.array([1.4, 0.5, 1.0])
+    ring = outer_sweep(solid, lower, upper, 1e-6)
+    assert len(ring) < 6_000
+    angles = np.linspace(lower.sum(), upper.sum(), 500)
+    copies = shapely.points(turned(solid.vertices, angles))
+    assert shapely.distance(Polygon(ring), copies).max() <= 1e-12
+    furthest = np.hypot(1.0, 0.1)
+    assert furthest <= np.hypot(*ring.T).max() <= furthest + 2e-6
 
 
 def test_sweeps_are_as_sharp_as_asked():

@@ -65,6 +65,21 @@ def test_facets_are_shared_where_boxes_touch_in_more_than_an_edge(tiling):
     assert {pair for pair in found if len(pair) == 2} == {pair for pair in expected if len(pair) == 2}
 
 
+def test_an_axis_of_a_single_value_is_tiled_by_boxes_of_that_value():
+    """As theta is at a blocked goal; a box of a single value inside a wider axis covers nothing."""
+    whole = np.array([0.3, -1.0]), np.array([0.3, 1.0])
+    lower, upper = np.array([[0.3, -1.0], [0.3, 0.2]]), np.array([[0.3, 0.2], [0.3, 1.0]])
+    check_tiling(lower, upper, whole)
+    for k, axis, value in ((0, 0, 0.2), (1, 1, 0.3), (1, 0, np.nextafter(0.3, 1.0))):
+        wrong = lower.copy()
+        wrong[k, axis] = value
+        with pytest.raises(RefusalError, match="slices"):
+            check_tiling(wrong, upper, whole)
+    point = np.array([[0.3, 1.0]])
+    with pytest.raises(RefusalError, match="slices"):
+        check_tiling(np.vstack((lower, point, point)), np.vstack((upper, point, point)), whole)
+
+
 def test_a_whole_turn_is_two_pi_up_to_rounding():
     quarter = 0.5 * np.pi
     assert turn_is_whole(-0.5 * quarter, 3.5 * quarter)

@@ -1,9 +1,14 @@
-"""Whether the cells that a proof calls reached are those that touching cells join to the start."""
+"""Check that no sequence of touching cells leads from the start to the goal.
+
+A motion from start to goal through free configurations only would pass through cells of which each touches
+the next, as the cells of all slices together cover the free configurations and are closed sets. If the cells
+that such sequences join to the start do not hold the goal, there is no such motion.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import remainder
+from math import remainder, tau
 
 import numpy as np
 import shapely
@@ -13,31 +18,32 @@ from shapely import Point
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import OverSlice
 from coop_drake.errors import RefusalError
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
-from coop_drake.verification.tiling import TURN, facet_pairs
+from coop_drake.verification.tiling import facet_pairs
 
-__all__ = ["check_labels", "check_spread"]
+__all__ = ["check_labels", "check_reachability"]
 
 HELD = 1e-9
-"""Slices that miss an angle by no more than this hold it [rad, m]."""
+"""A slice whose interval misses an angle by no more than this holds it all the same [rad, m]."""
 
 
-def check_labels(
+def check_reachability(
     slices: Sequence[OverSlice],
     start: Sequence[float],
     goal: Sequence[float | None],
     problem: PlanningProblem,
 ) -> tuple[Check, Check]:
-    """Spread from the start over touching cells, of one slice and of slices that share a facet.
+    """Check the labels of cells, where cells of one slice and of slices that share a facet may touch.
 
-    A path that leaves a slice through an edge or a corner lies in cells of all slices that meet there, and
-    facets through that very place join them: so facets are enough.
+    Facets are enough: where a motion leaves a slice through an edge or a corner, its position lies in cells
+    of all slices that meet there, and these slices are joined by facets that contain this edge or corner.
 
     Args:
         slices: A tiling with its cells.
         start: (theta, kept joints...) of the start.
         goal: The same of the goal, None where a joint is free.
-        problem: The question.
+        problem: The problem.
 
     Raises:
         RefusalError: Names the cell and what is wrong with it.
@@ -49,9 +55,8 @@ def check_labels(
     polygons = np.array([cell.polygon for part in slices for cell in part.cells], dtype=object)
     names = [f"slices[{k}].cells[{i - first[k]}]" for i, k in enumerate(owners)]
     labels = [cell.reached for part in slices for cell in part.cells]
-    facets = facet_pairs(lower, upper)
     own = np.stack((np.arange(len(slices)),) * 2, axis=1)
-    pairs = _cell_pairs(np.concatenate((own, facets)), slices, first)
+    pairs = _cell_pairs(np.concatenate((own, facet_pairs(lower, upper))), slices, first)
     touching = pairs[shapely.intersects(polygons[pairs[:, 0]], polygons[pairs[:, 1]])]
     at_start, at_goal = (
         {
@@ -61,21 +66,19 @@ def check_labels(
         }
         for angles, pose in ((start, problem.start), (goal, problem.goal_pose))
     )
-    check_spread(labels, names, touching, at_start, at_goal)
-    return (
-        Check("cells that touch are both reached or both not", len(touching)),
-        Check("the start is in reached cells, the goal in none", len(at_start) + len(at_goal)),
+    return Check("cells that touch are both reached or both not", len(touching)), check_labels(
+        labels, names, touching, at_start, at_goal
     )
 
 
-def check_spread(
+def check_labels(
     labels: Sequence[bool],
     names: Sequence[str],
     touching: NDArray[np.int64],
     at_start: set[int],
     at_goal: set[int],
-) -> None:
-    """Compare labels with what spreads from the start.
+) -> Check:
+    """Compare the labels of cells with what a search from the start over touching cells reaches.
 
     Args:
         labels: Which cells are called reached.
@@ -98,20 +101,20 @@ def check_spread(
         onwards = [k for k in neighbours[left.pop()] if k not in reached]
         reached.update(onwards)
         left += onwards
-    for k in sorted(at_goal):
-        if k in reached:
-            raise RefusalError(names[k], "holds the goal and touching cells join it to the start")
+    for k in sorted(at_goal & reached):
+        raise RefusalError(names[k], "holds the goal and touching cells join it to the start")
     for k, label in enumerate(labels):
         if label != (k in reached):
             raise RefusalError(
                 f"{names[k]}.reached", f"is {label}; touching cells say {k in reached} from the start on"
             )
+    return Check("the start is in reached cells, the goal in none", len(at_start) + len(at_goal))
 
 
 def _cell_pairs(
     slices: NDArray[np.int64], parts: Sequence[OverSlice], first: NDArray[np.int64]
 ) -> NDArray[np.int64]:
-    """Pairs of cells of pairs of slices, shape (k, 2); of one slice each pair once."""
+    """Pairs of cells of pairs of slices, shape (k, 2); within one slice every pair once."""
     pairs = [
         (first[a] + i, first[b] + j)
         for a, b in slices
@@ -122,13 +125,13 @@ def _cell_pairs(
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
 
 
-def _holds(lower: NDArray[np.float64], upper: NDArray[np.float64], angles: Sequence[float | None]) -> bool:
-    """Whether intervals hold (theta, q...), theta modulo a turn; None is held by any interval."""
+def _holds(lower: FloatArray, upper: FloatArray, angles: Sequence[float | None]) -> bool:
+    """Whether intervals hold (theta, q...), theta modulo a turn; any interval holds a free joint, None."""
     for axis, angle in enumerate(angles):
         if angle is None:
             continue
         middle, half = 0.5 * (lower[axis] + upper[axis]), 0.5 * (upper[axis] - lower[axis])
-        off = remainder(float(angle - middle), TURN) if axis == 0 else float(angle - middle)
+        off = remainder(float(angle - middle), tau) if axis == 0 else float(angle - middle)
         if abs(off) > half + HELD:
             return False
     return True

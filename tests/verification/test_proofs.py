@@ -3,6 +3,7 @@
 import json
 from copy import deepcopy
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import shapely
 from shapely import Polygon
 
 from coop_drake.answers.digest import problem_digest
-from coop_drake.answers.proof import BlockedGoalProof, DiscProof, SlicesProof
+from coop_drake.answers.proof import AngleBox, BlockedGoalProof, DiscProof, SlicesProof
 from coop_drake.answers.proof_file import load_proof, save_proof
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning import find_channel
@@ -207,6 +208,19 @@ def test_refusals_under_a_new_digest_say_what_and_where(documents, tmp_path, kin
     document = changed(documents[kind], way, value)
     with pytest.raises((RefusalError, PlanError), match=message):
         verify_file(write(document, tmp_path / "certificate.json", signed=True), KINDS[kind], GAINS)
+
+
+def test_a_blocked_goal_is_proved_by_several_slices_of_a_free_joint(proofs):
+    (part,) = proofs[BlockedGoalProof].slices
+    joint = AT_GOAL.tree.joints[0]
+    cuts = [joint.lower, 0.2, joint.upper]
+    slices = tuple(
+        AngleBox(np.append(part.lower, low), np.append(part.upper, high)) for low, high in pairwise(cuts)
+    )
+    verified = verify_proof(BlockedGoalProof((0,), slices), AT_GOAL)
+    assert [check.count for check in verified.checks] == [2, 2, 2]
+    with pytest.raises(RefusalError, match=r"slices\[0\]: .* leaves a gap or an overlap"):
+        verify_proof(BlockedGoalProof((0,), slices[:1]), AT_GOAL)
 
 
 def test_a_goal_is_not_blocked_where_the_team_fits(proofs):

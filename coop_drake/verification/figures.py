@@ -1,11 +1,9 @@
-"""Whether the figures that a plan states about its transitions are true: recomputed one by one."""
+"""Check the figures that a plan states about its transitions, by computing them again."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from math import isclose
-from typing import Any
 
 import numpy as np
 import shapely
@@ -17,23 +15,23 @@ from coop_drake.laws import GainSet, TransitionGains, transition_gains
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 
-__all__ = ["check_claims"]
+__all__ = ["check_figures"]
 
 RELATIVE = 1e-9
-"""Recomputed figures agree to so many parts."""
+"""Relative difference of figures that are computed twice, in another order of operations [-]."""
 
-NECK_SHARE = 1e-3
-"""A neck is tried by eroding with arcs in chords, which are this exact [-]."""
+NECK_FRACTION = 1e-3
+"""Fraction of a neck by which eroding with polygons for arcs may be wrong; a bound for 32 chords [-]."""
 
 SAME_PLACE = 1e-9
-"""Ways shorter than this move only angles [m]."""
+"""Paths shorter than this do not move the position, only angles [m]."""
 
 
-def check_claims(plan: Plan, gain_sets: Mapping[str, GainSet]) -> tuple[Check, Check, Check]:
-    """Recompute inradius and gains of every transition; test neck and length.
+def check_figures(plan: Plan, gain_sets: Mapping[str, GainSet]) -> tuple[Check, Check, Check]:
+    """Compute inradius and gains of every transition again; test its neck and its length.
 
-    The estimated time comes of a simulation and is no claim about safety: of all figures it alone is left to
-    the document's digest.
+    The estimated time comes of a simulation and does not matter for safety: it is the only figure that
+    nothing but the digest of the file protects.
 
     Args:
         plan: The plan.
@@ -47,8 +45,9 @@ def check_claims(plan: Plan, gain_sets: Mapping[str, GainSet]) -> tuple[Check, C
     entry, resting = plan.start[:2], plan.start[2:]
     for k, transition in enumerate(plan.transitions):
         where = f"transitions[{k}]"
-        room = float(transition.goal_region.boundary.distance(Point(transition.target)))
-        _require_equal(transition.inradius, room, f"{where}.inradius")
+        inradius = float(transition.goal_region.boundary.distance(Point(transition.target)))
+        if not isclose(transition.inradius, inradius, rel_tol=RELATIVE, abs_tol=1e-12):
+            raise RefusalError(f"{where}.inradius", f"is {transition.inradius}; expected {inradius}")
         _check_neck(plan.cells[k].tidied, entry, transition, where)
         _check_length(entry, transition, where)
         gains = transition_gains(
@@ -64,18 +63,20 @@ def check_claims(plan: Plan, gain_sets: Mapping[str, GainSet]) -> tuple[Check, C
         entry, resting = transition.target, 0.5 * (transition.goal_lower + transition.goal_upper)
     necks = [transition.neck for transition in plan.transitions]
     return (
-        Check("some way to the target is as wide as its neck", len(necks), min(necks), "m, narrowest neck"),
+        Check(
+            "a path to every target keeps the stated clearance", len(necks), min(necks), "m, narrowest neck"
+        ),
         Check("inradii are distances, lengths no shorter than straight lines", 2 * len(necks)),
-        Check("gains follow from the cells", len(necks)),
+        Check("gains are those that the gain set gives for the cells", len(necks)),
     )
 
 
 def _check_neck(cell: Polygon, entry: FloatArray, transition: Transition, where: str) -> None:
-    """Eroding the cell by the neck must leave both ends joined."""
-    eroded = cell.buffer(-transition.neck * (1.0 - NECK_SHARE), quad_segs=32)
+    """The cell, eroded by the neck, must hold entry and target in one connected part."""
+    eroded = cell.buffer(-transition.neck * (1.0 - NECK_FRACTION), quad_segs=32)
     ends = Point(entry), Point(transition.target)
     if not any(all(part.covers(end) for end in ends) for part in shapely.get_parts(eroded)):
-        raise RefusalError(f"{where}.neck", f"no way keeps {transition.neck} m of clearance")
+        raise RefusalError(f"{where}.neck", f"no path keeps {transition.neck} m of clearance")
 
 
 def _check_length(entry: FloatArray, transition: Transition, where: str) -> None:
@@ -87,16 +88,8 @@ def _check_length(entry: FloatArray, transition: Transition, where: str) -> None
 
 
 def _check_gains(found: TransitionGains, expected: TransitionGains, where: str) -> None:
-    for (name, mine), theirs in zip(asdict(expected).items(), asdict(found).values(), strict=True):
-        same = mine == theirs if isinstance(mine, str) else _close(theirs, mine)
-        if not same:
-            raise RefusalError(f"{where}.{name}", f"is {theirs}; the cell gives {mine}")
-
-
-def _close(found: Any, expected: Any) -> bool:
-    return bool(np.allclose(found, expected, rtol=RELATIVE, atol=0.0))
-
-
-def _require_equal(found: float, expected: float, where: str) -> None:
-    if not isclose(found, expected, rel_tol=RELATIVE, abs_tol=1e-12):
-        raise RefusalError(where, f"is {found}; expected {expected}")
+    for name, value in vars(expected).items():
+        stated = getattr(found, name)
+        text = isinstance(value, str)
+        if not (stated == value if text else np.allclose(stated, value, rtol=RELATIVE, atol=0.0)):
+            raise RefusalError(f"{where}.{name}", f"is {stated}; the cell gives {value}")

@@ -53,7 +53,7 @@ def test_the_plan_of_the_base_case_is_verified(tmp_path):
     path = save_plan(plan, tmp_path / "plan.json")
     checks = {check.name: check for check in verify_file(path, problem, GAINS).checks}
     (apart,) = (name for name in checks if name.startswith("bodies stay apart"))
-    assert apart == "bodies stay apart in every cell, 2 pairs aside that share a joint or are filtered"
+    assert apart == "bodies stay apart in every cell, except 2 pairs that share a joint or are filtered"
     assert checks[apart].tightest > 0.0
     assert checks["cores keep the margin"].tightest == plan.margin > 0.01
 
@@ -160,10 +160,10 @@ def moved_target(document):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (put(["other"], "joint_names"), r"joint_names: \['other'\] are not the scenario's"),
+        (put(["other"], "joint_names"), r"joint_names: \['other'\] is not the scenario's"),
         (moved(1e-9, "start", 0), r"start: .* is not the scenario's"),
         (moved(1e-9, "goal_pose", 1), r"goal_pose: .* is not the scenario's"),
-        (put([None], "goal_joints"), r"goal_joints: \[None\] are not the scenario's"),
+        (put([None], "goal_joints"), r"goal_joints: \[None\] is not the scenario's"),
         (put("0" * 64, "problem"), r"problem: '0+' is not the scenario's digest"),
         (put("table_3", "gain_set"), r"gain_set: 'table_3' is none of scheduled"),
         (moved(0.02, "margin"), r"cells\[\d\].core: .* or come nearer than 0\.\d+ m"),
@@ -176,7 +176,7 @@ def moved_target(document):
         (grown_tidied, r"cells\[0\].tidied"),
         (moved_target, r"transitions\[0\].inradius: is .* expected"),
         (moved(1e-6, "transitions", 0, "inradius"), r"transitions\[0\].inradius: is"),
-        (moved(0.05, "transitions", 0, "neck"), r"transitions\[0\].(neck: no way keeps|gains)"),
+        (moved(0.05, "transitions", 0, "neck"), r"transitions\[0\].(neck: no path keeps|gains)"),
         (put(1e-6, "transitions", 0, "length"), r"transitions\[0\].length: .* is less than"),
         (put(True, "transitions", 0, "only_angles"), r"transitions\[0\].only_angles: True over"),
         (moved(1e-6, "transitions", 0, "gains", "stiffness"), r"transitions\[0\].gains.stiffness: is"),

@@ -1,10 +1,9 @@
-"""Plans and proofs as files: recognised, read, held against their digests, verified."""
+"""Verify the files that the planner wrote: read them, compare their digests, check what they state."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 import shapely
 
@@ -15,9 +14,9 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
 from coop_drake.verification.checks import Check, Progress, Verified
-from coop_drake.verification.found import verify_plan
-from coop_drake.verification.infeasible import verify_proof
-from coop_drake.verification.question import same_question
+from coop_drake.verification.plans import verify_plan
+from coop_drake.verification.problem_match import check_digest
+from coop_drake.verification.proofs import verify_proof
 
 __all__ = ["verify_file"]
 
@@ -32,38 +31,36 @@ def verify_file(
 
     Args:
         path: The file.
-        problem: The question that it should answer.
+        problem: The problem that it should solve or refute.
         gain_sets: The scenario's gain sets by name.
-        progress: Called with a phase and the share of it that is done.
+        progress: Called with a phase and the fraction of it that is done.
 
     Returns:
         What was checked.
 
     Raises:
         PlanError: The file is neither a plan nor a proof: names the file, the key and what is allowed.
-        RefusalError: It is one, but something in it does not hold: names the place.
+        RefusalError: It is one, but a statement in it does not hold: names the place.
     """
     document = Document.load(path, "a plan or a proof of infeasibility")
     form = document.read_head(Head, format=(plan_file.FORMAT, proof_file.FORMAT)).format
     try:
         if form == plan_file.FORMAT:
             plan = plan_file.read_plan(document)
-            digest = _check_digest(document.content)
+            unaltered = _check_unaltered(document)
             verified = verify_plan(plan, problem, gain_sets, progress)
         else:
             saved = proof_file.read_proof(document)
-            digest = _check_digest(document.content)
-            same_question(saved.problem, problem)
+            unaltered = _check_unaltered(document)
+            check_digest(saved.problem, problem)
             verified = verify_proof(saved.proof, problem, progress)
     except shapely.errors.GEOSException as error:
         raise RefusalError("document", f"geometry in it cannot be worked with: {error}") from error
-    return Verified(verified.answer, verified.subject, (digest, *verified.checks))
+    return Verified(verified.answer, verified.subject, (unaltered, *verified.checks))
 
 
-def _check_digest(content: Mapping[str, Any]) -> Check:
-    expected = content_digest(content)
-    if content["digest"] != expected:
-        raise RefusalError(
-            "digest", f"{content['digest']!r} is not that of the content, '{expected}': it was altered"
-        )
-    return Check("content is what was written, for this scenario", 1)
+def _check_unaltered(document: Document) -> Check:
+    found, expected = document.content["digest"], content_digest(document.content)
+    if found != expected:
+        raise RefusalError("digest", f"{found!r} is not that of the content, '{expected}': it was altered")
+    return Check("the file is as it was written, for this scenario", 1)
