@@ -1,4 +1,4 @@
-"""From cells of a map to the room that holds a point: exact outlines of pixel squares."""
+"""Finds the room of an occupancy map that holds a point, and its exact outline along the edges of cells."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ def room_of_map(
     unknown_is_free: bool = False,
     closing: float = 0.0,
 ) -> Room:
-    """Find the room of connected free cells, cells that touch at corners only not being connected.
+    """Find the room of connected free cells; cells that touch only at a corner are not connected.
 
     Args:
         cells: The map.
         file: For messages.
-        inside: A point of the room that is meant; None for the largest.
+        inside: A point of the room to find; None for the largest.
         unknown_is_free: Whether unknown cells count as floor.
-        closing: Places that no disc of this radius fits into become walls [m].
+        closing: Radius of a disc; places into which it does not fit become walls [m].
 
     Raises:
         FloorPlanError: Nothing is free, or the point stands on no free cell.
     """
     free = cells.free | cells.unknown if unknown_is_free else cells.free
-    free = np.pad(free, 1)  # What lies outside the map is wall.
+    free = np.pad(free, 1)  # Everything outside the map is wall.
     notes = []
     if not unknown_is_free and cells.unknown.any():
         notes.append(f"{int(cells.unknown.sum())} unknown cells count as walls")
@@ -53,7 +53,7 @@ def room_of_map(
 def _component(
     free: BoolGrid, cells: OccupancyMap, file: str, inside: Inside | None
 ) -> tuple[BoolGrid, list[int]]:
-    """The connected cells round a point, or most of all, and the sizes of the others, largest first."""
+    """The connected cells around a point, or the most cells; and how many the others have, descending."""
     labels, count = ndimage.label(free)
     if count == 0:
         raise FloorPlanError(
@@ -82,7 +82,7 @@ def _component(
 
 
 def _opened(room: BoolGrid, radius: float) -> BoolGrid:
-    """Cells of the room that some disc covers which fits into it; so walls grow, and never shrink."""
+    """The cells of the room that discs inside the room cover (an opening); so walls only grow."""
     centres = ndimage.distance_transform_edt(room) > radius
     covered: BoolGrid = (ndimage.distance_transform_edt(~centres) <= radius) & room
     return covered
@@ -103,17 +103,17 @@ def _without_checkers(room: BoolGrid) -> BoolGrid:
 
 
 def _outline(room: BoolGrid, cells: OccupancyMap) -> Polygon:
-    """The union of the cells' squares: edges between room and wall, joined to rings."""
+    """The union of the cells' squares, from the edges between room and wall."""
     edges = np.vstack([_runs(room), _runs(room.T)[:, :, ::-1]])
     placed = cells.place((edges - 1.0).reshape(-1, 2)).reshape(-1, 2, 2)
     faces: list[Polygon] = list(shapely.get_parts(shapely.polygonize([LineString(edge) for edge in placed])))
-    # One room without touching corners: its face is the only one that spans all edges.
+    # The room is connected and its outline does not touch itself: only its face spans all edges.
     outline = max(faces, key=lambda face: shapely.box(*face.bounds).area)
     return shapely.orient_polygons(outline)
 
 
 def _runs(room: BoolGrid) -> FloatArray:
-    """Longest straight edges along the rows, as (column, row) pairs of both ends, shape (n, 2, 2)."""
+    """Straight edges between room and wall along rows, each as two (column, row), shape (n, 2, 2)."""
     change = np.diff(room.astype(np.int8), axis=0)
     padded = np.pad(change, ((0, 0), (1, 1)))
     steps = np.diff(padded, axis=1) != 0

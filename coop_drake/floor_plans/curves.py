@@ -1,4 +1,4 @@
-"""Bézier curves to chords, with a bound on how far the curve strays from them."""
+"""Turns Bézier curves into chords, with a bound on the distance of the curve from them."""
 
 from __future__ import annotations
 
@@ -12,25 +12,27 @@ from coop_drake.tree.pose import FloatArray
 __all__ = ["flatten"]
 
 _ARC_ERROR = 3e-4
-"""A cubic through a quarter of a circle strays by 2.8e-4 radii from it; relative to its own size [-]."""
+"""Error of a cubic that stands for a quarter of a circle: 2.8e-4 of the radius, as a fraction of its size
+[-]."""
 
 _MOST_CHORDS = 5_000
+"""Chords for one curve at most; the bound on the distance accounts for a curve that would need more."""
 
 
 def flatten(
     pieces: Iterable[Sequence[Sequence[float]] | FloatArray], sagitta: float, *, from_arcs: bool = False
 ) -> tuple[FloatArray, float]:
-    """Put lines and Bézier curves that follow each other into one polyline.
+    """Join lines and Bézier curves that follow each other into one polyline.
 
     A chord over a step of h lies within h^2 / 8 of the largest second derivative.
 
     Args:
         pieces: Control points of each piece, two to four, each (x, y) [m]; each starts where the last ended.
-        sagitta: How far chords may lie from their curve [m].
-        from_arcs: Whether curves may stand for circular or elliptical arcs, which they only come close to.
+        sagitta: Largest distance of a chord from its curve [m].
+        from_arcs: Whether the curves may be approximations of circular or elliptical arcs.
 
     Returns:
-        The polyline, shape (n, 2) [m], and how far the drawn curve may lie from it at most [m].
+        The polyline, shape (n, 2) [m], and a bound on the distance of the drawn curve from it [m].
     """
     points: list[FloatArray] = []
     strays = 0.0
@@ -50,7 +52,7 @@ def flatten(
 
 
 def _second_derivative(control: FloatArray) -> float:
-    """A bound on its length, over the parameter from 0 to 1 [m]."""
+    """A bound on the length of the second derivative with respect to the parameter in [0, 1] [m]."""
     degree = len(control) - 1
     bends = np.linalg.norm(np.diff(control, n=2, axis=0), axis=1)
     return float(degree * (degree - 1) * bends.max())

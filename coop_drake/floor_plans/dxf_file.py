@@ -1,4 +1,4 @@
-"""Lines of a DXF drawing: its model space with all blocks put in, as CAD programs write them."""
+"""Reads the lines of a DXF drawing: its model space with all blocks inserted."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from coop_drake.floor_plans.walls import Drawing, Wall, refuse_many
 __all__ = ["read_dxf"]
 
 _UNITS = {1: 0.0254, 2: 0.3048, 4: 1e-3, 5: 1e-2, 6: 1.0, 7: 1e3, 10: 0.9144, 14: 1e-1}
-"""Codes of $INSUNITS that a floor plan may be in [m]."""
+"""Units that a floor plan may have, by their codes in $INSUNITS [m]."""
 
 _REQUIRED = {
     "LINE": ("start", "end"),
@@ -29,21 +29,22 @@ _REQUIRED = {
     "ARC": ("center", "radius", "start_angle", "end_angle"),
     "ELLIPSE": ("center", "major_axis", "ratio"),
 }
-"""What the reader would put a number of its own for, were it missing."""
+"""Attributes that ezdxf would replace by a default if they were missing."""
 
 _MOST_ENTITIES = 200_000
-_MOST_TOLD = 5
-"""Warnings of the reader that are passed on."""
+"""Entities that are read at most: blocks inside blocks can multiply without end."""
+_MOST_WARNINGS = 5
+"""Warnings of ezdxf that become notes."""
 
 
 def read_dxf(path: Path, settings: FloorPlanSettings) -> Drawing:
-    """Read lines, polylines, arcs, circles, ellipses, splines and solids of the layers that are shown.
+    """Read lines, polylines, arcs, circles, ellipses, splines and solids of the visible layers.
 
     Raises:
         FloorPlanError: The file is damaged, or does not say its unit.
     """
     file = str(path)
-    with _told() as told:
+    with _warnings() as warnings:
         document = _document(path)
     metre = settings.metres(_UNITS.get(int(document.header.get("$INSUNITS", 0))), file)
     names = {layer.dxf.name: layer for layer in document.layers}
@@ -71,13 +72,13 @@ def read_dxf(path: Path, settings: FloorPlanSettings) -> Drawing:
             known = ", ".join(sorted(used)) or "none"
             raise FloorPlanError(file, "layers", f"nothing is drawn on layer {layer!r}", f"known: {known}")
     notes = [f"{count} {kind} left out" for kind, count in sorted(ignored.items())]
-    notes += [f"while reading: {line}" for line in told[:_MOST_TOLD]]
+    notes += [f"while reading: {line}" for line in warnings[:_MOST_WARNINGS]]
     return Drawing(tuple(walls), tuple(notes))
 
 
 @contextmanager
-def _told() -> Iterator[list[str]]:
-    """What the reader warns of meanwhile, as notes of the plan and not as lines of its own on the screen."""
+def _warnings() -> Iterator[list[str]]:
+    """Collect the warnings of ezdxf in a block, so that they become notes and are not printed."""
     lines: list[str] = []
     handler, logger = logging.Handler(logging.WARNING), logging.getLogger("ezdxf")
     handler.emit = lambda record: lines.append(_one_line(record.getMessage()))  # type: ignore[method-assign]
@@ -95,7 +96,7 @@ def _one_line(finding: object) -> str:
 
 
 def _document(path: Path) -> Any:
-    """The drawing; nothing in it is guessed, for a number that is mended may be a wall that has moved."""
+    """The drawing, read without repairs: a repaired number could be a wall in another place."""
     from ezdxf.filemanagement import readfile
     from ezdxf.lldxf.const import DXFError
 
@@ -120,7 +121,7 @@ def _document(path: Path) -> Any:
 
 
 def _entities(document: Any, file: str) -> Iterator[Any]:
-    """All entities, blocks dissolved; refuses endless ones."""
+    """Yield all entities with blocks dissolved; refuse too many."""
     from ezdxf.disassemble import recursive_decompose
     from ezdxf.lldxf.const import DXFError
 
@@ -140,14 +141,14 @@ def _entities(document: Any, file: str) -> Iterator[Any]:
 
 
 def _layer_of(entity: Any) -> str:
-    """The layer that an entity is shown on: what a block holds on layer 0 goes with the block."""
+    """The layer that an entity is shown on; entities on layer 0 of a block take the layer of the block."""
     layer = str(entity.dxf.get("layer", "0"))
     block = entity.source_block_reference
     return layer if layer != "0" or block is None else _layer_of(block)
 
 
 def _walls_of(entity: Any, layer: str, metre: float, sagitta: float, file: str) -> list[Wall] | None:
-    """Lines of an entity, None if it has none."""
+    """The walls that an entity draws; None for a kind of entity that draws no lines."""
     from ezdxf.lldxf.const import DXFError
     from ezdxf.path import make_path
 
@@ -174,7 +175,7 @@ def _walls_of(entity: Any, layer: str, metre: float, sagitta: float, file: str) 
 
 
 def _refuse_no_numbers(entity: Any, file: str, place: str) -> None:
-    """Refuse an entity whose numbers are missing or not finite: it would be drawn elsewhere, or not."""
+    """Refuse an entity whose numbers are missing or not finite."""
     numbers = entity.dxf.all_existing_dxf_attribs()
     missing = [name for name in _REQUIRED.get(entity.dxftype(), ()) if name not in numbers]
     wrong = [name for name, value in numbers.items() if isinstance(value, float) and not isfinite(value)]

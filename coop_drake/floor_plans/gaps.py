@@ -1,4 +1,4 @@
-"""Loose ends of lines, joined to what they nearly touch: this adds walls and takes none away."""
+"""Joins loose ends of lines to lines that they nearly touch: this adds walls and removes none."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def bridges(noded: BaseGeometry, gap: float) -> list[LineString]:
 
 
 def _segments(noded: BaseGeometry) -> list[LineString]:
-    """All straight pieces."""
+    """All straight pieces of the lines."""
     pieces = []
     for line in shapely.get_parts(noded):
         coordinates = shapely.get_coordinates(line)

@@ -1,4 +1,4 @@
-"""ROS occupancy maps: a picture of cells and a YAML file that says what its shades mean."""
+"""Reads ROS occupancy maps: a picture of cells, and a YAML file that says what its shades mean."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import yaml
 from numpy.typing import NDArray
 
 from coop_drake.errors import FloorPlanError
+from coop_drake.floor_plans.settings import FloorPlanSettings
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["BoolGrid", "OccupancyMap", "read_map"]
@@ -21,16 +22,17 @@ BoolGrid = NDArray[np.bool_]
 
 _MODES = ("trinary", "scale", "raw")
 _MOST_CELLS = 64_000_000
+"""Larger pictures would fill the memory: a cell takes about 50 bytes while it is read."""
 _REMEDY = "see the map_server's documentation for the file's keys"
 
 
 @dataclass(frozen=True)
 class OccupancyMap:
-    """Cells and where they lie.
+    """The cells of a map and their place in W.
 
     Attributes:
         free: Whether a cell is known to be free, shape (rows, columns); row 0 is the lowest.
-        unknown: Whether nothing is known of a cell, same shape.
+        unknown: Whether a cell is neither known to be free nor known to be occupied, same shape.
         resolution: Edge of a cell [m].
         origin: Pose of the lower left corner of cell (0, 0) in W, (x, y, yaw) [m, rad].
     """
@@ -41,9 +43,10 @@ class OccupancyMap:
     origin: tuple[float, float, float]
 
     def place(self, corners: FloatArray) -> FloatArray:
-        """Corners counted in cells, (column, row), in W, shape (n, 2) [m]."""
+        """Points given in cells, (column, row), in W, shape (n, 2) [m]."""
         x, y, yaw = self.origin
-        # Not as a product of matrices: equal corners must come out equal to the last bit.
+        # No product of matrices: the order of its sums may differ, and equal points must stay equal to the
+        # last bit.
         along, across = self.resolution * corners[:, 0], self.resolution * corners[:, 1]
         return np.column_stack(
             [x + cos(yaw) * along - sin(yaw) * across, y + sin(yaw) * along + cos(yaw) * across]
@@ -58,20 +61,23 @@ class OccupancyMap:
         return int(np.floor(row)), int(np.floor(column))
 
 
-def read_map(path: Path, scale: float) -> OccupancyMap:
+def read_map(path: Path, settings: FloorPlanSettings) -> OccupancyMap:
     """Read the YAML file and the picture that it names.
 
-    What is neither surely free nor surely occupied counts as unknown, also shades between in the modes
-    ``scale`` and ``raw``.
+    A cell that is neither certainly free nor certainly occupied is unknown, also where the modes ``scale``
+    and ``raw`` give a probability.
 
     Args:
         path: The YAML file.
-        scale: Factor on the resolution and the origin [-].
+        settings: The scale multiplies the resolution and the origin.
 
     Raises:
-        FloorPlanError: A key or the picture is missing or wrong.
+        FloorPlanError: A key or the picture is missing or wrong, or a setting is for drawings only.
     """
-    file = str(path)
+    file, scale = str(path), settings.scale
+    for key in ("unit", "layers"):
+        if getattr(settings, key):
+            raise FloorPlanError(file, key, "an occupancy map has none", f"leave {key} away")
     document = _document(path)
     resolution = _number(document, "resolution", file) * scale
     if not 0.0 < resolution <= 10.0:
@@ -121,7 +127,7 @@ def _number(document: dict[str, Any], key: str, file: str, default: float | None
 
 
 def _judged(document: dict[str, Any], mode: str, shades: FloatArray, file: str) -> tuple[BoolGrid, BoolGrid]:
-    """Which cells are surely free and which surely occupied."""
+    """Which cells are certainly free and which are certainly occupied, each of shape (rows, columns)."""
     negate = document.get("negate", 0)
     if negate not in (0, 1):
         raise FloorPlanError(file, "negate", f"{negate!r} is neither 0 nor 1", "use 0 or 1")

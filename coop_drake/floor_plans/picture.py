@@ -1,4 +1,4 @@
-"""A picture of a floor that was read: what is free, what walls took, and what was said about it."""
+"""Draws a floor that was read: the floor, what the growth of walls took from it, and the notes."""
 
 from __future__ import annotations
 
@@ -21,16 +21,18 @@ from coop_drake.floor_plans.plan import FloorPlan
 __all__ = ["save_picture"]
 
 _WIDTH = 8.0
+"""Width of the figure [in]."""
 _TALLEST = 9.0
+"""Largest height of the figure [in]."""
 
 
 def save_picture(plan: FloorPlan, path: Path, title: str, inside: tuple[float, float] | None = None) -> None:
     """Write a preview as PNG or SVG.
 
     Args:
-        plan: What was read.
+        plan: The floor plan.
         path: Where to write.
-        title: Above the picture, for example the file's name.
+        title: Text above the picture, for example the file's name.
         inside: The point that chose the room, marked if given [m].
     """
     from matplotlib.patches import Patch

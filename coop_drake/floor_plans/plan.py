@@ -1,4 +1,4 @@
-"""Reads a floor plan of any kind, and saves corners where walls may grow a little."""
+"""Reads a floor plan of any format, and removes corners where that makes walls a little larger."""
 
 from __future__ import annotations
 
@@ -11,48 +11,40 @@ from shapely import Polygon
 
 from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans.cells import room_of_map
-from coop_drake.floor_plans.dxf_file import read_dxf
-from coop_drake.floor_plans.map_file import read_map
+from coop_drake.floor_plans.formats import READERS, SUFFIXES
+from coop_drake.floor_plans.map_file import OccupancyMap
 from coop_drake.floor_plans.rooms import Inside, Room, chosen_room, room_of
 from coop_drake.floor_plans.settings import FloorPlanSettings
-from coop_drake.floor_plans.shape_file import read_geojson, read_wkt
-from coop_drake.floor_plans.svg_file import read_svg
+from coop_drake.floor_plans.walls import Drawing
 
-__all__ = ["ENDINGS", "FloorPlan", "excess", "read_floor_plan"]
-
-_READERS = {
-    ".svg": read_svg,
-    ".dxf": read_dxf,
-    ".geojson": read_geojson,
-    ".json": read_geojson,
-    ".wkt": read_wkt,
-}
-_MAPS = (".yaml", ".yml")
-ENDINGS = (*_READERS, *_MAPS)
-"""Names of files that can be read end in one of these."""
+__all__ = ["FloorPlan", "excess", "read_floor_plan"]
 
 _LARGEST_FILE = 200_000_000
+"""Larger files would fill the memory while they are read [bytes]."""
 _MANY_DRAWN, _MANY_TRACED = 4_000, 300
-"""Corners from which a quick pass goes before the careful one, whose work grows with their square. It takes a
-little off straight walls, too, which do not matter where walls are as rough as in maps."""
+"""Corners of a drawing and of a map from which a quick simplification goes before the exact one, whose work
+grows with the square of their number. The quick one also takes a little off straight walls; the walls of a
+map are rough in any case."""
 
 _MOST_CORNERS = 20_000
+"""Corners after the quick simplification from which the exact one would take minutes."""
 _SLOW = 500
+"""Corners from which planning takes minutes, which a note says."""
 _SPECK = 0.1
-"""Other places smaller than this are not worth a word [m^2]."""
-
+"""Other rooms smaller than this are not reported [m^2]."""
 _ROUNDING = 1e-9
+"""A floor may reach this far beyond the drawn one, by the rounding of coordinates [m]."""
 
 
 @dataclass(frozen=True)
 class FloorPlan:
-    """A floor that was read, with what became of it on the way.
+    """A floor that was read from a file.
 
     Attributes:
-        polygon: The floor, holes and all, in W [m]; inside ``drawn`` to a nanometre.
-        drawn: The floor with every corner of the file.
+        polygon: The floor with its holes, in W [m]; inside ``drawn`` up to a nanometre.
+        drawn: The floor with every corner of the file [m].
         others: Areas of the file's other rooms, largest first [m^2].
-        notes: What was left out, joined or taken for granted, in words.
+        notes: Sentences about what was left out, joined or assumed.
     """
 
     polygon: Polygon
@@ -68,13 +60,13 @@ def read_floor_plan(
 ) -> FloorPlan:
     """Read the room that holds a point from an SVG, DXF, GeoJSON or WKT file, or from an occupancy map.
 
-    In drawings every line is a wall; in maps every cell that is not surely free. What is returned lies inside
-    the drawn floor: curves are enclosed from the floor's side, and corners saved only where walls grow.
+    In drawings every line is a wall, in maps every cell that is not certainly free. The result lies inside
+    the drawn floor: curves are enclosed from the floor's side, and corners are removed only where walls grow.
 
     Args:
-        path: The file; its ending says what it is, ``.yaml`` for an occupancy map.
-        settings: How to understand it.
-        inside: A point of the room that is meant [m]; None for the largest room.
+        path: The file; its suffix says its format, ``.yaml`` for an occupancy map.
+        settings: How the file is read.
+        inside: A point of the room to read [m]; None for the largest room.
 
     Raises:
         FloorPlanError: The file cannot be read or used; with place, finding and remedy.
@@ -85,8 +77,9 @@ def read_floor_plan(
     settings.check(file)
     _check_file(path)
     try:
-        with np.errstate(invalid="ignore", over="ignore"):  # Such numbers are refused by name.
-            room, notes, tolerance = _room(path, settings, inside)
+        with np.errstate(invalid="ignore", over="ignore"):  # such numbers are refused later, by name
+            content = READERS[path.suffix.lower()](path, settings)
+            room, notes, tolerance = _room(content, file, settings, inside)
     except ModuleNotFoundError as error:
         remedy = "install it: pip install 'coop-drake[floor-plans]'"
         raise FloorPlanError(file, "the reader", f"it needs the package {error.name}", remedy) from error
@@ -94,7 +87,7 @@ def read_floor_plan(
         raise FloorPlanError(
             file, "the lines", f"they cannot be combined ({error})", "clean the drawing up, or choose layers"
         ) from error
-    many = _MANY_TRACED if path.suffix.lower() in _MAPS else _MANY_DRAWN
+    many = _MANY_TRACED if isinstance(content, OccupancyMap) else _MANY_DRAWN
     floor = _simplified(room.floor, tolerance, many, inside, file)
     if (stray := excess(floor, room.floor)) > _ROUNDING:
         raise FloorPlanError(
@@ -108,7 +101,7 @@ def read_floor_plan(
 
 
 def excess(floor: Polygon, drawn: Polygon) -> float:
-    """How far a floor reaches beyond the drawn one [m]; zero where it lies inside."""
+    """How far a floor reaches beyond the drawn one [m]; zero if it lies inside."""
     if drawn.covers(floor):
         return 0.0
     outside = floor.difference(drawn)
@@ -117,9 +110,9 @@ def excess(floor: Polygon, drawn: Polygon) -> float:
 
 def _check_file(path: Path) -> None:
     file = str(path)
-    if path.suffix.lower() not in ENDINGS:
+    if path.suffix.lower() not in SUFFIXES:
         maps = path.suffix.lower() in (".pgm", ".png", ".bmp")
-        remedy = "name the map's YAML file" if maps else f"use one of {', '.join(ENDINGS)}"
+        remedy = "name the map's YAML file" if maps else f"use one of {', '.join(SUFFIXES)}"
         raise FloorPlanError(file, "the name", f"{path.suffix or 'no ending'!r} is no floor plan", remedy)
     try:
         size = path.stat().st_size
@@ -134,30 +127,23 @@ def _check_file(path: Path) -> None:
 
 
 def _room(
-    path: Path, settings: FloorPlanSettings, inside: Inside | None
+    content: Drawing | OccupancyMap, file: str, settings: FloorPlanSettings, inside: Inside | None
 ) -> tuple[Room, tuple[str, ...], float]:
     """The room as drawn, notes, and how far its walls may grow [m]."""
-    file, kind = str(path), path.suffix.lower()
-    if kind not in _MAPS:
-        drawing = _READERS[kind](path, settings)
-        return room_of(drawing, file, settings.gap, inside), drawing.notes, settings.growth()
-    for key in ("unit", "layers"):
-        if getattr(settings, key):
-            raise FloorPlanError(file, key, "an occupancy map has none", f"leave {key} away")
-    cells = read_map(path, settings.scale)
-    growth = settings.growth(cells.resolution)
-    free = settings.unknown_is_free
-    return room_of_map(cells, file, inside, unknown_is_free=free, closing=growth), (), growth
+    if isinstance(content, Drawing):
+        return room_of(content, file, settings.gap, inside), content.notes, settings.growth()
+    growth, free = settings.growth(content.resolution), settings.unknown_is_free
+    return room_of_map(content, file, inside, unknown_is_free=free, closing=growth), (), growth
 
 
 def _simplified(drawn: Polygon, tolerance: float, many: int, inside: Inside | None, file: str) -> Polygon:
-    """Fewer corners, inwards; the part that holds the point."""
+    """The floor with fewer corners, inside the drawn one; of several parts the one that holds the point."""
     from coop_drake.geometry.simplify import simplify_inward
 
-    floor = simplify_inward(drawn, _ROUNDING)  # Corners on straight edges
+    floor = simplify_inward(drawn, _ROUNDING)  # removes corners on straight edges
     corners = shapely.get_num_coordinates
     if tolerance > 0.0 and corners(floor) > many:
-        # Shrunk by half of what chords may stray, no chord reaches the drawn walls.
+        # The floor is shrunk by as much as the new edges may lie off the old ones: none reaches a drawn wall.
         quick = 0.25 * tolerance
         shrunk = shapely.simplify(floor.buffer(-quick, join_style="mitre"), quick * (1.0 - 1e-6))
         parts = [part for part in shapely.get_parts(shrunk.buffer(0.0)) if part.area > 0.0]

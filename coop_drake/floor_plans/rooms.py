@@ -1,4 +1,4 @@
-"""From lines to rooms: the faces that walls enclose, and the one that is meant."""
+"""Finds the rooms that the walls of a drawing enclose, and chooses one of them."""
 
 from __future__ import annotations
 
@@ -19,22 +19,24 @@ __all__ = ["Inside", "Room", "chosen_room", "room_of"]
 
 _LARGEST = 1000.0
 _SMALLEST = 0.1
-"""Floors beyond these widths are taken for a wrong unit [m]."""
+"""Floors wider or narrower than this are refused, since the unit is probably wrong [m]."""
 
 _THINNEST = 1e-3
-"""Half the width that a line gets that ends freely in a room [m]."""
+"""Half the thickness that a line gets which ends freely inside a room [m]."""
 
 _LARGEST_COORDINATE = 1e6
+"""Larger coordinates are refused; they would leave too few digits for millimetres [m]."""
 _MANY_ENDS = 1000
+"""Loose ends among which the closest two are looked for, in a table of their squared number."""
 
 
 class Inside(NamedTuple):
-    """A point that says which room is meant, in W.
+    """A point in W that says which room to read.
 
     Attributes:
         x: [m].
         y: [m].
-        called: What messages call it.
+        called: Its name in messages.
     """
 
     x: float
@@ -50,9 +52,9 @@ class Room:
     """One room of a plan.
 
     Attributes:
-        floor: What its walls leave free, in W [m].
+        floor: The area that its walls leave free, in W [m].
         others: Areas of the plan's other rooms, largest first [m^2].
-        notes: What was done to the lines, in words.
+        notes: Sentences about what was done to the lines.
     """
 
     floor: Polygon
@@ -61,17 +63,17 @@ class Room:
 
 
 def room_of(drawing: Drawing, file: str, gap: float, inside: Inside | None) -> Room:
-    """Find the room that every line of a drawing bounds as a wall.
+    """Find a room of a drawing, with every line as a wall.
 
     Args:
-        drawing: All lines; what has a width is a wall of that width, what has none is a thin wall.
+        drawing: All lines with their half widths.
         file: For messages.
         gap: Lines that end this close to another line are joined to it [m].
-        inside: A point of the room that is meant; None for the largest.
+        inside: A point of the room to find; None for the largest.
 
     Raises:
-        FloorPlanError: Nothing is enclosed, an outline crosses itself, the point stands in a wall or outside,
-            or the size cannot be meant.
+        FloorPlanError: Nothing is enclosed, an outline crosses itself, the point lies in a wall or outside,
+            or the size is no floor's.
     """
     if not drawing.walls:
         raise FloorPlanError(
@@ -98,7 +100,7 @@ def room_of(drawing: Drawing, file: str, gap: float, inside: Inside | None) -> R
     if not free.is_empty and free.length > 0.0:
         parts = shapely.get_parts(room.difference(free.buffer(_THINNEST, join_style="mitre")))
         floor = chosen_room([part for part in parts if isinstance(part, Polygon)], file, inside, solid)
-    outline = Polygon(room.exterior)  # What lies inside is an obstacle and no room.
+    outline = Polygon(room.exterior)  # Faces inside this outline are obstacles, not rooms.
     places = [other for other in rooms if other is not room and not outline.covers(other)]
     others = sorted((float(other.area) for other in places), reverse=True)
     notes = [f"{len(joined)} gaps of up to {gap:g} m were closed"] if joined else []
@@ -166,13 +168,13 @@ def _line(wall: Wall) -> LineString:
 
 
 def _thick(wall: Wall) -> Any:
-    """The wall with its width; mitred corners lie outside round ones."""
+    """The wall with its thickness; mitred corners enclose the round ones."""
     line = LinearRing(wall.points) if wall.closed else _line(wall)
     return shapely.buffer(line, wall.half_width, cap_style="square", join_style="mitre", mitre_limit=2.0)
 
 
 def _nothing_closed(noded: BaseGeometry, file: str, gap: float) -> FloorPlanError:
-    """Say where the outline is open."""
+    """The error that says where the outline is open."""
     ends = loose_ends(noded)[:_MANY_ENDS]
     if len(ends) < 2:
         return FloorPlanError(

@@ -1,4 +1,4 @@
-"""A floor as the section ``workspace`` of a scenario file."""
+"""Writes a floor as the section ``workspace`` of a scenario file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from shapely import Polygon
 __all__ = ["workspace_section"]
 
 _DECIMALS = 9
+"""Decimals of a metre that are written."""
 _WIDTH = 100
+"""Longest line [characters]."""
 
 
 def workspace_section(floor: Polygon, comment: str) -> str:
@@ -16,7 +18,7 @@ def workspace_section(floor: Polygon, comment: str) -> str:
 
     Args:
         floor: The floor [m].
-        comment: What stands above it, one line.
+        comment: One line of text to write above the section.
     """
     outer, *holes = (_ring(ring) for ring in (floor.exterior, *floor.interiors))
     lines = [f"# {' '.join(comment.split())}", "workspace:", "  outer: [", *_indented(outer, 4), "  ]"]
@@ -33,13 +35,13 @@ def _ring(ring: shapely.LinearRing) -> list[str]:
 
 
 def _number(value: float) -> str:
-    """As YAML 1.1 reads a number back: never with an exponent alone."""
+    """A decimal number with a point and no exponent, which YAML 1.1 could read as text."""
     text = f"{value:.{_DECIMALS}f}".rstrip("0")
     return text + "0" if text.endswith(".") else text
 
 
 def _indented(words: list[str], indent: int) -> list[str]:
-    """Words put into lines of a readable width."""
+    """Words joined to lines of at most ``_WIDTH`` characters."""
     lines = [""]
     for word in words:
         if lines[-1] and len(lines[-1]) + len(word) + 1 > _WIDTH - indent:

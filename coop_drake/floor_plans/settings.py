@@ -1,4 +1,4 @@
-"""How a drawing or a map is to be understood."""
+"""Settings for reading a drawing or a map."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ UNITS = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3, "in": 0.0254, 
 
 @dataclass(frozen=True)
 class FloorPlanSettings:
-    """What a file alone does not say.
+    """What the file itself does not say, and how accurately it is read.
 
     Attributes:
-        unit: What one unit of the file's coordinates is, one of ``UNITS``; None for what the file says.
+        unit: Unit of the file's coordinates, one of ``UNITS``; None for the unit that the file names.
         scale: Factor on all lengths, for example 50 for a drawing at 1:50 [-].
-        layers: Layers to read; empty for all that are shown.
-        tolerance: How far walls may grow where that saves corners, and curves where they are flattened [m];
-            None for 1 cm, or for one and a half cells of a map.
+        layers: Names of the layers to read; empty for all visible layers.
+        tolerance: Largest growth of walls where corners are removed and curves become chords [m]; None for
+            1 cm, or for one and a half cells of a map.
         gap: Lines that end this close to another line are joined to it [m].
         unknown_is_free: Whether the unknown cells of an occupancy map count as floor.
     """
@@ -53,11 +53,11 @@ class FloorPlanSettings:
 
     @property
     def sagitta(self) -> float:
-        """How far chords may lie from the curves they stand for [m]."""
+        """Largest distance of chords from the curves that they replace [m]."""
         return max(0.25 * self.growth(), 1e-4)
 
     def growth(self, cell: float | None = None) -> float:
-        """How far walls may grow [m].
+        """Largest growth of walls [m].
 
         Args:
             cell: Edge of a map's cells [m], None for a drawing.
@@ -70,11 +70,11 @@ class FloorPlanSettings:
         """Length of one unit of the file's coordinates in W [m].
 
         Args:
-            unit_of_file: What the file says of its unit [m], None if nothing.
+            unit_of_file: The unit that the file names [m], None if it names none.
             file: For messages.
 
         Raises:
-            FloorPlanError: Neither the file nor the settings say it.
+            FloorPlanError: Neither the file nor the settings name the unit.
         """
         unit = UNITS[self.unit] if self.unit is not None else unit_of_file
         if unit is None:

@@ -1,4 +1,4 @@
-"""Lines of GeoJSON and of well-known text: polygons' rings and line strings in plane coordinates."""
+"""Reads GeoJSON and well-known text: rings of polygons and line strings in plane coordinates."""
 
 from __future__ import annotations
 
@@ -28,7 +28,9 @@ _KINDS = (
     "GeometryCollection",
 )
 _DEGREES = ("4326", "CRS84", "WGS84", "4258")
+"""Names by which a file says that its coordinates are degrees."""
 _DEEPEST = 20
+"""Levels of collections inside each other that are allowed."""
 
 
 def read_wkt(path: Path, settings: FloorPlanSettings) -> Drawing:
@@ -87,10 +89,10 @@ def read_geojson(path: Path, settings: FloorPlanSettings) -> Drawing:
 
 
 def _with_whole_rings(shape: BaseGeometry) -> BaseGeometry:
-    """The same shape.
+    """Return the shape as it is.
 
     Raises:
-        ValueError: A ring runs to a corner and back, which encloses nothing.
+        ValueError: A ring has two different corners only and encloses nothing.
     """
     for polygon in shapely.get_parts(shape):
         rings = (polygon.exterior, *polygon.interiors) if isinstance(polygon, Polygon) else ()
@@ -111,7 +113,7 @@ def _text(path: Path) -> str:
 def _geometries(
     value: Any, file: str, place: str, layer: str | None, depth: int = 0
 ) -> Iterator[tuple[str, str | None, BaseGeometry]]:
-    """Yield place, layer and geometry of all that a document holds."""
+    """Yield the place, the layer and the geometry of everything in a document."""
     kind = value.get("type") if isinstance(value, dict) else None
     if depth > _DEEPEST:
         raise FloorPlanError(file, place, f"nested more than {_DEEPEST} levels deep", "export it flat")
@@ -156,7 +158,7 @@ def _drawing(file: str, geometries: list[tuple[str, BaseGeometry]], settings: Fl
 
 
 def _parts(geometry: BaseGeometry) -> Iterator[BaseGeometry]:
-    """Rings, lines and points."""
+    """The rings, lines and points of a geometry."""
     if hasattr(geometry, "geoms"):
         for part in geometry.geoms:
             yield from _parts(part)

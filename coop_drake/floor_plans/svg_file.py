@@ -1,4 +1,4 @@
-"""Lines of an SVG drawing: paths and shapes with all their transforms, as Inkscape and others write them."""
+"""Reads the lines of an SVG drawing: paths and shapes with all their transforms."""
 
 from __future__ import annotations
 
@@ -40,15 +40,18 @@ _LENGTHS = {
 }
 _NEVER_NEGATIVE = ("width", "height", "rx", "ry", "r")
 _MOST_ELEMENTS = 100_000
+"""Elements that are read at most, counted again in every clone."""
 _MOST_CLONES = 2_000
+"""Clones that are read at most: clones of clones can multiply without end."""
 _DEEPEST = 100
+"""Levels of elements inside each other that are allowed."""
 
 
 def read_svg(path: Path, settings: FloorPlanSettings) -> Drawing:
-    """Read all lines that are shown; a stroke's width belongs to the wall.
+    """Read all visible lines; the width of a stroke is part of the wall.
 
     Raises:
-        FloorPlanError: The file is damaged, or holds what this reader would have to guess.
+        FloorPlanError: The file is damaged, or contains something that the reader could only guess.
     """
     page = read_svg_page(path, settings)
     walk = _Walk(str(path), page, settings)
@@ -67,7 +70,7 @@ def read_svg(path: Path, settings: FloorPlanSettings) -> Drawing:
 
 @dataclass(frozen=True)
 class _Style:
-    """What an element inherits."""
+    """The attributes that an element passes on to those inside it."""
 
     transform: str = ""
     stroke: str = "none"
@@ -80,7 +83,7 @@ class _Style:
 
 @dataclass
 class _Walk:
-    """Goes through the tree once; remembers what it left out."""
+    """One pass through the tree, with counts of what was left out."""
 
     file: str
     page: SvgPage
@@ -99,7 +102,7 @@ class _Walk:
         return FloorPlanError(self.file, _name(element), finding, remedy)
 
     def walls(self, element: Element, outer: _Style, *, used: bool = False) -> Iterator[Wall]:
-        """All lines of an element and of what is inside it."""
+        """Yield all lines of an element and of the elements inside it."""
         self.count += 1
         if self.count > _MOST_ELEMENTS or outer.depth > _DEEPEST:
             finding = f"more than {_MOST_ELEMENTS:,} elements, or {_DEEPEST} levels of them"
@@ -239,7 +242,7 @@ def _name(element: Element) -> str:
 
 
 def _pieces(subpath: Any) -> tuple[list[Any], bool]:
-    """Control points of every piece of a subpath, and whether it closes itself."""
+    """Control points of every piece of a subpath, and whether it is closed."""
     from svgelements import Arc, Close, Move
 
     pieces: list[Any] = []

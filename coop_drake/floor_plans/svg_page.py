@@ -1,4 +1,4 @@
-"""An SVG file as a tree, safe to walk, and where its page lies in W."""
+"""Parses an SVG file safely, and places its page in W."""
 
 from __future__ import annotations
 
@@ -20,23 +20,24 @@ if TYPE_CHECKING:
 __all__ = ["SVG", "SvgPage", "length", "read_svg_page"]
 
 SVG = "{http://www.w3.org/2000/svg}"
-"""Namespace of all that is drawn."""
+"""Namespace of SVG elements."""
 
 _LENGTH = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(px|pt|pc|mm|cm|in)?\s*")
 _PIXELS = {"px": 1.0, "pt": 96.0 / 72.0, "pc": 16.0, "mm": 96.0 / 25.4, "cm": 96.0 / 2.54, "in": 96.0}
 _PHYSICAL = ("mm", "cm", "in", "pt", "pc")
 _PIXEL = UNITS["in"] / 96.0
+"""Length of a pixel by the CSS standard, 96 to an inch [m]."""
 
 
 @dataclass(frozen=True)
 class SvgPage:
-    """The tree and its page.
+    """The parsed file and its page.
 
     Attributes:
         root: The ``svg`` element.
         metre: Length of one user unit in W [m].
         left: First coordinate of the page's left edge, in user units.
-        bottom: Second coordinate of its lower edge; SVG counts downwards.
+        bottom: Second coordinate of the lower edge, in user units; y points down in SVG.
     """
 
     root: Element
@@ -45,7 +46,7 @@ class SvgPage:
     bottom: float
 
     def place(self, points: FloatArray) -> FloatArray:
-        """Points of the root's coordinates in W: the page's lower left corner is the origin, y goes up."""
+        """Points of the root's coordinates in W: the origin is the page's lower left corner, y points up."""
         return np.column_stack([points[:, 0] - self.left, self.bottom - points[:, 1]]) * self.metre
 
 
@@ -85,7 +86,7 @@ def length(text: str, file: str, place: str) -> float:
     """A length in pixels, which are user units inside the page.
 
     Raises:
-        FloorPlanError: It is no number with an absolute unit.
+        FloorPlanError: The text is no number with an absolute unit.
     """
     match = _LENGTH.fullmatch(text)
     if not match:
@@ -121,7 +122,7 @@ def _physical(sizes: list[str]) -> bool:
 
 
 def _view(file: str, root: Element, pixels: list[float] | None) -> tuple[float, float, float, float] | None:
-    """The viewBox, or the one that width and height stand for."""
+    """The viewBox (x, y, width, height), or the one that width and height imply; None if neither is given."""
     text = root.get("viewBox")
     if text is None:
         return None if pixels is None else (0.0, 0.0, pixels[0], pixels[1])

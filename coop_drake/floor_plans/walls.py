@@ -1,4 +1,4 @@
-"""Lines that a drawing holds, each of them a wall."""
+"""The lines of a drawing, each of them a wall: what the readers of drawings return."""
 
 from __future__ import annotations
 
@@ -12,17 +12,18 @@ from coop_drake.tree.pose import FloatArray
 __all__ = ["Drawing", "Wall", "refuse_many"]
 
 _MOST_POINTS = 400_000
+"""Points of a drawing from which finding its rooms would take hours."""
 
 
 @dataclass(frozen=True)
 class Wall:
-    """One polyline; what it was flattened from lies within its half width.
+    """One polyline; the curve that it replaces lies within its half width.
 
     Attributes:
         points: Shape (n, 2), in W [m].
-        half_width: How far the wall reaches to both sides; zero for a line [m].
-        closed: Whether the last point is joined to the first; then they are not repeated.
-        place: Which element of the file it is, in words.
+        half_width: Half the thickness of the wall, zero for a thin line [m].
+        closed: Whether the last point is joined to the first, which is not repeated then.
+        place: Name of the element of the file, for messages.
     """
 
     points: FloatArray
@@ -38,11 +39,11 @@ class Wall:
 
 @dataclass(frozen=True)
 class Drawing:
-    """What was read from one file.
+    """The content of one drawing.
 
     Attributes:
         walls: All lines, in the file's order.
-        notes: What was left out or taken for granted, in words.
+        notes: Sentences about what was left out or assumed.
     """
 
     walls: tuple[Wall, ...]
@@ -50,10 +51,10 @@ class Drawing:
 
 
 def refuse_many(file: str, points: int) -> None:
-    """Refuse files that would take hours.
+    """Refuse files with too many points.
 
     Raises:
-        FloorPlanError: There are too many points.
+        FloorPlanError: There are more than ``_MOST_POINTS``.
     """
     if points > _MOST_POINTS:
         raise FloorPlanError(

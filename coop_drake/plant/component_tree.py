@@ -11,9 +11,9 @@ from pydrake.multibody.tree import Joint, RigidBody
 from pydrake.systems.framework import Context
 
 from coop_drake.plant.chain import limits_of, scoped
-from coop_drake.plant.flatness import axis_in_world
 from coop_drake.plant.footprint import DIGITS, project
 from coop_drake.plant.parsing import bodies_of, joints_of, refusal
+from coop_drake.plant.planarity import axis_in_world
 from coop_drake.plant.shadows import without_covered
 from coop_drake.plant.team import TeamPlant
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint

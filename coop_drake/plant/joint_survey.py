@@ -14,8 +14,8 @@ from pydrake.multibody.tree import Joint
 
 from coop_drake.errors import ScenarioError
 from coop_drake.plant.chain import limits_of
-from coop_drake.plant.flatness import TILT, axis_in_world, is_upright
 from coop_drake.plant.parsing import joints_of
+from coop_drake.plant.planarity import TILT, axis_in_world, is_upright
 
 __all__ = ["SurveyedJoint", "survey_joints"]
 

@@ -14,8 +14,8 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from coop_drake.plant.chain import find_base
 from coop_drake.plant.constrained_grasps import ConstrainedGrasp, ConstrainedGrasps
 from coop_drake.plant.fixing import fix_joints
-from coop_drake.plant.flatness import object_frame, planar_pose
 from coop_drake.plant.parsing import add_models, finalize, set_actuators
+from coop_drake.plant.planarity import object_frame, planar_pose
 from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
 from coop_drake.scenario import Assembly, Scenario
 from coop_drake.tree.pose import FloatArray

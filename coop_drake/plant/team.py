@@ -21,9 +21,9 @@ from pydrake.systems.framework import Context, DiagramBuilder
 
 from coop_drake.plant.chain import find_base, scoped
 from coop_drake.plant.fixing import fix_joints
-from coop_drake.plant.flatness import check_flat, check_masses, object_frame, planar_pose
 from coop_drake.plant.grasps import Grasps, WeldedGrasps
 from coop_drake.plant.parsing import add_models, bodies_of, finalize, set_actuators
+from coop_drake.plant.planarity import check_masses, check_planar, object_frame, planar_pose
 from coop_drake.scenario import Assembly, RobotAssembly, Scenario, assemble
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
@@ -168,7 +168,7 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
     set_actuators(plant, [joint for _, joints in chains for joint in joints])
     finalize(scenario, plant)
     context = plant.CreateDefaultContext()
-    check_flat(scenario, assembly, plant, context, chains)
+    check_planar(scenario, assembly, plant, context, chains)
     check_masses(scenario, assembly, plant, context)
     robots: list[RobotModel] = []
     for robot, (base, joints) in zip(assembly.robots, chains, strict=True):

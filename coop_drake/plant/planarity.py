@@ -60,7 +60,7 @@ def object_frame(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant) 
     return (frame, frame.body()) if frame else (roots[0].body_frame(), roots[0])
 
 
-def check_flat(
+def check_planar(
     scenario: Scenario,
     assembly: Assembly,
     plant: MultibodyPlant,
