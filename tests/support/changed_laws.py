@@ -1,0 +1,156 @@
+"""Changes one law after the other and prints what changes with it, as JSON; needs NUMBA_DISABLE_JIT=1."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import sys
+from dataclasses import replace
+from types import FunctionType
+
+import numpy as np
+
+from coop_drake.answers.plan import Plan
+from coop_drake.diagram import build_closed_loop
+from coop_drake.geometry.boundary import edges_of
+from coop_drake.laws import ScheduledGains, axis_table
+from coop_drake.laws.gain_schedule import schedule_of
+from coop_drake.planning.execution.transport_kernels import cross_cell
+from coop_drake.planning.improvement.box_crossing import cross_box
+from coop_drake.plant import set_configuration
+from coop_drake.simulation.stall import blocking_margin
+from coop_drake.simulation.telemetry import Telemetry
+from tests.support.small_loop import small_maps, small_problem
+from tests.support.small_plan import POSITION_TOLERANCE
+
+
+def change(law: FunctionType) -> FunctionType:
+    """Let a law return, or write into its last argument, other numbers; return the original."""
+    original = FunctionType(law.__code__, law.__globals__, law.__name__, law.__defaults__)
+
+    def changed(*arguments):
+        result = __original__(*arguments)  # noqa: F821
+        if result is None:
+            arguments[-1][:] *= 1.1
+            return None
+        if isinstance(result, tuple):
+            return tuple(1.1 * number for number in result)
+        return result - __lowered__  # noqa: F821
+
+    # A margin becomes the worst of all, so that nothing hides it; an energy changes a little.
+    lowered = 10.0 if law.__module__.endswith("readiness") else 0.5
+    law.__globals__.update(__original__=original, __lowered__=lowered)
+    law.__code__, law.__defaults__ = changed.__code__, None
+    return original
+
+
+def restore(law: FunctionType, original: FunctionType) -> None:
+    """Undo a change."""
+    law.__code__, law.__defaults__ = original.__code__, original.__defaults__
+
+
+class Loop:
+    """A closed loop in the middle of a transition, moving, a short way behind its governor."""
+
+    def __init__(self, blocks: str, plan: Plan) -> None:
+        scenario, _ = small_problem()
+        self.loop = build_closed_loop(scenario, plan, small_maps(), blocks=blocks)
+        self.blocks = blocks
+
+    def sample(self):
+        """A fresh sample of all that the controllers compute."""
+        loop, root = self.loop, self.loop.create_context()
+        root.SetTime(0.1)
+        plan, team = loop.plan, loop.team
+        transition = plan.transitions[0]
+        axes = 0.6 * transition.goal_lower + 0.4 * transition.goal_upper
+        z = np.concatenate([transition.target - [0.3, 0.2], axes])
+        rates = np.linspace(0.02, 0.05, len(z))
+        set_configuration(team, team.plant.GetMyMutableContextFromRoot(root), z, rates)
+        integrators = (
+            [loop.fused.governor]
+            if loop.fused
+            else [law.GetSubsystemByName("governor_state") for law in loop.laws]
+        )
+        for integrator in integrators:
+            state = integrator.GetMyMutableContextFromRoot(root)
+            integrator.set_integral_value(state, transition.target - [0.25, 0.18])
+        self.rates = [
+            integrator.EvalTimeDerivatives(integrator.GetMyContextFromRoot(root)).CopyToVector()
+            for integrator in integrators
+        ]
+        return Telemetry(loop, root).read()
+
+    def numbers(self):
+        """All numbers that may depend on a law."""
+        sample = self.sample()
+        return np.concatenate(
+            [
+                *self.rates, sample.funnel_lower, sample.funnel_upper, [sample.energy_margin],
+                sample.commanded_wrenches.ravel(), sample.base_wrenches.ravel(), sample.joint_torques,
+                sample.ready_margins,
+            ]
+        )  # fmt: skip
+
+
+def estimated(plan: Plan):
+    """The state in which the time estimate leaves the first cell."""
+    n = len(plan.start) - 2
+    state = np.concatenate([plan.start[:2], np.zeros(2), plan.start[:2], plan.start[2:], np.zeros(n)])
+    cells = [
+        (edges_of(cell.tidied), transition.gains.governor_row, axis_table(plan.funnel(k), transition.gains))
+        for k, (cell, transition) in enumerate(zip(plan.cells[:2], plan.transitions[:2], strict=True))
+    ]
+    path = np.array([plan.start[:2], plan.transitions[0].target])
+    edges, gains, table = cells[0]
+    seconds = cross_cell(
+        state, edges, path, gains, table, plan.transitions[0].inradius, *cells[1], False, 10.0
+    )
+    return np.array([*state, seconds])
+
+
+def crossed():
+    """The state in which the choice of boxes leaves a box."""
+    state, axis = np.zeros(5), np.array([0.0])
+    seconds = cross_box(
+        state, np.array([0.0, 0.5]), np.array([0.2, 0.2]), axis - 0.5, axis + 0.5,
+        np.array([axis + 0.1, axis + 0.4]), axis, schedule_of(ScheduledGains()), 0.0, 5.0,
+    )  # fmt: skip
+    return np.array([*state, seconds])
+
+
+def stalled(plan: Plan, sample):
+    """The message about a team that is not ready, for each condition that may be the worst."""
+    worse = [
+        replace(sample, rates=0.6 * np.ones_like(sample.rates)),
+        replace(sample, governor_position=sample.governor_position + 0.65),
+    ]
+    return [blocking_margin(plan, one, POSITION_TOLERANCE) for one in worse]
+
+
+def main(names: list[str]) -> None:
+    """Print, for every law (module:function), which results change with it."""
+    _, plan = small_problem()
+    named, fused = Loop("named", plan), Loop("fused", plan)
+    sample = named.sample()
+    results = {
+        "named": lambda: named.numbers().tolist(),
+        "fused": lambda: fused.numbers().tolist(),
+        "estimate": lambda: estimated(plan).tolist(),
+        "boxes": lambda: crossed().tolist(),
+        "stall": lambda: stalled(plan, sample),
+    }
+    before = {name: result() for name, result in results.items()}
+    found = {}
+    for name in names:
+        module, function = name.split(":")
+        law = getattr(importlib.import_module(module), function)
+        original = change(law)
+        found[name] = [result for result, compute in results.items() if compute() != before[result]]
+        restore(law, original)
+    assert {name: result() for name, result in results.items()} == before
+    print(json.dumps(found))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
