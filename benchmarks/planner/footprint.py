@@ -9,9 +9,9 @@ import numpy as np
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.planning.sampling.collision_kernels import is_free
-from coop_drake.planning.sampling.obstacle_grid import walls_for
-from coop_drake.planning.sampling.team_arrays import team_arrays
+from coop_drake.planning.sampling.obstacle_grid import grid_for_team
 from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.team_arrays import team_arrays
 
 __all__ = ["compiled_check", "free_goals"]
 
@@ -25,11 +25,11 @@ def compiled_check(problem: PlanningProblem) -> Callable[..., bool]:
     a call can; handing thirteen arrays over at every call would cost three times the check itself.
     """
     team = team_arrays(problem.tree)
-    walls = walls_for(problem.workspace, team)
+    grid = grid_for_team(problem.workspace, team)
 
     @numba.njit
     def check(*values: float) -> bool:
-        free: bool = is_free(team, walls, np.array(values), 0.0)
+        free: bool = is_free(team, grid, np.array(values), 0.0)
         return free
 
     check(*map(float, problem.start))

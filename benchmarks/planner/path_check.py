@@ -10,11 +10,11 @@ import shapely
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.planning.sampling.collision_kernels import is_free
-from coop_drake.planning.sampling.obstacle_grid import walls_for
-from coop_drake.planning.sampling.team_arrays import team_arrays
+from coop_drake.planning.sampling.obstacle_grid import grid_for_team
 from coop_drake.tree.component_tree import ConvexShape
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.team_arrays import team_arrays
 
 __all__ = ["fault_of"]
 
@@ -47,10 +47,10 @@ def fault_of(problem: PlanningProblem, path: FloatArray) -> str:
     if (joints < tree.joint_lower - _ARRIVED).any() or (joints > tree.joint_upper + _ARRIVED).any():
         return "a joint leaves its range"
     team = team_arrays(tree)
-    walls = walls_for(problem.workspace, team)
+    grid = grid_for_team(problem.workspace, team)
     scale = configuration_scale(tree)
     for z in _densified(path, scale, _DENSE):
-        if not is_free(team, walls, z, 0.0):
+        if not is_free(team, grid, z, 0.0):
             return f"it collides at {np.round(z, 4).tolist()}"
     return _exact_fault(problem, _densified(path, scale, _EXACT))
 

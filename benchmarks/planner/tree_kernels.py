@@ -7,11 +7,10 @@ from math import pi
 import numba
 import numpy as np
 
-from coop_drake.geometry.sweep_kernels import IntArray
 from coop_drake.planning.sampling.collision_kernels import is_free
-from coop_drake.planning.sampling.obstacle_grid import Walls
-from coop_drake.planning.sampling.team_arrays import TeamArrays
-from coop_drake.tree.pose import FloatArray
+from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
+from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.team_arrays import TeamArrays
 
 __all__ = ["rrt_connect"]
 
@@ -47,7 +46,7 @@ def _nearest(nodes: FloatArray, count: int, z: FloatArray, scale: FloatArray) ->
 @numba.njit(cache=True)
 def _extend(
     team: TeamArrays,
-    walls: Walls,
+    grid: ObstacleGrid,
     nodes: FloatArray,
     parents: IntArray,
     count: int,
@@ -63,7 +62,7 @@ def _extend(
     share = 1.0 if length <= reach else reach / length
     motions = max(1, int(np.ceil(np.abs(way * scale).max() * share / step)))
     for i in range(motions, 0, -1):
-        if not is_free(team, walls, nodes[near] + way * (share * i / motions), 0.0):
+        if not is_free(team, grid, nodes[near] + way * (share * i / motions), 0.0):
             return _TRAPPED, motions - i + 1
     nodes[count] = nodes[near] + way * share
     parents[count] = near
@@ -73,7 +72,7 @@ def _extend(
 @numba.njit(cache=True)
 def rrt_connect(
     team: TeamArrays,
-    walls: Walls,
+    grid: ObstacleGrid,
     start: FloatArray,
     goals: FloatArray,
     lower: FloatArray,
@@ -88,7 +87,7 @@ def rrt_connect(
 
     Args:
         team: The team.
-        walls: The floor.
+        grid: The floor.
         start: Free configuration, shape (d,).
         goals: Free configurations, shape (G, d).
         lower: Lower ends of what is sampled, shape (d,).
@@ -113,7 +112,7 @@ def rrt_connect(
     while checks < budget:
         z = lower + random.random(len(start)) * (upper - lower)
         other = 1 - side
-        got, spent = _extend(team, walls, nodes[side], parents[side], counts[side], z, scale, reach, step)
+        got, spent = _extend(team, grid, nodes[side], parents[side], counts[side], z, scale, reach, step)
         checks += spent
         if got != _TRAPPED:
             z = nodes[side, counts[side]].copy()
@@ -121,7 +120,7 @@ def rrt_connect(
             got = _ADVANCED
             while got == _ADVANCED and checks < budget:
                 got, spent = _extend(
-                    team, walls, nodes[other], parents[other], counts[other], z, scale, reach, step
+                    team, grid, nodes[other], parents[other], counts[other], z, scale, reach, step
                 )
                 checks += spent
                 if got != _TRAPPED:

@@ -15,9 +15,9 @@ from benchmarks.planner.footprint import compiled_check, free_goals
 from benchmarks.planner.peer import GOALS, MOTION_STEP, RANGE, PeerRun
 from benchmarks.planner.tree_kernels import rrt_connect
 from coop_drake.answers import PlanningProblem
-from coop_drake.planning.sampling.obstacle_grid import walls_for
-from coop_drake.planning.sampling.team_arrays import team_arrays
+from coop_drake.planning.sampling.obstacle_grid import grid_for_team
 from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.team_arrays import team_arrays
 
 __all__ = ["CHECKS", "run_trees"]
 
@@ -35,7 +35,7 @@ def run_trees(problem: PlanningProblem, seeds: Sequence[int], checks: int = CHEC
     """
     tree = problem.tree
     team, scale, check = team_arrays(tree), configuration_scale(tree), compiled_check(problem)
-    walls = walls_for(problem.workspace, team)
+    grid = grid_for_team(problem.workspace, team)
     x_lower, y_lower, x_upper, y_upper = problem.workspace.bounds
     lower = np.array([x_lower, y_lower, -np.pi, *tree.joint_lower])
     upper = np.array([x_upper, y_upper, np.pi, *tree.joint_upper])
@@ -48,7 +48,7 @@ def run_trees(problem: PlanningProblem, seeds: Sequence[int], checks: int = CHEC
         random = np.random.default_rng(seed)
         begin = process_time()
         path, spent = rrt_connect(
-            team, walls, start, goals, lower, upper, scale, RANGE, MOTION_STEP, random, budget
+            team, grid, start, goals, lower, upper, scale, RANGE, MOTION_STEP, random, budget
         )
         return PeerRun(seed, process_time() - begin, path, spent)
 

@@ -12,9 +12,10 @@ from shapely import Polygon
 
 from coop_drake.compiled import compiled
 from coop_drake.errors import GeometryError
+from coop_drake.geometry.distances import segments_cross, squared_distance
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BoundaryDistance", "edges_of", "signed_distance", "squared_distance"]
+__all__ = ["BoundaryDistance", "edges_of", "signed_distance"]
 
 
 def edges_of(polygon: Polygon) -> FloatArray:
@@ -24,20 +25,14 @@ def edges_of(polygon: Polygon) -> FloatArray:
 
 
 @compiled
-def squared_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
-    """Squared distance of a point to the segment from (x0, y0) to (x1, y1), which may be a point."""
-    dx, dy = x1 - x0, y1 - y0
-    px, py = x - x0, y - y0
-    squared_length = dx * dx + dy * dy
-    s = (px * dx + py * dy) / squared_length if squared_length > 0.0 else 0.0
-    s = min(max(s, 0.0), 1.0)
-    ex, ey = px - s * dx, py - s * dy
-    return ex * ex + ey * ey
-
-
-@compiled
 def signed_distance(edges: FloatArray, x: float, y: float) -> float:
-    """Distance to the nearest edge, positive where a ray to the right crosses an odd number of edges."""
+    """Distance of a point to the nearest edge [m], positive inside: a ray from there crosses an odd number.
+
+    Args:
+        edges: Edges (x0, y0, x1, y1) of closed rings, shape (E, 4) [m].
+        x: First coordinate of the point [m].
+        y: Second coordinate [m].
+    """
     nearest = np.inf
     inside = False
     for k in range(edges.shape[0]):
@@ -50,26 +45,22 @@ def signed_distance(edges: FloatArray, x: float, y: float) -> float:
 
 @compiled
 def _segment_clearance(edges: FloatArray, ax: float, ay: float, bx: float, by: float) -> float:
-    """Distance between the segment from a to b and the nearest edge, zero where they cross."""
+    """Distance of the segment a-b from the nearest edge [m], zero where they cross."""
     nearest = np.inf
     for k in range(edges.shape[0]):
-        cx, cy, dx, dy = edges[k, 0], edges[k, 1], edges[k, 2], edges[k, 3]
-        side_c = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        side_d = (bx - ax) * (dy - ay) - (by - ay) * (dx - ax)
-        side_a = (dx - cx) * (ay - cy) - (dy - cy) * (ax - cx)
-        side_b = (dx - cx) * (by - cy) - (dy - cy) * (bx - cx)
-        if side_c * side_d < 0.0 and side_a * side_b < 0.0:
+        x0, y0, x1, y1 = edges[k, 0], edges[k, 1], edges[k, 2], edges[k, 3]
+        if segments_cross(ax, ay, bx, by, x0, y0, x1, y1):
             return 0.0
-        nearest = min(nearest, squared_distance(ax, ay, cx, cy, dx, dy))
-        nearest = min(nearest, squared_distance(bx, by, cx, cy, dx, dy))
-        nearest = min(nearest, squared_distance(cx, cy, ax, ay, bx, by))
-        nearest = min(nearest, squared_distance(dx, dy, ax, ay, bx, by))
+        nearest = min(nearest, squared_distance(ax, ay, x0, y0, x1, y1))
+        nearest = min(nearest, squared_distance(bx, by, x0, y0, x1, y1))
+        nearest = min(nearest, squared_distance(x0, y0, ax, ay, bx, by))
+        nearest = min(nearest, squared_distance(x1, y1, ax, ay, bx, by))
     return sqrt(nearest)
 
 
 @compiled
 def _signed_distances(edges: FloatArray, points: FloatArray) -> FloatArray:
-    """The same for many points, shape (n, 2) -> (n,)."""
+    """Signed distance of many points, shape (n, 2) -> (n,) [m]."""
     result = np.empty(points.shape[0])
     for k in range(points.shape[0]):
         result[k] = signed_distance(edges, points[k, 0], points[k, 1])

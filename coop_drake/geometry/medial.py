@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from coop_drake.compiled import compiled
-from coop_drake.geometry.boundary import BoundaryDistance, edges_of, squared_distance
+from coop_drake.geometry.boundary import BoundaryDistance, edges_of
+from coop_drake.geometry.distances import squared_distance
 from coop_drake.tree.pose import FloatArray
 
 if TYPE_CHECKING:

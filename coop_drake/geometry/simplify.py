@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from shapely import Polygon
 
 from coop_drake.compiled import compiled
-from coop_drake.geometry.boundary import squared_distance
+from coop_drake.geometry.distances import segments_cross, squared_distance, twice_area
 from coop_drake.geometry.medial import IndexArray
 from coop_drake.tree.pose import FloatArray
 
@@ -72,24 +72,12 @@ def sharpest_angle(polygon: Polygon) -> float:
 
 
 @compiled
-def _cross(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
-    """Twice the signed area of a triangle, positive counter-clockwise."""
-    return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-
-
-@compiled
 def _drop_depth(points: FloatArray, a: int, b: int, c: int, slack: float) -> float:
     """Depth that leaving out b cuts off; infinite where b is reflex by more than the slack."""
-    ax, ay, bx, by, cx, cy = (
-        points[a, 0],
-        points[a, 1],
-        points[b, 0],
-        points[b, 1],
-        points[c, 0],
-        points[c, 1],
-    )
+    ax, ay, bx, by = points[a, 0], points[a, 1], points[b, 0], points[b, 1]
+    cx, cy = points[c, 0], points[c, 1]
     depth = sqrt(squared_distance(bx, by, ax, ay, cx, cy))
-    return depth if _cross(ax, ay, bx, by, cx, cy) >= 0.0 or depth <= slack else inf
+    return depth if twice_area(ax, ay, bx, by, cx, cy) >= 0.0 or depth <= slack else inf
 
 
 @compiled
@@ -121,7 +109,7 @@ def _is_free(
     """Whether triangle b, (x, y), c holds no vertex but ``own`` = a, b, c, d, and no edge cuts it."""
     a, b, c, d = own
     bx, by, cx, cy = points[b, 0], points[b, 1], points[c, 0], points[c, 1]
-    turn = 1.0 if _cross(bx, by, x, y, cx, cy) >= 0.0 else -1.0
+    turn = 1.0 if twice_area(bx, by, x, y, cx, cy) >= 0.0 else -1.0
     for v in range(points.shape[0]):
         if not alive[v]:
             continue
@@ -130,9 +118,9 @@ def _is_free(
             v not in (a, b, c, d)
             and min(bx, x, cx) <= px <= max(bx, x, cx)
             and min(by, y, cy) <= py <= max(by, y, cy)
-            and turn * _cross(bx, by, x, y, px, py) >= -1e-12
-            and turn * _cross(x, y, cx, cy, px, py) >= -1e-12
-            and turn * _cross(cx, cy, bx, by, px, py) >= -1e-12
+            and turn * twice_area(bx, by, x, y, px, py) >= -1e-12
+            and turn * twice_area(x, y, cx, cy, px, py) >= -1e-12
+            and turn * twice_area(cx, cy, bx, by, px, py) >= -1e-12
         ):
             return False
         w = following[v]
@@ -140,10 +128,7 @@ def _is_free(
             continue
         qx, qy = points[w, 0], points[w, 1]
         for ex, ey in ((bx, by), (cx, cy)):
-            if (
-                _cross(ex, ey, x, y, px, py) * _cross(ex, ey, x, y, qx, qy) < 0.0
-                and _cross(px, py, qx, qy, ex, ey) * _cross(px, py, qx, qy, x, y) < 0.0
-            ):
+            if segments_cross(ex, ey, x, y, px, py, qx, qy):
                 return False
     return True
 

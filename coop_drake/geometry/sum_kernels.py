@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.geometry.sweep_kernels import IntArray
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
 
 _NEEDLE = 1e-12
 

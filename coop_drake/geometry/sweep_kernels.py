@@ -2,45 +2,20 @@
 
 from __future__ import annotations
 
-from math import atan2, ceil, cos, hypot, pi, sin, sqrt
-from typing import NamedTuple
+from math import atan2, ceil, cos, floor, hypot, pi, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coop_drake.compiled import compiled
 from coop_drake.geometry.convex import SLACK
 from coop_drake.tree.pose import FloatArray
-
-IntArray = NDArray[np.int64]
+from coop_drake.tree.team_arrays import TeamArrays
 
 _TURN = 2.0 * pi
 _SAME_ANGLE = 1e-5
 _SAME_POINT = 1e-11
 _LARGEST_TURN = 0.75 * pi
 _ARC_SHARE = 10.0
-
-
-class SweepArrays(NamedTuple):
-    """Every convex piece of a tree with the joints that move it, P pieces, V vertices, S stages in all.
-
-    Attributes:
-        first: Where each piece's vertices begin, shape (P + 1,).
-        vertices: Vertices in the component's frame, shape (V, 2) [m].
-        radius: Growth of each piece, shape (P,) [m].
-        first_stage: Where each piece's stages begin, its own joint first, theta last, shape (P + 1,).
-        axis: Axis of the slice (theta, q...) of each stage, shape (S,).
-        turning: 1 for revolute joints and theta, 0 for prismatic ones, shape (S,).
-        joint: Sign, axis in J and X_PJ as (x, y, cos, sin) of each stage, shape (S, 7).
-    """
-
-    first: IntArray
-    vertices: FloatArray
-    radius: FloatArray
-    first_stage: IntArray
-    axis: IntArray
-    turning: IntArray
-    joint: FloatArray
 
 
 @compiled
@@ -56,7 +31,18 @@ def disc_turn(half_width: float) -> float:
 
 
 @compiled
-def closed_directions(angles: FloatArray, largest_turn: float = _LARGEST_TURN) -> FloatArray:
+def sort(values: FloatArray) -> None:
+    """Sort a short array in place by insertion; numpy's sort takes longer to compile, and as long to run."""
+    for i in range(1, len(values)):
+        value, k = values[i], i
+        while k > 0 and values[k - 1] > value:
+            values[k] = values[k - 1]
+            k -= 1
+        values[k] = value
+
+
+@compiled
+def closed_directions(angles: FloatArray, largest_turn: float) -> FloatArray:
     """Sort directions, drop repeated ones and fill gaps so that no two neighbours are further apart.
 
     Args:
@@ -66,7 +52,10 @@ def closed_directions(angles: FloatArray, largest_turn: float = _LARGEST_TURN) -
     Returns:
         Directions in ascending order within one turn, shape (m,).
     """
-    ordered = np.sort(angles - _TURN * np.floor(angles / _TURN)) if len(angles) else np.zeros(1)
+    ordered = np.zeros(max(len(angles), 1))
+    for i in range(len(angles)):
+        ordered[i] = angles[i] - _TURN * floor(angles[i] / _TURN)
+    sort(ordered)
     kept = np.empty(len(ordered))
     count = 0
     for i in range(len(ordered)):
@@ -101,7 +90,9 @@ def circumscribed(angles: FloatArray, offsets: FloatArray) -> FloatArray:
         Vertices, counter-clockwise, without repetitions, shape (m, 2).
     """
     count = len(angles)
-    x, y = np.cos(angles), np.sin(angles)
+    x, y = np.empty(count), np.empty(count)
+    for i in range(count):
+        x[i], y[i] = cos(angles[i]), sin(angles[i])
     vertices = np.empty((count, 2))
     for i in range(count):
         k = i + 1 if i + 1 < count else 0
@@ -114,9 +105,9 @@ def circumscribed(angles: FloatArray, offsets: FloatArray) -> FloatArray:
     for i in range(count):
         step = max(abs(vertices[i, 0] - vertices[i - 1, 0]), abs(vertices[i, 1] - vertices[i - 1, 1]))
         if step > _SAME_POINT:
-            distinct[size] = vertices[i]
+            distinct[size, 0], distinct[size, 1] = vertices[i, 0], vertices[i, 1]
             size += 1
-    return distinct[:size].copy() if size >= 3 else vertices
+    return distinct[:size] if size >= 3 else vertices
 
 
 @compiled
@@ -145,9 +136,9 @@ def edge_directions(vertices: FloatArray) -> FloatArray:
 @compiled
 def _furthest(vertices: FloatArray, i: int) -> bool:
     """Whether a vertex is no nearer to the origin than the points of its edges close by."""
-    x, y = vertices[i]
-    ax, ay = vertices[i - 1]
-    bx, by = vertices[i + 1 if i + 1 < len(vertices) else 0]
+    after = i + 1 if i + 1 < len(vertices) else 0
+    x, y = vertices[i, 0], vertices[i, 1]
+    ax, ay, bx, by = vertices[i - 1, 0], vertices[i - 1, 1], vertices[after, 0], vertices[after, 1]
     outermost: bool = (bx - x) * x + (by - y) * y <= 0.0 and (ax - x) * x + (ay - y) * y <= 0.0
     return outermost
 
@@ -173,8 +164,8 @@ def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> Flo
     radii, bearings = np.empty(count), np.empty(count)
     angles = np.empty(2 * len(edges) + count * (parts + 1) + 4)
     size = 0
-    for angle in edges:
-        angles[size], angles[size + 1] = angle - half_width, angle + half_width
+    for i in range(len(edges)):
+        angles[size], angles[size + 1] = edges[i] - half_width, edges[i] + half_width
         size += 2
     for i in range(count):
         radii[i] = hypot(vertices[i, 0], vertices[i, 1])
@@ -186,7 +177,9 @@ def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> Flo
     for quarter in range(4 if count < 3 else 0):
         angles[size] = bearings[0] + 0.5 * pi * quarter
         size += 1
-    directions = closed_directions(angles[:size] + centre)
+    for i in range(size):
+        angles[i] += centre
+    directions = closed_directions(angles[:size], _LARGEST_TURN)
     offsets = np.empty(len(directions))
     for k in range(len(directions)):
         best = -np.inf
@@ -200,21 +193,27 @@ def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> Flo
 
 
 @compiled
-def over_prismatic(vertices: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray:
-    """Enclose a convex set moved along a segment of displacements: the hull of both end copies.
+def over_prismatic(vertices: FloatArray, x0: float, y0: float, x1: float, y1: float) -> FloatArray:
+    """Enclose a convex set moved by every displacement from (x0, y0) to (x1, y1): the hull of both ends.
 
     Args:
         vertices: Convex ring or one point or a segment, shape (n, 2) [m].
-        first: Displacement at the interval's lower end, shape (2,) [m].
-        last: Displacement at its upper end, shape (2,) [m].
+        x0: First coordinate of the displacement at the interval's lower end [m].
+        y0: Second coordinate [m].
+        x1: First coordinate of the displacement at its upper end [m].
+        y1: Second coordinate [m].
     """
-    heading = atan2(last[1] - first[1], last[0] - first[0])
-    along = heading + 0.5 * pi * np.arange(-1.0, 3.0)
-    directions = closed_directions(np.concatenate((edge_directions(vertices), along)))
+    edges = edge_directions(vertices)
+    angles = np.empty(len(edges) + 4)
+    angles[: len(edges)] = edges
+    heading = atan2(y1 - y0, x1 - x0)
+    for quarter in range(4):
+        angles[len(edges) + quarter] = heading + 0.5 * pi * (quarter - 1.0)
+    directions = closed_directions(angles, _LARGEST_TURN)
     offsets = support(vertices, directions)
     for k in range(len(directions)):
         x, y = cos(directions[k]), sin(directions[k])
-        offsets[k] += max(x * first[0] + y * first[1], x * last[0] + y * last[1])
+        offsets[k] += max(x * x0 + y * y0, x * x1 + y * y1)
     swept: FloatArray = circumscribed(directions, offsets)
     return swept
 
@@ -229,42 +228,51 @@ def grown(vertices: FloatArray, radius: float, largest_turn: float) -> FloatArra
         largest_turn: Largest angle between neighbouring normals [rad].
     """
     directions = closed_directions(edge_directions(vertices), largest_turn)
-    outer: FloatArray = circumscribed(directions, support(vertices, directions) + radius)
+    offsets = support(vertices, directions)
+    for k in range(len(offsets)):
+        offsets[k] += radius
+    outer: FloatArray = circumscribed(directions, offsets)
     return outer
 
 
 @compiled
 def over_piece(
-    sweeps: SweepArrays, piece: int, lower: FloatArray, upper: FloatArray, stages: int, rounded: bool
+    team: TeamArrays, piece: int, lower: FloatArray, upper: FloatArray, stages: int, rounded: bool
 ) -> FloatArray:
-    """Polygon that encloses a piece at every configuration of a slice.
+    """Compute a polygon that encloses a piece at every configuration of a slice, eq. (6).
 
     Args:
-        sweeps: The pieces and their joints.
-        piece: Which one.
+        team: The team.
+        piece: Index of the piece.
         lower: Lower ends of (theta, q...), shape (1 + n,) [rad, m].
         upper: Upper ends, shape (1 + n,).
-        stages: Number of joints to sweep, from the piece's own.
+        stages: Number of joints to sweep, from the piece's own; theta is the last one, and any larger number
+            means all.
         rounded: Whether to grow the sweep by the piece's radius.
 
     Returns:
         Vertices, counter-clockwise, shape (n, 2) [m].
     """
-    ring = sweeps.vertices[sweeps.first[piece] : sweeps.first[piece + 1]].copy()
+    ring = team.vertices[team.pieces[piece, 1] : team.pieces[piece, 2]].copy()
     widest = 0.0
-    for stage in range(sweeps.first_stage[piece], sweeps.first_stage[piece] + stages):
-        low, high = lower[sweeps.axis[stage]], upper[sweeps.axis[stage]]
-        sign, ax, ay, x, y, c, s = sweeps.joint[stage]
+    link = team.pieces[piece, 0]
+    while link >= 0 and stages > 0:
+        axis = team.links[link, 1] - 2
+        low, high = lower[axis], upper[axis]
         widest = max(widest, high - low)
-        if sweeps.turning[stage] == 1:
-            ring = over_revolute(ring, sign * 0.5 * (low + high), 0.5 * (high - low))
+        if team.links[link, 2] == 1:
+            ring = over_revolute(ring, team.joints[link, 3] * 0.5 * (low + high), 0.5 * (high - low))
         else:
-            ring = over_prismatic(ring, np.array([ax * low, ay * low]), np.array([ax * high, ay * high]))
+            ax, ay = team.joints[link, 4], team.joints[link, 5]
+            ring = over_prismatic(ring, ax * low, ay * low, ax * high, ay * high)
+        x, y, angle = team.joints[link, 0], team.joints[link, 1], team.joints[link, 2]
+        c, s = cos(angle), sin(angle)
         for i in range(len(ring)):
-            u, v = ring[i]
+            u, v = ring[i, 0], ring[i, 1]
             ring[i, 0], ring[i, 1] = x + c * u - s * v, y + s * u + c * v
-    if rounded and sweeps.radius[piece] > 0.0:
-        ring = grown(ring, sweeps.radius[piece], disc_turn(0.5 * widest))
+        link, stages = team.links[link, 0], stages - 1
+    if rounded and team.radii[piece] > 0.0:
+        ring = grown(ring, team.radii[piece], disc_turn(0.5 * widest))
     return ring
 
 

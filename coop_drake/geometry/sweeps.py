@@ -2,6 +2,11 @@
 
 A stage maps convex sets to convex sets: the over-sweep encloses every placed copy, the under-sweep is
 enclosed by every placed copy. Rigid motions are bijections, so stages nest over a product of intervals.
+
+The formulas are compiled: over-sweeps of one joint are ``over_revolute`` and ``over_prismatic`` of
+``sweep_kernels.py``, and ``over_piece`` there applies them from a link to the object; under-sweeps are in
+``under_kernels.py``. ``SweptTree`` keeps the results of both. The verifier has over-sweeps of its own, in
+``verification``.
 """
 
 from __future__ import annotations
@@ -22,8 +27,8 @@ def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> Fl
 
 
 def under_prismatic(vertices: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray | None:
-    """Points that a convex polygon covers at every displacement of a segment, None if none."""
-    return _or_none(under_kernels.under_prismatic(vertices, first, last))
+    """Points that a convex polygon covers at every displacement from first to last, (2,) each, or None."""
+    return _or_none(under_kernels.under_prismatic(vertices, first[0], first[1], last[0], last[1]))
 
 
 def common_disc(centres: FloatArray, radius: float, largest_turn: float) -> FloatArray | None:

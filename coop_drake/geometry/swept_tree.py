@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import cos, sin
 
 import numpy as np
 
-from coop_drake.geometry.sweep_kernels import SweepArrays, disc_turn, over_piece
+from coop_drake.geometry.sweep_kernels import disc_turn, over_piece
 from coop_drake.geometry.sweeps import common_disc, inscribed, under_prismatic, under_revolute
 from coop_drake.tree.component_tree import ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.team_arrays import TeamArrays, team_arrays
 
 Interval = tuple[float, float]
 Intervals = tuple[Interval, ...]
@@ -58,7 +57,7 @@ class SweptTree:
                 for shape in body.shapes
             ]
         self.pieces: tuple[Piece, ...] = tuple(pieces)
-        self.arrays = sweep_arrays(tree, self.pieces)
+        self.arrays: TeamArrays = team_arrays(tree)
         self._over: dict[tuple[object, ...], FloatArray] = {}
         self._under: dict[tuple[object, ...], FloatArray | None] = {}
 
@@ -143,26 +142,3 @@ def _sliding(joint: TreeJoint, interval: Interval) -> tuple[FloatArray, FloatArr
     """Displacements in J at both ends of an interval of a prismatic joint."""
     axis = np.array(joint.axis)
     return axis * interval[0], axis * interval[1]
-
-
-def sweep_arrays(tree: ComponentTree, pieces: Sequence[Piece]) -> SweepArrays:
-    """Lay out the pieces and the joints of their chains for the compiled sweeps."""
-    stages = [tree.components[i].joint for piece in pieces for i in piece.chain]
-    rings = [np.asarray(piece.shape.vertices, dtype=float).reshape(-1, 2) for piece in pieces]
-    return SweepArrays(
-        first=np.cumsum([0, *map(len, rings)]),
-        vertices=np.concatenate(rings),
-        radius=np.array([piece.shape.radius for piece in pieces], dtype=float),
-        first_stage=np.cumsum([0, *(len(piece.chain) for piece in pieces)]),
-        axis=np.array([axis for piece in pieces for axis in piece.axes]),
-        turning=np.array([joint is None or joint.kind == "revolute" for joint in stages], dtype=np.int64),
-        joint=np.array([_stage(joint) for joint in stages]),
-    )
-
-
-def _stage(joint: TreeJoint | None) -> tuple[float, ...]:
-    """Sign, axis and X_PJ of a joint; of theta if there is none."""
-    if joint is None:
-        return 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0
-    X_PJ = joint.X_PJ
-    return joint.sign, *joint.axis, X_PJ.x, X_PJ.y, cos(X_PJ.angle), sin(X_PJ.angle)

@@ -1,8 +1,8 @@
-"""Compiled under-sweeps: intersections of half-planes or discs, a hair inside; no rows where none is."""
+"""Compiled under-sweeps: intersections of half-planes or discs, rounded inwards; no rows where empty."""
 
 from __future__ import annotations
 
-from math import cos, pi, sin, sqrt
+from math import cos, floor, pi, sin, sqrt
 
 import numpy as np
 
@@ -19,7 +19,7 @@ _SHORTEST = 1e-9
 
 @compiled
 def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray:
-    """Intersection of half-planes that bound a polygon, a hair inside.
+    """Intersection of half-planes that bound a polygon, rounded inwards by ``SLACK``.
 
     Line i keeps the stretch between the largest of its lower and the smallest of its upper crossings with
     all the others.
@@ -31,15 +31,28 @@ def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray:
     Returns:
         Vertices, counter-clockwise, shape (m, 2); no rows where the intersection has no interior.
     """
-    turned = angles - _TURN * np.floor(angles / _TURN)
-    x, y, h = np.empty(len(angles)), np.empty(len(angles)), np.empty(len(angles))
-    count, last = 0, -1.0
-    for i in np.argsort(turned):
-        if count > 0 and turned[i] - last <= _SAME_ANGLE:
-            h[count - 1] = min(h[count - 1], offsets[i] - SLACK)
+    x, y, h, turned = (
+        np.empty(len(angles)),
+        np.empty(len(angles)),
+        np.empty(len(angles)),
+        np.empty(len(angles)),
+    )
+    count = 0
+    for i in range(len(angles)):
+        angle, offset = angles[i] - _TURN * floor(angles[i] / _TURN), offsets[i] - SLACK
+        k = count
+        while k > 0 and turned[k - 1] > angle:
+            turned[k], h[k] = turned[k - 1], h[k - 1]
+            k -= 1
+        turned[k], h[k] = angle, offset
+        count += 1
+    lines, count = count, 0
+    for i in range(lines):
+        if count > 0 and turned[i] - turned[count - 1] <= _SAME_ANGLE:
+            h[count - 1] = min(h[count - 1], h[i])
             continue
-        last = turned[i]
-        x[count], y[count], h[count] = cos(last), sin(last), offsets[i] - SLACK
+        turned[count], h[count] = turned[i], h[i]
+        x[count], y[count] = cos(turned[i]), sin(turned[i])
         count += 1
     vertices = np.empty((count, 2))
     size = 0
@@ -58,7 +71,7 @@ def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray:
         if upper - lower > _SHORTEST:
             vertices[size, 0], vertices[size, 1] = h[i] * x[i] - upper * y[i], h[i] * y[i] + upper * x[i]
             size += 1
-    return vertices[:size].copy() if size >= 3 else np.empty((0, 2))
+    return vertices[: size if size >= 3 else 0]
 
 
 @compiled
@@ -83,7 +96,8 @@ def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> Fl
     half_chord = half_width / parts
     angles, distances = np.empty(len(edges) * (2 + parts)), np.empty(len(edges) * (2 + parts))
     size = 0
-    for angle, offset in zip(edges, offsets):  # noqa: B905
+    for i in range(len(edges)):
+        angle, offset = edges[i], offsets[i]
         if offset <= 0.0 and half_width >= 0.5 * pi:
             return np.empty((0, 2))
         for side in (-1.0, 1.0):
@@ -98,19 +112,23 @@ def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> Fl
 
 
 @compiled
-def under_prismatic(vertices: FloatArray, first: FloatArray, last: FloatArray) -> FloatArray:
-    """Find points that a convex polygon covers at every displacement of a segment: both ends' overlap.
+def under_prismatic(vertices: FloatArray, x0: float, y0: float, x1: float, y1: float) -> FloatArray:
+    """Find points that a convex polygon covers at every displacement from (x0, y0) to (x1, y1).
+
+    They are the points that both end copies cover.
 
     Args:
         vertices: Convex ring, counter-clockwise, shape (n, 2) [m].
-        first: Displacement at the interval's lower end, shape (2,) [m].
-        last: Displacement at its upper end, shape (2,) [m].
+        x0: First coordinate of the displacement at the interval's lower end [m].
+        y0: Second coordinate [m].
+        x1: First coordinate of the displacement at its upper end [m].
+        y1: Second coordinate [m].
     """
     angles = edge_directions(vertices)
     offsets = support(vertices, angles)
     for k in range(len(angles)):
         x, y = cos(angles[k]), sin(angles[k])
-        offsets[k] += min(x * first[0] + y * first[1], x * last[0] + y * last[1])
+        offsets[k] += min(x * x0 + y * y0, x * x1 + y * y1)
     found: FloatArray = half_planes_polygon(angles, offsets)
     return found
 
@@ -127,8 +145,11 @@ def common_disc(centres: FloatArray, radius: float, largest_turn: float) -> Floa
         radius: Radius of all discs [m].
         largest_turn: Angle between neighbouring vertices of the result [rad].
     """
-    x = 0.5 * (centres[:, 0].min() + centres[:, 0].max())
-    y = 0.5 * (centres[:, 1].min() + centres[:, 1].max())
+    low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
+    for i in range(len(centres)):
+        low_x, high_x = min(low_x, centres[i, 0]), max(high_x, centres[i, 0])
+        low_y, high_y = min(low_y, centres[i, 1]), max(high_y, centres[i, 1])
+    x, y = 0.5 * (low_x + high_x), 0.5 * (low_y + high_y)
     directions = closed_directions(np.empty(0), largest_turn)
     ring = np.empty((len(directions), 2))
     for k in range(len(directions)):

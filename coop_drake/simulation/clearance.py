@@ -9,10 +9,10 @@ from shapely import Polygon
 
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.boundary import edges_of
-from coop_drake.simulation.convex_distance import IntArray
 from coop_drake.simulation.step_kernels import team_distances
-from coop_drake.tree.component_tree import Component, ComponentTree
+from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.team_arrays import TeamArrays, team_arrays
 
 __all__ = ["Clearance", "TeamClearance"]
 
@@ -42,35 +42,15 @@ class TeamClearance:
     """
 
     def __init__(self, workspace: Polygon, tree: ComponentTree) -> None:
-        walls = np.ascontiguousarray(edges_of(workspace))
-        self._names: list[str] = []
-        pieces: list[tuple[float, float, float]] = []
-        vertices: list[tuple[float, float, float]] = []
-        pieces_of_body: dict[tuple[int, int], list[int]] = {}
-        for c, component in enumerate(tree.components):
-            for b, body in enumerate(component.bodies):
-                for shape in body.shapes:
-                    first = len(vertices)
-                    vertices += [(float(c), float(x), float(y)) for x, y in shape.vertices]
-                    pieces_of_body.setdefault((c, b), []).append(len(self._names))
-                    self._names.append(body.name)
-                    pieces.append((float(first), float(len(vertices)), float(shape.radius)))
+        self._names = [
+            body.name for component in tree.components for body in component.bodies for _ in body.shapes
+        ]
         if not self._names:
             raise GeometryError("the component tree has no body with a shape, so no clearance is defined")
-        self._pairs: IntArray = np.array(
-            [
-                (i, j)
-                for first_body, second_body in tree.collision_pairs
-                for i in pieces_of_body.get(first_body, [])
-                for j in pieces_of_body.get(second_body, [])
-            ],
-            dtype=np.int64,
-        ).reshape(-1, 2)
-        links = np.array([_link(component) for component in tree.components])
-        self._arrays = links, np.array(vertices), np.array(pieces), self._pairs, walls
+        self._arrays = team_arrays(tree), np.ascontiguousarray(edges_of(workspace))
 
     @property
-    def kernel_arguments(self) -> tuple[FloatArray, FloatArray, FloatArray, IntArray, FloatArray]:
+    def kernel_arguments(self) -> tuple[TeamArrays, FloatArray]:
         """What the compiled distances read of team and floor, see ``team_distances``."""
         return self._arrays
 
@@ -89,17 +69,8 @@ class TeamClearance:
 
     def pair_place(self, pair: int) -> str:
         """What the distance of a pair lies between."""
-        if not len(self._pairs):
+        pairs = self._arrays[0].pairs
+        if not len(pairs):
             return "no two bodies"
-        first, second = (self._names[piece] for piece in self._pairs[pair])
+        first, second = (self._names[piece] for piece in pairs[pair])
         return f"{first} and {second}"
-
-
-def _link(component: Component) -> tuple[float, ...]:
-    """A component's row, see ``LINK_COLUMNS``."""
-    joint = component.joint
-    if component.parent is None or joint is None:
-        return -1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    X_PJ, sliding = joint.X_PJ, joint.kind == "prismatic"
-    motion = (0.0, *joint.axis) if sliding else (joint.sign, 0.0, 0.0)
-    return float(component.parent), X_PJ.x, X_PJ.y, X_PJ.angle, float(3 + joint.index), *motion

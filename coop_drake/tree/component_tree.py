@@ -47,6 +47,10 @@ class TreeJoint:
     """A joint seen from the object outwards: frame J is fixed on the parent, the child C moves against J.
 
     A revolute joint gives ``X_PC = X_PJ @ Rot(sign * q)``, a prismatic one ``X_PC = X_PJ @ Trans(axis * q)``.
+    A new kind of joint has to be added to ``tree/team_arrays.py`` (its pose), ``tree/levers.py`` and
+    ``ComponentTree.reach`` (how far it moves the team), ``geometry/sweep_kernels.py`` (``over_piece``) and
+    ``geometry/swept_tree.py`` (``SweptTree.under``), ``laws/planar_chain.py`` (velocities and forces), and
+    independently of all these to ``verification``.
 
     Attributes:
         name: Scoped name, for example ``robot_0::elbow``.
@@ -74,12 +78,6 @@ class TreeJoint:
     def unit(self) -> str:
         """Unit of its value: rad, or m if it slides."""
         return "rad" if self.kind == "revolute" else "m"
-
-    def X_JC(self, q: float) -> PlanarPose:
-        """Pose of the child in J at joint value q [rad or m]."""
-        if self.kind == "revolute":
-            return PlanarPose(0.0, 0.0, self.sign * q)
-        return PlanarPose(self.axis[0] * q, self.axis[1] * q, 0.0)
 
 
 @dataclass(frozen=True)
@@ -132,7 +130,7 @@ class ComponentTree:
 
     @cached_property
     def ancestors(self) -> tuple[tuple[int, ...], ...]:
-        """For each component the components on the way to the object, itself first, the object's last."""
+        """For each component the components from itself to the object's, both included."""
         chains: list[tuple[int, ...]] = []
         for index, component in enumerate(self.components):
             chains.append((index,) if component.parent is None else (index, *chains[component.parent]))
@@ -162,15 +160,11 @@ class ComponentTree:
         Args:
             configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
         """
-        z = [float(value) for value in configuration]
-        poses: list[PlanarPose] = []
-        for component in self.components:
-            if component.parent is None or component.joint is None:
-                poses.append(PlanarPose(*z[:3]))
-            else:
-                X_WJ = poses[component.parent] @ component.joint.X_PJ
-                poses.append(X_WJ @ component.joint.X_JC(z[3 + component.joint.index]))
-        return tuple(poses)
+        # Importing numba takes half a second: only where poses are computed.
+        from coop_drake.tree.team_arrays import place, team_arrays
+
+        rows = place(team_arrays(self), np.ascontiguousarray(configuration, dtype=float))
+        return tuple(PlanarPose(x, y, angle) for x, y, _, _, angle in rows.tolist())
 
     @cached_property
     def reach(self) -> float:

@@ -8,8 +8,8 @@ import pytest
 from benchmarks.planner.cases import CASES
 from benchmarks.planner.family import corridor_problem, crowd_problem, shelf_floor, shelf_problem
 from coop_drake.planning.sampling.collision_kernels import is_free
-from coop_drake.planning.sampling.obstacle_grid import walls_for
-from coop_drake.planning.sampling.team_arrays import team_arrays
+from coop_drake.planning.sampling.obstacle_grid import grid_for_team
+from coop_drake.tree.team_arrays import team_arrays
 
 MAKERS = {
     "corridor": lambda: corridor_problem(0.9),
@@ -22,7 +22,7 @@ MAKERS = {
 
 def starts_freely(problem):
     team = team_arrays(problem.tree)
-    return is_free(team, walls_for(problem.workspace, team), problem.start.astype(float), 0.0)
+    return is_free(team, grid_for_team(problem.workspace, team), problem.start.astype(float), 0.0)
 
 
 @pytest.mark.parametrize("make", MAKERS.values(), ids=MAKERS)

@@ -10,13 +10,13 @@ SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
 def test_supports_at_the_edges_rebuild_the_polygon() -> None:
-    directions = closed_directions(edge_angles(SQUARE))
+    directions = closed_directions(edge_angles(SQUARE), 0.75 * np.pi)
     rebuilt = Polygon(circumscribed(directions, support(SQUARE, directions)))
     assert rebuilt.symmetric_difference(Polygon(SQUARE)).area == pytest.approx(0.0, abs=1e-7)
 
 
 def test_directions_are_closed_and_distinct() -> None:
-    directions = closed_directions(np.array([0.0, 0.0, 1e-9, 6.2]), largest_turn=0.5)
+    directions = closed_directions(np.array([0.0, 0.0, 1e-9, 6.2]), 0.5)
     gaps = np.diff(np.append(directions, directions[0] + 2 * np.pi))
     assert gaps.min() > 0.0
     assert gaps.max() <= 0.5 + 1e-12

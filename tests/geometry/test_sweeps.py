@@ -98,7 +98,7 @@ def test_turning_by_pi_or_more_leaves_nothing_beside_the_pivot() -> None:
 @given(RINGS, st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(0.0, 1.0))
 def test_prismatic_sweeps_are_exact(ring: np.ndarray, dx: float, dy: float, share: float) -> None:
     first, last = np.array([-0.05, 0.02]), np.array([dx, dy])
-    over = Polygon(over_prismatic(ring, first, last))
+    over = Polygon(over_prismatic(ring, *first, *last))
     exact = MultiPoint(np.concatenate((ring + first, ring + last))).convex_hull
     assert over.covers(exact)
     assert over.area == pytest.approx(exact.area, abs=1e-6)

@@ -11,9 +11,9 @@ from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.boxes.box_kernels import box_clearance
 from coop_drake.planning.boxes.certify import box_arrays
 from coop_drake.planning.cells.cells import CellMaker
-from coop_drake.planning.sampling.collision_kernels import place, wall_clearance
-from coop_drake.planning.sampling.obstacle_grid import FAR, walls_near, walls_under
-from coop_drake.planning.sampling.team_arrays import team_arrays
+from coop_drake.planning.sampling.collision_kernels import team_clearance
+from coop_drake.planning.sampling.obstacle_grid import FAR, grid_inside, lay_grid
+from coop_drake.tree.team_arrays import place, team_arrays
 from tests.support.trees import configurations, footprint, room, slices_of, trees
 
 SLOW = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -24,10 +24,10 @@ ROUNDING = 2e-3
 @given(st.data())
 def test_a_configuration_is_as_far_from_the_walls_as_its_footprint(data: st.DataObject) -> None:
     tree = data.draw(trees())
-    walls = walls_near(polygon_rings(room()), 2.0)
+    grid = lay_grid(polygon_rings(room()), 2.0)
     position = tuple(data.draw(st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0))))
     for z in configurations(data.draw(slices_of(tree)), seed=4, count=4, position=position):
-        found = wall_clearance(team_arrays(tree), walls, place(team_arrays(tree), z), 0.5)
+        found = team_clearance(team_arrays(tree), grid, place(team_arrays(tree), z), 0.5)
         shape = footprint(tree, z)
         exact = room().boundary.distance(shape)
         if room().contains(shape) and exact > ROUNDING:
@@ -43,11 +43,11 @@ def test_a_box_has_the_clearance_of_its_cell(data: st.DataObject) -> None:
     intervals = data.draw(slices_of(tree))
     swept = SweptTree(tree)
     pairs = BodyPairs(swept)
-    boxes, walls = box_arrays(swept, pairs), walls_under(room(), tree.reach)
+    boxes, grid = box_arrays(swept, pairs), grid_inside(room(), tree.reach)
     bounds = np.array(intervals)
 
     def clearance(position: np.ndarray) -> float:
-        return box_clearance(boxes, walls, bounds[:, 0].copy(), bounds[:, 1].copy(), position, 1e-3)
+        return box_clearance(boxes, grid, bounds[:, 0].copy(), bounds[:, 1].copy(), position, 0, 0, 1e-3)
 
     regions = CellMaker(swept, pairs, room()).under_cells(intervals)
     for region in regions:

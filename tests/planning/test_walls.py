@@ -1,4 +1,4 @@
-"""The grid of walls: every square lists all edges near it, nearest first, and knows whether it is inside."""
+"""The grid of grid: every square lists all edges near it, nearest first, and knows whether it is inside."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from shapely import LineString, MultiPolygon, Point, Polygon, box
 
 from coop_drake.geometry.minkowski import polygon_rings
 from coop_drake.planning.boxes.boxes import nearby
-from coop_drake.planning.sampling.obstacle_grid import Walls, square_at, walls_near
+from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, lay_grid, square_at
 from tests.support.cases import warehouse
 from tests.support.trees import room
 
@@ -19,24 +19,24 @@ FLOORS = {
 }
 
 
-def middle(walls: Walls, square: int) -> np.ndarray:
+def middle(grid: ObstacleGrid, square: int) -> np.ndarray:
     """Middle of a square."""
-    column, row = divmod(square, walls.rows)
-    return walls.corner + (np.array([column, row]) + 0.5) * walls.side
+    column, row = divmod(square, grid.rows)
+    return grid.corner + (np.array([column, row]) + 0.5) * grid.side
 
 
 @pytest.mark.parametrize("reach", [0.05, 0.7])
 @pytest.mark.parametrize("name", FLOORS)
 def test_a_square_lists_every_edge_that_comes_near_it(name: str, reach: float) -> None:
-    walls = walls_near(polygon_rings(FLOORS[name]), reach)
-    edges = shapely.linestrings(walls.edges.reshape(-1, 2, 2))
-    squares = np.random.default_rng(3).permutation(walls.rows * walls.columns)[:150]
+    grid = lay_grid(polygon_rings(FLOORS[name]), reach)
+    edges = shapely.linestrings(grid.edges.reshape(-1, 2, 2))
+    squares = np.random.default_rng(3).permutation(grid.rows * grid.columns)[:150]
     for square in squares.tolist():
-        here = middle(walls, square)
-        half = 0.5 * walls.side
+        here = middle(grid, square)
+        half = 0.5 * grid.side
         area = box(*(here - half), *(here + half))
-        listed = walls.listed[walls.first[square] : walls.first[square + 1]]
-        away = walls.away[walls.first[square] : walls.first[square + 1]]
+        listed = grid.listed[grid.first[square] : grid.first[square + 1]]
+        away = grid.away[grid.first[square] : grid.first[square + 1]]
         assert set(np.flatnonzero(shapely.distance(edges, area) < reach - 1e-9)) <= set(listed.tolist())
         assert (np.diff(away) >= 0.0).all()
         assert away == pytest.approx(shapely.distance(edges[listed], Point(here)), abs=1e-7)
@@ -45,25 +45,25 @@ def test_a_square_lists_every_edge_that_comes_near_it(name: str, reach: float) -
 
 @pytest.mark.parametrize("name", FLOORS)
 def test_middles_lie_inside_where_the_floor_is(name: str) -> None:
-    walls = walls_near(polygon_rings(FLOORS[name]), 0.5)
-    middles = np.array([middle(walls, square) for square in range(walls.rows * walls.columns)])
-    assert (walls.inside == shapely.contains_xy(FLOORS[name], middles)).all()
-    assert walls.inside.any()
+    grid = lay_grid(polygon_rings(FLOORS[name]), 0.5)
+    middles = np.array([middle(grid, square) for square in range(grid.rows * grid.columns)])
+    assert (grid.inside == shapely.contains_xy(FLOORS[name], middles)).all()
+    assert grid.inside.any()
 
 
 def test_points_find_their_square_or_none() -> None:
-    walls = walls_near(polygon_rings(room()), 0.4)
-    for square in range(0, walls.rows * walls.columns, 7):
-        assert square_at(walls, *middle(walls, square)) == square
-    end = walls.corner + walls.side * np.array([walls.columns, walls.rows])
-    for x, y in [walls.corner - 1e-6, end + 1e-6, (walls.corner[0] - 5.0, end[1] - 0.1)]:
-        assert square_at(walls, x, y) == -1
+    grid = lay_grid(polygon_rings(room()), 0.4)
+    for square in range(0, grid.rows * grid.columns, 7):
+        assert square_at(grid, *middle(grid, square)) == square
+    end = grid.corner + grid.side * np.array([grid.columns, grid.rows])
+    for x, y in [grid.corner - 1e-6, end + 1e-6, (grid.corner[0] - 5.0, end[1] - 0.1)]:
+        assert square_at(grid, x, y) == -1
 
 
 def test_a_floor_without_rings_has_no_squares() -> None:
-    walls = walls_near([], 0.5)
-    assert len(walls.edges) == 0
-    assert square_at(walls, 0.0, 0.0) == -1
+    grid = lay_grid([], 0.5)
+    assert len(grid.edges) == 0
+    assert square_at(grid, 0.0, 0.0) == -1
 
 
 @pytest.mark.parametrize("reach", [0.2, 1.5])

@@ -9,12 +9,11 @@ import numpy as np
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.sweep_kernels import IntArray
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.boxes.box_kernels import BoxArrays, longest_box, padded
-from coop_drake.planning.sampling.obstacle_grid import Walls, walls_under
+from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_inside
 from coop_drake.planning.sampling.sampler import densified
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
 
 LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.0003))
 """Padding of a box in every angle and joint [rad or m], and clearance that it needs at both ends [m]; the
@@ -77,7 +76,7 @@ class Certifier:
         margin: float,
     ) -> None:
         self._boxes = box_arrays(swept, pairs)
-        self._walls: Walls = walls_under(workspace, swept.tree.reach)
+        self._grid: ObstacleGrid = grid_inside(workspace, swept.tree.reach)
         self._scale, self._margin = scale, margin
         self._reach = FIRST_REACH
         self.trials = 0
@@ -126,16 +125,15 @@ class Certifier:
         """The box that begins at sample i, and the sample at which it ends; None if there is none."""
         for pad, clearance in levels:
             fastest, furthest, trials = longest_box(
-                self._boxes, self._walls, samples, i, self._reach, pad, clearance, self._margin
+                self._boxes, self._grid, samples, i, self._reach, pad, clearance, self._margin
             )
             self.trials += trials
             j = furthest if longest else fastest
             if j > i:
                 self._reach = max(1, (furthest - i) // 2)
-                part = samples[i : j + 1]
-                lower, upper = padded(self._boxes, part, pad)
+                lower, upper = padded(self._boxes, samples, i, j, pad)
                 intervals = tuple((float(a), float(b)) for a, b in zip(lower, upper, strict=True))
-                return j, PathBox(intervals, part[:, :2].copy())
+                return j, PathBox(intervals, samples[i : j + 1, :2].copy())
         return None
 
 

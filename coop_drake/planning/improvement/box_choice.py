@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.geometry.sweep_kernels import IntArray, over_piece
 from coop_drake.laws.gain_schedule import Schedule
-from coop_drake.planning.boxes.box_kernels import BoxArrays, bodies_apart, enclosing_disc, ring_clearance
+from coop_drake.planning.boxes.box_kernels import BoxArrays, clearances_in_box
 from coop_drake.planning.improvement.box_crossing import cross_box
-from coop_drake.planning.sampling.obstacle_grid import Walls
-from coop_drake.tree.pose import FloatArray
+from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
+from coop_drake.tree.pose import FloatArray, IntArray
 
 __all__ = ["Course", "choose_boxes", "fits"]
 
@@ -34,13 +33,13 @@ FAR = 1.0
 
 
 class Course(NamedTuple):
-    """A way and what boxes along it are tried with.
+    """A path and what boxes along it are tried with.
 
     Attributes:
         boxes: The team.
-        walls: The floor.
-        way: Waypoints z, theta unwrapped, shape (n, 3 + joints) [m, rad].
-        places: Where they lie along the way, shape (n,) [m].
+        grid: The floor.
+        path: Waypoints z, theta unwrapped, shape (n, 3 + joints) [m, rad].
+        places: Where they lie along the path, shape (n,) [m].
         pads: Paddings of a box to choose from, shape (p,) [rad or m].
         goals: Lower and upper ends of the last goal intervals, shape (2, m).
         schedule: Gains.
@@ -49,8 +48,8 @@ class Course(NamedTuple):
     """
 
     boxes: BoxArrays
-    walls: Walls
-    way: FloatArray
+    grid: ObstacleGrid
+    path: FloatArray
     places: FloatArray
     pads: FloatArray
     goals: FloatArray
@@ -60,30 +59,24 @@ class Course(NamedTuple):
 
 
 @compiled
-def _clearances(
-    boxes: BoxArrays, walls: Walls, lower: FloatArray, upper: FloatArray, way: FloatArray, most: float
-) -> FloatArray:
-    """Distance of the swept team from the walls at every position; empty if one is in the way."""
-    nothing = np.empty(0)
-    result = np.full(len(way), most)
-    for piece in range(len(boxes.sweeps.radius) - 1, -1, -1):
-        stages = boxes.sweeps.first_stage[piece + 1] - boxes.sweeps.first_stage[piece]
-        ring = over_piece(boxes.sweeps, piece, lower, upper, stages, True)
-        disc = enclosing_disc(ring)
-        for k in range(len(way)):
-            result[k] = ring_clearance(ring, disc, walls, way[k, 0], way[k, 1], result[k])
-            if result[k] < 0.0:
-                return nothing
-    return result if bodies_apart(boxes, lower, upper) else nothing
+def fits(
+    boxes: BoxArrays, grid: ObstacleGrid, lower: FloatArray, upper: FloatArray, path: FloatArray, least: float
+) -> bool:
+    """Whether the swept team keeps a clearance of ``least`` [m] at every row of a path, and no bodies touch.
+
+    Other arguments as in ``clearances_in_box``.
+    """
+    clearances = clearances_in_box(boxes, grid, lower, upper, path, 0, len(path) - 1, FAR)
+    return len(clearances) > 0 and _least(clearances) >= least
 
 
 @compiled
-def fits(
-    boxes: BoxArrays, walls: Walls, lower: FloatArray, upper: FloatArray, way: FloatArray, least: float
-) -> bool:
-    """Whether the swept team keeps a clearance at every position of a way, and no bodies touch."""
-    room = _clearances(boxes, walls, lower, upper, way, FAR)
-    return len(room) > 0 and room.min() >= least
+def _least(values: FloatArray) -> float:
+    """The smallest of some values, shape (k,)."""
+    least = np.inf
+    for k in range(len(values)):
+        least = min(least, values[k])
+    return least
 
 
 @compiled
@@ -100,32 +93,36 @@ def choose_boxes(course: Course, banned: FloatArray) -> tuple[float, IntArray]:
     Returns:
         Estimated time [s], infinite if there is no chain, and its rows (first waypoint, last one, padding).
     """
-    n, count, m = len(course.way), len(course.pads), course.way.shape[1] - 2
+    n, count, m = len(course.path), len(course.pads), course.path.shape[1] - 2
     best = np.full((n, count), np.inf)
     states = np.zeros((n, count, 3 + 2 * m))
     before = np.full((n, count, 2), -1, np.int64)
-    best[0] = 0.0
-    states[0, :, 3 : 3 + m] = course.way[0, 2:]
+    for p in range(count):
+        best[0, p] = 0.0
+        for a in range(m):
+            states[0, p, 3 + a] = course.path[0, 2 + a]
+    low, high, lower, upper = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     for i in range(n - 1):
         for p in range(count):
-            if not best[i, p] < best[i].min() + LATEST:
+            if not best[i, p] < _least(best[i]) + LATEST:
                 continue
-            lowest, highest = course.way[i, 2:].copy(), course.way[i, 2:].copy()
+            for a in range(m):
+                low[a], high[a] = course.path[i, 2 + a], course.path[i, 2 + a]
             for j in range(i + 1, n):
-                lowest, highest = (
-                    np.minimum(lowest, course.way[j, 2:]),
-                    np.maximum(highest, course.way[j, 2:]),
-                )
+                for a in range(m):
+                    low[a] = min(low[a], course.path[j, 2 + a])
+                    high[a] = max(high[a], course.path[j, 2 + a])
+                    lower[a] = max(course.boxes.lower[a], low[a] - course.pads[p])
+                    upper[a] = min(course.boxes.upper[a], high[a] + course.pads[p])
                 if j - i > EVERY and (j - i) % SOME != 0 and j + 1 < n:
                     continue
-                lower = np.maximum(course.boxes.lower, lowest - course.pads[p])
-                upper = np.minimum(course.boxes.upper, highest + course.pads[p])
-                way = course.way[i : j + 1, :2]
-                room = _clearances(course.boxes, course.walls, lower, upper, way, FAR)
-                if len(room) == 0 or room.min() < course.least:
+                clearances = clearances_in_box(
+                    course.boxes, course.grid, lower, upper, course.path, i, j, FAR
+                )
+                if len(clearances) == 0 or _least(clearances) < course.least:
                     break
                 if banned[i, j, p] <= 0.0:
-                    _reach(course, i, p, j, lower, upper, room, best, states, before)
+                    _reach(course, i, p, j, lower, upper, clearances, best, states, before)
     return best[n - 1, 0], _chain(before)
 
 
@@ -137,38 +134,57 @@ def _reach(
     j: int,
     lower: FloatArray,
     upper: FloatArray,
-    room: FloatArray,
+    clearances: FloatArray,
     best: FloatArray,
     states: FloatArray,
     before: IntArray,
 ) -> None:
-    """Cross a box from waypoint i to j for every padding of the next one; keep what is quicker."""
-    last = j + 1 == len(course.way)
+    """Cross a box from waypoint i to j for every padding of the next one; keep what is quicker.
+
+    Args:
+        course: The path.
+        i: Waypoint where the box begins.
+        p: Its padding.
+        j: Waypoint where it ends.
+        lower: Its lower ends, shape (m,) [rad, m].
+        upper: Its upper ends, shape (m,).
+        clearances: Clearances at its waypoints, shape (j - i + 1,) [m].
+        best: Earliest time at which each waypoint is reached, by the next box's padding, shape (n, p) [s].
+        states: States in which that happens, shape (n, p, 3 + 2 m).
+        before: First waypoint and padding of the box before, shape (n, p, 2).
+    """
+    last = j + 1 == len(course.path)
+    m = len(lower)
+    ends, state = np.empty((2, m)), np.empty(3 + 2 * m)
     for q in range(1 if last else len(course.pads)):
-        ends = np.empty((2, len(lower)))
-        if last:
-            ends[0], ends[1] = np.maximum(lower, course.goals[0]), np.minimum(upper, course.goals[1])
-        else:
-            ends[0] = np.maximum(lower, course.way[j, 2:] - course.pads[q])
-            ends[1] = np.minimum(upper, course.way[j, 2:] + course.pads[q])
-        state = states[i, p].copy()
+        for a in range(m):
+            if last:
+                low, high = course.goals[0, a], course.goals[1, a]
+            else:
+                low, high = course.path[j, 2 + a] - course.pads[q], course.path[j, 2 + a] + course.pads[q]
+            ends[0, a], ends[1, a] = max(lower[a], low), min(upper[a], high)
+        for k in range(len(state)):
+            state[k] = states[i, p, k]
         limit = min(LONGEST, best[j, q] - best[i, p])
         time = best[i, p] + BOX_COST / course.pads[p]
         time += cross_box(
-            state, course.places[i : j + 1], room, lower, upper, ends, course.way[i, 2:], course.schedule,
-            course.tolerance if last else 0.0, limit,
+            state, course.places[i : j + 1], clearances, lower, upper, ends, course.path[i, 2:],
+            course.schedule, course.tolerance if last else 0.0, limit,
         )  # fmt: skip
         if time < best[j, q]:
-            best[j, q], states[j, q] = time, state
+            best[j, q] = time
+            for k in range(len(state)):
+                states[j, q, k] = state[k]
             before[j, q, 0], before[j, q, 1] = i, p
 
 
 @compiled
 def _chain(before: IntArray) -> IntArray:
-    """Boxes from the first to the last waypoint, none if it was not reached."""
+    """Boxes up to the last waypoint, rows (first waypoint, last one, padding); none if it was not reached."""
     rows = np.empty((len(before), 3), np.int64)
-    j, q, k = len(before) - 1, 0, 0
+    j, q, first = len(before) - 1, 0, len(rows)
     while j > 0 and before[j, q, 0] >= 0:
-        rows[k, 0], rows[k, 1], rows[k, 2] = before[j, q, 0], j, before[j, q, 1]
-        j, q, k = before[j, q, 0], before[j, q, 1], k + 1
-    return rows[:k][::-1].copy()
+        first -= 1
+        rows[first, 0], rows[first, 1], rows[first, 2] = before[j, q, 0], j, before[j, q, 1]
+        j, q = before[j, q, 0], before[j, q, 1]
+    return rows[first:]

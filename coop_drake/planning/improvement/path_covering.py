@@ -22,7 +22,7 @@ from coop_drake.planning.cells.slices import nearest_turn
 from coop_drake.planning.execution.channel_ends import final_intervals
 from coop_drake.planning.improvement.box_choice import Course, choose_boxes, fits
 from coop_drake.planning.questions.margins import shrunk
-from coop_drake.planning.sampling.obstacle_grid import Walls, walls_under
+from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_inside
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.usual_unit import usual_unit
 
@@ -87,18 +87,18 @@ def cover_path(
     swept = SweptTree(problem.tree)
     pairs = BodyPairs(swept)
     floor = shrunk(problem.workspace, 0.0)
-    boxes, walls = box_arrays(swept, pairs), walls_under(floor, problem.tree.reach)
+    boxes, grid = box_arrays(swept, pairs), grid_inside(floor, problem.tree.reach)
     angle = float(path[-1, 2] + nearest_turn(float(problem.goal_pose[2] - path[-1, 2])))
     goals = np.array(final_intervals(problem, angle))
     smallest = LEAST_CLEARANCE * usual_unit(problem.tree)
     # At a small margin some levels are equal; each is tried once.
     for least, pads in dict.fromkeys((max(fraction * margin, smallest), pads) for fraction, pads in LEVELS):
-        points = _waypoints(boxes, walls, path, least, pads[0])
+        points = _waypoints(boxes, grid, path, least, pads[0])
         if points is None:
             continue
         places = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
         course = Course(
-            boxes, walls, points, places, np.array(pads), goals, schedule_of(gain_set), least,
+            boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), least,
             problem.position_tolerance,
         )  # fmt: skip
         found = _quickest_boxes(course, Regions(problem, swept, pairs, CORE_FRACTION * least))
@@ -110,7 +110,7 @@ def cover_path(
 
 
 def _waypoints(
-    boxes: BoxArrays, walls: Walls, path: FloatArray, least: float, pad: float
+    boxes: BoxArrays, grid: ObstacleGrid, path: FloatArray, least: float, pad: float
 ) -> FloatArray | None:
     """Waypoints along a path, so close that one box holds each of them with the next, shape (n, 3 + m).
 
@@ -126,8 +126,8 @@ def _waypoints(
     def between(first: float, last: float, halvings: int) -> list[FloatArray] | None:
         """Waypoints after the first place, the last one at the last place."""
         pair = np.stack([configuration(first), configuration(last)])
-        lower, upper = padded(boxes, pair, pad)
-        if fits(boxes, walls, lower, upper, pair[:, :2].copy(), least):
+        lower, upper = padded(boxes, pair, 0, 1, pad)
+        if fits(boxes, grid, lower, upper, pair, least):
             return [pair[1]]
         if halvings == 0:
             return None
@@ -148,7 +148,7 @@ def _waypoints(
 
 def _quickest_boxes(course: Course, regions: Regions) -> tuple[list[FreeBox], list[int]] | None:
     """The quickest boxes that are all proved free, and for each of them the waypoint at which it ends."""
-    n = len(course.way)
+    n = len(course.path)
     banned = np.zeros((n, n, len(course.pads)))
     for _ in range(1 + REPAIRS):
         _, rows = choose_boxes(course, banned)
@@ -165,7 +165,7 @@ def _quickest_boxes(course: Course, regions: Regions) -> tuple[list[FreeBox], li
 
 def _proved(course: Course, regions: Regions, first: int, last: int, pad: int) -> FreeBox | None:
     """The box of some waypoints, if over-sweeps prove a region free that holds the first and the last one."""
-    part, width = course.way[first : last + 1], course.pads[pad]
+    part, width = course.path[first : last + 1], course.pads[pad]
     lower = np.maximum(course.boxes.lower, part[:, 2:].min(axis=0) - width)
     upper = np.minimum(course.boxes.upper, part[:, 2:].max(axis=0) + width)
     intervals = tuple(zip(lower.tolist(), upper.tolist(), strict=True))

@@ -14,12 +14,12 @@ from coop_drake.answers.proof import DiscProof
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.sweep_kernels import over_piece
-from coop_drake.geometry.swept_tree import Piece, sweep_arrays
 from coop_drake.planning.cells.cells import regions_of
 from coop_drake.planning.proofs.proof_making import disc_proof
 from coop_drake.planning.questions.relaxation import inscribed_disc
 from coop_drake.tree.component_tree import ComponentTree, ConvexShape
 from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.team_arrays import team_arrays
 
 _DIRECTIONS = normals(np.arange(0.0, 32.0) * (pi / 16.0))
 
@@ -63,10 +63,6 @@ def _discs(tree: ComponentTree) -> Iterator[tuple[int, ConvexShape]]:
 def _places(problem: PlanningProblem, component: int, centre: FloatArray) -> BaseGeometry:
     """A convex polygon that holds all places in W where a point of a component can be at the goal."""
     tree = problem.tree
-    chain = tree.ancestors[component]
-    joints = [tree.components[i].joint for i in chain]
-    axes = (*[1 + joint.index for joint in joints if joint is not None], 0)
-    piece = Piece(component, 0, ConvexShape(centre[None, :]), chain, axes)
     angle = float(problem.goal_pose[2])
     bounds = np.array(
         [(angle, angle)]
@@ -75,7 +71,8 @@ def _places(problem: PlanningProblem, component: int, centre: FloatArray) -> Bas
             for joint, goal in zip(tree.joints, problem.goal_joints, strict=True)
         ]
     )
+    point = team_arrays(tree)._replace(pieces=np.array([[component, 0, 1]]), vertices=centre[None, :].copy())
     ring = over_piece(
-        sweep_arrays(tree, (piece,)), 0, bounds[:, 0].copy(), bounds[:, 1].copy(), len(axes), False
+        point, 0, bounds[:, 0].copy(), bounds[:, 1].copy(), len(tree.ancestors[component]), False
     )
     return shapely.MultiPoint(ring + problem.goal_pose[:2]).convex_hull

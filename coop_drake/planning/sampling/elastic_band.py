@@ -7,12 +7,12 @@ import numpy as np
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.questions.margins import marginal_workspace
 from coop_drake.planning.sampling.elastic_band_kernels import clearances, improve
-from coop_drake.planning.sampling.obstacle_grid import FAR, walls_for
+from coop_drake.planning.sampling.obstacle_grid import FAR, grid_for_team
 from coop_drake.planning.sampling.sampler import JOINT_RATE, SPEED, TURN_RATE, densified
-from coop_drake.planning.sampling.team_arrays import team_arrays
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.team_arrays import team_arrays
 
 __all__ = ["CLEARANCE_PRICE", "estimated_duration", "path_clearance", "smoothed"]
 
@@ -67,11 +67,11 @@ def smoothed(
     tree = problem.tree
     scale = configuration_scale(tree)
     team = team_arrays(tree)
-    walls = walls_for(marginal_workspace(problem, clearance), team)
+    grid = grid_for_team(marginal_workspace(problem, clearance), team)
     unbounded = np.full(3, np.inf)
     better: FloatArray = improve(
         team,
-        walls,
+        grid,
         np.array([price * spacing, max(clearance - margin, 0.0) + CLEARANCE_OFFSET, FAR]),
         densified(path, scale, spacing),
         np.concatenate((-unbounded, tree.joint_lower)),
@@ -94,7 +94,7 @@ def estimated_duration(problem: PlanningProblem, path: FloatArray) -> float:
     """
     scale, team = configuration_scale(problem.tree), team_arrays(problem.tree)
     samples = densified(path, scale, SPACING)
-    clear = np.maximum(clearances(team, walls_for(problem.workspace, team), samples, FAR), 0.0)
+    clear = np.maximum(clearances(team, grid_for_team(problem.workspace, team), samples, FAR), 0.0)
     moved = np.abs(np.diff(samples, axis=0))
     shifted = np.hypot(moved[:, 0], moved[:, 1])
     shortest = np.maximum(shifted / SPEED, (moved[:, 2:] / _speeds(problem.tree)[2:]).max(axis=1))
@@ -117,7 +117,7 @@ def path_clearance(problem: PlanningProblem, path: FloatArray, most: float) -> f
     """
     scale, team = configuration_scale(problem.tree), team_arrays(problem.tree)
     samples = densified(path, scale, 0.5 * SPACING)
-    clear = clearances(team, walls_for(problem.workspace, team), samples, FAR)
+    clear = clearances(team, grid_for_team(problem.workspace, team), samples, FAR)
     moved = [(np.abs(samples - samples[end]) * scale).sum(axis=1) for end in (0, -1)]
     exempt = np.minimum(*moved) / EXEMPT_DISTANCE
     least = most

@@ -1,24 +1,24 @@
-"""Compiled improvement of candidate paths: shorter in every axis, further from the walls."""
+"""Compiled improvement of candidate paths: shorter in every axis, further from the grid."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.planning.sampling.collision_kernels import bodies_apart, place, wall_clearance
-from coop_drake.planning.sampling.obstacle_grid import Walls
-from coop_drake.planning.sampling.team_arrays import TeamArrays
+from coop_drake.planning.sampling.collision_kernels import bodies_apart, team_clearance
+from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.team_arrays import TeamArrays, place
 
 STRIDES = (7, 3, 5, 1, 6, 2, 4, 0)
 """Order in which samples of a move are looked at, each time every eighth one."""
 
 
 @compiled
-def _price(team: TeamArrays, walls: Walls, z: FloatArray, gap: float, rate: FloatArray) -> float:
+def _price(team: TeamArrays, grid: ObstacleGrid, z: FloatArray, gap: float, rate: FloatArray) -> float:
     """Price of a sample: inverse to its clearance up to a limit, infinite where it is not free."""
     poses = place(team, z)
-    clearance = wall_clearance(team, walls, poses, rate[2])
+    clearance = team_clearance(team, grid, poses, rate[2])
     if clearance <= 0.0 or not bodies_apart(team, poses, gap):
         return np.inf
     price: float = rate[0] / (rate[1] + clearance)
@@ -28,7 +28,7 @@ def _price(team: TeamArrays, walls: Walls, z: FloatArray, gap: float, rate: Floa
 @compiled
 def improve(
     team: TeamArrays,
-    walls: Walls,
+    grid: ObstacleGrid,
     rate: FloatArray,
     path: FloatArray,
     lower: FloatArray,
@@ -45,7 +45,7 @@ def improve(
 
     Args:
         team: The team.
-        walls: The floor that the path stays on.
+        grid: The floor that the path stays on.
         rate: A sample with clearance c costs rate[0] / (rate[1] + min(c, rate[2])).
         path: Samples, close together, shape (m, d).
         lower: Lower limits, shape (d,); minus infinity where there is none.
@@ -61,7 +61,7 @@ def improve(
     cost = np.empty(count)
     least = rate[0] / (rate[1] + rate[2])
     for k in range(count):
-        cost[k] = _price(team, walls, path[k], gap, rate)
+        cost[k] = _price(team, grid, path[k], gap, rate)
     fresh = np.empty((count, size))
     fresh_cost = np.empty(count)
     for row in range(len(uniforms)):
@@ -87,7 +87,8 @@ def improve(
                 value += shift * min(1.0, 2.0 * share)
             else:
                 value += shift * min(1.0, 3.0 * min(share, 1.0 - share))
-            fresh[k] = path[k]
+            for other in range(size):
+                fresh[k, other] = path[k, other]
             fresh[k, axis] = min(upper[axis], max(lower[axis], value))
             change += weights[axis] * abs(
                 fresh[k, axis] - (path[k - 1, axis] if k == i + 1 else fresh[k - 1, axis])
@@ -104,22 +105,22 @@ def improve(
             for k in range(i + 1 + first, j, len(STRIDES)):
                 if change >= -1e-9:
                     break
-                fresh_cost[k] = _price(team, walls, fresh[k], gap, rate)
+                fresh_cost[k] = _price(team, grid, fresh[k], gap, rate)
                 change += fresh_cost[k] - least
         if change < -1e-9:
             for k in range(i + 1, j):
-                path[k] = fresh[k]
+                path[k, axis] = fresh[k, axis]
                 cost[k] = fresh_cost[k]
     return path
 
 
 @compiled
-def clearances(team: TeamArrays, walls: Walls, path: FloatArray, most: float) -> FloatArray:
+def clearances(team: TeamArrays, grid: ObstacleGrid, path: FloatArray, most: float) -> FloatArray:
     """Distance of the team from the walls at every sample, at most ``most``; -1 where it meets one.
 
     Args:
         team: The team.
-        walls: The floor.
+        grid: The floor.
         path: Configurations, shape (m, 3 + n).
         most: Distances above this one do not matter [m].
 
@@ -128,5 +129,5 @@ def clearances(team: TeamArrays, walls: Walls, path: FloatArray, most: float) ->
     """
     result = np.empty(len(path))
     for k in range(len(path)):
-        result[k] = wall_clearance(team, walls, place(team, path[k]), most)
+        result[k] = team_clearance(team, grid, place(team, path[k]), most)
     return result

@@ -12,11 +12,11 @@ from shapely import MultiPolygon, Polygon
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.sampling.collision_kernels import is_free
 from coop_drake.planning.sampling.elastic_band_kernels import improve
-from coop_drake.planning.sampling.obstacle_grid import walls_for
+from coop_drake.planning.sampling.obstacle_grid import grid_for_team
 from coop_drake.planning.sampling.sampler import densified
-from coop_drake.planning.sampling.team_arrays import team_arrays
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.team_arrays import team_arrays
 
 __all__ = [
     "Eased",
@@ -113,7 +113,7 @@ def with_larger_least_clearance(
     unbounded = np.full(3, np.inf)
     better: FloatArray = improve(
         team,
-        walls_for(problem.workspace, team),
+        grid_for_team(problem.workspace, team),
         np.array(PRICES),
         path,
         np.concatenate((-unbounded, tree.joint_lower)),
@@ -144,9 +144,9 @@ def are_free(problem: PlanningProblem, path: FloatArray) -> NDArray[np.bool_]:
     """Whether each sample is within limits and free of collisions; exact, shape (m,)."""
     tree = problem.tree
     team = team_arrays(tree)
-    walls = walls_for(problem.workspace, team)
+    grid = grid_for_team(problem.workspace, team)
     within = np.all((path[:, 3:] >= tree.joint_lower) & (path[:, 3:] <= tree.joint_upper), axis=1)
-    free: NDArray[np.bool_] = within & np.array([is_free(team, walls, z, 0.0) for z in path])
+    free: NDArray[np.bool_] = within & np.array([is_free(team, grid, z, 0.0) for z in path])
     return free
 
 

@@ -11,10 +11,10 @@ from shapely import MultiPolygon, Polygon
 
 from coop_drake.compiled import compiled
 from coop_drake.geometry.convex import following
+from coop_drake.geometry.distances import squared_distance
 from coop_drake.geometry.minkowski import FreeSpace, polygon_rings
-from coop_drake.geometry.sweep_kernels import IntArray
-from coop_drake.planning.sampling.team_arrays import TeamArrays
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.team_arrays import TeamArrays
 
 FAR = 0.2
 """Distances from walls that are larger than this one do not matter [m]."""
@@ -24,7 +24,7 @@ _SQUARES_PER_REACH = 6.0
 _OFF_THE_EDGES = np.array([0.317, 0.291])  # Middles of squares must not lie on walls; these hardly ever do.
 
 
-class Walls(NamedTuple):
+class ObstacleGrid(NamedTuple):
     """Edges of a floor and a grid over it, E edges, S squares, L entries in all lists.
 
     Attributes:
@@ -52,7 +52,7 @@ class Walls(NamedTuple):
     inside: IntArray
 
 
-def walls_near(rings: Sequence[FloatArray], reach: float) -> Walls:
+def lay_grid(rings: Sequence[FloatArray], reach: float) -> ObstacleGrid:
     """Lay a grid over a floor.
 
     Args:
@@ -64,7 +64,7 @@ def walls_near(rings: Sequence[FloatArray], reach: float) -> Walls:
     """
     if not rings:
         none = np.empty(0, np.int64)
-        return Walls(
+        return ObstacleGrid(
             np.empty((0, 4)), np.zeros(2), 1.0, 0, 0, reach, np.zeros(1, np.int64), none, np.empty(0), none
         )
     edges = np.concatenate([np.hstack((ring, following(ring))) for ring in rings])
@@ -76,38 +76,16 @@ def walls_near(rings: Sequence[FloatArray], reach: float) -> Walls:
     radius = reach + 0.5 * sqrt(2.0) * side
     first, listed, away = _lists(edges, corner, side, rows, columns, radius)
     inside = _insides(edges, corner, side, rows, columns)
-    return Walls(edges, corner, side, rows, columns, reach, first, listed, away, inside)
+    return ObstacleGrid(edges, corner, side, rows, columns, reach, first, listed, away, inside)
 
 
 @compiled
-def point_segment(px: float, py: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """Squared distance of a point from a segment."""
-    ux, uy = bx - ax, by - ay
-    length = ux * ux + uy * uy
-    t = 0.0 if length == 0.0 else min(1.0, max(0.0, ((px - ax) * ux + (py - ay) * uy) / length))
-    dx, dy = px - ax - t * ux, py - ay - t * uy
-    return dx * dx + dy * dy
-
-
-@compiled
-def square_at(walls: Walls, x: float, y: float) -> int:
+def square_at(grid: ObstacleGrid, x: float, y: float) -> int:
     """Number of the square that holds a point, -1 if none does."""
-    column, row = np.floor((x - walls.corner[0]) / walls.side), np.floor((y - walls.corner[1]) / walls.side)
-    if column < 0 or row < 0 or column >= walls.columns or row >= walls.rows:
+    column, row = np.floor((x - grid.corner[0]) / grid.side), np.floor((y - grid.corner[1]) / grid.side)
+    if column < 0 or row < 0 or column >= grid.columns or row >= grid.rows:
         return -1
-    return int(column) * walls.rows + int(row)
-
-
-@compiled
-def crosses(ax: float, ay: float, bx: float, by: float, ux: float, uy: float, wx: float, wy: float) -> bool:
-    """Whether segments a-b and u-w cross; an end of u-w on the line of a-b counts for one side of it."""
-    dx, dy = bx - ax, by - ay
-    first, last = dx * (uy - ay) - dy * (ux - ax), dx * (wy - ay) - dy * (wx - ax)
-    if (first > 0.0) == (last > 0.0):
-        return False
-    ex, ey = wx - ux, wy - uy
-    apart: bool = (ex * (ay - uy) - ey * (ax - ux) > 0.0) != (ex * (by - uy) - ey * (bx - ux) > 0.0)
-    return apart
+    return int(column) * grid.rows + int(row)
 
 
 @compiled
@@ -130,7 +108,7 @@ def _lists(
                 for row in range(south, north):
                     y = corner[1] + (row + 0.5) * side
                     square = column * rows + row
-                    gap = point_segment(x, y, x0, y0, x1, y1)
+                    gap = squared_distance(x, y, x0, y0, x1, y1)
                     if gap > radius * radius:
                         continue
                     if writing == 0:
@@ -171,11 +149,11 @@ def _insides(edges: FloatArray, corner: FloatArray, side: float, rows: int, colu
     return inside
 
 
-def walls_for(workspace: Polygon | MultiPolygon, team: TeamArrays) -> Walls:
+def grid_for_team(workspace: Polygon | MultiPolygon, team: TeamArrays) -> ObstacleGrid:
     """Lay a grid over a floor, fine and wide enough for a team and for distances up to ``FAR``."""
-    return walls_near(polygon_rings(workspace), float(team.disc[:, 2].max(initial=0.0)) + FAR)
+    return lay_grid(polygon_rings(workspace), float(team.discs[:, 2].max(initial=0.0)) + FAR)
 
 
-def walls_under(workspace: Polygon | MultiPolygon, reach: float) -> Walls:
+def grid_inside(workspace: Polygon | MultiPolygon, reach: float) -> ObstacleGrid:
     """Lay a grid over a floor shrunk by a hair: what stays on it is on the floor in spite of rounding."""
-    return walls_near(FreeSpace.under(workspace).rings, reach + FAR)
+    return lay_grid(FreeSpace.under(workspace).rings, reach + FAR)

@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.geometry.sweep_kernels import IntArray
 from coop_drake.planning.sampling.collision_kernels import is_free, segment_is_free
-from coop_drake.planning.sampling.obstacle_grid import Walls
-from coop_drake.planning.sampling.team_arrays import TeamArrays
-from coop_drake.tree.pose import FloatArray
+from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
+from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.team_arrays import TeamArrays
 
 _SQUARES = 2_500
 _GUIDED = 0.85
@@ -46,13 +45,9 @@ def _empty_tree(room: int, lower: FloatArray, upper: FloatArray) -> _Tree:
     side = max(sqrt(width * height / _SQUARES), 1e-9)
     rows, columns = int(height / side) + 1, int(width / side) + 1
     return _Tree(
-        np.empty((room, len(lower))),
-        np.full(room, -1),
-        np.full(rows * columns, -1),
-        np.full(room, -1),
-        np.array([lower[0], lower[1], side]),
-        rows,
-    )
+        np.empty((room, len(lower))), np.full(room, -1), np.full(rows * columns, -1), np.full(room, -1),
+        np.array([lower[0], lower[1], side]), rows,
+    )  # fmt: skip
 
 
 @compiled
@@ -69,7 +64,8 @@ def _add(tree: _Tree, index: int, z: FloatArray, parent: int) -> None:
     """Store a node."""
     column, row = _place_of(tree, z)
     square = column * tree.rows + row
-    tree.nodes[index] = z
+    for k in range(len(z)):
+        tree.nodes[index, k] = z[k]
     tree.parents[index] = parent
     tree.before[index] = tree.latest[square]
     tree.latest[square] = index
@@ -107,7 +103,7 @@ def _nearest(tree: _Tree, z: FloatArray, scale: FloatArray) -> int:
 @compiled
 def _grow(
     team: TeamArrays,
-    walls: Walls,
+    grid: ObstacleGrid,
     tree: _Tree,
     count: int,
     z: FloatArray,
@@ -118,15 +114,24 @@ def _grow(
 ) -> tuple[int, bool]:
     """Add a node on the way from the nearest one to z; returns the new count and whether z was reached."""
     near = _nearest(tree, z, scale)
-    turn = z - tree.nodes[near]
-    turn[2] -= 2.0 * pi * floor(turn[2] / (2.0 * pi) + 0.5)
-    length = np.sqrt(((turn * scale) ** 2).sum())
-    share = 1.0 if length <= reach else reach / length
-    passed = segment_is_free(team, walls, tree.nodes[near], tree.nodes[near] + share * turn, gap, scale, step)
-    if passed * share * length < 0.5 * step and passed < 1.0:
+    length = 0.0
+    move, aim = np.empty(len(z)), np.empty(len(z))
+    for k in range(len(z)):
+        move[k] = z[k] - tree.nodes[near, k]
+        if k == 2:
+            move[k] -= 2.0 * pi * floor(move[k] / (2.0 * pi) + 0.5)
+        length += (move[k] * scale[k]) ** 2
+    length = sqrt(length)
+    fraction = 1.0 if length <= reach else reach / length
+    for k in range(len(z)):
+        aim[k] = tree.nodes[near, k] + fraction * move[k]
+    passed = segment_is_free(team, grid, tree.nodes[near], aim, gap, scale, step)
+    if passed * fraction * length < 0.5 * step and passed < 1.0:
         return count, False
-    _add(tree, count, tree.nodes[near] + passed * share * turn, near)
-    return count + 1, passed == 1.0 and share == 1.0
+    for k in range(len(z)):
+        aim[k] = tree.nodes[near, k] + passed * fraction * move[k]
+    _add(tree, count, aim, near)
+    return count + 1, passed == 1.0 and fraction == 1.0
 
 
 @compiled
@@ -137,13 +142,15 @@ def _draw(
 
     Some keep closer to the guide than others: what is narrow for the guide is narrower for what it guides.
     """
-    z = lower + u[2:] * (upper - lower)
+    z = np.empty(len(lower))
+    for k in range(len(z)):
+        z[k] = lower[k] + u[2 + k] * (upper[k] - lower[k])
     if len(guide) > 0 and u[0] < _GUIDED:
-        at = guide[min(len(guide) - 1, int(u[1] * len(guide)))]
-        share = _LEAST_SPREAD + (1.0 - _LEAST_SPREAD) * u[0] / _GUIDED
+        at = min(len(guide) - 1, int(u[1] * len(guide)))
+        fraction = _LEAST_SPREAD + (1.0 - _LEAST_SPREAD) * u[0] / _GUIDED
         for k in range(len(z)):
             if spread[k] > 0.0:
-                z[k] = at[k] + (2.0 * u[2 + k] - 1.0) * share * spread[k]
+                z[k] = guide[at, k] + (2.0 * u[2 + k] - 1.0) * fraction * spread[k]
                 if k > 2:
                     z[k] = min(upper[k], max(lower[k], z[k]))
     return z
@@ -152,7 +159,7 @@ def _draw(
 @compiled
 def connect(
     team: TeamArrays,
-    walls: Walls,
+    grid: ObstacleGrid,
     start: FloatArray,
     roots: FloatArray,
     guide: FloatArray,
@@ -168,7 +175,7 @@ def connect(
 
     Args:
         team: The team.
-        walls: The floor.
+        grid: The floor.
         start: Free configuration, shape (d,).
         roots: Free goal configurations, shape (R, d).
         guide: Configurations to sample around, shape (G, d); may be empty.
@@ -186,19 +193,19 @@ def connect(
     """
     room = 2 * len(uniforms) + len(roots) + 1
     trees = (_empty_tree(room, lower, upper), _empty_tree(room, lower, upper))
-    _add(trees[0], 0, start, -1)
-    for k in range(len(roots)):
-        _add(trees[1], k, roots[k], -1)
     counts = np.array([1, len(roots)])
+    for side in range(2):
+        for k in range(counts[side]):
+            _add(trees[side], k, start if side == 0 else roots[k], -1)
     side = 0
     for row in range(len(uniforms)):
         z = _draw(uniforms[row], guide, spread, lower, upper)
         other = 1 - side
         before = counts[side]
-        counts[side], _ = _grow(team, walls, trees[side], before, z, 40.0 * step, gap, scale, step)
+        counts[side], _ = _grow(team, grid, trees[side], before, z, 40.0 * step, gap, scale, step)
         if counts[side] > before:
-            z = trees[side].nodes[before].copy()
-            counts[other], met = _grow(team, walls, trees[other], counts[other], z, np.inf, gap, scale, step)
+            z = trees[side].nodes[before]
+            counts[other], met = _grow(team, grid, trees[other], counts[other], z, np.inf, gap, scale, step)
             if met:
                 return _join(trees[0], trees[1], counts), row + 1
         side = other
@@ -208,7 +215,7 @@ def connect(
 @compiled
 def shortened(
     team: TeamArrays,
-    walls: Walls,
+    grid: ObstacleGrid,
     path: FloatArray,
     scale: FloatArray,
     gap: float,
@@ -219,60 +226,63 @@ def shortened(
 
     Args:
         team: The team.
-        walls: The floor.
+        grid: The floor.
         path: Free samples, close together, shape (m, d).
         scale: How far a unit of each axis moves the team, shape (d,).
         gap: Distance that pairs of bodies must keep [m].
         step: Distance between checks [m].
         uniforms: Random numbers in [0, 1), one row for each attempt, shape (k, 3).
     """
-    path = path.copy()
+    path, part = path.copy(), np.empty(path.shape)
     count, size = path.shape
     for row in range(len(uniforms)):
         a, b = int(uniforms[row, 0] * count), int(uniforms[row, 1] * count)
         i, j = min(a, b), max(a, b)
         if j - i < 2:
             continue
-        part = path[i : j + 1].copy()
         only = 2 + int(uniforms[row, 2] * (size - 2))
-        for k in range(1, j - i):
-            share = k / (j - i)
+        for k in range(j - i + 1):
             for axis in range(size):
-                if row % 3 == 0 or axis == only:
-                    part[k, axis] = path[i, axis] + share * (path[j, axis] - path[i, axis])
+                part[k, axis] = path[i + k, axis]
+                if 0 < k < j - i and (row % 3 == 0 or axis == only):
+                    part[k, axis] = path[i, axis] + k / (j - i) * (path[j, axis] - path[i, axis])
         free = True
         stride = 8
         while free and stride > 0:
             for k in range(stride, j - i, 2 * stride if stride < 8 else stride):
-                if not is_free(team, walls, part[k], gap):
+                if not is_free(team, grid, part[k], gap):
                     free = False
                     break
             stride //= 2
         k = 0
         while free and k < j - i:
-            free = segment_is_free(team, walls, part[k], part[k + 1], gap, scale, step) == 1.0
+            free = segment_is_free(team, grid, part[k], part[k + 1], gap, scale, step) == 1.0
             k += 1
-        if free:
-            path[i : j + 1] = part
+        for k in range(j - i if free else 0):
+            for axis in range(size):
+                path[i + k, axis] = part[k, axis]
     return path
 
 
 @compiled
 def _join(first: _Tree, last: _Tree, counts: IntArray) -> FloatArray:
     """Path through the newest nodes of both trees, which stand for one configuration."""
-    chain = np.empty((counts[0] + counts[1], first.nodes.shape[1]))
+    path = np.empty((counts[0] + counts[1], first.nodes.shape[1]))
     size = 0
     i = counts[0] - 1
     while i >= 0:
-        chain[size] = first.nodes[i]
-        size += 1
+        size, i = size + 1, first.parents[i]
+    at, i = size, counts[0] - 1
+    while i >= 0:
+        at -= 1
+        for k in range(path.shape[1]):
+            path[at, k] = first.nodes[i, k]
         i = first.parents[i]
-    chain[:size] = chain[:size][::-1].copy()
     i = last.parents[counts[1] - 1]
     while i >= 0:
-        turn = last.nodes[i, 2] - chain[size - 1, 2]
-        chain[size] = last.nodes[i]
-        chain[size, 2] = chain[size - 1, 2] + turn - 2.0 * pi * floor(turn / (2.0 * pi) + 0.5)
-        size += 1
-        i = last.parents[i]
-    return chain[:size].copy()
+        for k in range(path.shape[1]):
+            path[size, k] = last.nodes[i, k]
+        turn = last.nodes[i, 2] - path[size - 1, 2]
+        path[size, 2] = path[size - 1, 2] + turn - 2.0 * pi * floor(turn / (2.0 * pi) + 0.5)
+        size, i = size + 1, last.parents[i]
+    return path[:size]

@@ -9,7 +9,7 @@ import numpy as np
 from shapely import MultiPolygon
 
 from coop_drake.planning.sampling.collision_kernels import is_free
-from coop_drake.planning.sampling.obstacle_grid import Walls, walls_for
+from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_for_team
 from coop_drake.planning.sampling.random_trees import connect, shortened
 from coop_drake.planning.sampling.subsystems import Subsystem, SubsystemHierarchy
 from coop_drake.tree.pose import FloatArray
@@ -83,7 +83,7 @@ class Sampler:
         progress: Callable[[float], None] | None = None,
     ) -> None:
         self._hierarchy, self._gap = hierarchy, gap
-        self._walls: Walls = walls_for(workspace, hierarchy.subsystem(hierarchy.robots).team)
+        self._grid: ObstacleGrid = grid_for_team(workspace, hierarchy.subsystem(hierarchy.robots).team)
         self._bounds = workspace.bounds
         self._random = np.random.default_rng(seed)
         self._progress = progress
@@ -137,7 +137,7 @@ class Sampler:
     ) -> tuple[GuidePath | None, int]:
         """Path of a subsystem, sampled around a guide path, and the number of samples drawn for it."""
         guide, spread = _sampling_region(subsystem, around)
-        if not is_free(subsystem.team, self._walls, subsystem.start, self._gap):
+        if not is_free(subsystem.team, self._grid, subsystem.start, self._gap):
             return None, 0
         roots = self._goals(subsystem)
         if len(roots) == 0:
@@ -156,7 +156,7 @@ class Sampler:
         uniforms = self._random.random((samples, 2 + len(lower)))
         path, drawn = connect(
             subsystem.team,
-            self._walls,
+            self._grid,
             subsystem.start,
             roots,
             guide,
@@ -182,7 +182,7 @@ class Sampler:
             if free:
                 joints[free] = lower[free] + self._random.random(len(free)) * (upper - lower)[free]
             z = np.concatenate((question.goal_pose, joints))
-            if is_free(subsystem.team, self._walls, z, self._gap):
+            if is_free(subsystem.team, self._grid, z, self._gap):
                 roots.append(z)
             if len(roots) == GOALS:
                 break
@@ -192,7 +192,7 @@ class Sampler:
         uniforms = self._random.random((SHORTCUTS, 3))
         path = densified(path, subsystem.scale, SPACING)
         better: FloatArray = shortened(
-            subsystem.team, self._walls, path, subsystem.scale, self._gap, COLLISION_STEP, uniforms
+            subsystem.team, self._grid, path, subsystem.scale, self._gap, COLLISION_STEP, uniforms
         )
         return better
 

@@ -1,0 +1,123 @@
+"""Distances and crossings of points, segments and convex rings in the plane, compiled: one formula each.
+
+A ring is a range of rows of an array of vertices, counter-clockwise: one vertex is a point, two are a
+segment, more are a convex polygon.
+"""
+
+from __future__ import annotations
+
+from coop_drake.compiled import compiled
+from coop_drake.tree.pose import FloatArray
+
+__all__ = [
+    "meets_ring",
+    "ring_holds",
+    "segments_cross",
+    "squared_distance",
+    "squared_ring_distance",
+    "twice_area",
+]
+
+
+@compiled
+def twice_area(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
+    """Twice the signed area of the triangle a, b, c [m^2]: positive where c lies to the left of a to b."""
+    return (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+
+
+@compiled
+def squared_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
+    """Squared distance of a point to the segment from (x0, y0) to (x1, y1), which may be a point [m^2]."""
+    dx, dy = x1 - x0, y1 - y0
+    px, py = x - x0, y - y0
+    squared_length = dx * dx + dy * dy
+    s = (px * dx + py * dy) / squared_length if squared_length > 0.0 else 0.0
+    s = min(max(s, 0.0), 1.0)
+    ex, ey = px - s * dx, py - s * dy
+    return ex * ex + ey * ey
+
+
+@compiled
+def segments_cross(
+    ax: float, ay: float, bx: float, by: float, cx: float, cy: float, dx: float, dy: float
+) -> bool:
+    """Whether the segments a-b and c-d cross.
+
+    An end that lies on the other segment's line counts as on its right side, so that a path through a vertex
+    crosses one of the two edges there.
+    """
+    if (twice_area(ax, ay, bx, by, cx, cy) > 0.0) == (twice_area(ax, ay, bx, by, dx, dy) > 0.0):
+        return False
+    return (twice_area(cx, cy, dx, dy, ax, ay) > 0.0) != (twice_area(cx, cy, dx, dy, bx, by) > 0.0)
+
+
+@compiled
+def meets_ring(
+    vertices: FloatArray, first: int, last: int, ax: float, ay: float, bx: float, by: float
+) -> bool:
+    """Whether the segment a-b meets a ring of two or more vertices or what it encloses; False for a point.
+
+    The segment is clipped by the half-plane of every edge.
+
+    Args:
+        vertices: Vertices, shape (V, 2) [m].
+        first: First vertex of the ring.
+        last: The vertex after its last.
+        ax: First coordinate of the segment's one end; with the next three [m].
+        ay: Second coordinate.
+        bx: First coordinate of the other end.
+        by: Second coordinate.
+    """
+    if last - first == 1:
+        return False
+    if last - first == 2:
+        ux, uy = vertices[first, 0], vertices[first, 1]
+        return segments_cross(ax, ay, bx, by, ux, uy, vertices[first + 1, 0], vertices[first + 1, 1])
+    enter, leave = 0.0, 1.0
+    before = last - 1
+    for k in range(first, last):
+        nx, ny = vertices[k, 1] - vertices[before, 1], vertices[before, 0] - vertices[k, 0]
+        left = nx * (vertices[before, 0] - ax) + ny * (vertices[before, 1] - ay)
+        rate = nx * (bx - ax) + ny * (by - ay)
+        before = k
+        if rate > 0.0:
+            leave = min(leave, left / rate)
+        elif rate < 0.0:
+            enter = max(enter, left / rate)
+        elif left < 0.0:
+            return False
+        if enter > leave:
+            return False
+    return True
+
+
+@compiled
+def squared_ring_distance(
+    vertices: FloatArray, first: int, last: int, ax: float, ay: float, bx: float, by: float, most: float
+) -> float:
+    """Squared distance of the segment a-b from the edges of a ring that it does not cross, at most ``most``.
+
+    Segments that do not cross are nearest at an end of one of them. Arguments as in ``meets_ring``.
+    """
+    best = most
+    before = last - 1
+    for k in range(first, last):
+        ux, uy, wx, wy = vertices[before, 0], vertices[before, 1], vertices[k, 0], vertices[k, 1]
+        before = k
+        best = min(best, squared_distance(wx, wy, ax, ay, bx, by))
+        best = min(best, squared_distance(ax, ay, ux, uy, wx, wy))
+        best = min(best, squared_distance(bx, by, ux, uy, wx, wy))
+    return best
+
+
+@compiled
+def ring_holds(vertices: FloatArray, first: int, last: int, x: float, y: float) -> bool:
+    """Whether a ring of three or more vertices encloses a point; see ``meets_ring`` for the arguments."""
+    if last - first < 3:
+        return False
+    before = last - 1
+    for k in range(first, last):
+        if twice_area(vertices[before, 0], vertices[before, 1], vertices[k, 0], vertices[k, 1], x, y) < 0.0:
+            return False
+        before = k
+    return True
