@@ -9,7 +9,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.fields.outline import Outline
 from coop_drake.fields.quadrature import FloatArray
-from coop_drake.geometry.boundary import squared_distance
+from coop_drake.geometry.distances import squared_distance
 
 __all__ = ["Panels", "lay_panels", "point_distance", "segment_distance"]
 
