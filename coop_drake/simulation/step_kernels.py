@@ -91,7 +91,6 @@ def largest_difference(rows: FloatArray, others: FloatArray) -> float:
 
 
 @compiled
-@compiled
 def _narrowest(z: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[float, int]:
     """Smallest distance of an axis to its interval's ends, and the axis; the first that is no number."""
     least, axis = inf, 0
