@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.geometry.sweep_kernels import separated
+from coop_drake.geometry.distances import separated
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 
 TOUCH = 1e-6

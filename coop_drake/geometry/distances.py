@@ -6,6 +6,8 @@ segment, more are a convex polygon.
 
 from __future__ import annotations
 
+from math import hypot
+
 from coop_drake.compiled import compiled
 from coop_drake.tree.pose import FloatArray
 
@@ -13,6 +15,7 @@ __all__ = [
     "meets_ring",
     "ring_holds",
     "segments_cross",
+    "separated",
     "squared_distance",
     "squared_ring_distance",
     "twice_area",
@@ -121,3 +124,29 @@ def ring_holds(vertices: FloatArray, first: int, last: int, x: float, y: float) 
             return False
         before = k
     return True
+
+
+@compiled
+def separated(first: FloatArray, second: FloatArray, gap: float = 0.0) -> bool:
+    """Whether the line of some edge keeps two convex polygons further apart than ``gap`` [m].
+
+    With a negative gap polygons that overlap less deep than that count as separated, too.
+    """
+    apart: bool = _edge_separates(first, second, gap) or _edge_separates(second, first, gap)
+    return apart
+
+
+@compiled
+def _edge_separates(first: FloatArray, second: FloatArray, gap: float) -> bool:
+    for i in range(len(first)):
+        k = i + 1 if i + 1 < len(first) else 0
+        x, y = first[k, 1] - first[i, 1], first[i, 0] - first[k, 0]
+        reach = x * first[i, 0] + y * first[i, 1] + gap * hypot(x, y)
+        apart = True
+        for j in range(len(second)):
+            if x * second[j, 0] + y * second[j, 1] <= reach:
+                apart = False
+                break
+        if apart:
+            return True
+    return False

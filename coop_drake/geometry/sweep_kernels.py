@@ -274,29 +274,3 @@ def over_piece(
     if rounded and team.radii[piece] > 0.0:
         ring = grown(ring, team.radii[piece], disc_turn(0.5 * widest))
     return ring
-
-
-@compiled
-def separated(first: FloatArray, second: FloatArray, gap: float = 0.0) -> bool:
-    """Whether some edge's line keeps two convex polygons further apart than ``gap`` [m].
-
-    A negative gap lets them overlap that deep and still be told apart.
-    """
-    apart: bool = _edge_separates(first, second, gap) or _edge_separates(second, first, gap)
-    return apart
-
-
-@compiled
-def _edge_separates(first: FloatArray, second: FloatArray, gap: float) -> bool:
-    for i in range(len(first)):
-        k = i + 1 if i + 1 < len(first) else 0
-        x, y = first[k, 1] - first[i, 1], first[i, 0] - first[k, 0]
-        reach = x * first[i, 0] + y * first[i, 1] + gap * hypot(x, y)
-        apart = True
-        for j in range(len(second)):
-            if x * second[j, 0] + y * second[j, 1] <= reach:
-                apart = False
-                break
-        if apart:
-            return True
-    return False

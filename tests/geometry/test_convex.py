@@ -3,7 +3,8 @@ import pytest
 from shapely import Polygon, box
 
 from coop_drake.geometry.convex import edge_angles, normals
-from coop_drake.geometry.sweep_kernels import circumscribed, closed_directions, separated, support
+from coop_drake.geometry.distances import separated
+from coop_drake.geometry.sweep_kernels import circumscribed, closed_directions, support
 from coop_drake.geometry.under_kernels import half_planes_polygon
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])

@@ -14,7 +14,8 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.geometry.body_pairs import TOUCH
-from coop_drake.geometry.sweep_kernels import over_piece, separated
+from coop_drake.geometry.distances import separated
+from coop_drake.geometry.sweep_kernels import over_piece
 from coop_drake.planning.sampling.collision_kernels import ring_clearance
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.tree.pose import FloatArray, IntArray
