@@ -6,11 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import hypot
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from coop_drake.tree.pose import FloatArray, PlanarPose
+
+if TYPE_CHECKING:
+    from coop_drake.tree.team_arrays import TeamArrays
 
 
 @dataclass(frozen=True)
@@ -154,16 +157,23 @@ class ComponentTree:
             and (second, first) not in self.sharing_joint
         )
 
+    @cached_property
+    def arrays(self) -> TeamArrays:
+        """The tree as flat arrays, for compiled functions."""
+        # Importing numba takes half a second: only where something is computed.
+        from coop_drake.tree.team_arrays import team_arrays
+
+        return team_arrays(self)
+
     def poses(self, configuration: Sequence[float] | FloatArray) -> tuple[PlanarPose, ...]:
         """Pose ``X_WC`` of every component.
 
         Args:
             configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
         """
-        # Importing numba takes half a second: only where poses are computed.
-        from coop_drake.tree.team_arrays import place, team_arrays
+        from coop_drake.tree.team_arrays import place
 
-        rows = place(team_arrays(self), np.ascontiguousarray(configuration, dtype=float))
+        rows = place(self.arrays, np.ascontiguousarray(configuration, dtype=float))
         return tuple(PlanarPose(x, y, angle) for x, y, _, _, angle in rows.tolist())
 
     @cached_property

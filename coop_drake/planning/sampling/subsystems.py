@@ -8,9 +8,9 @@ import shapely
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.questions.relaxation import inscribed_disc, relaxed
-from coop_drake.planning.sampling.team_arrays import TeamArrays, team_arrays
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape
 from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.team_arrays import TeamArrays, team_arrays
 
 __all__ = ["Subsystem", "SubsystemHierarchy"]
 
