@@ -7,6 +7,7 @@ from paper.exhibits import Exhibit, Statement, Verdict
 from paper.material import Material, gather
 from paper.pages import write_report
 from paper.report import exhibits
+from paper.slice_figure import slice_figure
 from paper.table_1 import CORRECTED, PRINTED
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "corridor_scenario",
     "exhibits",
     "gather",
+    "slice_figure",
     "write_errata_figure",
     "write_report",
 ]

@@ -6,7 +6,6 @@ from coop_drake.watching.pictures import write_pictures
 from coop_drake.watching.recording import SearchRecording, Strategy, record_search
 from coop_drake.watching.scene import scene_page, write_scene
 from coop_drake.watching.search_states import ChannelCell, Leaf, SearchState, search_states
-from coop_drake.watching.slice_figure import slice_figure
 
 __all__ = [
     "ChannelCell",
@@ -20,7 +19,6 @@ __all__ = [
     "record_search",
     "scene_page",
     "search_states",
-    "slice_figure",
     "write_pictures",
     "write_scene",
 ]

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from coop_drake.watching import slice_figure
+from paper import slice_figure
 from tests.support.cases import case
 from tests.support.sliding import with_sliding_joint
 
