@@ -1,4 +1,4 @@
-"""Every exception that coop_drake raises on purpose; each carries its data and says what is allowed."""
+"""The exceptions that coop_drake raises on purpose; each has its data as attributes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = [
 ]
 
 _LONGEST_VALUE = 200
-"""Characters of a value that a message shows."""
+"""Characters of a value that a message shows; a whole section of a file would fill the screen."""
 
 
 class CoopDrakeError(Exception):
@@ -24,7 +24,7 @@ class CoopDrakeError(Exception):
 
 
 class ScenarioError(CoopDrakeError):
-    """A file is wrong: says in which file, at which key, with which value, and what is allowed.
+    """A file is wrong; the message names the file, the key, the value and what is allowed.
 
     Args:
         file: Path of the offending file as the user wrote it.
@@ -39,23 +39,23 @@ class ScenarioError(CoopDrakeError):
 
     @property
     def shown(self) -> str:
-        """The offending value, cut where a whole section of a file would fill the screen."""
+        """The offending value as text, shortened if it is long."""
         text = repr(self.value)
         return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}…"
 
     def __reduce__(self) -> tuple[type[ScenarioError], tuple[str, str, object, str]]:
-        """Pickle the data and not the message: files are read in a process of their own."""
+        """Pickle the data instead of the message, so that the error can come from another process."""
         return type(self), (self.file, self.key, self.value, self.allowed)
 
 
 class FloorPlanError(CoopDrakeError):
-    """A drawing or a map that gives no floor: says in which file, where, what is wrong, and what helps.
+    """A drawing or a map gives no floor; the message names the file, the place, the mistake and the remedy.
 
     Args:
         file: Path of the offending file as the user wrote it.
-        place: Where in it: a line, an element, a key, or coordinates in W.
+        place: Place in the file: a line, an element, a key, or coordinates in W.
         finding: What is wrong there.
-        remedy: What would help.
+        remedy: What to do about it.
     """
 
     def __init__(self, file: str, place: str, finding: str, remedy: str) -> None:
@@ -63,7 +63,7 @@ class FloorPlanError(CoopDrakeError):
         super().__init__(f"{file}: {place}: {finding}; {remedy}")
 
     def __reduce__(self) -> tuple[type[FloorPlanError], tuple[str, str, str, str]]:
-        """Pickle the data and not the message: files are read in a process of their own."""
+        """Pickle the data instead of the message, so that the error can come from another process."""
         return type(self), (self.file, self.place, self.finding, self.remedy)
 
 
@@ -80,13 +80,13 @@ class FieldError(CoopDrakeError):
 
 
 class UnmappableError(FieldError):
-    """A shape that no map within the tolerance was found for: says which corner or gap is at fault.
+    """No harmonic map within the tolerance was found for a shape; the message names the corner or gap.
 
     Args:
-        message: What is wrong, in words that name the place.
-        place: Where, in W, (x, y) [m].
-        angle: Interior angle of the corner at fault [degrees], None for a gap.
-        width: Width of the gap at fault [m], None for a corner.
+        message: What is wrong, with the place.
+        place: The place in W, (x, y) [m].
+        angle: Interior angle of the corner that is too sharp [degrees], None for a gap.
+        width: Width of the gap that is too narrow [m], None for a corner.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class StallError(CoopDrakeError):
 
 
 class RefusalError(CoopDrakeError):
-    """A plan or a proof does not hold: says where, what is wrong there, and by how much.
+    """A plan or a proof does not hold; the message names the place and what is wrong there, with numbers.
 
     Args:
         where: The place in the document, for example ``cells[3].safe``.
@@ -119,4 +119,4 @@ class RefusalError(CoopDrakeError):
 
 
 class TuningError(CoopDrakeError):
-    """What gains are to be chosen for, or by, makes no sense; the message says what is allowed."""
+    """The options of tuning are wrong, or its optimizer is missing; the message says what is expected."""

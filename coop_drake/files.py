@@ -1,4 +1,4 @@
-"""Files are written whole or not at all."""
+"""Writes files so that no reader ever finds a part of one."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ __all__ = ["write_atomically"]
 
 
 def write_atomically(path: Path | str, content: bytes | Callable[[IO[bytes]], object]) -> Path:
-    """Write a file so that a reader, a crash or Ctrl-C never meets half of it.
+    """Write a file as a whole: neither a crash nor Ctrl-C leaves a part of it.
 
-    The content goes to a temporary file beside the target, which is then renamed over it.
+    The content goes to a temporary file beside the target, which then replaces the target.
 
     Args:
-        path: Where the file shall stand; missing directories are made.
-        content: The bytes, or a function that writes them to the open binary file it is given.
+        path: The file; missing folders are made.
+        content: The bytes, or a function that writes them to the open binary file that it is given.
 
     Returns:
-        The path written.
+        The path of the file.
 
     Raises:
-        OSError: If the directory cannot be written; no temporary file is left behind.
+        OSError: The folder cannot be written; no temporary file is left.
     """
     target = Path(path)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -45,7 +45,7 @@ def write_atomically(path: Path | str, content: bytes | Callable[[IO[bytes]], ob
 
 
 def _permissions_of_new_files() -> int:
-    """Permissions that ``open`` would give; temporary files are born private."""
+    """Return the permissions that ``open`` gives; those of temporary files exclude other users."""
     mask = os.umask(0)
     os.umask(mask)
     return 0o666 & ~mask

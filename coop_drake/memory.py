@@ -1,4 +1,4 @@
-"""How much memory this process and those that it waited for took."""
+"""Peak memory of this process and of its children."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from pathlib import Path
 __all__ = ["peak_memory_mb"]
 
 _STATUS = Path("/proc/self/status")
-_UNIT = 1e-6 if sys.platform == "darwin" else 1.024e-3  # Bytes there, kibibytes here.
+_UNIT = 1e-6 if sys.platform == "darwin" else 1.024e-3
+"""Unit of ``ru_maxrss`` [MB]: macOS counts bytes, Linux kibibytes."""
 
 
 def peak_memory_mb() -> float:
-    """Return the largest resident memory of this process or of one that it waited for, so far [MB].
+    """Return the largest resident memory so far of this process or of a child that has ended [MB].
 
-    Where the kernel keeps it for the program alone that is read: the figure of ``getrusage`` begins with
-    what the parent held when it started this process.
+    On Linux it is read from ``/proc``: the figure of ``getrusage`` includes the memory that the parent had
+    when it started this process.
     """
     children = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * _UNIT
     if _STATUS.exists():

@@ -1,4 +1,4 @@
-"""Where shipped models and scenarios are: beside the package in a checkout, inside it where installed."""
+"""Finds the shipped models and scenarios: beside the package in a checkout, inside it where installed."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ SHIPPED = next(
 
 
 def shipped_scenarios() -> dict[str, Path]:
-    """The shipped scenarios by name."""
+    """Return the files of the shipped scenarios by name."""
     return {path.name.removesuffix(_SUFFIX): path for path in sorted(SHIPPED.glob("*" + _SUFFIX))}
 
 
 def scenario_file(given: Path | str) -> Path:
-    """The file that is meant: the one given, the only one in a folder given, or the shipped one so named."""
+    """Return the file given, the only scenario file of the folder given, or the shipped one of that name."""
     path = Path(given)
     if path.is_dir():
         inside = list(path.glob("*" + _SUFFIX))

@@ -1,4 +1,4 @@
-"""Fills templates: every room keeps its own in its folder ``templates``."""
+"""Fills Jinja templates; every package has its own in its folder ``templates``."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from typing import Any
 __all__ = ["rendered"]
 
 
-def rendered(room: str, name: str, **content: Any) -> str:
-    """Fill a Jinja template; what goes into HTML is escaped unless the template says otherwise.
+def rendered(package: str, name: str, **content: Any) -> str:
+    """Fill a Jinja template; values in HTML are escaped unless the template says otherwise.
 
     Args:
-        room: The package that it belongs to, such as ``coop_drake.viz``.
+        package: The package that holds it, such as ``coop_drake.viz``.
         name: Its name without the suffix ``.j2``.
-        content: What the template may name; a name that it lacks is an error.
+        content: Values for the names in the template; a name without a value is an error.
     """
-    # Here and not above: most who import a room that has templates never fill one.
+    # Imported here because most uses of a package fill no template.
     from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescape
 
     environment = Environment(
-        loader=PackageLoader(room),
+        loader=PackageLoader(package),
         autoescape=select_autoescape(("html.j2",)),
         undefined=StrictUndefined,
         trim_blocks=True,

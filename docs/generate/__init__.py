@@ -1,1 +1,1 @@
-"""Builds the documentation: pages by hand, pages made from the code, all of it checked."""
+"""Builds the documentation from pages that are written by hand and pages that are made from the code."""

@@ -1,6 +1,6 @@
-"""``python -m docs.generate out/docs``: the documentation as pages that any browser opens.
+"""``python -m docs.generate out/docs`` builds the documentation as a site of HTML pages.
 
-The page of scenario files is kept beside the others, so that it can be read without a site, too.
+The page of scenario files is kept in ``docs``, so that it can be read without the site, too.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ SCENARIO_PAGE = ROOT / "docs" / "reference" / "scenario.md"
 
 
 def main(site: Path) -> int:
-    """Lay out the sources beside the site and build it, warnings being errors; returns the exit code."""
-    if _mended(SCENARIO_PAGE, scenario_page()):
-        print(f"{SCENARIO_PAGE.relative_to(ROOT)} was out of date and is written anew", file=sys.stderr)
+    """Write the sources beside the site and build it, with warnings as errors; return the exit code."""
+    if _updated(SCENARIO_PAGE, scenario_page()):
+        print(f"{SCENARIO_PAGE.relative_to(ROOT)} was out of date and has been updated", file=sys.stderr)
         return 1
     sources = site.with_name(site.name + "_sources").absolute()
     shutil.rmtree(sources, ignore_errors=True)
@@ -63,8 +63,8 @@ def main(site: Path) -> int:
     return code
 
 
-def _mended(file: Path, text: str) -> bool:
-    """Write a file that does not say what it should; returns whether it had to be written."""
+def _updated(file: Path, text: str) -> bool:
+    """Write a file if its content is another one; return whether it was written."""
     if file.exists() and file.read_text(encoding="utf-8") == text:
         return False
     file.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""Pages of the API: one for each room of the house, its public modules one after the other."""
+"""Pages of the API: one for each package, with its public modules."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ class ApiPage(NamedTuple):
     """One page.
 
     Attributes:
-        title: The room.
-        path: Where the page goes.
+        title: Name of the package.
+        path: Path of the page.
         text: Its markdown.
     """
 
@@ -24,20 +24,20 @@ class ApiPage(NamedTuple):
 
 
 def api_pages(root: Path) -> list[ApiPage]:
-    """Pages of all rooms by name, and of the modules outside of rooms.
+    """Return the pages of all packages by name, then that of the modules outside of them.
 
     Args:
         root: The repository.
     """
     package = root / "coop_drake"
-    rooms = sorted(path.parent for path in package.glob("*/__init__.py"))
+    packages = sorted(path.parent for path in package.glob("*/__init__.py"))
     alone = sorted(path for path in package.glob("*.py") if path.stem != "__init__")
-    pages = [_page(room.name, room / "__init__.py", sorted(room.glob("[!_]*.py"))) for room in rooms]
+    pages = [_page(inner.name, inner / "__init__.py", sorted(inner.glob("[!_]*.py"))) for inner in packages]
     return [*pages, _page("coop_drake", package / "__init__.py", alone)]
 
 
 def _page(title: str, caption: Path, modules: list[Path]) -> ApiPage:
-    """A room's caption and its modules, those of compiled inner loops left out."""
+    """Return the page of a package: its docstring, and its modules except those of compiled inner loops."""
     said = ast.get_docstring(ast.parse(caption.read_text(encoding="utf-8"))) or ""
     shown = [path for path in modules if "kernels" not in path.stem]
     names = [".".join((*path.parts[path.parts.index("coop_drake") : -1], path.stem)) for path in shown]

@@ -1,4 +1,4 @@
-"""Links of pages that are read in two places: beside the sources, and in the site."""
+"""Adapts links for the site: pages are read in the repository and in the site."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from pathlib import PurePosixPath
 
 __all__ = ["for_site"]
 
-_ROOM = re.compile(r"\]\((?:\.\./)+coop_drake/(\w+)\)")
+_PACKAGE = re.compile(r"\]\((?:\.\./)+coop_drake/(\w+)\)")
 
 
 def for_site(text: str, page: PurePosixPath) -> str:
-    """Let links to a room's folder lead to the room's page of the API, for the site has no sources.
+    """Replace links to a package's folder by links to its page of the API: the site has no source files.
 
     Args:
         text: The page.
-        page: Where it stands below ``docs``.
+        page: Its path below ``docs``.
     """
     up = "../" * (len(page.parts) - 1)
-    return _ROOM.sub(lambda link: f"]({up}reference/api/{link[1]}.md)", text)
+    return _PACKAGE.sub(lambda link: f"]({up}reference/api/{link[1]}.md)", text)

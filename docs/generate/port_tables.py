@@ -1,4 +1,4 @@
-"""An extension of griffe: tables of ports, ruled with equal signs in docstrings, become markdown."""
+"""An extension of griffe that turns the tables of ports in docstrings, ruled with ``=``, into markdown."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ _HEADS = ("", "port", "size", "meaning", "frame")
 
 
 class PortTables(Extension):
-    """Rewrites the docstrings that griffe reads."""
+    """Rewrites the tables in the docstrings that griffe reads."""
 
     def on_instance(self, *, obj: Object, **kwargs: Any) -> None:
-        """Rewrite the docstring of whatever has one."""
+        """Rewrite the docstring of an object that has one."""
         if obj.docstring is not None:
             obj.docstring.value = as_markdown(obj.docstring.value)
 
 
 def as_markdown(docstring: str) -> str:
-    """The docstring with every ruled table as markdown."""
+    """Return the docstring with every ruled table as markdown."""
     lines, rulers = docstring.splitlines(), []
     for number, line in enumerate(lines):
         if _RULER.match(line):
@@ -34,7 +34,7 @@ def as_markdown(docstring: str) -> str:
 
 
 def _table(ruler: str, rows: list[str]) -> list[str]:
-    """Rows by the columns of a ruler; a row whose first column is empty goes on with the one before."""
+    """Return the lines of a table; a row whose first column is empty continues the row before."""
     spans = [match.span() for match in re.finditer("=+", ruler)]
     ends = [start for start, _ in spans[1:]] + [None]
     cells: list[list[str]] = []

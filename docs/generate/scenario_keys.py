@@ -22,10 +22,10 @@ class ScenarioKey(NamedTuple):
 
     Attributes:
         name: As it stands in the file.
-        kind: What may stand there, with its limits.
-        unit: In which unit, empty for what has none.
-        default: As YAML has it, empty where the key is required.
-        meaning: One or two sentences.
+        kind: Type and limits of its value, in words.
+        unit: Unit of its value, empty if it has none.
+        default: Default as YAML text, empty if the key is required.
+        meaning: Its meaning, in one or two sentences.
     """
 
     name: str
@@ -39,9 +39,9 @@ class Section(NamedTuple):
     """The keys of one class.
 
     Attributes:
-        path: Where the section stands in the file, empty for the top.
-        about: What it is for.
-        keys: Its keys.
+        path: Key of the section in the file, empty for the file itself.
+        about: Purpose of the section.
+        keys: Keys in the section.
     """
 
     path: str
@@ -54,7 +54,7 @@ def sections(cls: Any = Scenario, path: str = "") -> Iterator[Section]:
 
     Args:
         cls: A dataclass that is read from scenario files.
-        path: Where it stands in the file.
+        path: Its key in the file.
     """
     meanings = field_meanings(cls)
     keys = []
@@ -72,7 +72,7 @@ def sections(cls: Any = Scenario, path: str = "") -> Iterator[Section]:
 
 
 def _unit_apart(meaning: str) -> tuple[str, str]:
-    """The unit in brackets, and the sentence without it."""
+    """Return the unit in brackets, and the sentence without it."""
     found = re.search(r" ?\[([^\]]+)\]", meaning)
     if found is None:
         return "", meaning
@@ -80,7 +80,7 @@ def _unit_apart(meaning: str) -> tuple[str, str]:
 
 
 def _kind(kind: Any) -> str:
-    """What may stand at a key, in words."""
+    """Return a type and its limits in words."""
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
     if kind in SCALARS:
         return SCALARS[kind].replace("finite ", "")

@@ -18,7 +18,7 @@ angles radians, frames those of the [conventions](../conventions.md).
 
 
 def scenario_page() -> str:
-    """All sections, one table each."""
+    """Return the page: one table for each section."""
     return "\n".join([_TOP, *map(_section, sections())])
 
 
