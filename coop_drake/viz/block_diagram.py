@@ -38,14 +38,14 @@ Point = tuple[float, float]
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a block stands: its left edge, its top and its height [in]."""
+    """Where a block is drawn: its left edge, its top and its height [in]."""
 
     x: float
     y: float
     height: float
 
     def port(self, row: int) -> float:
-        """Height of the middle of a port's row."""
+        """Return the height of the middle of a port's row [in]."""
         return self.y - _TITLE - _ROW * (row + 0.5)
 
 
@@ -78,7 +78,7 @@ def block_diagram_figure(loop: ClosedLoop, robot: int = 0) -> Figure:
 
 
 def _places(flow: SignalFlow) -> dict[str, _Place]:
-    """Columns from left to right; in each, blocks and wires that pass, in the order of what feeds them."""
+    """Place blocks, and wires that pass a column, in columns; in each, in the order of what feeds them."""
     places: dict[str, _Place] = {}
     wires = _wires(flow)
     columns = range(1 + max(block.column for block in flow.blocks))
@@ -100,7 +100,7 @@ def _places(flow: SignalFlow) -> dict[str, _Place]:
 
 
 def _wires(flow: SignalFlow) -> dict[str, tuple[int, Signal]]:
-    """Where signals pass columns without a stop: their names, the column and one such signal."""
+    """Return the wires that pass columns between their blocks: names, the column and one such signal."""
     columns = {block.name: block.column for block in flow.blocks}
     return {
         _wire(signal, column): (column, signal)
@@ -124,7 +124,7 @@ def _stack(names: list[str], heights: dict[str, float]) -> float:
 def _fed_from(
     name: str, flow: SignalFlow, wires: dict[str, tuple[int, Signal]], places: dict[str, _Place]
 ) -> float:
-    """Mean height of the ports and wires already placed that feed a block or a wire."""
+    """Return the mean height of the ports and wires already placed that feed a block or a wire [in]."""
     column, signal = wires.get(name, (0, None))
     feeding = [signal] if signal else [s for s in flow.signals if s.sink == name and s.source in places]
     blocks = {block.name: block for block in flow.blocks}
@@ -172,14 +172,14 @@ def _ends(signal: Signal, blocks: dict[str, Block], places: dict[str, _Place]) -
 
 
 def _passing(signal: Signal, blocks: dict[str, Block], places: dict[str, _Place]) -> list[Point]:
-    """Both ends of the wire in every column that a signal passes."""
+    """Return both ends of the wire in every column that a signal passes [in]."""
     columns = range(blocks[signal.source].column + 1, blocks[signal.sink].column)
     wires = [places[_wire(signal, column)] for column in columns]
     return [(wire.x + along, wire.y) for wire in wires for along in (0.0, _WIDTH)]
 
 
 def _curves(points: list[Point]) -> Path:
-    """Smooth from point to point, level at each."""
+    """Return a smooth curve from point to point, horizontal at each."""
     vertices, codes = [points[0]], [Path.MOVETO]
     for start, end in pairwise(points):
         middle = 0.5 * (start[0] + end[0])
@@ -189,7 +189,7 @@ def _curves(points: list[Point]) -> Path:
 
 
 def _round_trip(start: Point, end: Point, lane: float, out: float) -> Path:
-    """Out to the right, down to a lane below all blocks, back to the left and up again."""
+    """Return a path out to the right, down to a lane below all blocks, back to the left and up again."""
     right, left = start[0] + out, end[0] - out
     return Path([start, (right, start[1]), (right, lane), (left, lane), (left, end[1]), end])
 

@@ -1,4 +1,4 @@
-"""The plan in the scene: every cell and its goal region as flat shapes on the floor, one shown at a time."""
+"""The plan in the scene: cells and goal regions as flat shapes on the floor, one cell shown at a time."""
 
 from __future__ import annotations
 
@@ -15,13 +15,18 @@ __all__ = ["CELL_COLOUR", "GOAL_COLOUR", "GOAL_POSE_COLOUR", "cell_paths", "set_
 
 CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR = BLUE, GREEN, OBJECT
 
-_LINE = 0.03  # Width of outlines [m].
-_COARSE = 0.003  # What outlines may move by, so that the page stays small [m].
-_TARGET = 0.05  # Radius of the dot at a cell's target [m].
+_LINE = 0.03
+"""Width of outlines [m]."""
+
+_OUTLINE_TOLERANCE = 0.003
+"""Distance by which outlines may move when they are simplified [m]: the page stays small."""
+
+_TARGET = 0.05
+"""Radius of the dot at a cell's target [m]."""
 
 
 def set_cells(meshcat: Meshcat, plan: Plan) -> None:
-    """Draw every cell, its goal region and its target, hidden but for the first one's."""
+    """Draw every cell, its goal region and its target; only those of the first cell are visible."""
     for index, (cell, transition) in enumerate(zip(plan.cells, plan.transitions, strict=True)):
         of_cell, of_goal = cell_paths(index)
         _set_area(meshcat, of_cell, cell.tidied, 0.004, CELL_COLOUR)
@@ -44,9 +49,9 @@ def cell_paths(index: int) -> tuple[str, str]:
 
 
 def _set_area(meshcat: Meshcat, path: str, shape: BaseGeometry, height: float, colour: str) -> None:
-    """Draw an area with its outline, which lies inside, so that it is never larger than the area."""
-    shape = shape.simplify(_COARSE)
-    outline = shape.difference(shape.buffer(-_LINE, join_style="mitre")).simplify(_COARSE)
+    """Draw an area with an outline inside of it, so that both together are as large as the area."""
+    shape = shape.simplify(_OUTLINE_TOLERANCE)
+    outline = shape.difference(shape.buffer(-_LINE, join_style="mitre")).simplify(_OUTLINE_TOLERANCE)
     _set_flat(meshcat, f"{path}/area", shape, height, colour, 0.22)
     _set_flat(meshcat, f"{path}/outline", outline, height + 0.003, colour, 0.9)
 

@@ -22,7 +22,7 @@ def write_figures(
 ) -> list[Path]:
     """Write figures 4 to 13 of the paper for this run, and a summary of the margins, as PNG.
 
-    Figures 10 and 11 show one robot each; further robots are counted on under Figure 11.
+    Figures 10 and 11 show one robot each; those of further robots are called Figure 11, too.
 
     Args:
         workspace: The floor [m].

@@ -1,4 +1,4 @@
-"""A live view: shows a run in a browser while it is simulated, at most as fast as it would be."""
+"""The live view: shows a run in a browser while it is simulated, no faster than in reality."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ from coop_drake.viz.trail import STEP, set_trail
 __all__ = ["LiveView"]
 
 _FRAMES_PER_SECOND = 25.0
+"""Steps shown per simulated second [1/s]: motion looks smooth."""
 
 
 class LiveView:
-    """An onlooker for ``simulate``; it looks at accepted steps and changes nothing about them.
+    """An observer of ``simulate``: it shows accepted steps and changes nothing.
 
     Args:
         scenario: What is simulated.
         plan: What is executed.
         meshcat: Where it is shown; ``meshcat.web_url()`` is its address.
-        rate: Simulated seconds a second at most; infinite to wait for nothing.
+        rate: Greatest ratio of simulated time to real time; infinite not to wait at all.
     """
 
     def __init__(self, scenario: Scenario, plan: Plan, meshcat: Meshcat, *, rate: float = 1.0) -> None:
@@ -40,7 +41,7 @@ class LiveView:
         self._trail = [plan.start[:2].copy()]
 
     def wait_for_viewer(self, seconds: float) -> bool:
-        """Wait until a browser looks; returns whether one does."""
+        """Wait for a browser to connect; return whether one did."""
         until = monotonic() + seconds
         while self._scene.meshcat.GetNumActiveConnections() == 0 and monotonic() < until:
             sleep(0.1)
@@ -48,7 +49,7 @@ class LiveView:
         return bool(self._scene.meshcat.GetNumActiveConnections())
 
     def __call__(self, sample: Sample) -> None:
-        """Show one step, unless a frame was shown just before."""
+        """Show one step, unless another one was shown less than a frame before."""
         if sample.time < self._next and not sample.arrived:
             return
         self._next = sample.time + 1.0 / _FRAMES_PER_SECOND
@@ -66,7 +67,7 @@ class LiveView:
             sleep(ahead)
 
     def _show_cell(self, cell: int) -> None:
-        if cell == self._cell:  # Hiding it for a moment would let it flicker.
+        if cell == self._cell:  # Hiding and showing it again would make it flicker.
             return
         for index, visible in ((self._cell, False), (cell, True)):
             for path in cell_paths(index):

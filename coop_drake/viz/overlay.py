@@ -1,4 +1,4 @@
-"""What a recording says beside the scene: headline, time, cell, key of colours, and its player."""
+"""What a recording shows beside the scene: headline, time, cell, key of colours, and its player."""
 
 from __future__ import annotations
 

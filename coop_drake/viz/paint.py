@@ -23,5 +23,5 @@ def rgba(colour: str, opacity: float = 1.0) -> Rgba:
 
 
 def hex_colour(colour: Rgba) -> str:
-    """Return a colour of Drake's as ``#rrggbb``."""
+    """Return a colour of Drake as ``#rrggbb``."""
     return "#" + "".join(f"{round(255 * part):02x}" for part in (colour.r(), colour.g(), colour.b()))

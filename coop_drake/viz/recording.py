@@ -1,4 +1,4 @@
-"""A recording of a run that opens in any browser, without a server."""
+"""The recording of a run: a page that any browser opens, without a server."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def write_recording(
     """Write the run as one self-contained HTML page; an interrupted write leaves no file behind.
 
     Args:
-        scenario: Where it happened; its directives bring the models.
-        plan: What was executed.
-        log: What happened.
-        path: Where to write.
+        scenario: Floor and team.
+        plan: Its cells.
+        log: The run.
+        path: The file.
         progress: Called with a text and the fraction done.
     """
     write_atomically(path, recording_html(scenario, plan, log, progress=progress).encode())
@@ -42,9 +42,9 @@ def recording_html(
     """Return a run as a page: the scene, an animation of what was logged, and a player.
 
     Args:
-        scenario: Where it happened; its directives bring the models.
-        plan: What was executed.
-        log: What happened.
+        scenario: Floor and team.
+        plan: Its cells.
+        log: The run.
         progress: Called with a text and the fraction done.
     """
     meshcat = silent_meshcat()

@@ -1,4 +1,4 @@
-"""A log as an animation: bodies move, arrows stretch, cells take turns, the trail grows."""
+"""The log of a run as an animation of bodies, arrows, cells and the object's trail."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from pydrake.math import RigidTransform
 
 from coop_drake.simulation import SimulationLog
 from coop_drake.tree.pose import FloatArray
+from coop_drake.viz.animation_tracks import Tracks
 from coop_drake.viz.arrows import ABOVE, arrow_path, arrow_sizes
 from coop_drake.viz.cells import cell_paths
-from coop_drake.viz.key_frames import Tracks
 from coop_drake.viz.scene import TransportScene
 from coop_drake.viz.trail import INDICES, set_trail, trail_points
 
@@ -22,17 +22,18 @@ __all__ = ["Progress", "animation_of"]
 Progress = Callable[[str, float], None]
 
 _TRAIL = "/motion/trail"
-_ARROW_ANGLE = 0.06  # [rad]
+_ARROW_ANGLE = 0.06
+"""Largest error of an arrow's direction [rad]: arrows turn fast where forces are small."""
 
 
 def animation_of(
     scene: TransportScene, log: SimulationLog, times: FloatArray, progress: Progress | None
 ) -> MeshcatAnimation:
-    """Return the tracks of everything that moves, appears or grows; puts the trail into the scene.
+    """Return the tracks of all that moves, appears or grows; the trail is put into the scene.
 
     Args:
-        scene: What is animated.
-        log: What happened.
+        scene: The scene.
+        log: The run.
         times: Of the frames, evenly spaced, shape (F,) [s].
         progress: Called with a text and the fraction done.
     """
@@ -49,14 +50,14 @@ def animation_of(
 
 
 def _at_times(log: SimulationLog, values: FloatArray, times: FloatArray) -> FloatArray:
-    """Return logged values, shape (T, k), between steps on straight lines, at times of shape (F,): (F, k)."""
+    """Return logged values of shape (T, k), interpolated at times of shape (F,): shape (F, k)."""
     return np.column_stack([np.interp(times, log.times, column) for column in values.T])
 
 
 def _add_bodies(
     tracks: Tracks, scene: TransportScene, configurations: FloatArray, progress: Progress | None
 ) -> FloatArray:
-    """Move every body; returns where the grasps are, shape (F, N, 3) [m]."""
+    """Move every body; return the positions of the grasps, shape (F, N, 3) [m]."""
     poses, grasps = [], []
     for frame, z in enumerate(configurations):
         poses.append(scene.team.poses(z))
@@ -74,7 +75,7 @@ def _add_bodies(
 
 
 def _turns(poses: list[RigidTransform]) -> FloatArray:
-    """Angles about the vertical since the first pose, unwrapped, shape (F,) [rad]."""
+    """Return the angles about the vertical since the first pose, unwrapped, shape (F,) [rad]."""
     R_0 = poses[0].rotation().inverse()
     turns = [(X_WB.rotation() @ R_0).matrix() for X_WB in poses]
     return np.unwrap([np.arctan2(turn[1, 0], turn[0, 0]) for turn in turns])

@@ -1,4 +1,4 @@
-"""The scene of a transport in Meshcat: stage, plan, team and arrows, as recordings and live views show it."""
+"""The scene of a transport in Meshcat, for recordings and live views: floor, plan, team and arrows."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ from coop_drake.viz.team_view import TeamView
 
 __all__ = ["TransportScene"]
 
-_SHADOW_HEIGHT = 0.003  # Above the grid, below the cells, which it would else darken [m].
+_SHADOW_HEIGHT = 0.003
+"""Height of the object's shadow [m]: above the grid, below the cells, which it would otherwise darken."""
 
 
 class TransportScene:
-    """Everything that a transport shows, put up in a Meshcat, the team at the plan's start.
+    """All that recordings and live views of a transport show, with the team at the plan's start.
 
     Args:
         scenario: Floor and team.
@@ -34,8 +35,8 @@ class TransportScene:
         meshcat: Where to draw.
 
     Attributes:
-        meshcat: Where it stands.
-        team: The team in it.
+        meshcat: Where it is drawn.
+        team: The team.
         of_a_metre: The force that an arrow of a metre stands for [N].
     """
 
@@ -53,7 +54,7 @@ class TransportScene:
         self.team.show(plan.start)
 
     def _footprint(self, pose: FloatArray) -> BaseGeometry:
-        """What the object covers of the floor at a pose (x, y, theta)."""
+        """Return the object's footprint at a pose (x, y, theta), shape (3,) [m, rad]."""
         z = np.concatenate([pose, np.zeros(len(self.team.team.joint_names))])
         footprints = team_footprints(read_component_tree(self.team.team), z)
         return union_all([footprint.shape for footprint in footprints if footprint.robot is None])

@@ -1,4 +1,4 @@
-"""Starts Meshcat without Drake's own line on standard error: who wants its address told tells it."""
+"""Starts a Meshcat server without the line that Drake writes to standard error."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ __all__ = ["silent_meshcat"]
 
 
 def silent_meshcat(parameters: MeshcatParams | None = None) -> Meshcat:
-    """Start a Meshcat server that does not announce itself; ``web_url()`` is its address.
+    """Start a Meshcat server and log no address; ``web_url()`` returns it.
 
     Args:
-        parameters: As Drake's; its defaults if None.
+        parameters: Drake's parameters; its defaults if None.
 
     Raises:
         RuntimeError: No port is free.
     """
     logger = logging.getLogger("drake")
-    logger.addFilter(_matters)
+    logger.addFilter(_is_no_address)
     try:
         return Meshcat(parameters or MeshcatParams())
     finally:
-        logger.removeFilter(_matters)
+        logger.removeFilter(_is_no_address)
 
 
-def _matters(record: logging.LogRecord) -> bool:
+def _is_no_address(record: logging.LogRecord) -> bool:
     return "Meshcat listening for connections" not in record.getMessage()

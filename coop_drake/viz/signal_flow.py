@@ -1,4 +1,4 @@
-"""Which blocks a Diagram has and which signals join them, as plain data."""
+"""The blocks of a Diagram and the signals that join them, as plain data."""
 
 from __future__ import annotations
 
@@ -69,9 +69,9 @@ def signal_flow(diagram: Diagram, name: str, *, telemetry: frozenset[str] = froz
     """Read the blocks and the connections of a Diagram, in an order that only depends on how it was built.
 
     Args:
-        diagram: The Diagram; what is inside its blocks is not looked at.
-        name: What to call it.
-        telemetry: Outputs that are only looked at; they are left away.
+        diagram: The Diagram; the inside of its blocks is not read.
+        name: Its name in the picture.
+        telemetry: Outputs that only logs read; they are left out.
     """
     signals = [
         Signal(
@@ -107,7 +107,7 @@ def signal_flow(diagram: Diagram, name: str, *, telemetry: frozenset[str] = froz
 
 
 def _port_orders(diagram: Diagram) -> tuple[dict[tuple[str, str], int], dict[tuple[str, str], int]]:
-    """Ranks of all (block, port) that signals come from, and go to; Drake lists signals by addresses."""
+    """Return the ranks of all (block, port) that signals come from, and go to; Drake's order changes."""
     outputs = [(INPUTS, diagram.get_input_port(k).get_name()) for k in range(diagram.num_input_ports())]
     inputs = [(OUTPUTS, diagram.get_output_port(k).get_name()) for k in range(diagram.num_output_ports())]
     for system in diagram.GetSystems():
@@ -140,7 +140,7 @@ def _kind(system: System) -> str:
 
 
 def _columns(signals: list[Signal], held: set[tuple[str, str]]) -> dict[str, int]:
-    """Longest ways from the sources; signals that are held, not passed through, do not count."""
+    """Return the longest distances of blocks from the sources, not counting signals from a state."""
     graph: nx.DiGraph[str] = nx.DiGraph()
     for signal in signals:
         graph.add_nodes_from((signal.source, signal.sink))

@@ -1,4 +1,4 @@
-"""The team in the scene: its bodies as the models draw them, grasp points, colours of robots."""
+"""The team in the scene: its bodies as the models draw them, and its grasp points."""
 
 from __future__ import annotations
 
@@ -25,20 +25,23 @@ from coop_drake.viz.paint import rgba, set_mesh
 
 __all__ = ["TeamView"]
 
-_SEE_THROUGH = 0.6  # Opacity of the object, under which its cell is to be seen.
-_GRASP = 0.07  # Radius of a grasp point [m].
+_SEE_THROUGH = 0.6
+"""Opacity of the object, below which its cell is to be seen."""
+
+_GRASP = 0.07
+"""Radius of the sphere at a grasp point [m]."""
 
 
 class TeamView:
-    """A team standing in a Meshcat, in any configuration, beside whatever simulates it.
+    """A team in Meshcat, in any configuration; it has a plant of its own, apart from the simulation's.
 
     Args:
-        scenario: Where the team comes from.
-        meshcat: Where it is shown.
+        scenario: The scenario that describes the team.
+        meshcat: Where it is drawn.
 
     Attributes:
-        team: A plant of its own.
-        colours: Every robot's colour, its base's own where the model gives it one.
+        team: Its plant.
+        colours: Of every robot: that of its base in the model, or one of the palette.
     """
 
     def __init__(self, scenario: Scenario, meshcat: Meshcat) -> None:
@@ -48,8 +51,8 @@ class TeamView:
         roles = [Role.kIllustration] + ([Role.kProximity] if scenario.visualization.show_collision else [])
         self._prefixes = [f"/team/{role.name[1:].lower()}" for role in roles]
         for role, prefix in zip(roles, self._prefixes, strict=True):
-            look = MeshcatVisualizerParams(role=role, prefix=prefix)
-            MeshcatVisualizer.AddToBuilder(builder, self.team.scene_graph, meshcat, look)
+            parameters = MeshcatVisualizerParams(role=role, prefix=prefix)
+            MeshcatVisualizer.AddToBuilder(builder, self.team.scene_graph, meshcat, parameters)
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
         self._plant_context = self.team.plant.GetMyMutableContextFromRoot(self._context)
@@ -59,7 +62,7 @@ class TeamView:
         self._set_grasps()
 
     def show(self, z: FloatArray) -> None:
-        """Put the team where z = (x, y, theta, q...) says, shape (3 + n,) [m, rad]."""
+        """Draw the team at z = (x, y, theta, q...), shape (3 + n,) [m, rad]."""
         set_configuration(self.team, self._plant_context, z)
         self._diagram.ForcedPublish(self._context)
 
@@ -70,21 +73,21 @@ class TeamView:
 
     @property
     def paths(self) -> list[list[str]]:
-        """Where in Meshcat every body is to be moved."""
+        """Paths in Meshcat of every body that is drawn."""
         return [paths for _, paths in self._bodies]
 
     def grasp_points(self, z: FloatArray) -> FloatArray:
-        """Return where the robots hold the object at z, shape (N, 3), in W [m]."""
+        """Return the positions of the grasps in W at z, shape (N, 3) [m]."""
         set_configuration(self.team, self._plant_context, z)
         frames = [robot.gripper_frame for robot in self.team.robots]
         return np.array([frame.CalcPoseInWorld(self._plant_context).translation() for frame in frames])
 
     def fix_to_object(self, name: str, mesh: TriangleMesh, colour: Rgba) -> None:
-        """Let a mesh go with the object.
+        """Draw a mesh that moves with the object.
 
         Args:
             name: Its name.
-            mesh: Given in W as it lies while L is at W.
+            mesh: Its vertices in L.
             colour: Of the mesh.
         """
         set_configuration(self.team, self._plant_context, np.zeros(3 + len(self.team.joint_names)))
@@ -108,7 +111,7 @@ class TeamView:
         return shown
 
     def _set_grasps(self) -> None:
-        """Mark the grasps on the object's body, with which they move."""
+        """Draw the grasps on the object's body, so that they move with it."""
         meshcat, body, inside = self._meshcat, self.team.object_body, self._plant_context
         path = self._object_path
         inspector = self.team.scene_graph.model_inspector()
@@ -128,13 +131,13 @@ class TeamView:
     def _colour(self, base: RigidBody, index: int) -> Rgba:
         inspector = self.team.scene_graph.model_inspector()
         for geometry in self._geometries(base):
-            looks = inspector.GetIllustrationProperties(geometry)
-            if looks is not None and looks.HasProperty("phong", "diffuse"):
-                colour: Rgba = looks.GetProperty("phong", "diffuse")
+            properties = inspector.GetIllustrationProperties(geometry)
+            if properties is not None and properties.HasProperty("phong", "diffuse"):
+                colour: Rgba = properties.GetProperty("phong", "diffuse")
                 return Rgba(colour.r(), colour.g(), colour.b(), 1.0)
         return rgba(robot_colour(index))
 
 
 def _path_of(name: str) -> str:
-    """Where Drake puts what has a scoped name."""
+    """Return the path at which Drake's visualizer draws a body of a scoped name."""
     return name.replace("::", "/")

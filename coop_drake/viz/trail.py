@@ -1,4 +1,4 @@
-"""The object's trail: a ribbon on the floor that grows as the object goes."""
+"""The object's trail: a ribbon on the floor that grows as the object moves."""
 
 from __future__ import annotations
 
@@ -15,29 +15,30 @@ __all__ = ["INDICES", "STEP", "TRAIL_COLOUR", "set_trail", "trail_points"]
 TRAIL_COLOUR = INK
 
 STEP = 0.03
-"""Length of the pieces that a trail grows by [m]."""
+"""Length of the pieces of a trail [m]."""
 
 INDICES = 6
-"""Indices of vertices in the mesh of a piece."""
+"""Number of indices of vertices in the mesh of a piece: two triangles."""
 
-_WIDTH, _HEIGHT = 0.035, 0.030  # [m]
+_WIDTH, _HEIGHT = 0.035, 0.030
+"""Width of the ribbon and its height above the floor [m]."""
 
 
 def set_trail(meshcat: Meshcat, path: str, points: FloatArray) -> None:
-    """Draw a stretch of the trail; points of shape (P, 2) [m], nothing if they are fewer than two."""
+    """Draw a part of the trail through points of shape (P, 2) [m]; fewer than two draw nothing."""
     if len(points) > 1:
         set_mesh(meshcat, path, ribbon_mesh(points, _WIDTH, _HEIGHT), rgba(TRAIL_COLOUR))
 
 
 def trail_points(positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Space points evenly along the way.
+    """Return points at even distances along the path.
 
     Args:
         positions: Of the object at every frame, shape (F, 2) [m].
 
     Returns:
-        The points, shape (P, 2) [m], and how many pieces between them are behind the object at every frame,
-        shape (F,).
+        The points, shape (P, 2) [m], and the number of pieces between them that the object has passed at
+        every frame, shape (F,).
     """
     gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
     pieces = int(np.ceil(gone[-1] / STEP))

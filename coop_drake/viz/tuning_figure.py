@@ -1,4 +1,4 @@
-"""The picture of a search for gains: every trial by two criteria, and how the best score fell."""
+"""The figure of a search for gains: every trial by two criteria, and the best score so far."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["tuning_figure", "write_tuning_figure"]
 
 
 def write_tuning_figure(found: Search, path: Path) -> Path:
-    """Write the picture of a search as PNG."""
+    """Write the figure of a search as PNG."""
     with house_style():
         save_figure(tuning_figure(found), path)
     return path

@@ -1,4 +1,4 @@
-"""An animation of few key frames: between them straight lines stay within a tolerance of every frame."""
+"""Animations of few frames: between those kept, linear interpolation meets all within a tolerance."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Tracks", "key_frames"]
+__all__ = ["Tracks", "kept_frames"]
 
-_POSITION, _ANGLE, _SCALE = 3e-3, 5e-3, 0.03  # [m], [rad], [-]
+_POSITION, _ANGLE, _SCALE = 3e-3, 5e-3, 0.03
+"""Largest errors of positions [m], angles [rad] and scales [-]: a pixel or so."""
 
 
-def key_frames(values: FloatArray, tolerance: float, *, longest: int) -> list[int]:
+def kept_frames(values: FloatArray, tolerance: float, *, longest: int) -> list[int]:
     """Return the frames to keep so that linear interpolation between them meets all others.
 
     Args:
@@ -30,8 +31,8 @@ def key_frames(values: FloatArray, tolerance: float, *, longest: int) -> list[in
     stretches = list(zip(sorted(kept), sorted(kept)[1:], strict=False))
     while stretches:
         first, end = stretches.pop()
-        share = (np.arange(first + 1, end) - first)[:, None] / (end - first)
-        errors = np.abs(values[first] + share * (values[end] - values[first]) - values[first + 1 : end])
+        fraction = (np.arange(first + 1, end) - first)[:, None] / (end - first)
+        errors = np.abs(values[first] + fraction * (values[end] - values[first]) - values[first + 1 : end])
         if errors.size and errors.max() > tolerance:
             middle = first + 1 + int(errors.max(axis=1).argmax())
             kept.add(middle)
@@ -40,10 +41,10 @@ def key_frames(values: FloatArray, tolerance: float, *, longest: int) -> list[in
 
 
 class Tracks:
-    """Animation tracks over frames of equal length; every track lasts from the first to the last frame.
+    """Tracks of an animation; every track lasts from the first to the last frame.
 
     Args:
-        frames_per_second: Of the values that come [1/s].
+        frames_per_second: Of the values that the methods receive [1/s].
     """
 
     def __init__(self, frames_per_second: float) -> None:
@@ -69,20 +70,20 @@ class Tracks:
             angle_tolerance: Largest error of the angle [rad].
         """
         R_0 = RotationMatrix() if R_0 is None else R_0
-        # A kept frame at least every second: turns between two of them go the shorter way round.
-        weighed = np.column_stack([positions, angles * (_POSITION / angle_tolerance)])
-        for frame in key_frames(weighed, _POSITION, longest=self._longest):
+        # A kept frame at least every second: between two of them Meshcat turns the shorter way round.
+        weighted = np.column_stack([positions, angles * (_POSITION / angle_tolerance)])
+        for frame in kept_frames(weighted, _POSITION, longest=self._longest):
             turn = RotationMatrix.MakeZRotation(angles[frame])
             self.animation.SetTransform(frame, path, RigidTransform(turn @ R_0, positions[frame]))
 
     def vary(self, path: str, name: str, values: FloatArray) -> None:
-        """Let a property of three components follow values of shape (F, 3)."""
-        for frame in key_frames(values, _SCALE, longest=len(values)):
+        """Change a property of three components, with values of shape (F, 3)."""
+        for frame in kept_frames(values, _SCALE, longest=len(values)):
             self.animation.SetProperty(frame, path, name, values[frame].tolist())
 
     def count(self, path: str, name: str, values: FloatArray) -> None:
-        """Let a number follow values of shape (F,), to the nearest whole."""
-        for frame in key_frames(values[:, None], 1.0, longest=len(values)):
+        """Change a property that counts, with values of shape (F,), to within one."""
+        for frame in kept_frames(values[:, None], 1.0, longest=len(values)):
             self.animation.SetProperty(frame, path, name, float(values[frame]))
 
     def show(self, path: str, visible: NDArray[np.bool_]) -> None:
