@@ -6,7 +6,6 @@ mapping's entry ``_tag`` tells apart (in YAML the tag ``!ClassName``). ``Annotat
 number, or a :class:`Codec` to a type that is none of these.
 """
 
-# No `from __future__ import annotations` in modules that define such dataclasses: their types are read.
 import dataclasses
 import math
 from collections.abc import Callable

@@ -10,8 +10,6 @@ from coop_drake.tree.component_tree import Component, ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import Limits, NotNegative, Positive
 
-# No `from __future__ import annotations` here: `typed_data` reads the types of the fields.
-
 LIMIT_ROOM = 0.01
 """Room that a joint has about its start and goal, also beyond a limit: a funnel has two sides [rad].
 

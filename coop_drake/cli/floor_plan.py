@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 from rich.markup import escape
@@ -14,6 +14,7 @@ from coop_drake.cli.reporter import Reporter
 
 if TYPE_CHECKING:
     from coop_drake.floor_plans import FloorPlan
+    from coop_drake.floor_plans.settings import Unit
 
 __all__ = ["floor_plan_command"]
 
@@ -73,7 +74,9 @@ def floor_plan_command(
     with reporting(machine=machine, quiet=quiet) as reporter:
         from coop_drake.floor_plans import FloorPlanSettings, Inside, read_floor_plan
 
-        settings = FloorPlanSettings(unit, scale, tuple(layer or ()), tolerance, gap, unknown_is_free)
+        settings = FloorPlanSettings(
+            cast("Unit | None", unit), scale, tuple(layer or ()), tolerance, gap, unknown_is_free
+        )
         with reporter.stage("reading"):
             plan = read_floor_plan(file, settings, Inside(*inside, "--inside") if inside else None)
         _tell(plan, file, reporter)

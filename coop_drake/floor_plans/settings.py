@@ -3,14 +3,32 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import inf
+from typing import Annotated, Literal
 
 from coop_drake.errors import FloorPlanError
+from coop_drake.typed_data import DataError, Limits, check_fields
 
-__all__ = ["UNITS", "FloorPlanSettings"]
+__all__ = ["UNITS", "FloorPlanSettings", "Scale", "Tolerance", "Unit"]
 
-UNITS = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048, "yd": 0.9144}
+Unit = Literal["mm", "cm", "dm", "m", "km", "in", "ft", "yd"]
+UNITS: dict[Unit, float] = {
+    "mm": 1e-3,
+    "cm": 1e-2,
+    "dm": 1e-1,
+    "m": 1.0,
+    "km": 1e3,
+    "in": 0.0254,
+    "ft": 0.3048,
+    "yd": 0.9144,
+}
 """Lengths that a file's coordinates may be in [m]."""
+
+Scale = Annotated[float, Limits(at_least=1e-6, at_most=1e6)]
+"""Factor on all lengths of a file [-]; no drawing of a floor is further from its true size."""
+
+Tolerance = Annotated[float, Limits(at_least=0.0, at_most=1.0)]
+"""Length by which a drawing may be changed [m]; more than a metre would close every door."""
 
 
 @dataclass(frozen=True)
@@ -27,11 +45,11 @@ class FloorPlanSettings:
         unknown_is_free: Whether the unknown cells of an occupancy map count as floor.
     """
 
-    unit: str | None = None
-    scale: float = 1.0
+    unit: Unit | None = None
+    scale: Scale = 1.0
     layers: tuple[str, ...] = ()
-    tolerance: float | None = None
-    gap: float = 0.01
+    tolerance: Tolerance | None = None
+    gap: Tolerance = 0.01
     unknown_is_free: bool = False
 
     def check(self, file: str) -> None:
@@ -40,16 +58,11 @@ class FloorPlanSettings:
         Raises:
             FloorPlanError: Naming the setting.
         """
-        if self.unit is not None and self.unit not in UNITS:
-            raise FloorPlanError(file, "unit", f"{self.unit!r} is no unit", f"use one of {', '.join(UNITS)}")
-        for name, value, least, most in (
-            ("scale", self.scale, 1e-6, 1e6),
-            ("tolerance", self.tolerance, 0.0, 1.0),
-            ("gap", self.gap, 0.0, 1.0),
-        ):
-            if value is not None and not (isfinite(value) and least <= value <= most):
-                allowed = f"a number between {least:g} and {most:g}"
-                raise FloorPlanError(file, name, f"{value!r} is out of range", f"use {allowed}")
+        try:
+            check_fields(self)
+        except DataError as error:
+            remedy = f"use {error.allowed.removesuffix(', or null')}"
+            raise FloorPlanError(file, error.key, f"{error.value!r} is not allowed", remedy) from error
 
     @property
     def sagitta(self) -> float:

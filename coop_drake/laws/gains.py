@@ -1,6 +1,5 @@
 """Gain sets: fixed gains (the paper's Table 2) or scheduled by cell; and the gains of one transition."""
 
-# No `from __future__ import annotations` here: `typed_data` reads the types of the fields.
 from dataclasses import dataclass, replace
 from typing import Annotated, Literal, get_args
 

@@ -13,8 +13,6 @@ from typing import Annotated
 
 from coop_drake.typed_data import Limits, NotNegative, Positive
 
-# No `from __future__ import annotations` here: `typed_data` reads the types of the fields.
-
 Delay = Annotated[float, Limits(at_least=0.0, at_most=10.0)]
 """A delay [s]; the loop is lost after fractions of a second, so that a longer one is a typing error."""
 

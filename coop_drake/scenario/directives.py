@@ -15,8 +15,6 @@ from coop_drake.scenario.drake_types import Directive
 from coop_drake.scenario.packages import resolve
 from coop_drake.scenario.reading import read_file
 
-# No `from __future__ import annotations` here: `typed_data` reads the types of the fields.
-
 REQUIRED = {
     "add_model": ("name", "file"),
     "add_model_instance": ("name",),

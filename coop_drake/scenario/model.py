@@ -8,13 +8,12 @@ from shapely import Polygon
 
 from coop_drake.answers.problem import PlannerSettings
 from coop_drake.fields.tolerance import TOLERANCE
+from coop_drake.floor_plans.settings import Scale, Tolerance, Unit
 from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains
 from coop_drake.scenario.deployment import Deployment
 from coop_drake.scenario.drake_types import Directive
 from coop_drake.tree.pose import PlanarPose
 from coop_drake.typed_data import Limits, Positive
-
-# No `from __future__ import annotations` here: `typed_data` reads the types of the fields.
 
 MapTolerance = Annotated[float, Limits(above=0.0, below=0.01)]
 """Error of a harmonic map [-]; a larger one would turn the direction of motion."""
@@ -47,11 +46,11 @@ class Workspace:
     outer: tuple[tuple[float, float], ...] = ()
     holes: tuple[tuple[tuple[float, float], ...], ...] = ()
     file: str | None = None
-    unit: Literal["mm", "cm", "dm", "m", "km", "in", "ft", "yd"] | None = None
-    scale: float = 1.0
+    unit: Unit | None = None
+    scale: Scale = 1.0
     layers: tuple[str, ...] = ()
-    tolerance: float | None = None
-    gap: float = 0.01
+    tolerance: Tolerance | None = None
+    gap: Tolerance = 0.01
     unknown_is_free: bool = False
 
     @property

@@ -42,7 +42,7 @@ def test_it_writes_a_workspace_that_is_the_floor_and_pictures(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["hall.svg", "--unit", "feet"], "'feet' is no unit"),
+        (["hall.svg", "--unit", "feet"], "'feet' is not allowed; use one of mm, cm"),
         (["hall.svg", "--unit", "m", "--inside", "20", "20"], "--inside (20, 20): it stands in none"),
         (["gone.svg"], "cannot be read"),
         (["hall.svg", "--out", "hall.pdf"], "ends neither in .yaml nor in .png or .svg"),
