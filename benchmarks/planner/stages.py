@@ -72,8 +72,7 @@ STAGES: dict[str, tuple[Replacement, ...]] = {
         Replacement(sampled_search, "moved_from_obstacles", lambda problem, path, gap: path),
     ),
     "no_covering": (Replacement(quickest, "cover_path", lambda *asked: None),),
-    "one_covering_level": (Replacement(path_covering, "LEVELS", path_covering.LEVELS[:1]),),
-    "no_box_repairs": (Replacement(path_covering, "REPAIRS", 0),),
+    "no_narrow_boxes": (Replacement(path_covering, "LEVELS", path_covering.LEVELS[:1]),),
 }
 """For every variant what is replaced; the name says which stage is missing."""
 

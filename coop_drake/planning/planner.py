@@ -38,7 +38,7 @@ def plan(
         progress: Called with a phase and the fraction of it that is done.
 
     Returns:
-        Found with the plan, Infeasible with the reason, or Undecided with what stood in the way.
+        Found with the plan, Infeasible with the reason, or Undecided with the reason.
     """
     question, report, stall = problem, SearchReport(0), ""
     for _ in range(1 + FINER_ATTEMPTS):

@@ -1,4 +1,4 @@
-"""Compiled choice of boxes along a way: the chain that is crossed in the least time. It proves nothing."""
+"""Compiled choice of boxes along waypoints, such that a transport through them is fast. It proves nothing."""
 
 from __future__ import annotations
 
@@ -13,27 +13,28 @@ from coop_drake.planning.improvement.box_crossing import cross_box
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.tree.pose import FloatArray, IntArray
 
-__all__ = ["Course", "choose_boxes", "fits"]
+__all__ = ["Waypoints", "choose_boxes", "fits"]
 
 LONGEST = 20.0
-"""A box that takes longer than this is not used [s]."""
+"""A box that takes longer than this is not used [s]: two of them with a waypoint between are faster."""
 
 BOX_COST = 9e-4
-"""A box counts this over its padding more than is simulated [rad s]: few boxes are better where all else is
-equal, and narrow funnels leave little room for what the simulation does not know."""
+"""Every box costs this over its padding besides its simulated time [rad s]: fewer boxes are better if the
+times are equal, and narrow funnels leave little tolerance for what the simulation leaves out."""
 
-LATEST = 0.6
-"""Ways to reach a waypoint that are later than the quickest one by more than this are not pursued [s]."""
+LARGEST_DELAY = 0.6
+"""Box sequences that reach a waypoint later than the fastest one by more than this are dropped [s]: the time
+that angles need to settle is the most that a wider box can save."""
 
-EVERY, SOME = 8, 3
-"""After so many waypoints only every third one is tried as the end of a box."""
+DENSE_ENDS, SPARSE_STEP = 8, 3
+"""Each of the first eight waypoints of a box is tried as its end; after them only every third one is."""
 
-FAR = 1.0
-"""Clearances above this are not told apart [m]."""
+LARGEST_CLEARANCE = 1.0
+"""Larger clearances count as this one [m]: the object has reached its highest speed."""
 
 
-class Course(NamedTuple):
-    """A path and what boxes along it are tried with.
+class Waypoints(NamedTuple):
+    """Waypoints of a path, and the data with which boxes along them are tried.
 
     Attributes:
         boxes: The team.
@@ -41,10 +42,10 @@ class Course(NamedTuple):
         path: Waypoints z, theta unwrapped, shape (n, 3 + joints) [m, rad].
         places: Where they lie along the path, shape (n,) [m].
         pads: Paddings of a box to choose from, shape (p,) [rad or m].
-        goals: Lower and upper ends of the last goal intervals, shape (2, m).
-        schedule: Gains.
+        goals: Lower and upper ends of the last goal intervals, shape (2, m) [rad, m].
+        schedule: The rules by which gains are chosen.
         least: Clearance that every waypoint must keep [m].
-        tolerance: Of the goal's position [m].
+        tolerance: Tolerance of the goal's position [m].
     """
 
     boxes: BoxArrays
@@ -66,7 +67,7 @@ def fits(
 
     Other arguments as in ``clearances_in_box``.
     """
-    clearances = clearances_in_box(boxes, grid, lower, upper, path, 0, len(path) - 1, FAR)
+    clearances = clearances_in_box(boxes, grid, lower, upper, path, 0, len(path) - 1, LARGEST_CLEARANCE)
     return len(clearances) > 0 and _least(clearances) >= least
 
 
@@ -80,55 +81,54 @@ def _least(values: FloatArray) -> float:
 
 
 @compiled
-def choose_boxes(course: Course, banned: FloatArray) -> tuple[float, IntArray]:
-    """Find the chain of boxes along a way that is crossed in the least time.
+def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
+    """Find the sequence of boxes along waypoints that is crossed in the shortest time.
 
-    Each box is the hull of a stretch of the way, padded by one of a few widths. Every waypoint is reached by
-    the quickest chain for each width that the next box may have; the state in which that happens is kept.
+    Each box holds some consecutive waypoints, padded by one of a few widths. By dynamic programming, every
+    waypoint is reached by the fastest sequence for each width of the next box, and the state is kept.
 
     Args:
-        course: The way.
-        banned: Positive where a box (first waypoint, last one, padding) must not be used, shape (n, n, p).
+        waypoints: The waypoints.
 
     Returns:
-        Estimated time [s], infinite if there is no chain, and its rows (first waypoint, last one, padding).
+        Estimated time [s], infinite if there is no sequence, and for each box a row (first waypoint, last
+        waypoint, index of the padding).
     """
-    n, count, m = len(course.path), len(course.pads), course.path.shape[1] - 2
+    n, count, m = len(waypoints.path), len(waypoints.pads), waypoints.path.shape[1] - 2
     best = np.full((n, count), np.inf)
     states = np.zeros((n, count, 3 + 2 * m))
     before = np.full((n, count, 2), -1, np.int64)
     for p in range(count):
         best[0, p] = 0.0
         for a in range(m):
-            states[0, p, 3 + a] = course.path[0, 2 + a]
+            states[0, p, 3 + a] = waypoints.path[0, 2 + a]
     low, high, lower, upper = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     for i in range(n - 1):
         for p in range(count):
-            if not best[i, p] < _least(best[i]) + LATEST:
+            if not best[i, p] < _least(best[i]) + LARGEST_DELAY:
                 continue
             for a in range(m):
-                low[a], high[a] = course.path[i, 2 + a], course.path[i, 2 + a]
+                low[a], high[a] = waypoints.path[i, 2 + a], waypoints.path[i, 2 + a]
             for j in range(i + 1, n):
                 for a in range(m):
-                    low[a] = min(low[a], course.path[j, 2 + a])
-                    high[a] = max(high[a], course.path[j, 2 + a])
-                    lower[a] = max(course.boxes.lower[a], low[a] - course.pads[p])
-                    upper[a] = min(course.boxes.upper[a], high[a] + course.pads[p])
-                if j - i > EVERY and (j - i) % SOME != 0 and j + 1 < n:
+                    low[a] = min(low[a], waypoints.path[j, 2 + a])
+                    high[a] = max(high[a], waypoints.path[j, 2 + a])
+                    lower[a] = max(waypoints.boxes.lower[a], low[a] - waypoints.pads[p])
+                    upper[a] = min(waypoints.boxes.upper[a], high[a] + waypoints.pads[p])
+                if j - i > DENSE_ENDS and (j - i) % SPARSE_STEP != 0 and j + 1 < n:
                     continue
                 clearances = clearances_in_box(
-                    course.boxes, course.grid, lower, upper, course.path, i, j, FAR
+                    waypoints.boxes, waypoints.grid, lower, upper, waypoints.path, i, j, LARGEST_CLEARANCE
                 )
-                if len(clearances) == 0 or _least(clearances) < course.least:
+                if len(clearances) == 0 or _least(clearances) < waypoints.least:
                     break
-                if banned[i, j, p] <= 0.0:
-                    _reach(course, i, p, j, lower, upper, clearances, best, states, before)
-    return best[n - 1, 0], _chain(before)
+                _reach(waypoints, i, p, j, lower, upper, clearances, best, states, before)
+    return best[n - 1, 0], _box_rows(before)
 
 
 @compiled
 def _reach(
-    course: Course,
+    waypoints: Waypoints,
     i: int,
     p: int,
     j: int,
@@ -139,10 +139,10 @@ def _reach(
     states: FloatArray,
     before: IntArray,
 ) -> None:
-    """Cross a box from waypoint i to j for every padding of the next one; keep what is quicker.
+    """Cross a box from waypoint i to j for every padding of the next box, and keep what is faster.
 
     Args:
-        course: The path.
+        waypoints: The waypoints.
         i: Waypoint where the box begins.
         p: Its padding.
         j: Waypoint where it ends.
@@ -153,23 +153,26 @@ def _reach(
         states: States in which that happens, shape (n, p, 3 + 2 m).
         before: First waypoint and padding of the box before, shape (n, p, 2).
     """
-    last = j + 1 == len(course.path)
+    last = j + 1 == len(waypoints.path)
     m = len(lower)
     ends, state = np.empty((2, m)), np.empty(3 + 2 * m)
-    for q in range(1 if last else len(course.pads)):
+    for q in range(1 if last else len(waypoints.pads)):
         for a in range(m):
             if last:
-                low, high = course.goals[0, a], course.goals[1, a]
+                low, high = waypoints.goals[0, a], waypoints.goals[1, a]
             else:
-                low, high = course.path[j, 2 + a] - course.pads[q], course.path[j, 2 + a] + course.pads[q]
+                low, high = (
+                    waypoints.path[j, 2 + a] - waypoints.pads[q],
+                    waypoints.path[j, 2 + a] + waypoints.pads[q],
+                )
             ends[0, a], ends[1, a] = max(lower[a], low), min(upper[a], high)
         for k in range(len(state)):
             state[k] = states[i, p, k]
         limit = min(LONGEST, best[j, q] - best[i, p])
-        time = best[i, p] + BOX_COST / course.pads[p]
+        time = best[i, p] + BOX_COST / waypoints.pads[p]
         time += cross_box(
-            state, course.places[i : j + 1], clearances, lower, upper, ends, course.path[i, 2:],
-            course.schedule, course.tolerance if last else 0.0, limit,
+            state, waypoints.places[i : j + 1], clearances, lower, upper, ends, waypoints.path[i, 2:],
+            waypoints.schedule, waypoints.tolerance if last else 0.0, limit,
         )  # fmt: skip
         if time < best[j, q]:
             best[j, q] = time
@@ -179,8 +182,8 @@ def _reach(
 
 
 @compiled
-def _chain(before: IntArray) -> IntArray:
-    """Boxes up to the last waypoint, rows (first waypoint, last one, padding); none if it was not reached."""
+def _box_rows(before: IntArray) -> IntArray:
+    """A row (first waypoint, last waypoint, padding) for each box; none if the goal was not reached."""
     rows = np.empty((len(before), 3), np.int64)
     j, q, first = len(before) - 1, 0, len(rows)
     while j > 0 and before[j, q, 0] >= 0:

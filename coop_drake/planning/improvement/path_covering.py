@@ -20,7 +20,7 @@ from coop_drake.planning.boxes.certify import PathBox, box_arrays
 from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.cells.slices import nearest_turn
 from coop_drake.planning.execution.channel_ends import final_intervals
-from coop_drake.planning.improvement.box_choice import Course, choose_boxes, fits
+from coop_drake.planning.improvement.box_choice import Waypoints, choose_boxes, fits
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_inside
 from coop_drake.tree.pose import FloatArray
@@ -41,7 +41,7 @@ PADS = (0.005, 0.015, 0.03, 0.06)
 NARROW_PADS = (0.001, 0.003, 0.01, 0.03)
 """Paddings for narrow passages, where the smallest of the others is too wide [rad or m]."""
 
-LEVELS = ((0.3, PADS), (0.1, PADS), (0.1, NARROW_PADS))
+LEVELS = ((0.3, PADS), (0.1, NARROW_PADS))
 """Fractions of the margin that waypoints keep [-], and paddings; tried in this order until one works."""
 
 LEAST_CLEARANCE = 2e-3
@@ -49,9 +49,6 @@ LEAST_CLEARANCE = 2e-3
 
 CORE_FRACTION = 0.9
 """Fraction of the waypoints' clearance that cores keep, so that waypoints lie inside them [-]."""
-
-REPAIRS = 3
-"""Times that boxes are chosen again because some of them could not be proved free."""
 
 
 @dataclass(frozen=True)
@@ -97,11 +94,11 @@ def cover_path(
         if points is None:
             continue
         places = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
-        course = Course(
+        waypoints = Waypoints(
             boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), least,
             problem.position_tolerance,
         )  # fmt: skip
-        found = _quickest_boxes(course, Regions(problem, swept, pairs, CORE_FRACTION * least))
+        found = _fastest_boxes(waypoints, Regions(problem, swept, pairs, CORE_FRACTION * least))
         if found is not None:
             free, ends = found
             targets = (*(points[j, :2] for j in ends[:-1]), problem.goal_pose[:2])
@@ -146,28 +143,19 @@ def _waypoints(
     return np.array(points)
 
 
-def _quickest_boxes(course: Course, regions: Regions) -> tuple[list[FreeBox], list[int]] | None:
-    """The quickest boxes that are all proved free, and for each of them the waypoint at which it ends."""
-    n = len(course.path)
-    banned = np.zeros((n, n, len(course.pads)))
-    for _ in range(1 + REPAIRS):
-        _, rows = choose_boxes(course, banned)
-        if not len(rows):
-            return None
-        free = [_proved(course, regions, first, last, pad) for first, last, pad in rows]
-        proved = [box for box in free if box is not None]
-        if len(proved) == len(rows):
-            return proved, rows[:, 1].tolist()
-        for (first, last, pad), box in zip(rows, free, strict=True):
-            banned[first, last, pad] = float(box is None)
-    return None
+def _fastest_boxes(waypoints: Waypoints, regions: Regions) -> tuple[list[FreeBox], list[int]] | None:
+    """The fastest boxes, and the waypoint at which each of them ends; None if one is not proved free."""
+    _, rows = choose_boxes(waypoints)
+    boxes = [_proved(waypoints, regions, first, last, pad) for first, last, pad in rows]
+    proved = [box for box in boxes if box is not None]
+    return (proved, rows[:, 1].tolist()) if 0 < len(proved) == len(rows) else None
 
 
-def _proved(course: Course, regions: Regions, first: int, last: int, pad: int) -> FreeBox | None:
+def _proved(waypoints: Waypoints, regions: Regions, first: int, last: int, pad: int) -> FreeBox | None:
     """The box of some waypoints, if over-sweeps prove a region free that holds the first and the last one."""
-    part, width = course.path[first : last + 1], course.pads[pad]
-    lower = np.maximum(course.boxes.lower, part[:, 2:].min(axis=0) - width)
-    upper = np.minimum(course.boxes.upper, part[:, 2:].max(axis=0) + width)
+    part, width = waypoints.path[first : last + 1], waypoints.pads[pad]
+    lower = np.maximum(waypoints.boxes.lower, part[:, 2:].min(axis=0) - width)
+    upper = np.minimum(waypoints.boxes.upper, part[:, 2:].max(axis=0) + width)
     intervals = tuple(zip(lower.tolist(), upper.tolist(), strict=True))
     box = regions.around(PathBox(intervals, part[:, :2].copy()))
     if box is None:

@@ -1,4 +1,4 @@
-"""Ways for a floor a little larger, drawn tight until they fit the floor as it is."""
+"""Paths for a larger floor, repaired until they fit the original floor."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -23,24 +23,24 @@ THROUGH = np.array([[-2.5, 0.0, 1.5], [-2.5, 0.0, 0.0], [2.5, 0.0, 0.0], [2.5, 0
 
 
 def tilted(angle: float = 0.05) -> np.ndarray:
-    """A way of the rod through the corridor that holds it at an angle inside."""
-    ways = THROUGH.copy()
-    ways[1:3, 2] = angle
-    return np.concatenate([a + (b - a) * np.linspace(0, 1, 41)[:, None] for a, b in pairwise(ways)])
+    """A path of the rod through the corridor that holds it at an angle inside."""
+    paths = THROUGH.copy()
+    paths[1:3, 2] = angle
+    return np.concatenate([a + (b - a) * np.linspace(0, 1, 41)[:, None] for a, b in pairwise(paths)])
 
 
-def test_the_amount_that_a_way_needs_is_what_its_tightest_sample_sticks_out():
+def test_the_amount_that_a_path_needs_is_what_its_tightest_sample_sticks_out():
     problem = rod_problem(0.15)
 
     def eased(amount):
         return replace(problem, workspace=problem.workspace.buffer(amount, join_style="mitre"))
 
-    way = tilted(0.0)
-    needed, worst = amount_needed(eased, way, 0.1)
+    path = tilted(0.0)
+    needed, worst = amount_needed(eased, path, 0.1)
     assert needed == pytest.approx(0.025, abs=2e-4)
-    assert abs(way[worst, 0]) < 1.6
-    assert are_free(eased(needed), way).all()
-    assert not are_free(eased(needed - 5e-4), way).all()
+    assert abs(path[worst, 0]) < 1.6
+    assert are_free(eased(needed), path).all()
+    assert not are_free(eased(needed - 5e-4), path).all()
     closer, less = ease_less(eased, tilted(), 0.1)
     assert less < amount_needed(eased, tilted(), 0.1)[0]
     assert less >= 0.025 - 2e-4
@@ -48,12 +48,12 @@ def test_the_amount_that_a_way_needs_is_what_its_tightest_sample_sticks_out():
 
 
 @pytest.mark.parametrize(("corridor", "fits"), [(0.21, True), (0.19, False)])
-def test_a_way_fits_where_it_can_only(corridor, fits):
+def test_a_path_is_repaired_only_where_it_fits(corridor, fits):
     problem = rod_problem(corridor)
-    way = repaired(problem, tilted(), 0.06)
-    assert (way is not None) == fits
-    if way is not None:
-        assert are_free(problem, way).all()
+    path = repaired(problem, tilted(), 0.06)
+    assert (path is not None) == fits
+    if path is not None:
+        assert are_free(problem, path).all()
 
 
 def test_a_wider_floor_holds_the_floor():

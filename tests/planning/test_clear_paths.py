@@ -1,4 +1,4 @@
-"""Ways with room: drawn away from the walls, measured as shapely measures them, and covered on demand."""
+"""Paths with clearance: moved from the walls, measured as shapely measures them, and covered on request."""
 
 from dataclasses import replace
 
@@ -27,7 +27,7 @@ def problem():
 
 @pytest.fixture(scope="module")
 def bent():
-    """A way for the rod that turns late and scrapes along a wall of the corridor."""
+    """A path for the rod that turns late and passes close to a wall of the corridor."""
     y = 0.5 * CORRIDOR - 0.1 - 0.02
     return np.array(
         [[-2.5, 0, 1.5], [-1.7, y, 0.0], [1.7, y, 0.0], [2.5, 0, 1.5]],
@@ -35,28 +35,28 @@ def bent():
     )
 
 
-def clearance(problem, way):
-    """Least distance of the exact footprint from the walls at many places of a way [m]."""
-    places = np.linspace(0.0, len(way) - 1.0, 400)
-    samples = np.array([np.interp(places, np.arange(len(way)), column) for column in way.T]).T
+def clearance(problem, path):
+    """Least distance of the exact footprint from the walls at many places of a path [m]."""
+    places = np.linspace(0.0, len(path) - 1.0, 400)
+    samples = np.array([np.interp(places, np.arange(len(path)), column) for column in path.T]).T
     walls = problem.workspace.boundary
     return min(walls.distance(exact_footprint(problem.tree, z)) for z in samples)
 
 
-def test_room_is_what_shapely_measures(problem, bent):
+def test_the_clearance_is_what_shapely_measures(problem, bent):
     assert path_clearance(problem, bent, 1.0) == pytest.approx(clearance(problem, bent), abs=2e-3)
     assert path_clearance(problem, bent, 0.01) == 0.01
 
 
-def test_a_start_near_a_wall_leaves_room_elsewhere(problem):
-    way = np.array([[-2.5, 0.48, 1.5], [-2.0, 0.0, 0.0], [-1.8, 0.0, 0.0]])
-    near = replace(problem, start=way[0])
-    assert clearance(near, way) < 0.03
-    assert path_clearance(near, way, 0.15) > 0.05
-    assert path_clearance(near, np.vstack((way, way[0])), 0.15) > 0.05
+def test_a_start_near_a_wall_allows_clearance_elsewhere(problem):
+    path = np.array([[-2.5, 0.48, 1.5], [-2.0, 0.0, 0.0], [-1.8, 0.0, 0.0]])
+    near = replace(problem, start=path[0])
+    assert clearance(near, path) < 0.03
+    assert path_clearance(near, path, 0.15) > 0.05
+    assert path_clearance(near, np.vstack((path, path[0])), 0.15) > 0.05
 
 
-def test_a_way_is_drawn_from_the_walls_and_stays_free(problem, bent):
+def test_a_path_is_moved_from_the_walls_and_stays_free(problem, bent):
     wide = moved_from_obstacles(problem, bent, 0.01)
     np.testing.assert_array_equal(wide[[0, -1]], bent[[0, -1]])
     assert clearance(problem, wide) > 3.0 * clearance(problem, bent)
@@ -78,14 +78,14 @@ def test_polygons_are_made_where_they_are_asked_for(problem, monkeypatch):
     made = []
     inner = sampled_search.make_channel
     monkeypatch.setattr(sampled_search, "make_channel", lambda *given: made.append(given) or inner(*given))
-    way, _ = find_path(problem)
-    assert isinstance(way, CoveredPath)
+    path, _ = find_path(problem)
+    assert isinstance(path, CoveredPath)
     assert made == []
-    assert way.margin > 0.0
-    channel = way.channel()
+    assert path.margin > 0.0
+    channel = path.channel()
     assert isinstance(channel, Channel)
     assert len(made) == 1
-    assert channel.margin == way.margin
+    assert channel.margin == path.margin
     for box in channel.boxes:
         assert isinstance(box.polygon, Polygon)
         assert box.polygon.covers(box.core)
@@ -93,9 +93,9 @@ def test_polygons_are_made_where_they_are_asked_for(problem, monkeypatch):
 
 def test_polygons_that_cannot_be_made_are_no_channel_and_no_proof(problem, monkeypatch):
     monkeypatch.setattr(SampledSearch, "_channel", lambda self, chain: None)
-    way, _ = find_path(problem)
+    path, _ = find_path(problem)
     with pytest.raises(GeometryError, match="cannot be computed"):
-        way.channel()
+        path.channel()
     answer, _ = find_channel(problem)
     assert not isinstance(answer, Channel)
     assert not answer.proved

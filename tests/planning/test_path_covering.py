@@ -1,4 +1,4 @@
-"""Boxes laid anew along a channel's way: free, joined, quicker, and never argued free."""
+"""Paths covered with other boxes: free, overlapping, faster, and never used without a proof."""
 
 from dataclasses import replace
 
@@ -78,14 +78,14 @@ def test_targets_lie_in_the_cores_of_both_boxes_and_cores_inside(base):
         assert (np.maximum(here.lower, after.lower) < np.minimum(here.upper, after.upper)).all()
 
 
-def test_a_way_can_be_had_from_the_boxes_alone(base):
+def test_a_path_can_be_made_from_the_boxes_alone(base):
     problem, channel = base
-    way = path_through(problem, channel)
-    np.testing.assert_array_equal(way[0], problem.start)
-    np.testing.assert_allclose(way[-1, :3], [*problem.goal_pose[:2], channel.goal_angle])
+    path = path_through(problem, channel)
+    np.testing.assert_array_equal(path[0], problem.start)
+    np.testing.assert_allclose(path[-1, :3], [*problem.goal_pose[:2], channel.goal_angle])
     plan = quickest_plan(problem, replace(channel, path=None), ScheduledGains(), gain_set_name="scheduled")
     check_plan(plan, "plan")
-    for z in way:
+    for z in path:
         assert FreePositions(problem.tree, problem.workspace, z[2:]).free(z[None, :2]).all()
 
 
