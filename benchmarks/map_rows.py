@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from time import process_time
+from unittest.mock import patch
 
 import numpy as np
 import scipy.linalg
@@ -15,9 +17,9 @@ from benchmarks.domains import Domain
 from benchmarks.rows import Row
 from benchmarks.timing import best_seconds, seconds
 from coop_drake.errors import FieldError
-from coop_drake.fields import HarmonicMap
+from coop_drake.fields import HarmonicMap, skeletons
 
-__all__ = ["cost_rows", "map_rows"]
+__all__ = ["ablation_rows", "cost_rows", "map_rows"]
 
 RESIDUAL = 1e-8
 """Largest residual on the boundary that a map may have; the certified error is 2 M + 1 times that."""
@@ -55,6 +57,15 @@ def map_rows(name: str, domain: Domain, hntf2d_residual: float | None = None) ->
 def cost_rows(name: str, domain: Domain) -> list[Row]:
     """Solve and judge a map; arguments as in `map_rows`."""
     return _measured(name, domain, None)[0]
+
+
+def ablation_rows(name: str, domain: Domain) -> list[Row]:
+    """CPU time of solving a map with compressed clusters of nodes, beside one dense system of all nodes."""
+    _mapped(domain)
+    compressed = _best(lambda: _mapped(domain))
+    with patch.object(skeletons, "DENSE", sys.maxsize):
+        dense = seconds(lambda: _mapped(domain), process_time)
+    return [Row(f"{name}/cpu_seconds", compressed, "s", "without compression", dense)]
 
 
 def _measured(

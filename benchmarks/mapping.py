@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from benchmarks.domains import Domain, hall_with_pillars, standard_domains, wavy_room
-from benchmarks.map_rows import cost_rows, map_rows
+from benchmarks.map_rows import ablation_rows, cost_rows, map_rows
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from benchmarks.timing import best_seconds
@@ -38,7 +38,7 @@ _POINTS = 2_000
 
 
 def mapping_tasks() -> list[Task]:
-    """One task for the base plan, one for every shape."""
+    """One task for the base plan, one for every shape, one for the ablation of the compression."""
     tasks = [Task("mapping/base", lambda rows: base_rows(), alone=True)]
     tasks += [
         _task(f"mapping/domains/{name}", domain, _HNTF2D[name]) for name, domain in standard_domains().items()
@@ -47,6 +47,8 @@ def mapping_tasks() -> list[Task]:
     grown.update({f"holes/{count}": hall_with_pillars(count) for count in PILLARS})
     for what, domain in grown.items():
         tasks.append(_growth_task(f"mapping/growth/{what}", domain))
+    name, maze = "mapping/ablation/skeletons", standard_domains()["maze"]
+    tasks.append(Task(name, lambda rows: ablation_rows(name, maze), alone=True))
     return tasks
 
 

@@ -1,4 +1,4 @@
-"""Harmonic maps of planar cells to the unit disk, and the velocity fields they induce."""
+"""Harmonic maps of planar domains to the unit disk, and the velocity fields that they induce."""
 
 import lazy_loader
 

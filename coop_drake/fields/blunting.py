@@ -1,4 +1,4 @@
-"""Spikes cut off: corners that are too sharp to map become blunt, inward only."""
+"""Cuts off corners of a domain that are too sharp to map, without leaving the domain."""
 
 from __future__ import annotations
 
@@ -16,11 +16,17 @@ __all__ = ["blunted"]
 
 ComplexArray = NDArray[np.complex128]
 
-_DEPTH = 0.01  # of the domain's size: as far from their tips spikes are cut, where there is room
-_ROOM = 0.45  # of the distance to the next vertex or wall
-_SQUARE = np.exp(-1j * np.pi * np.array([0.25, 0.75, 1.25, 1.75]))  # corners of a cap, clockwise
-_LEAST = 1e-9  # of the domain's size: no room for anything that is not rounding
-_ROUNDING = 1e-12  # of the domain's size, by which new vertices may stick out of it
+_DEPTH = 0.01
+"""Distance from the tip at which a spike is cut, per size of the domain [-]."""
+_FRACTION = 0.45
+"""Largest such distance, per distance to the next vertex or wall: two neighbours leave an edge between them
+[-]."""
+_SQUARE = np.exp(-1j * np.pi * np.array([0.25, 0.75, 1.25, 1.75]))
+"""Corners of a cap, clockwise, at unit distance from its middle [-]."""
+_LEAST = 1e-9
+"""Smallest such distance, per size of the domain: rounding alone is hardly smaller [-]."""
+_ROUNDING = 1e-12
+"""Distance, per size of the domain, by which rounding may put new vertices outside [-]."""
 
 
 def blunted(domain: Polygon, *, sharpest: float = 10.0, depth: float | None = None) -> Polygon:
@@ -59,7 +65,7 @@ def blunted(domain: Polygon, *, sharpest: float = 10.0, depth: float | None = No
         z, own = walls[first : first + n, 0], angles[first : first + n]
         reach = np.zeros(n)
         for k in np.flatnonzero(np.minimum(own, 2.0 * np.pi - own) < limit).tolist():
-            reach[k] = min(depth or _DEPTH * size, _ROOM * _free(walls, first + k, first + (k - 1) % n))
+            reach[k] = min(depth or _DEPTH * size, _FRACTION * _free(walls, first + k, first + (k - 1) % n))
             if reach[k] <= _LEAST * size:
                 _refuse(z[k], own[k])
         rings.append(np.concatenate([_replacement(z, k, own[k], reach[k]) for k in range(n)]))
@@ -70,7 +76,7 @@ def blunted(domain: Polygon, *, sharpest: float = 10.0, depth: float | None = No
 
 
 def _free(walls: ComplexArray, edge: int, before: int) -> float:
-    """How far round the start of an edge there is nothing but the edge and the one before [m]."""
+    """Distance from the start of an edge to the nearest other edge or vertex [m]."""
     place, a, b = walls[edge, 0], walls[:, 0], walls[:, 1]
     t = np.clip(np.real(np.conj(b - a) * (place - a)) / np.abs(b - a) ** 2, 0.0, 1.0)
     gap = np.abs(a + t * (b - a) - place)
@@ -79,7 +85,7 @@ def _free(walls: ComplexArray, edge: int, before: int) -> float:
 
 
 def _replacement(z: ComplexArray, k: int, angle: float, reach: float) -> ComplexArray:
-    """What stands for vertex k: itself, the ends of a cut across, or a cap."""
+    """The vertices that replace vertex k: itself, the ends of a cut, or a cap."""
     if reach == 0.0:
         return z[k : k + 1]
     back, out = z[k - 1] - z[k], z[(k + 1) % len(z)] - z[k]

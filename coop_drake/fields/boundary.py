@@ -1,4 +1,4 @@
-"""A map on the boundary of its region: where it sends it, and where that belongs."""
+"""Samples a map on the boundary of its region: computed and exact images."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ class BoundarySamples:
     """Samples along all rings of a region, the outer ring first, the region on the left.
 
     Attributes:
-        points: Where, in W, shape (n, 2) [m].
-        ring: Ring of each, 0 for the outer one, shape (n,).
-        arc_length: Length of boundary before each, counted on through all rings, shape (n,) [m].
-        images: Where the map sends them, shape (n, 2).
-        expected: Where they belong: a point of the circle, or the one point of a hole (the mean of its
-            samples, for a hole's point is not given beforehand), shape (n, 2).
+        points: The samples in W, shape (n, 2) [m].
+        ring: Ring of each sample, 0 for the outer one, shape (n,).
+        arc_length: Length of the boundary before each, summed over all rings, shape (n,) [m].
+        images: Their computed images, shape (n, 2).
+        expected: Their exact images: points of the circle, or the one point of a hole, which is not known
+            beforehand and taken as the mean of the computed images, shape (n, 2).
         vertices: The corners, shape (m, 2) [m].
         vertex_arc_length: Length of boundary before each corner, shape (m,) [m].
-        vertex_images: Where the corners belong, shape (m, 2).
+        vertex_images: The exact images of the corners, shape (m, 2).
     """
 
     points: FloatArray
@@ -40,7 +40,7 @@ class BoundarySamples:
 
     @property
     def residual(self) -> FloatArray:
-        """Distance of every image from where it belongs, shape (n,)."""
+        """Distance of every computed image from the exact one, shape (n,)."""
         return np.asarray(np.linalg.norm(self.images - self.expected, axis=1))
 
 

@@ -1,4 +1,4 @@
-"""How far the direction of a field can be from the true one: in crowded places it drowns in rounding."""
+"""Bounds the error of a velocity field's direction, which grows where the Jacobian is nearly singular."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ from coop_drake.fields.quadrature import FloatArray
 
 __all__ = ["check_certainty", "direction_error"]
 
-_UNCERTAIN = 0.1  # a direction that may err by more does not count as known, as a sine [-]
-_MOST = 0.01  # part of the region where the direction may be unknown
-_ASIDE = 0.25  # of a leaf's size
-_LEAST_ROOM = 0.1  # of a leaf's size: sampled directions are judged as if walls were no closer
+_UNCERTAIN = 0.1
+"""Sine of the error above which a direction counts as unknown: six degrees [-]."""
+_MOST = 0.01
+"""Largest fraction of the region where the direction may be unknown [-]."""
+_ASIDE = 0.25
+"""Distance by which a sample at the goal, which has no direction, is moved, in sizes of its leaf [-]."""
+_LEAST_DISTANCE = 0.1
+"""Smallest distance from the walls at which a leaf's sample is judged, in sizes of the leaf [-]."""
 
 
 def direction_error(harmonic_map: HarmonicMap, points: FloatArray) -> FloatArray:
@@ -43,9 +47,9 @@ def direction_error(harmonic_map: HarmonicMap, points: FloatArray) -> FloatArray
 def check_certainty(harmonic_map: HarmonicMap) -> None:
     """Refuse a map that leaves the field's direction open in more than a hundredth of the region.
 
-    It does so in aisles between holes, far longer than wide, whose images lie in line with the goal's: there
-    the direction depends on what is as small as exp(-pi length / width). Sampled at the leaves of the map's
-    quadtree, which are as small as the walls around them are close.
+    This happens in aisles between holes that are far longer than wide and whose images lie in line with the
+    goal's: there the Jacobian's determinant is of the size of exp(-pi length / width). The direction is
+    sampled in the leaves of the map's quadtree, which are smaller near walls.
 
     Raises:
         FieldError: With the part of the region and the place there that is farthest from walls.
@@ -54,11 +58,11 @@ def check_certainty(harmonic_map: HarmonicMap) -> None:
     centres, sizes = leaves[:, :2] + harmonic_map.solution.centre, leaves[:, 2]
     inside = shapely.contains_xy(harmonic_map.region, *centres.T)
     centres, sizes = centres[inside], sizes[inside]
-    # No way leads on from the goal: a leaf about it is judged beside it.
-    at_goal = shapely.distance(harmonic_map.goal, shapely.points(centres)) < _LEAST_ROOM * sizes
+    # At the goal there is no direction: its leaf is judged beside it.
+    at_goal = shapely.distance(harmonic_map.goal, shapely.points(centres)) < _LEAST_DISTANCE * sizes
     centres[at_goal] += _ASIDE * sizes[at_goal, None]
     room = shapely.distance(harmonic_map.region.boundary, shapely.points(centres))
-    unknown = _bound(harmonic_map, centres, np.maximum(room, _LEAST_ROOM * sizes)) > _UNCERTAIN
+    unknown = _bound(harmonic_map, centres, np.maximum(room, _LEAST_DISTANCE * sizes)) > _UNCERTAIN
     part = float((sizes * sizes)[unknown].sum() / (sizes * sizes).sum())
     if part > _MOST:
         x, y = centres[np.argmax(np.where(unknown, room, -1.0))]
@@ -70,7 +74,7 @@ def check_certainty(harmonic_map: HarmonicMap) -> None:
 
 
 def _bound(harmonic_map: HarmonicMap, points: FloatArray, room: FloatArray) -> FloatArray:
-    """The bound, with the distances from the boundary given (n,) [m]."""
+    """The bound of `direction_error` for given distances from the boundary, shape (n,) [m]."""
     T, J = harmonic_map(points)
     line = harmonic_map.goal_image - T
     x = J[:, 1, 1] * line[:, 0] - J[:, 0, 1] * line[:, 1]

@@ -1,4 +1,4 @@
-"""What a map is worth: its boundary residual, sampled where it was not solved, and the bound that follows."""
+"""Certifies a map: its residual, sampled on the boundary between the solved nodes, and the error bound."""
 
 from __future__ import annotations
 
@@ -15,18 +15,20 @@ from coop_drake.fields.quadrature import FloatArray
 
 __all__ = ["Fault", "MapCertificate", "certify", "find_fault"]
 
-# Chebyshev points of two degrees: denser than the nodes, and other points than they are.
+#: Chebyshev points [-]: denser than the nodes of a panel, and different from them.
 _ON_PANEL = np.sort(np.cos(np.pi * (np.arange(23) + 0.5) / 23))
 _ON_RING = np.cos(np.pi * (np.arange(5) + 0.5) / 5)
-_NARROW = 0.01  # of a corner's walls: a gap beside it that is narrower is what is at fault
+_NARROW = 0.01
+"""Width of a gap, per length of the walls of the corner beside it, below which the gap is at fault [-]."""
 _RINGS = np.array([0, 1, 2, 3, 5, 8, 13, 21, 33])
+"""Dyadic rings of a corner on which the residual is sampled: down to 1e-10 of its legs."""
 
 
 @dataclass(frozen=True)
 class MapCertificate:
     """How far a computed map can be from the true one.
 
-    The error is harmonic, without flux round any hole, and on every hole a constant but for the residual.
+    The error is harmonic, has no flux around any hole, and on every hole it is a constant up to the residual.
     With M holes it is nowhere larger than (2 M + 1) times the largest boundary residual.
 
     Attributes:
@@ -52,13 +54,13 @@ class MapCertificate:
     worst_gap: float | None = None
 
     def plain(self) -> dict[str, Any]:
-        """The same as plain values by name, as JSON holds them."""
+        """The values by name, for JSON."""
         values = asdict(self)
         return values | {"worst_place": values["worst_place"].tolist()}
 
 
 class Fault(NamedTuple):
-    """A corner or a gap, by its name.
+    """A corner or a gap that limits the accuracy.
 
     Attributes:
         description: Its name.
@@ -83,7 +85,7 @@ def certify(
 
     Args:
         outline: The rings.
-        panels: Where they are cut.
+        panels: Their panels.
         flat: The map, evaluated as its users evaluate it.
         hole_images: c_k, shape (holes, 2).
         unknowns: Size of the linear system, to report.

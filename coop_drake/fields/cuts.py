@@ -1,4 +1,4 @@
-"""Cells cut open: without holes no streamline lingers, and no aisle between collapsed holes is crowded."""
+"""Cuts a domain with holes open by slits, so that its map is well-conditioned everywhere."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from coop_drake.geometry.slits import cut_holes
 
 __all__ = ["cut_open"]
 
-_ROUNDING = 1e-9  # of the domain's boundary, by which what is left may stick out of it
+_ROUNDING = 1e-9
+"""Distance, per length of the boundary, by which rounding may put the result outside the domain [-]."""
 
 
 def cut_open(domain: Polygon, goal: Point | Polygon, start: Point | None = None) -> Polygon:
-    """The domain with slits that join its holes to the outer ring, where the quickest ways to the goal part.
+    """The domain with slits from its holes to the outer ring, where the shortest paths to the goal divide.
 
-    A hole that collapses to a point makes two kinds of trouble: streamlines beside the two that end on it
-    linger there, and in an aisle between two holes the map's Jacobian is as small as exp(-pi length / width),
-    so that its direction drowns in rounding. In a simply connected cell neither happens. Slits lie where ways
-    to the goal on either side take equally long, so hardly any way gets longer.
+    A hole that collapses to a point has two disadvantages: streamlines beside the two that end on it are slow
+    there, and in an aisle between two holes the map's Jacobian is as small as exp(-pi length / width), so
+    that rounding errors hide its direction. In a simply connected domain neither happens. Slits lie where the
+    paths to the goal on both sides are equally long, so hardly any path gets longer.
 
     Example:
         ```
@@ -54,7 +55,7 @@ def cut_open(domain: Polygon, goal: Point | Polygon, start: Point | None = None)
 def _what_stays_open(
     domain: Polygon, goal: Point | Polygon, start: Point | None
 ) -> tuple[GeometryCollection, float]:
-    """The goal, with the widest passage to it; and the distance from it that slits are to keep [m]."""
+    """The goal and the widest passage to it, which no slit may cross; and the distance to keep [m]."""
     if start is None:
         return GeometryCollection([goal]), domain.area / domain.length
     from coop_drake.geometry.passage import PassageFinder  # loads scipy's Voronoi diagrams

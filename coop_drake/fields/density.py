@@ -1,15 +1,15 @@
-"""The boundary integral equation of one map: assembled and solved.
+"""Assembles and solves the boundary integral equation of one map.
 
 With the complex density mu and the domain on the left of every ring,
 
-    T(z) = Re (1 / 2 pi i) oint mu dt / (t - z),  real and imaginary part of mu apart,
+    T(z) = Re (1 / 2 pi i) oint mu dt / (t - z),  for the real and the imaginary part of mu,
 
-is harmonic, single-valued, and has no flux round any hole. On the boundary
+is harmonic, single-valued, and has no flux around any hole. On the boundary
 
     mu + 2 K mu - 2 c_k [on hole k] = 2 g,    a mean of mu over hole k = 0,
 
-K the double layer, g = exp(i angle) on the outer ring and 0 on holes; hole k collapses to the point c_k. A
-constant added to mu on a hole changes c_k's name only, so that any mean will do.
+K the double layer, g = exp(i angle) on the outer ring and 0 on holes; hole k collapses to the point c_k.
+Adding a constant to mu on a hole changes c_k alone, so any mean may be used.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Density:
         nodes: Where the equation was solved.
         weighted: Density at the nodes, weight-corrected in corner blocks, shape (n, 2).
         hole_images: c_k, shape (holes, 2).
-        condition: Largest condition of a system that was factorised, estimated in the 1-norm.
+        condition: Largest condition number of a system that was factorised, estimated in the 1-norm.
     """
 
     nodes: Nodes
@@ -70,7 +70,7 @@ def solve_density(
 
 
 def _atoms(corner_start: IntArray, blocks: list[FloatArray], nodes: int, right: FloatArray) -> list[Cluster]:
-    """Corner blocks and regular panels."""
+    """The smallest clusters: corner blocks and regular panels."""
     atoms = []
     for start, corner in zip(corner_start, blocks, strict=False):
         own = np.arange(start, start + len(corner))

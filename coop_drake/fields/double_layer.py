@@ -1,4 +1,4 @@
-"""Entries of the double layer between nodes of the boundary: the kernel, and exact weights of near panels."""
+"""The entries of the double layer between nodes of the boundary, with exact weights for near panels."""
 
 from __future__ import annotations
 
@@ -14,11 +14,13 @@ from coop_drake.fields.quadrature import FloatArray, legendre_transform
 
 __all__ = ["NEAR", "DoubleLayer", "block", "double_layer", "legendre_moments", "mark_near"]
 
-NEAR = 4.3  # |zeta - 1| + |zeta + 1| below which panels are integrated exactly
+NEAR = 4.3
+"""|zeta - 1| + |zeta + 1| below which panels are integrated exactly, zeta the target in a panel's coordinate
+[-]."""
 
 
 class DoubleLayer(NamedTuple):
-    """2 K on the nodes of a boundary, entry by entry.
+    """The data from which the entries of 2 K on the nodes of a boundary are computed.
 
     Entries of two nodes on one edge are exactly zero; so are, by convention, those of two nodes of one corner
     block, whose interaction is part of the block's compressed operator.
@@ -27,13 +29,13 @@ class DoubleLayer(NamedTuple):
         x: Nodes [m], shape (n,).
         y: Nodes [m], shape (n,).
         dx: Line element times weight, over pi [m], shape (n,).
-        dy: The same in y.
+        dy: Line element in y times weight, over pi [m], shape (n,).
         edge: Edge of each node, shape (n,).
         corner: Corner block of each node, -1 on regular panels, shape (n,).
         first: First node of the regular panels, shape (1,).
         pair_start: First near pair of each regular panel, and one more, shape (panels + 1,).
         pair_target: Node of each near pair, shape (pairs,).
-        pair_weight: What replaces the kernel of its panel there, shape (pairs, nodes a panel).
+        pair_weight: The weights that replace the kernel of its panel there, shape (pairs, nodes of a panel).
     """
 
     x: FloatArray
@@ -75,12 +77,12 @@ def double_layer(grid: Nodes, segments: ComplexArray, panel_edge: IntArray, node
 
 @compiled(reassociate=True)
 def block(k: DoubleLayer, rows: IntArray, columns: IntArray, row_of: IntArray) -> FloatArray:
-    """Entries of 2 K at ``rows`` x ``columns``, in columns (transposed rows) in memory.
+    """Entries of 2 K at ``rows`` x ``columns``, stored column by column.
 
     Args:
         k: The layer.
-        rows: Targets.
-        columns: Sources.
+        rows: The nodes that are targets.
+        columns: The nodes that are sources.
         row_of: Scratch of shape (n,), -1 throughout before and after.
     """
     m = len(rows)
@@ -113,9 +115,10 @@ def block(k: DoubleLayer, rows: IntArray, columns: IntArray, row_of: IntArray) -
 def mark_near(
     k: DoubleLayer, own: IntArray, disc: tuple[float, float, float], row_of: IntArray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes outside a set that its far field cannot represent: as sources on it, and as targets of it.
+    """Mark the nodes outside a set but not far from it: as sources on the set, and as its targets.
 
-    These are the nodes in a disc round the set, and those whose entry with a node of the set is corrected.
+    These are the nodes in a disc around the set, and those whose entry with a node of the set has exact
+    weights.
 
     Args:
         k: The layer.

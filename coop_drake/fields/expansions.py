@@ -1,11 +1,13 @@
-"""Local expansions: all that is far from a box, as one short power series in it.
+"""Local expansions: the field of everything far from a box, as one short power series.
 
-A quadtree covers the domain. Every box knows what is near it: panels, rings of corners, corners from some
-level down. What was near its parent and is far from it goes into its power series, the rest is inherited by
-its four quarters. A leaf keeps one series for everything far and a short list of what is near, so that a
-point costs a polynomial and a few panels, however long the boundary is.
+A quadtree covers the domain. Every box has a list of the sources near it: panels, rings of corners, corners
+from some level down. A source that was near the parent and is far from the box is added to the box's power
+series; the others are passed on to its four quarters. A leaf keeps one series for all far sources and a short
+list of near ones, so that evaluating a point costs a polynomial and a few panels, however long the boundary
+is.
 
-Far from a box is what the quadrature resolves anywhere in it and whose series converges fast enough.
+A source is far from a box if its quadrature is exact everywhere in the box and its series converges fast
+enough.
 """
 
 from __future__ import annotations
@@ -38,13 +40,20 @@ from coop_drake.fields.walls import is_inside
 
 __all__ = ["grown"]
 
-_REACH = 2.8  # distance per radius of a box from which something is far
-_REFINED = 1.45  # |zeta| from which the refined nodes of a panel do
-_TAIL = 2.0  # distance from the vertex per length of the legs from which a corner is its compressed density
-_MANY = 5  # near panels shorter than the box that are worth a division
-_CORNER = 2  # panels that a corner near by costs as much as
-_DEPTH = 50  # divisions at most
-_BOXES = 40_000  # boxes of one size at most
+_REACH = 2.8
+"""Distance of a far source per radius of the box: 2.8^-28 of the series is left out, 3e-13 [-]."""
+_REFINED = 1.45
+"""|zeta| from which the refined nodes of a panel are enough to integrate over it [-]."""
+_TAIL = 2.0
+"""Distance from the vertex, per length of the legs, from which a corner is its compressed density [-]."""
+_MANY = 5
+"""Near panels that are shorter than the box, above which it is divided."""
+_CORNER = 2
+"""Cost of a near corner, in near panels."""
+_DEPTH = 50
+"""Divisions of a box at most: then it is as small as rounding."""
+_BOXES = 40_000
+"""Boxes of one size at most, which bounds the memory of a map."""
 
 
 class _Boxes(NamedTuple):
@@ -65,14 +74,14 @@ class _Boxes(NamedTuple):
     near: IntArray
 
     def chosen(self, which: IntArray) -> _Boxes:
-        """Some of them."""
+        """The boxes of the given indices."""
         count = np.diff(self.near_start)[which]
         start = np.concatenate(([0], np.cumsum(count)))
         rows = np.arange(start[-1]) + np.repeat(self.near_start[which] - start[:-1], count)
         return _Boxes(self.square[which], self.state[which], self.series[which], start, self.near[rows])
 
     def quarters(self) -> _Boxes:
-        """The four quarters of each, with what was near the whole."""
+        """The four quarters of each box, with the sources that were near the whole box."""
         series = np.repeat(self.series, 4, axis=0)
         signs = np.array([(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)])
         _shift(series, signs / np.sqrt(8.0))
@@ -222,7 +231,7 @@ def _gain(m: FlatMap, near: IntArray, first: int, last: int, x: float, y: float,
 
 @compiled(reassociate=True)
 def _is_far(place: int, opened: bool, seen: tuple[float, float, float], radius: float) -> bool:
-    """Whether all of a box is far from what is ``seen`` from its centre."""
+    """Whether a source, ``seen`` from the centre of a box, is far from all of the box."""
     distance, middle, size = seen
     if place < 0:
         factor = _TAIL
@@ -265,7 +274,7 @@ def _expand(nodes: FloatArray, count: int, radius: float, series: FloatArray, bo
 
 @compiled(reassociate=True)
 def _shift(series: FloatArray, shifts: FloatArray) -> None:
-    """Turn series, four a box, into those of its quarters, whose centres are ``shifts`` (4, 2) radii away."""
+    """Shift series, four for each box, to its quarters, whose centres are ``shifts`` (4, 2) radii away."""
     n = series.shape[1]
     for box in range(len(series)):
         c, sx, sy = series[box], shifts[box % 4, 0], shifts[box % 4, 1]

@@ -1,4 +1,4 @@
-"""What is left of a domain when its goal collapses to a point, and which goals can collapse."""
+"""Checks domain and goal, and finds the region that is left when the goal collapses to a point."""
 
 from __future__ import annotations
 
@@ -14,17 +14,25 @@ from coop_drake.geometry.simplify import sharpest_angle, simplify_inward
 
 __all__ = ["check_domain", "check_question", "goal_edges", "pole_of", "region_to_map"]
 
-_ON = 1e-9  # what is this close, times the diameter, lies on the goal's boundary
-_SLIVER = 1e-9  # pieces that are thinner, times the diameter, come from rounding
-_NEAR = 1e-3  # a goal closer to a wall that it does not touch, times its own size, hardly leaves a gap
-_TINY = 1e-7  # shorter edges, times the diameter, are kinks to a map: their vertices are rounded
-_SHARPEST = np.deg2rad(5.0)  # sharper corners between goal and wall are cusps to a map
+_ON = 1e-9
+"""An edge closer to the goal's boundary than this fraction of the domain's diameter lies on it [-]."""
+_SLIVER = 1e-9
+"""Pieces thinner than this fraction of the diameter come from rounding [-]."""
+_NEAR = 1e-3
+"""A goal closer to a wall than this fraction of its own size, without touching, leaves too narrow a gap
+[-]."""
+_TINY = 1e-7
+"""Edges shorter than this fraction of the diameter are removed: rounding decides the angles at their ends
+[-]."""
+_SHARPEST = np.deg2rad(5.0)
+"""A goal that meets a wall at a smaller angle does not collapse: the corner would take too many nodes
+[rad]."""
 
 
 def region_to_map(
     domain: Polygon, goal: Point | Polygon, inside: Point | None = None
 ) -> tuple[Polygon, Point | Polygon]:
-    """F, the region to map, and the target: what its map sends to one point.
+    """F, the region to map, and the target, which its map sends to one point.
 
     A goal region that has a boundary of its own, or meets the outer ring in one arc, is taken out of the
     domain and collapses. One that meets walls otherwise (in several arcs, in a single point, at a cusp, along

@@ -58,7 +58,7 @@ class HarmonicMap:
     def from_solution(
         cls, domain: Polygon, goal: Point | Polygon, solution: Solution, *, inside: Point | None = None
     ) -> HarmonicMap:
-        """The map that was solved before with these arguments, without solving it again."""
+        """The map of a solution that was solved before with these arguments."""
         harmonic_map = cls.__new__(cls)
         harmonic_map._goal = goal
         harmonic_map._region, harmonic_map._target = region_to_map(domain, goal, inside)
@@ -68,8 +68,8 @@ class HarmonicMap:
     def __call__(self, points: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """T and its Jacobian.
 
-        On walls the values are the limits from inside, at vertices those a hair inside; outside of F those of
-        the nearest boundary point. Nothing is ever NaN.
+        On walls the values are the limits from inside, at vertices those of a point just inside (1e-13 of the
+        legs); outside of F they are those of the nearest boundary point. They are never NaN.
 
         Args:
             points: Points in W, shape (..., 2) [m].
@@ -93,7 +93,7 @@ class HarmonicMap:
 
     @property
     def target(self) -> Point | Polygon:
-        """What goes to the goal's image: the goal, or the pole of a goal region that cannot collapse [m]."""
+        """The shape whose image is the goal's: the goal, or its pole if it cannot collapse [m]."""
         return self._target
 
     @property
@@ -103,10 +103,10 @@ class HarmonicMap:
 
     @property
     def certificate(self) -> MapCertificate:
-        """How far the map can be from the true one."""
+        """The certified bound on the error of the map."""
         return self._solution.certificate
 
     @property
     def solution(self) -> Solution:
-        """What solving left behind, see `from_solution`."""
+        """The result of solving, see `from_solution`."""
         return self._solution

@@ -1,4 +1,4 @@
-"""Nodes on panels: position, line element and boundary data of every quadrature node, corner blocks first."""
+"""The quadrature nodes on the panels: position, line element and boundary data, corner blocks first."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def place_nodes(outline: Outline, panels: Panels, angles: FloatArray, nodes: int
 
     Args:
         outline: The rings.
-        panels: Where they are cut.
+        panels: Their panels.
         angles: Interior angle of each corner [rad], shape (corners,).
         nodes: Gauss nodes on a panel.
         closeness: Longest panel per unit of distance, see `leg_panels`.

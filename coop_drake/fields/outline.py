@@ -1,4 +1,4 @@
-"""The outline of what is mapped: rings of vertices, their angles on the circle, where the goal is."""
+"""The outline of a region to map: rings of vertices, their angles on the circle, and the goal's place."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ __all__ = ["Outline", "outline_of"]
 ComplexArray = NDArray[np.complex128]
 IntArray = NDArray[np.int64]
 
-_SHARPEST = 1.0  # corners sharper than this cost minutes [degrees]
-_STRAIGHT = 1e-12  # a vertex is dropped if it lies this close to its neighbours' chord, times the diameter
+_SHARPEST = 1.0
+"""Corners with a smaller angle are refused: their panels would take minutes [degrees]."""
+_STRAIGHT = 1e-12
+"""A vertex closer to its neighbours' chord than this fraction of the diameter is dropped [-]."""
 
 
 @dataclass(frozen=True)
@@ -75,13 +77,13 @@ class Outline:
 
 
 def outline_of(region: Polygon, target: Point | Polygon) -> Outline:
-    """Orient, clean and number the rings of F and share out the angles of the outer circle.
+    """Orient, clean and number the rings of F and assign the angles of the outer circle.
 
-    The angle is linear in arc length; an arc that bounds the goal gets none.
+    The angle is linear in arc length; an arc that bounds the goal has one angle.
 
     Args:
         region: F, from `region_to_map`.
-        target: What collapses, from there too: a point, a hole of F, or one arc of its outer ring.
+        target: The target from `region_to_map`: a point, a hole of F, or one arc of its outer ring.
 
     Raises:
         UnmappableError: If rings touch, or a corner is sharper than a degree.
@@ -122,7 +124,7 @@ def outline_of(region: Polygon, target: Point | Polygon) -> Outline:
 
 
 def _refuse_touching_rings(region: Polygon, scale: float) -> None:
-    """Two rings that meet in a point leave a gap of width zero."""
+    """Refuse two rings that meet in a point: the gap between them has no width."""
     rings = [region.exterior, *region.interiors]
     for k, ring in enumerate(rings):
         for other in rings[:k]:
@@ -138,7 +140,7 @@ def _refuse_touching_rings(region: Polygon, scale: float) -> None:
 
 
 def _refuse_spikes(outline: Outline) -> None:
-    """A corner of next to no angle, or next to a full turn, would take more nodes than there is time for."""
+    """Refuse a corner whose angle is close to zero or to a full turn: it would take too many nodes."""
     angles = np.rad2deg(outline.corner_angles)
     worst = int(np.argmin(np.minimum(angles, 360.0 - angles)))
     angle = float(angles[worst])

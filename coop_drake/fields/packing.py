@@ -1,4 +1,4 @@
-"""A solved density laid out as a map: refined, followed down every corner, far fields expanded."""
+"""Builds the arrays of a map from a solved density: refined panels, corners at all scales, far fields."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ from coop_drake.fields.refinement import refine
 
 __all__ = ["pack_layers"]
 
-_MARGIN = 1.0 + 1e-9  # of the square that holds the domain
+_MARGIN = 1.0 + 1e-9
+"""Size of the quadtree's square per size of the domain, so that rounding leaves no vertex outside [-]."""
 
 
 def pack_layers(
@@ -40,7 +41,7 @@ def pack_layers(
 
 
 def _bare(outline: Outline, panels: Panels, angles: FloatArray, density: Density) -> MapArrays:
-    """The solved nodes alone, in one box that everything is near to."""
+    """A map with the solved nodes alone, in a quadtree of one leaf that is near to all of them."""
     v, ends, nodes = outline.vertices, outline.ends, density.nodes
     tangent = (ends - v) / np.abs(ends - v)
     inward = tangent * np.exp(0.5j * angles)
@@ -86,7 +87,8 @@ def _bare(outline: Outline, panels: Panels, angles: FloatArray, density: Density
 def _panel_ends(outline: Outline, panels: Panels) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Ends as x y of the incoming legs, of the outgoing legs (corners, 2), and of the panels (panels, 4).
 
-    Neighbours along an edge get the very same numbers, lest a point between them be missed or counted twice.
+    Neighbours along an edge get the same numbers to the last bit: otherwise a point between them could be
+    missed or counted twice.
     """
     v = outline.vertices
     tangent = (outline.ends - v) / np.abs(outline.ends - v)

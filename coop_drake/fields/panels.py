@@ -1,4 +1,4 @@
-"""Panels on an outline: equal legs at every corner, graded panels between them."""
+"""Divides an outline into panels: two equal legs at every corner, graded panels between the legs."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _DEEPEST = 254
 
 @dataclass(frozen=True)
 class Panels:
-    """Where the boundary is cut.
+    """The panels of a boundary.
 
     Attributes:
         legs: Length of the two legs of each corner [m], shape (corners,).
@@ -43,10 +43,10 @@ class Panels:
 
 
 def lay_panels(outline: Outline, closeness: float) -> Panels:
-    """Cut the boundary so that every panel resolves the density on it.
+    """Divide the boundary so that every panel resolves the density on it.
 
     Legs are not longer than ``closeness`` times their distance to the other edges. Regular panels may lie
-    along a wall at any distance, for near panels are integrated exactly: they are not longer than
+    along a wall at any distance, because near panels are integrated exactly: they are not longer than
     ``closeness`` times their distance to the other edges or to the nearest vertex, whichever is more.
     """
     starts, ends = outline.vertices, outline.ends
@@ -118,7 +118,7 @@ def _corner_legs(
 def _close_slivers(lengths: FloatArray, following: np.ndarray, legs: FloatArray) -> None:
     """Make two legs that almost fill an edge meet: a panel as short as rounding could not be evaluated.
 
-    Goes round each ring; where the last edge still has a sliver, the first corner makes room.
+    Follows each ring; if the last edge still has a sliver, the legs of the first corner become shorter.
     """
     for e in range(len(lengths)):
         after = following[e]

@@ -1,4 +1,4 @@
-"""Pictures of a map: a grid and its image, streamlines and the straight lines they are, the residual."""
+"""Figures of a map: a grid and its image, streamlines and their straight images, the residual."""
 
 from __future__ import annotations
 

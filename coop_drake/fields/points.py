@@ -1,4 +1,4 @@
-"""Points as users give them: any array whose last axis is x, y."""
+"""Checks points that users pass: arrays whose last axis is x, y."""
 
 from __future__ import annotations
 

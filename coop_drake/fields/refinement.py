@@ -1,4 +1,4 @@
-"""The density on finer nodes: the integral equation, solved on coarse ones, interpolates itself."""
+"""Interpolates the density to finer nodes by the integral equation itself (Nystrom interpolation)."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ __all__ = ["refine"]
 def refine(
     outline: Outline, panels: Panels, angles: FloatArray, density: Density, closeness: float, m: MapArrays
 ) -> tuple[Nodes, FloatArray]:
-    """Nystrom interpolation of a density to `REFINED_NODES` nodes a panel.
+    """Interpolate a density to `REFINED_NODES` nodes on a panel.
 
     Args:
         outline: The rings.
-        panels: Where they are cut.
+        panels: Their panels.
         angles: Interior angle of each corner [rad], shape (corners,).
         density: The solution.
         closeness: Longest panel per unit of distance, see `leg_panels`.
@@ -73,10 +73,10 @@ def _subtract(
         m: The map with the solved nodes in the leaves of its quadtree.
         edge: Edge of each solved node.
         coefficients: Legendre coefficients of the density of regular panels, shape (panels, nodes, 2).
-        target: Where, shape (n,).
+        target: Points where 2 K density is evaluated [m], shape (n,).
         target_edge: Edge of each target.
         target_corner: Corner block of each target, -1 on regular panels.
-        out: Where the result is subtracted from, shape (n, 2).
+        out: The array that the result is subtracted from, shape (n, 2).
     """
     p = coefficients.shape[1]
     moments = np.empty(max(p, 2))

@@ -1,4 +1,4 @@
-"""Solving one outline: with as many nodes as the tolerance needs, certified, or refused by name."""
+"""Solves the map of one outline with as many nodes as its tolerance needs, or names the obstacle."""
 
 from __future__ import annotations
 
@@ -20,30 +20,35 @@ from coop_drake.fields.quadrature import FloatArray
 
 __all__ = ["Solution", "solve"]
 
-_GAIN = 4.0  # by which the error falls with every node a panel, about
-_PROGRESS = 0.7  # share of the error that an attempt must undercut, or more would not help either
-_LARGE = 2_000  # unknowns from which the first attempt is left out
+_GAIN = 4.0
+"""Factor by which the error falls with every further node on a panel, approximately [-]."""
+_PROGRESS = 0.7
+"""An attempt that leaves more than this fraction of the error is the last: more nodes would not help either
+[-]."""
+_LARGE = 2_000
+"""Unknowns from which the first attempt, which rarely suffices then, is left out."""
 _EPSILON = float(np.finfo(float).eps)
-_MAX_UNKNOWNS = 40_000  # some ten seconds
+_MAX_UNKNOWNS = 40_000
+"""Largest system that is solved: it takes about 7 s and 700 MB."""
 
 
 class Attempt(NamedTuple):
-    """How finely to solve: Gauss nodes on a panel; longest panel per unit of distance, see `leg_panels`."""
+    """A resolution: Gauss nodes on a panel, and longest panel per unit of distance (`leg_panels`)."""
 
     nodes: int
     closeness: float
 
 
-# Ten nodes suffice for most cells, thirteen for most large ones.
+# Ten nodes suffice for most domains, thirteen for most large ones.
 _FEWEST = Attempt(10, 1.5)
 _ATTEMPTS = (_FEWEST, Attempt(13, 1.5), Attempt(16, 1.5), Attempt(16, 1.0), Attempt(20, 0.7))
 
 
 class Solution(NamedTuple):
-    """What solving leaves behind: all that evaluating a map takes, as plain arrays and numbers.
+    """The result of solving: everything that evaluates a map, as plain arrays and numbers.
 
     Attributes:
-        flat: The layers, for the kernels that evaluate them, see `flat_map`.
+        flat: The map for compiled code, see `flat_map`.
         goal_image: q_d, the goal's image in the disk, shape (2,).
         certificate: How far the map can be from the true one.
     """
@@ -59,7 +64,7 @@ class Solution(NamedTuple):
 
     @property
     def centre(self) -> FloatArray:
-        """Origin of their coordinates in W [m], shape (2,)."""
+        """Origin of the map's coordinates in W [m], shape (2,)."""
         return self.flat[:2]
 
 
@@ -68,12 +73,12 @@ def solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solution
 
     Args:
         outline: The rings.
-        goal: What goes to the goal's image where the outline does not say it.
+        goal: The target, whose image is looked up if it is a point.
         tolerance: Largest certified error.
 
     Raises:
-        UnmappableError: If more nodes do not help any more, or would be too many, or the first attempt fails
-            at a system so near to singular, as narrow gaps make it, that rounding alone may cost more.
+        UnmappableError: If more nodes do not reduce the error, or would be too many, or the system is so
+            close to singular, as narrow gaps make it, that rounding alone may exceed the tolerance.
     """
     best: MapCertificate | None = None
     last = _FEWEST
@@ -93,26 +98,26 @@ def solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solution
         if best is not None and bound > _PROGRESS * best.error_bound:
             break
         best, last = solution.certificate, attempt
-        if _EPSILON * best.condition > tolerance:  # rounding stands in the way, which more nodes do not move
+        if _EPSILON * best.condition > tolerance:  # more nodes do not reduce rounding errors
             break
     _refuse(best, tolerance, outline, panels, unknowns)
 
 
 def _is_promising(attempt: Attempt, last: Attempt, excess: float) -> bool:
-    """Whether an attempt may bring the error down that far; the last of one closeness is always made."""
+    """Whether an attempt may reduce the error by a factor; the last one of a closeness is always made."""
     final = max(other.nodes for other in _ATTEMPTS if other.closeness == attempt.closeness)
     gain = _GAIN ** (attempt.nodes - last.nodes)
     return attempt.closeness != last.closeness or attempt.nodes == final or gain >= excess
 
 
 def _angles(outline: Outline) -> FloatArray:
-    """Angles of the corners, rounded: they hit the cache of operators and change nothing beyond rounding."""
+    """Angles of the corners [rad], rounded to 1e-12 so that equal corners share one operator in the cache."""
     angles: FloatArray = np.round(outline.corner_angles, 12)
     return angles
 
 
 def _unknowns(outline: Outline, panels: Panels, attempt: Attempt) -> int:
-    """Size of the linear system but for the holes' images."""
+    """Size of the linear system without the holes' images."""
     legs = sum(2 * len(leg_panels(float(angle), attempt.closeness)[0]) - 2 for angle in _angles(outline))
     return attempt.nodes * (len(panels.edge) + legs)
 
@@ -121,7 +126,7 @@ def _solve(outline: Outline, goal: Point | Polygon, panels: Panels, attempt: Att
     """Make one attempt."""
     angles = _angles(outline)
     centre = np.array([outline.centre.real, outline.centre.imag])
-    # Coordinates come rounded: what lies outside by less than this counts as on the wall.
+    # Coordinates of points are rounded: a point outside by less than this counts as on the wall.
     rounding = 8.0 * _EPSILON * (abs(outline.centre) + outline.diameter)
     density = solve_density(outline, panels, angles, *attempt)
     arrays = pack_layers(outline, panels, angles, density, attempt.closeness)
@@ -134,7 +139,7 @@ def _solve(outline: Outline, goal: Point | Polygon, panels: Panels, attempt: Att
 def _goal_image(
     outline: Outline, goal: Point | Polygon, hole_images: FloatArray, flat: FlatMap
 ) -> FloatArray:
-    """Where the goal goes: a point of the circle, a hole's image, or the image of a point."""
+    """Image of the goal: a point of the circle, a hole's image, or the image of a point, shape (2,)."""
     image: FloatArray
     if outline.goal_angle is not None:
         return np.array([np.cos(outline.goal_angle), np.sin(outline.goal_angle)])
@@ -149,7 +154,7 @@ def _goal_image(
 def _refuse(
     best: MapCertificate | None, tolerance: float, outline: Outline, panels: Panels, unknowns: int
 ) -> NoReturn:
-    """Name the place where the best attempt is worst; without one, the narrowest gap."""
+    """Raise an error with the place where the best attempt is worst, or the narrowest gap without one."""
     if best is not None:
         rounding = _EPSILON * best.condition
         why = f", and rounding alone may cost {rounding:.2g}" if rounding > tolerance else ""

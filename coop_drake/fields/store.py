@@ -1,4 +1,4 @@
-"""Solved maps on disk, found again by what they are maps of."""
+"""Keeps solved maps on disk, by a digest of domain, goal, tolerance and code."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ class MapStore:
     missing and is replaced. Where the folder cannot be written the maps are solved all the same.
 
     Args:
-        folder: Where the files lie; it is made when the first map is kept.
-        limit: Above so many bytes, maps that were not used for longest are forgotten by `trim`.
+        folder: The folder; it is made when the first map is kept.
+        limit: Size [bytes] to which `trim` reduces the folder, removing the maps used longest ago.
     """
 
     def __init__(self, folder: Path, *, limit: int = 1_000_000_000) -> None:
@@ -77,15 +77,15 @@ class MapStore:
         return harmonic_map
 
     def files(self) -> list[Path]:
-        """Its files, the one used last at the end."""
+        """The files of the folder, the one used last at the end."""
         return [path for _, _, path in self._by_age()]
 
     def size(self) -> int:
-        """Bytes that it takes."""
+        """Size of all files [bytes]."""
         return sum(size for _, size, _ in self._by_age())
 
     def trim(self) -> None:
-        """Forget maps that were not used for longest until the rest keeps within the limit."""
+        """Remove the maps used longest ago until the rest keeps within the limit."""
         files = self._by_age()
         total = sum(size for _, size, _ in files)
         for _, size, path in files:
@@ -96,7 +96,7 @@ class MapStore:
             total -= size
 
     def clear(self) -> int:
-        """Forget all maps; returns how many there were."""
+        """Remove all maps; return how many there were."""
         files = self.files()
         for path in files:
             path.unlink(missing_ok=True)
@@ -108,7 +108,7 @@ class MapStore:
         for path in self.folder.glob("*" + _SUFFIX):
             try:
                 status = path.stat()
-            except FileNotFoundError:  # another process was quicker to forget it
+            except FileNotFoundError:  # another process has removed it meanwhile
                 continue
             rows.append((status.st_mtime_ns, status.st_size, path))
         return sorted(rows)
@@ -123,7 +123,7 @@ def _key(domain: Polygon, goal: Point | Polygon, tolerance: float) -> str:
 
 @cache
 def _code() -> bytes:
-    """Digest of everything that the numbers in a map depend on, but for the question."""
+    """Digest of everything that the numbers in a map depend on except domain, goal and tolerance."""
     digest = hashlib.sha256()
     here = Path(__file__).parent
     for path in sorted([*here.glob("*.py"), *here.with_name("geometry").glob("*.py")]):
@@ -136,7 +136,7 @@ def _code() -> bytes:
 
 
 def _read(path: Path, key: str) -> Solution | None:
-    """A solution as it was written; None if there is none, or if it is damaged."""
+    """Read a solution; None if there is none, or if the file is damaged."""
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
             if file["key"].item() != key:
@@ -153,7 +153,7 @@ def _read(path: Path, key: str) -> Solution | None:
 
 
 def _write(path: Path, key: str, solution: Solution) -> None:
-    """Keep a solution; a folder that cannot be written keeps nothing."""
+    """Write a solution; nothing happens if the folder cannot be written."""
     flat, image = solution.flat, solution.goal_image
     certificate = json.dumps(solution.certificate.plain())
     with suppress(OSError):

@@ -14,21 +14,26 @@ from coop_drake.fields.velocity_field import VelocityField
 
 __all__ = ["Streamlines", "trace_streamlines"]
 
-_TURN = 0.2  # largest turn of the direction within a step [rad]
-_LONGEST = 0.05  # longest step, of the region's size
-_FIRST = 1e-3  # first step, of the region's size
-_GROWTH = 1.6  # of the next step where the direction hardly turns
-_ARRIVED = 0.01  # of the radius of slowing down
+_TURN = 0.2
+"""Largest turn of the direction within a step [rad]."""
+_LONGEST = 0.05
+"""Longest step, per size of the region [-]."""
+_FIRST = 1e-3
+"""First step, per size of the region [-]."""
+_GROWTH = 1.6
+"""Growth of the next step where the direction hardly turns [-]."""
+_ARRIVED = 0.01
+"""Distance from the goal at which a streamline has arrived, per slowdown radius [-]."""
 
 
 @dataclass(frozen=True)
 class Streamlines:
-    """Where the points of a field go.
+    """Streamlines of a velocity field and their travel times.
 
     Attributes:
         paths: For each start its streamline, shape (points, 2) [m].
-        times: When each comes within a hundredth of the radius of slowing down of the goal, infinite where
-            it does not, shape (n,) [s].
+        times: Time until each is within a hundredth of the slowdown radius of the goal, infinite if it does
+            not get there, shape (n,) [s].
     """
 
     paths: tuple[FloatArray, ...]
@@ -41,14 +46,14 @@ class Streamlines:
 
 
 def trace_streamlines(field: VelocityField, starts: ArrayLike, *, max_steps: int = 2_000) -> Streamlines:
-    """Follow a field from many starts by Heun's rule, with steps within which it hardly turns.
+    """Follow a field from many starts by Heun's rule, with steps in which its direction hardly turns.
 
     A step that would leave the region or turn too much is tried again at half its length.
 
     Args:
         field: The field.
         starts: Points in the map's region, shape (n, 2) [m].
-        max_steps: Tries after which a streamline counts as lost.
+        max_steps: Attempted steps after which a streamline counts as not arriving.
 
     Raises:
         FieldError: If the starts have another shape or are not finite.

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from shapely import Point
 
 from coop_drake.fields.certainty import check_certainty
-from coop_drake.fields.flat_field import flat_field, velocities_in_field, velocity_in_field
+from coop_drake.fields.flat_field import flat_field, velocities_in_field
 from coop_drake.fields.flat_map import FlatMap
 from coop_drake.fields.harmonic_map import HarmonicMap
 from coop_drake.fields.points import as_points
@@ -20,17 +20,17 @@ __all__ = ["VelocityField"]
 
 
 class VelocityField:
-    """Where to go, and how fast at most: the pulled-back straight line to the goal's image, eq. (13).
+    """The velocity along the pulled-back straight line to the goal's image, eq. (13).
 
-    The direction is that of J^-1 (q_d - T), computed as adj(J) (q_d - T) so that crowded places do no harm.
-    The speed is max_speed * min(1, distance / slowdown_radius): at most max_speed everywhere, near the goal
-    proportional to the remaining distance, zero in a goal region.
+    The direction is that of J^-1 (q_d - T), computed as adj(J) (q_d - T) which needs no inverse where J is
+    nearly singular. The speed is max_speed * min(1, distance / slowdown_radius): at most max_speed
+    everywhere, near the goal proportional to the remaining distance, zero in a goal region.
 
-    A streamline's image runs straight to q_d, so it never reaches a wall, and from almost everywhere it
-    arrives. Along it the field is Lipschitz: it is smooth in the interior but at the goal's edge, where the
-    speed has a kink. It is not near a vertex that juts into the cell, round which the direction turns within
-    any distance however small. Where a hole collapses, the streamlines that meet it form two lines at most
-    that do not arrive, and those beside them linger; `cut_open` rids a domain of holes.
+    The image of a streamline is a straight line to q_d, so the streamline never reaches a wall, and from
+    almost everywhere it arrives. The field is smooth in the interior except at the goal's edge, where the
+    speed has a kink. It is not Lipschitz near a vertex that juts into the domain: the direction turns around
+    it within any distance, however small. At most two streamlines end on a hole that collapses, and those
+    beside them are slow there; `cut_open` removes the holes of a domain.
     Points outside the map's region get the direction of the nearest boundary point, never NaN.
 
     Args:
@@ -74,11 +74,9 @@ class VelocityField:
             FieldError: If the points have another shape or are not finite.
         """
         p = as_points(points)
-        if p.ndim == 1:
-            return np.array(velocity_in_field(self._map, self._field, *p.tolist()))
         return velocities_in_field(self._map, self._field, p.reshape(-1, 2)).reshape(p.shape)
 
     @property
     def kernel_arguments(self) -> tuple[FlatMap, FloatArray]:
-        """What `velocity_in_field` takes, for compiled code that evaluates the field itself."""
+        """The first two arguments of `velocity_in_field`, for compiled code that evaluates the field."""
         return self._map, self._field

@@ -4,7 +4,7 @@ import pytest
 from shapely import Point, Polygon, box
 
 from benchmarks.domains import Domain, hall_with_pillars, standard_domains, wavy_room
-from benchmarks.map_rows import RESIDUAL, cost_rows, map_rows
+from benchmarks.map_rows import RESIDUAL, ablation_rows, cost_rows, map_rows
 from benchmarks.mapping import PILLARS, VERTICES, mapping_tasks
 
 
@@ -41,5 +41,11 @@ def test_a_shape_that_is_refused_is_a_row_too():
 
 def test_every_task_has_a_name_of_its_own_and_the_machine_to_itself():
     tasks = mapping_tasks()
-    assert len({task.name for task in tasks}) == len(tasks) == 1 + len(standard_domains()) + 10
+    assert len({task.name for task in tasks}) == len(tasks) == 1 + len(standard_domains()) + 11
     assert all(task.alone for task in tasks)
+
+
+def test_the_ablation_solves_a_map_with_and_without_compression():
+    (row,) = ablation_rows("mapping/ablation/square", standard_domains()["square"])
+    assert row.value > 0.0
+    assert row.peer_value > 0.0

@@ -23,7 +23,7 @@ def density_of(domain, goal, nodes=10):
 )
 def test_compressed_systems_have_the_same_solution(domain, goal, monkeypatch):
     dense = density_of(domain, goal)
-    monkeypatch.setattr(skeletons, "_DENSE", 150)
+    monkeypatch.setattr(skeletons, "DENSE", 150)
     monkeypatch.setattr(skeletons, "_LEAF", 60)
     compressed = density_of(domain, goal)
     np.testing.assert_allclose(compressed.hole_images, dense.hole_images, atol=1e-9)
