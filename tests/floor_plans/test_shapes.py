@@ -130,9 +130,9 @@ def test_damaged_files_are_refused(tmp_path, text, ending, message):
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        (FloorPlanSettings(unit="parsec"), "'parsec' is no unit; use one of mm"),
-        (FloorPlanSettings(scale=float("nan")), "scale: nan is out of range"),
-        (FloorPlanSettings(tolerance=-1.0), "tolerance: -1.0 is out of range"),
+        (FloorPlanSettings(unit="parsec"), "'parsec' is not allowed; use one of mm"),
+        (FloorPlanSettings(scale=float("nan")), "scale: nan is not allowed"),
+        (FloorPlanSettings(tolerance=-1.0), "tolerance: -1.0 is not allowed"),
         (FloorPlanSettings(layers=("a",)), "has none"),
     ],
 )
