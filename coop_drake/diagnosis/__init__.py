@@ -1,10 +1,10 @@
-"""Why there is no plan: which passage blocks, which bodies are at fault, how much is missing, what helps."""
+"""Why there is no plan: what blocks, where, which bodies collide, how much is missing, what would help."""
 
-from coop_drake.diagnosis.diagnosis import BlockedPose, Diagnosis, PassageFindings
+from coop_drake.diagnosis.diagnosing import diagnose
+from coop_drake.diagnosis.findings import BlockedPose, Diagnosis, PassageFindings
 from coop_drake.diagnosis.picture import diagnosis_figure
 from coop_drake.diagnosis.report import facts_of, rows_of, sentences_of
-from coop_drake.diagnosis.trials import Answer
-from coop_drake.diagnosis.why_not import diagnose
+from coop_drake.diagnosis.variants import Answer
 
 __all__ = [
     "Answer",

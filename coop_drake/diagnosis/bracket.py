@@ -1,30 +1,30 @@
-"""How much of a change is needed: a proof that so much is not enough, and a channel with so much."""
+"""Bounds of the change that is needed: an amount proved too little, and one found to be enough."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from coop_drake.diagnosis.trials import Answer, Trial
+from coop_drake.diagnosis.variants import Answer, Outcome
 
-__all__ = ["Bracket", "Steps", "bracketed"]
+__all__ = ["Amounts", "Bracket", "bracketed"]
 
 
 @dataclass(frozen=True)
 class Bracket:
-    """What was computed about the least amount of a change that makes a question feasible.
+    """What was computed about the least amount of a change that makes a problem feasible.
 
     Attributes:
         refuted: Largest amount that was proved not to be enough; None if none was, not even zero.
         found: Smallest amount with which a channel was found, None if there was none.
         most: Largest amount tried.
-        trial: The trial at ``found``, None if there was none.
+        outcome: The outcome at ``found``, None if there was none.
     """
 
     refuted: float | None
     found: float | None
     most: float
-    trial: Trial | None
+    outcome: Outcome | None
 
     @property
     def is_refuted(self) -> bool:
@@ -33,52 +33,54 @@ class Bracket:
 
 
 @dataclass(frozen=True)
-class Steps:
-    """Which amounts to try.
+class Amounts:
+    """Which amounts of a change to try.
 
     Attributes:
         first: First amount; doubled until a channel is found.
         most: Largest amount.
         resolution: The bracket is narrowed down to this.
-        share: Or to this share of the amount found, if that is more [-].
-        trials: How many amounts are tried at most.
+        fraction: Or to this fraction of the amount found, if that is more [-].
+        asked: How many amounts are tried at most.
     """
 
     first: float
     most: float
     resolution: float
-    share: float = 0.125
-    trials: int = 12
+    fraction: float = 0.125
+    asked: int = 12
 
 
 def bracketed(
-    ask: Callable[[float], Trial],
-    steps: Steps,
+    ask: Callable[[float], Outcome],
+    amounts: Amounts,
     *,
     refuted: float | None = 0.0,
-    improve: Callable[[float, Trial], tuple[float, Trial]] = lambda amount, trial: (amount, trial),
+    improve: Callable[[float, Outcome], tuple[float, Outcome]] = lambda amount, outcome: (amount, outcome),
 ) -> Bracket:
-    """Bracket the least amount of a change, more of which never makes a feasible question infeasible.
+    """Bracket the least amount of a change that is enough, by doubling and then by bisection.
+
+    More of the change must never make a feasible problem infeasible.
 
     Args:
-        ask: Puts the question with an amount of the change.
-        steps: Which amounts to try.
+        ask: Asks about the problem with an amount of the change.
+        amounts: Which amounts to try.
         refuted: Amount that is proved not to be enough beforehand, None if nothing is.
-        improve: Given an amount that is enough and its trial, looks for a smaller one.
+        improve: Given an amount that is enough and its outcome, looks for a smaller one.
     """
     search = _Search(ask, improve, refuted)
-    amount = min(steps.first, steps.most)
-    while not search.step(amount) and amount < steps.most and search.asked < steps.trials:
-        amount = min(2.0 * amount, steps.most)
-    while search.found is not None and search.asked < steps.trials:
-        wanted = max(steps.resolution, steps.share * search.found)
+    amount = min(amounts.first, amounts.most)
+    while not search.step(amount) and amount < amounts.most and search.asked < amounts.asked:
+        amount = min(2.0 * amount, amounts.most)
+    while search.found is not None and search.asked < amounts.asked:
+        wanted = max(amounts.resolution, amounts.fraction * search.found)
         if search.found - search.missed > wanted:
             search.step(0.5 * (search.found + search.missed))
         elif search.unproved - search.proved > wanted:
             search.step(0.5 * (search.unproved + search.proved))
         else:
             break
-    return Bracket(search.refuted, search.found, search.most, search.trial)
+    return Bracket(search.refuted, search.found, search.most, search.outcome)
 
 
 class _Search:
@@ -86,14 +88,14 @@ class _Search:
 
     def __init__(
         self,
-        ask: Callable[[float], Trial],
-        improve: Callable[[float, Trial], tuple[float, Trial]],
+        ask: Callable[[float], Outcome],
+        improve: Callable[[float, Outcome], tuple[float, Outcome]],
         refuted: float | None,
     ) -> None:
         self._ask, self._improve = ask, improve
         self.refuted = refuted
         self.found: float | None = None
-        self.trial: Trial | None = None
+        self.outcome: Outcome | None = None
         self.missed = 0.0  # Largest amount without a channel, proved or not.
         self.unproved = 0.0  # Smallest amount without a channel and without a proof, 0 if there is none.
         self.most, self.asked = 0.0, 0
@@ -104,16 +106,16 @@ class _Search:
         return self.refuted or 0.0
 
     def step(self, amount: float) -> bool:
-        """Ask with one amount; returns whether a channel was found."""
+        """Ask about one amount; returns whether a channel was found."""
         self.asked += 1
         self.most = max(self.most, amount)
-        trial = self._ask(amount)
-        if trial.answer is Answer.FOUND:
-            self.found, self.trial = self._improve(amount, trial)
+        outcome = self._ask(amount)
+        if outcome.answer is Answer.FOUND:
+            self.found, self.outcome = self._improve(amount, outcome)
             self.missed, self.unproved = min(self.missed, self.found), min(self.unproved, self.found)
             return True
         self.missed = max(self.missed, amount)
-        if trial.answer is Answer.INFEASIBLE:
+        if outcome.answer is Answer.INFEASIBLE:
             self.refuted = max(amount, self.proved)
             self.unproved = self.unproved if self.unproved > amount else 0.0
         else:

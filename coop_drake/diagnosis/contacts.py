@@ -1,4 +1,4 @@
-"""What is in the way at one configuration: bodies that stick out of the floor, bodies that overlap."""
+"""Collisions at one configuration: bodies that leave the floor, bodies that overlap."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ from coop_drake.tree.pose import FloatArray
 __all__ = ["Contact", "Overlap", "contacts", "deepest", "overlaps"]
 
 NEGLIGIBLE = 1e-4
-"""Arcs are drawn as polygons: less than this is no contact [m]."""
+"""Less deep than this is no collision: arcs are polygons here [m]."""
 
-_HAIR = 1e-9
+ROUNDING = 1e-9
+"""A corner of a wall this near to a part of a body is inside it [m]."""
 
 Depth = tuple[float, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
 class Contact:
-    """One body that sticks out of the floor on one side.
+    """One body that leaves the floor on one side.
 
     Attributes:
         body: Its name.
         robot: Its robot, None for the object.
-        depth: How far it sticks out [m].
+        depth: How far [m].
         point: Its point that is farthest out, shape (2,) [m].
         wall: Point of the wall nearest to that, shape (2,) [m].
     """
@@ -57,7 +58,7 @@ class Overlap:
 
 
 def contacts(workspace: Polygon, tree: ComponentTree, configuration: FloatArray) -> list[Contact]:
-    """Bodies that stick out of the floor, one entry for each side on which they do, the deepest first.
+    """Bodies that leave the floor, one entry for each side on which they do, the deepest first.
 
     Args:
         workspace: The floor W [m].
@@ -73,7 +74,7 @@ def contacts(workspace: Polygon, tree: ComponentTree, configuration: FloatArray)
 
 
 def deepest(workspace: Polygon, tree: ComponentTree, configuration: FloatArray) -> float:
-    """How far the body sticks out that does so most, 0 if none does [m]; arguments as above."""
+    """How far the bodies leave the floor at most, 0 if none does [m]; arguments as above."""
     found = contacts(workspace, tree, configuration)
     return found[0].depth if found else 0.0
 
@@ -83,7 +84,7 @@ def _outside(workspace: Polygon, footprint: BodyFootprint) -> list[Contact]:
     found = []
     for part in shapely.get_parts(shapely.difference(footprint.shape, workspace)):
         depth, point, wall = max(
-            [_sticking_out(workspace, part), *_pierced(workspace, footprint, part)],
+            [_farthest_corner(workspace, part), *_wall_corners(workspace, footprint, part)],
             key=lambda entry: entry[0],
         )
         if depth > NEGLIGIBLE:
@@ -91,7 +92,7 @@ def _outside(workspace: Polygon, footprint: BodyFootprint) -> list[Contact]:
     return found
 
 
-def _sticking_out(workspace: Polygon, part: BaseGeometry) -> Depth:
+def _farthest_corner(workspace: Polygon, part: BaseGeometry) -> Depth:
     """The corner of a part that is farthest from the floor, and the point of the wall nearest to it."""
     corners = shapely.get_coordinates(part)
     depths = [workspace.distance(Point(corner)) for corner in corners]
@@ -100,9 +101,9 @@ def _sticking_out(workspace: Polygon, part: BaseGeometry) -> Depth:
     return depths[worst], ends[0], ends[-1]
 
 
-def _pierced(workspace: Polygon, footprint: BodyFootprint, part: BaseGeometry) -> list[Depth]:
+def _wall_corners(workspace: Polygon, footprint: BodyFootprint, part: BaseGeometry) -> list[Depth]:
     """Corners of the walls inside a body: how far each is from the body's outline, and where."""
-    near = part.buffer(_HAIR)
+    near = part.buffer(ROUNDING)
     entries = []
     for corner in shapely.get_coordinates(workspace):
         place = Point(corner)

@@ -1,4 +1,4 @@
-"""The gap between two walls: the two points that pinch whatever is to pass."""
+"""The gap between two walls that face each other."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Gap", "narrowest_gap"]
 
-_FACING = 0.3
-_AWAY = 1e-6
+FACING = 0.3
+"""Cosine of the largest angle between a wall's normal and the direction to the wall that it faces [-]."""
+
+AWAY = 1e-6
+"""Points nearer than this are the same [m]."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class Gap:
 
 
 def narrowest_gap(workspace: Polygon, walls: Sequence[FloatArray]) -> Gap | None:
-    """The narrowest gap that one of some points of the walls makes with the walls across.
+    """The narrowest gap between one of some points of the walls and the walls across the floor.
 
     Args:
         workspace: The floor W [m].
@@ -47,27 +50,27 @@ def narrowest_gap(workspace: Polygon, walls: Sequence[FloatArray]) -> Gap | None
         The gap, None where no wall faces any of the points.
     """
     edges = edges_of(orient(workspace))  # The floor lies to the left of every edge.
-    floor = workspace.buffer(_AWAY, join_style="mitre")
-    gaps = [gap for wall in walls for gap in _gaps(edges, floor, wall)[:1]]
-    return min(gaps, key=lambda gap: gap.width, default=None)
+    floor = workspace.buffer(AWAY, join_style="mitre")
+    gaps = [_gap(edges, floor, wall) for wall in walls]
+    return min((gap for gap in gaps if gap is not None), key=lambda gap: gap.width, default=None)
 
 
-def _gaps(edges: FloatArray, floor: Polygon, wall: FloatArray) -> list[Gap]:
-    """The narrowest gap at one point of the walls, as a list of at most one."""
+def _gap(edges: FloatArray, floor: Polygon, wall: FloatArray) -> Gap | None:
+    """The narrowest gap at one point of the walls."""
     start, along = edges[:, :2], edges[:, 2:] - edges[:, :2]
     length = np.maximum(np.hypot(*along.T), 1e-12)
     inward = np.column_stack((-along[:, 1], along[:, 0])) / length[:, None]
-    share = np.clip(((wall - start) * along).sum(axis=1) / length**2, 0.0, 1.0)
-    across = start + share[:, None] * along
+    fraction = np.clip(((wall - start) * along).sum(axis=1) / length**2, 0.0, 1.0)
+    across = start + fraction[:, None] * along
     away = across - wall
     width = np.hypot(*away.T)
     direction = away / np.maximum(width, 1e-12)[:, None]
-    own = inward[width <= _AWAY]  # Normals of the edges that the point itself lies on: two at a corner.
-    faced = (direction @ own.T).max(axis=1, initial=-1.0) >= _FACING
-    facing = (inward * direction).sum(axis=1) <= -_FACING
+    own = inward[width <= AWAY]  # Normals of the edges that the point itself lies on: two at a corner.
+    faced = (direction @ own.T).max(axis=1, initial=-1.0) >= FACING
+    facing = (inward * direction).sum(axis=1) <= -FACING
     for index in np.argsort(width, kind="stable"):
-        if faced[index] and facing[index] and width[index] > _AWAY:
+        if faced[index] and facing[index] and width[index] > AWAY:
             line = LineString([wall, across[index]])
             if floor.covers(line):
-                return [Gap(wall, across[index])]
-    return []
+                return Gap(wall, across[index])
+    return None

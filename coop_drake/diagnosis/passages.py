@@ -1,168 +1,123 @@
-"""Stretches of a way that stick out of the floor, with the bodies that do so and the angles at which."""
+"""Which passages must be widened, and each by how much."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-
-import numpy as np
-import shapely
-from numpy.typing import NDArray
-from shapely.geometry.base import BaseGeometry
+from dataclasses import dataclass, replace
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.diagnosis.contacts import Contact, contacts
-from coop_drake.diagnosis.gap import Gap, narrowest_gap
-from coop_drake.geometry.swept_tree import Interval
-from coop_drake.planning.questions.margins import exact_footprint
+from coop_drake.diagnosis.path_collisions import CollidingStretch, colliding_stretches
+from coop_drake.diagnosis.variants import Answer, BudgetedPlanner
+from coop_drake.diagnosis.widened_floor import WidenedFloor
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BodyAtFault", "Stretch", "stretches"]
+__all__ = ["BlockingPassage", "UniformWidening", "blocking_passages"]
 
-_NOTICED = 0.05
-_APART = 0.3
-_LEAD = 0.15
-_ROOM = 0.15
+MOST = 4
+"""Passages that are widened together at most [-]."""
 
-
-@dataclass(frozen=True)
-class BodyAtFault:
-    """A body that sticks out of the floor on a stretch.
-
-    Attributes:
-        name: Its name.
-        robot: Its robot, None for the object.
-        depth: How far it sticks out at most [m].
-        axes: Names of the axes that move it: ``theta`` and the joints between it and the object.
-        intervals: Interval of each of these over the configurations at which it sticks out [rad or m].
-    """
-
-    name: str
-    robot: int | None
-    depth: float
-    axes: tuple[str, ...]
-    intervals: tuple[Interval, ...]
+SLACKS = (1.0, 2.0, 4.0)
+"""Amounts tried beyond what the path needs in a passage, in units of the slack that it has everywhere [-]."""
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """One stretch of a way on which the team sticks out of the floor.
+class BlockingPassage:
+    """A passage that blocks.
 
     Attributes:
-        configuration: Where it sticks out most on two sides together, shape (3 + n,) [m, rad].
-        contacts: What sticks out there, the deepest first.
-        gap: The walls that pinch it there, None if only one wall is in the way.
-        bodies: All bodies that stick out on the stretch, the deepest first.
-        limits: Names of the joints that reach a limit on the stretch.
-        zone: The floor that the team takes on the stretch, and some room around it, in W [m].
-        squeeze: How far the team sticks out there, both sides together [m].
+        stretch: The stretch of the path in it: where, which bodies collide, at which angles.
+        enough: A distance of moving its walls back with which a channel was found, the other passages widened
+            by theirs [m].
+        refuted: A distance that was proved not to be enough, whatever is done elsewhere up to ``enough``
+            there; None if nothing was proved [m].
     """
 
-    configuration: FloatArray
-    contacts: tuple[Contact, ...]
-    gap: Gap | None
-    bodies: tuple[BodyAtFault, ...]
-    limits: tuple[str, ...]
-    zone: BaseGeometry
-    squeeze: float
+    stretch: CollidingStretch
+    enough: float
+    refuted: float | None
 
 
-def stretches(problem: PlanningProblem, way: FloatArray) -> list[Stretch]:
-    """The stretches of a way on which the team sticks out of the floor, in the way's order.
+@dataclass(frozen=True)
+class UniformWidening:
+    """What is known about moving all walls back by one distance.
 
-    What sticks out by less than a twentieth of the worst is left out.
+    Attributes:
+        refuted: Largest distance that was proved not to be enough, None if none was [m].
+        enough: A distance with which a channel was found [m].
+        path: A path in that channel, away from the walls where it can be, shape (m, 3 + n).
+        needed: How far that path leaves the floor as it is [m].
+    """
+
+    refuted: float | None
+    enough: float
+    path: FloatArray
+    needed: float
+
+
+def blocking_passages(
+    problem: PlanningProblem, floor: WidenedFloor, everywhere: UniformWidening, planner: BudgetedPlanner
+) -> tuple[list[BlockingPassage], bool]:
+    """Choose the passages that have to be widened, and say by how much.
+
+    Those in which the path leaves the floor most are widened first, until a channel is found.
 
     Args:
-        problem: The question, with the floor as it is.
-        way: Configurations from start to goal, shape (m, 3 + n) [m, rad].
+        problem: The problem with the floor as it is.
+        floor: Moves walls back.
+        everywhere: What is known about moving all walls back.
+        planner: Answers variants.
+
+    Returns:
+        The passages in the order of the path, and whether a channel was found with only these widened.
     """
-    found = [contacts(problem.workspace, problem.tree, z) for z in way]
-    out = np.array([max((contact.depth for contact in here), default=0.0) for here in found])
-    along = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(way[:, :2], axis=0).T))))
-    least = _NOTICED * float(out.max())
-    found = [[contact for contact in here if contact.depth > least] for here in found]
-    return [_stretch(problem, way, found, rows, along) for rows in _runs(out > least, along)]
+    found = colliding_stretches(problem, everywhere.path)
+    choice = _Choice(problem, floor, everywhere, planner)
+    ranked = sorted(range(len(found)), key=lambda k: (-found[k].bodies[0].depth, k))
+    for count in range(1, min(len(ranked), MOST) + 1):
+        chosen = [found[k] for k in sorted(ranked[:count])]
+        amounts = choice.enough(chosen)
+        if amounts is not None:
+            return choice.needed(chosen, amounts), True
+    return [BlockingPassage(stretch, everywhere.enough, None) for stretch in found], False
 
 
-def _runs(noticed: NDArray[np.bool_], along: FloatArray) -> list[list[int]]:
-    """Rows that are noticed, cut where the way between two of them is long."""
-    rows = np.flatnonzero(noticed)
-    if len(rows) == 0:
-        return []
-    gaps = (np.diff(along[rows]) > _APART) & (np.diff(rows) > 1)
-    return [[int(row) for row in run] for run in np.split(rows, np.flatnonzero(gaps) + 1)]
+@dataclass(frozen=True)
+class _Choice:
+    """Asks about floors that are widened around some stretches only."""
 
+    problem: PlanningProblem
+    floor: WidenedFloor
+    everywhere: UniformWidening
+    planner: BudgetedPlanner
 
-def _stretch(
-    problem: PlanningProblem,
-    way: FloatArray,
-    found: Sequence[Sequence[Contact]],
-    rows: Sequence[int],
-    along: FloatArray,
-) -> Stretch:
-    squeezes = [_squeeze(found[row]) for row in rows]
-    tightest = rows[squeezes.index(max(squeezes))]
-    touched = [contact.wall for contact in found[tightest]]
-    lead = (along >= along[rows[0]] - _LEAD) & (along <= along[rows[-1]] + _LEAD)
-    taken = shapely.union_all([exact_footprint(problem.tree, z) for z in way[lead]])
-    return Stretch(
-        configuration=way[tightest],
-        contacts=tuple(found[tightest]),
-        gap=narrowest_gap(problem.workspace, touched),
-        bodies=_bodies(problem, way, found, rows),
-        limits=_limits(problem, way[rows]),
-        zone=taken.buffer(_ROOM, quad_segs=4),
-        squeeze=max(squeezes),
-    )
+    def enough(self, chosen: Sequence[CollidingStretch]) -> list[float] | None:
+        """Amounts with which a channel is found, along the known path or anywhere; None if none are."""
+        most = self.everywhere.enough
+        slack = most - self.everywhere.needed
+        for factor in SLACKS:
+            amounts = [min(most, stretch.bodies[0].depth + factor * slack) for stretch in chosen]
+            outcome = self.planner.prove(self._widened(chosen, amounts), self.everywhere.path)
+            if outcome.answer is Answer.FOUND:
+                return amounts
+        amounts = [most] * len(chosen)
+        return amounts if self._ask(chosen, amounts) is Answer.FOUND else None
 
+    def needed(self, chosen: Sequence[CollidingStretch], amounts: Sequence[float]) -> list[BlockingPassage]:
+        """The passages without those that need no widening once the others are widened."""
+        if len(chosen) == 1:
+            return [BlockingPassage(chosen[0], amounts[0], self.everywhere.refuted)]
+        passages = []
+        for k, (stretch, amount) in enumerate(zip(chosen, amounts, strict=True)):
+            others = [*chosen[:k], *chosen[k + 1 :]], [*amounts[:k], *amounts[k + 1 :]]
+            answer = self._ask(*others)
+            if answer is Answer.FOUND:
+                return self.needed(*others)
+            passages.append(BlockingPassage(stretch, amount, 0.0 if answer is Answer.INFEASIBLE else None))
+        return passages
 
-def _squeeze(found: Sequence[Contact]) -> float:
-    """How far two contacts on different sides reach together; in a gap that does not depend on the place."""
-    best = found[0].depth
-    for number, first in enumerate(found):
-        out = (first.point - first.wall) / first.depth
-        for second in found[number + 1 :]:
-            if float(out @ (second.point - second.wall)) < 0.0:
-                best = max(best, first.depth + second.depth)
-    return best
+    def _ask(self, chosen: Sequence[CollidingStretch], amounts: Sequence[float]) -> Answer:
+        return self.planner.ask(self._widened(chosen, amounts), "widening the passages").answer
 
-
-def _bodies(
-    problem: PlanningProblem, way: FloatArray, found: Sequence[Sequence[Contact]], rows: Sequence[int]
-) -> tuple[BodyAtFault, ...]:
-    places: dict[str, list[int]] = {}
-    worst: dict[str, Contact] = {}
-    for row in rows:
-        for contact in found[row]:
-            places.setdefault(contact.body, []).append(row)
-            if contact.body not in worst or contact.depth > worst[contact.body].depth:
-                worst[contact.body] = contact
-    bodies = []
-    for name, contact in worst.items():
-        columns, axes = _axes(problem, name)
-        values = way[places[name]][:, columns]
-        intervals = tuple(
-            (float(low), float(high))
-            for low, high in zip(values.min(axis=0), values.max(axis=0), strict=True)
-        )
-        bodies.append(BodyAtFault(name, contact.robot, contact.depth, axes, intervals))
-    return tuple(sorted(bodies, key=lambda body: (-body.depth, body.name)))
-
-
-def _axes(problem: PlanningProblem, name: str) -> tuple[list[int], tuple[str, ...]]:
-    """Columns of z that turn a body against the floor, and their names."""
-    tree = problem.tree
-    (index,) = [i for i, c in enumerate(tree.components) if any(body.name == name for body in c.bodies)]
-    joints = [tree.components[i].joint for i in tree.ancestors[index]]
-    moving = sorted((joint for joint in joints if joint is not None), key=lambda joint: joint.index)
-    return [2, *(3 + joint.index for joint in moving)], ("theta", *(joint.name for joint in moving))
-
-
-def _limits(problem: PlanningProblem, way: FloatArray) -> tuple[str, ...]:
-    """Joints that come within a fiftieth of their range of a limit."""
-    near = []
-    for joint in problem.tree.joints:
-        values, hair = way[:, 3 + joint.index], 0.02 * (joint.upper - joint.lower)
-        if values.min() <= joint.lower + hair or values.max() >= joint.upper - hair:
-            near.append(joint.name)
-    return tuple(near)
+    def _widened(self, chosen: Sequence[CollidingStretch], amounts: Sequence[float]) -> PlanningProblem:
+        zones = [(stretch.zone, amount) for stretch, amount in zip(chosen, amounts, strict=True)]
+        return replace(self.problem, workspace=self.floor.around(zones))

@@ -1,4 +1,4 @@
-"""One picture that says why not: the floor, the walls that pinch, the team where it is tightest."""
+"""The picture of a diagnosis: the floor, the walls on both sides of a passage, the team where it collides."""
 
 from __future__ import annotations
 
@@ -11,24 +11,29 @@ from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.diagnosis.blocking import Passage
-from coop_drake.diagnosis.diagnosis import Diagnosis
+from coop_drake.diagnosis.findings import Diagnosis
+from coop_drake.diagnosis.passages import BlockingPassage
 from coop_drake.drawing import draw_polygon, draw_workspace, new_figure, team_footprints
 from coop_drake.drawing.colours import AT_FAULT, BLUE, GREY, INK, NOT_AT_FAULT, OUTSIDE, PAPER, WALL
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["diagnosis_figure"]
 
-_MOST_PANELS = 3
-_ROOM = 0.35
-_SIDE = 4.8  # Height of every part [in].
+MOST_PLACES = 3
+"""Places that are shown enlarged at most: more would be too small to read [-]."""
+
+BORDER = 0.35
+"""Border around the team in an enlarged place [m]."""
+
+SIDE = 4.8
+"""Height of every panel [in]."""
 
 
 def diagnosis_figure(problem: PlanningProblem, diagnosis: Diagnosis) -> Figure | None:
-    """Draw the whole floor with what blocks, and every blocking place enlarged beside it.
+    """Draw the whole floor, and every place that blocks enlarged beside it.
 
     Args:
-        problem: The question.
+        problem: The problem.
         diagnosis: Its diagnosis.
 
     Returns:
@@ -37,10 +42,10 @@ def diagnosis_figure(problem: PlanningProblem, diagnosis: Diagnosis) -> Figure |
     places = _places(diagnosis)
     if not places:
         return None
-    places = places[:_MOST_PANELS]
+    places = places[:MOST_PLACES]
     x_min, y_min, x_max, y_max = problem.workspace.bounds
     wide = min(2.0, max(0.5, (x_max - x_min + 0.6) / (y_max - y_min + 0.6)))
-    figure = new_figure(_SIDE * (wide + len(places)) + 1.0, _SIDE + 0.9, _caption(diagnosis))
+    figure = new_figure(SIDE * (wide + len(places)) + 1.0, SIDE + 0.9, _caption(diagnosis))
     engine = figure.get_layout_engine()
     if isinstance(engine, ConstrainedLayoutEngine):
         engine.set(rect=(0.01, 0.09, 0.98, 0.88))
@@ -65,7 +70,7 @@ def _goal_title(diagnosis: Diagnosis) -> str:
     return "the goal is blocked" + (f", by {max(depths):.3f} m" if depths else "")
 
 
-def _places(diagnosis: Diagnosis) -> list[tuple[FloatArray, frozenset[str], Passage | None]]:
+def _places(diagnosis: Diagnosis) -> list[tuple[FloatArray, frozenset[str], BlockingPassage | None]]:
     """Configurations to show, with the bodies at fault."""
     if diagnosis.goal is not None:
         goal = diagnosis.goal
@@ -82,18 +87,18 @@ def _places(diagnosis: Diagnosis) -> list[tuple[FloatArray, frozenset[str], Pass
 
 def _caption(diagnosis: Diagnosis) -> str:
     return (
-        "Bodies in orange stick out of the floor somewhere in the passage, dark red is what lies outside "
-        "where they are shown; the blue line is the object's way with the walls moved back."
+        "Orange bodies collide with a wall in the passage; dark red is what lies behind the wall here. "
+        "The blue line is the object's path with the walls moved back."
         if diagnosis.passages is not None
-        else "Bodies in orange are in the way at the goal, dark red is what lies outside the floor."
+        else "Orange bodies collide at the goal; dark red is what lies behind a wall."
     )
 
 
 def _overview(ax: Axes, problem: PlanningProblem, diagnosis: Diagnosis, places: list[FloatArray]) -> None:
     draw_workspace(ax, problem.workspace)
-    if diagnosis.passages is not None and diagnosis.passages.way is not None:
-        way = diagnosis.passages.way
-        ax.plot(way[:, 0], way[:, 1], color=BLUE, linewidth=1.6, zorder=4)
+    if diagnosis.passages is not None and diagnosis.passages.path is not None:
+        path = diagnosis.passages.path
+        ax.plot(path[:, 0], path[:, 1], color=BLUE, linewidth=1.6, zorder=4)
     for label, pose in (("start", problem.start), ("goal", problem.goal_pose)):
         ax.plot(pose[0], pose[1], "o", color=INK, markersize=5, zorder=6)
         ax.annotate(label, _xy(pose), xytext=(6, 5), textcoords="offset points", zorder=6, fontweight="bold")
@@ -122,7 +127,7 @@ def _enlarged(ax: Axes, problem: PlanningProblem, z: FloatArray, bodies: frozens
         outside = footprint.shape.difference(problem.workspace)
         for part in _areas(outside):
             draw_polygon(ax, part, facecolor=OUTSIDE, edgecolor=OUTSIDE, linewidth=1.5, zorder=5)
-    reach = max(_reach(problem, z), 0.5) + _ROOM
+    reach = max(_reach(problem, z), 0.5) + BORDER
     ax.set_xlim(z[0] - reach, z[0] + reach)
     ax.set_ylim(z[1] - reach, z[1] + reach)
 
@@ -139,7 +144,7 @@ def _reach(problem: PlanningProblem, z: FloatArray) -> float:
     return max(centre.hausdorff_distance(footprint.shape) for footprint in team_footprints(problem.tree, z))
 
 
-def _mark_gap(ax: Axes, passage: Passage) -> str:
+def _mark_gap(ax: Axes, passage: BlockingPassage) -> str:
     """Draw the two wall points, the width between them and what is missing; returns the title."""
     gap = passage.stretch.gap
     missing = f"{2.0 * passage.enough:.3f} m more is enough"

@@ -1,14 +1,15 @@
-"""Changes to the team that may make a question feasible, each by as little as is found enough."""
+"""Changes to the team that may make a problem feasible, each alone and by as little as is found enough."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from math import pi
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.diagnosis.bracket import Bracket, Steps, bracketed
-from coop_drake.diagnosis.squeeze import squeezed
+from coop_drake.diagnosis.bracket import Amounts, Bracket, bracketed
+from coop_drake.diagnosis.smaller_changes import least_change
 from coop_drake.diagnosis.team_changes import (
     base_bodies,
     object_bodies,
@@ -16,25 +17,28 @@ from coop_drake.diagnosis.team_changes import (
     shrunk_bodies,
     widened_joints,
 )
-from coop_drake.diagnosis.trials import Trial, Trials
+from coop_drake.diagnosis.variants import BudgetedPlanner, Outcome
 from coop_drake.tree.component_tree import ComponentTree
 
-__all__ = ["Change", "Relaxation", "changes", "try_changes"]
+__all__ = ["Relaxation", "TeamChange", "changes", "try_changes"]
 
-_MOST_SHRINKAGE = 0.7
-_SHRINKAGE_RESOLUTION = 0.02
-_MOST_WIDENING = pi / 2
-_WIDENING_RESOLUTION = 0.05
-_TRIALS = 5
+MOST_SHRINKAGE, SHRINKAGE_RESOLUTION = 0.7, 0.02
+"""Bodies are made smaller by up to this fraction of their size, looked for this closely [-]."""
+
+MOST_WIDENING, WIDENING_RESOLUTION = pi / 2, 0.05
+"""Joint ranges are widened by up to this at either limit, looked for this closely [rad]."""
+
+ASKED = 5
+"""Amounts of one change that are tried at most [-]."""
 
 
 @dataclass(frozen=True)
-class Change:
+class TeamChange:
     """One kind of change to the team.
 
     Attributes:
         name: What it is called.
-        unit: What its amounts count: ``share`` of all lengths of a body, or ``rad`` at either limit.
+        unit: Unit of its amounts: ``share``, a fraction of all lengths of a body, or ``rad`` at either limit.
         tree: The team with an amount of the change.
         most: Largest amount tried.
         resolution: How closely the least amount is looked for.
@@ -51,14 +55,14 @@ class Change:
 
 @dataclass(frozen=True)
 class Relaxation:
-    """What was computed about one kind of change alone.
+    """What was computed about one change alone.
 
     Attributes:
         change: The change.
         bracket: Amounts proved not to be enough and found to be enough.
     """
 
-    change: Change
+    change: TeamChange
     bracket: Bracket
 
     @property
@@ -67,56 +71,53 @@ class Relaxation:
         return self.change.monotone and self.bracket.is_refuted
 
 
-def changes(tree: ComponentTree) -> list[Change]:
+def changes(tree: ComponentTree) -> list[TeamChange]:
     """The changes that make sense for a team."""
-    bases, carried = base_bodies(tree), object_bodies(tree)
 
-    def shrinking(name: str, bodies: frozenset[str]) -> Change:
-        return Change(
+    def shrinking(name: str, bodies: frozenset[str]) -> TeamChange:
+        return TeamChange(
             name,
             "share",
-            lambda a: shrunk_bodies(tree, bodies, 1.0 - a),
-            _MOST_SHRINKAGE,
-            _SHRINKAGE_RESOLUTION,
+            lambda amount: shrunk_bodies(tree, bodies, 1.0 - amount),
+            MOST_SHRINKAGE,
+            SHRINKAGE_RESOLUTION,
             shrink_into_themselves(tree, bodies),
         )
 
-    listed = [shrinking("smaller bases", bases)] if bases else []
-    listed += [shrinking("smaller object", carried)] if carried else []
+    kinds = (("smaller bases", base_bodies(tree)), ("smaller object", object_bodies(tree)))
+    listed = [shrinking(name, bodies) for name, bodies in kinds if bodies]
     if tree.joints:
-        wider = Change(
-            "wider joint range",
-            "rad",
-            lambda a: widened_joints(tree, a),
-            _MOST_WIDENING,
-            _WIDENING_RESOLUTION,
-        )
-        listed.append(wider)
+        name, wider = "wider joint range", partial(widened_joints, tree)
+        listed.append(TeamChange(name, "rad", wider, MOST_WIDENING, WIDENING_RESOLUTION))
     return listed
 
 
-def try_changes(problem: PlanningProblem, trials: Trials, *, refuted: bool) -> list[Relaxation]:
+def try_changes(problem: PlanningProblem, planner: BudgetedPlanner, *, refuted: bool) -> list[Relaxation]:
     """Bracket every change alone; the largest amount comes first, as most changes do not help at all.
 
     Args:
-        problem: The question as it is.
-        trials: Keeps account of the work.
+        problem: The problem as it is.
+        planner: Answers variants.
         refuted: Whether it was proved infeasible as it is.
     """
     return [
-        Relaxation(change, _bracket(problem, change, trials, 0.0 if refuted else None))
+        Relaxation(change, _bracket(problem, change, planner, 0.0 if refuted else None))
         for change in changes(problem.tree)
     ]
 
 
-def _bracket(problem: PlanningProblem, change: Change, trials: Trials, refuted: float | None) -> Bracket:
-    def varied(amount: float) -> PlanningProblem:
+def _bracket(
+    problem: PlanningProblem, change: TeamChange, planner: BudgetedPlanner, refuted: float | None
+) -> Bracket:
+    def eased(amount: float) -> PlanningProblem:
         return replace(problem, tree=change.tree(amount))
 
-    def improve(amount: float, trial: Trial) -> tuple[float, Trial]:
-        return squeezed(varied, amount, trial, trials, change.resolution)
+    def improve(amount: float, outcome: Outcome) -> tuple[float, Outcome]:
+        return least_change(eased, amount, outcome, planner, change.resolution)
 
-    steps = Steps(change.most, change.most, change.resolution, trials=_TRIALS)
     return bracketed(
-        lambda amount: trials.ask(varied(amount), change.name), steps, refuted=refuted, improve=improve
+        lambda amount: planner.ask(eased(amount), change.name),
+        Amounts(change.most, change.most, change.resolution, asked=ASKED),
+        refuted=refuted,
+        improve=improve,
     )

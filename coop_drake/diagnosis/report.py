@@ -1,18 +1,18 @@
-"""A diagnosis in words and in numbers."""
+"""A diagnosis in sentences, as rows of a table, and as plain numbers."""
 
 from __future__ import annotations
 
 from math import degrees
 from typing import Any
 
-from coop_drake.diagnosis.blocking import Passage
-from coop_drake.diagnosis.bodies import WithoutWalls
 from coop_drake.diagnosis.bracket import Bracket
-from coop_drake.diagnosis.diagnosis import BlockedPose, Diagnosis, PassageFindings
-from coop_drake.diagnosis.mixed import mixed_facts, mixed_sentences
-from coop_drake.diagnosis.passages import BodyAtFault
+from coop_drake.diagnosis.findings import BlockedPose, Diagnosis, PassageFindings
+from coop_drake.diagnosis.mixed_cells import mixed_facts, mixed_sentences
+from coop_drake.diagnosis.open_floor import OpenFloor
+from coop_drake.diagnosis.passages import BlockingPassage
+from coop_drake.diagnosis.path_collisions import BodyAtFault
 from coop_drake.diagnosis.relaxations import Relaxation
-from coop_drake.diagnosis.trials import Answer
+from coop_drake.diagnosis.variants import Answer
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["facts_of", "rows_of", "sentences_of"]
@@ -21,7 +21,7 @@ Row = tuple[str, str]
 
 
 def sentences_of(diagnosis: Diagnosis) -> list[str]:
-    """What was found, in sentences; proved and merely found things are told apart."""
+    """The findings in sentences; what is proved and what was merely found are told apart."""
     if diagnosis.answer is Answer.FOUND:
         return [f"Feasible: a channel was found that keeps {diagnosis.margin:.3f} m from the walls."]
     known = "Infeasible, proved" if diagnosis.answer is Answer.INFEASIBLE else "Undecided"
@@ -36,47 +36,44 @@ def sentences_of(diagnosis: Diagnosis) -> list[str]:
 
 
 def _passage_sentences(findings: PassageFindings) -> list[str]:
-    growth = findings.growth
-    if growth.found is None:
-        known = "proved not to be" if growth.is_refuted else "not found"
-        back = f"Moving every wall back by up to {growth.most:.3f} m was {known} enough."
-        return [back, *_bare_sentences(findings.bare)]
-    back = f"Moving every wall back by {growth.found:.3f} m was found enough"
-    back += f", by {growth.refuted:.3f} m proved too little." if growth.refuted else "."
-    if not findings.passages:
-        return [back]
-    count = len(findings.passages)
-    many = "One passage blocks" if count == 1 else f"{count} passages block"
-    alone = "widening it alone" if count == 1 else "widening these alone"
-    enough = f"{alone} was found enough" if findings.are_enough else f"{alone} was not found enough"
-    sentences = [back, f"{many}; {enough}."]
-    for number, passage in enumerate(findings.passages, start=1):
-        sentences.append(f"Passage {number}: {_where(passage)}, {_missing(passage)}.")
-    return sentences
-
-
-def _bare_sentences(bare: WithoutWalls | None) -> list[str]:
-    if bare is None:
-        return []
-    if bare.answer is Answer.FOUND:
-        return ["Without any walls there is a way: the walls block by more than was tried."]
-    known = "exists, proved" if bare.answer is Answer.INFEASIBLE else "was found"
-    sentences = [f"Even without walls no way {known}: the bodies may be in each other's way."]
-    sentences += [
-        f"If {first} and {second} could overlap, there would be one." for first, second in bare.pairs
+    widening, count = findings.widening, len(findings.passages)
+    if widening.found is None:
+        known = "proved not to be" if widening.is_refuted else "not found"
+        back = f"Moving every wall back by up to {widening.most:.3f} m was {known} enough."
+        return [back, *_open_floor_sentences(findings.open_floor)]
+    if not count:
+        refuted = f", by {widening.refuted:.3f} m proved too little" if widening.refuted else ""
+        return [f"Moving every wall back by {widening.found:.3f} m was found enough{refuted}."]
+    sentences = [
+        f"Passage {number} blocks: {_where(passage)}. {_missing(passage)}."
+        for number, passage in enumerate(findings.passages, start=1)
     ]
-    return sentences
+    known = "found" if findings.are_enough else "not found"
+    these = "this passage" if count == 1 else f"these {count} passages"
+    return [*sentences, f"Widening only {these} was {known} enough."]
 
 
-def _where(passage: Passage) -> str:
+def _open_floor_sentences(floor: OpenFloor | None) -> list[str]:
+    if floor is None:
+        return []
+    if floor.answer is Answer.FOUND:
+        return ["Without any walls there is a path: the walls must move back by more than was tried."]
+    known = "exists, proved" if floor.answer is Answer.INFEASIBLE else "was found"
+    sentences = [f"Even without walls no path {known}: the bodies may be in each other's way."]
+    return sentences + [
+        f"If {first} and {second} could overlap, there would be one." for first, second in floor.pairs
+    ]
+
+
+def _where(passage: BlockingPassage) -> str:
     gap = passage.stretch.gap
     if gap is None:
         return f"at {_point(passage.stretch.contacts[0].wall)}"
     return f"{gap.width:.3f} m wide between {_point(gap.first)} and {_point(gap.second)}"
 
 
-def _missing(passage: Passage) -> str:
-    enough = f"{2.0 * passage.enough:.3f} m more was found enough"
+def _missing(passage: BlockingPassage) -> str:
+    enough = f"{2.0 * passage.enough:.3f} m more width was found enough"
     if passage.refuted:
         return f"{enough}, {2.0 * passage.refuted:.3f} m more was proved too little"
     if passage.refuted is None:
@@ -86,16 +83,15 @@ def _missing(passage: Passage) -> str:
 
 def _goal_sentences(goal: BlockedPose) -> list[str]:
     sentences = [
-        f"At the goal {contact.body} sticks out of the floor by {contact.depth:.3f} m "
-        f"at the wall point {_point(contact.wall)}."
+        f"At the goal {contact.body} is {contact.depth:.3f} m behind the wall at {_point(contact.wall)}."
         for contact in goal.contacts
     ]
     sentences += [
         f"At the goal {overlap.bodies[0]} and {overlap.bodies[1]} overlap by {overlap.depth:.3f} m."
         for overlap in goal.overlaps
     ]
-    if goal.retreat.found is not None:
-        sentences.append(f"With every wall moved back by {goal.retreat.found:.3f} m the goal is free.")
+    if goal.widening.found is not None:
+        sentences.append(f"With every wall moved back by {goal.widening.found:.3f} m the goal is free.")
     return sentences
 
 
@@ -106,23 +102,13 @@ def rows_of(diagnosis: Diagnosis) -> list[Row]:
         rows.append(("margin kept", f"{diagnosis.margin:.3f} m"))
     findings = diagnosis.passages
     for number, passage in enumerate(findings.passages if findings is not None else (), start=1):
-        rows += [(f"passage {number}", _where(passage)), ("  missing width", _range(passage))]
-        rows += [("  sticks out", _body(body)) for body in passage.stretch.bodies]
+        proved = "unknown" if passage.refuted is None else f"{2.0 * passage.refuted:.3f}"
+        missing = f"more than {proved} m, at most {2.0 * passage.enough:.3f} m"
+        rows += [(f"passage {number}", _where(passage)), ("  missing width", missing)]
+        rows += [("  in collision", _body(body)) for body in passage.stretch.bodies]
         if passage.stretch.limits:
             rows.append(("  joints at a limit", ", ".join(passage.stretch.limits)))
-        rows.append(("wider passage", f"by {2.0 * passage.enough:.3f} m round {_centre(passage)}"))
-    rows += [(relaxation.change.name, _relaxation(relaxation)) for relaxation in diagnosis.relaxations]
-    return rows
-
-
-def _range(passage: Passage) -> str:
-    lower = "unknown" if passage.refuted is None else f"{2.0 * passage.refuted:.3f}"
-    return f"more than {lower} m, at most {2.0 * passage.enough:.3f} m"
-
-
-def _centre(passage: Passage) -> str:
-    gap = passage.stretch.gap
-    return _point(passage.stretch.contacts[0].wall if gap is None else 0.5 * (gap.first + gap.second))
+    return rows + [(relaxation.change.name, _relaxation(relaxation)) for relaxation in diagnosis.relaxations]
 
 
 def _body(body: BodyAtFault) -> str:
@@ -132,28 +118,24 @@ def _body(body: BodyAtFault) -> str:
         else f"{name} {low:.2f} to {high:.2f}"
         for name, (low, high) in zip(body.axes, body.intervals, strict=True)
     )
-    return f"{body.name} by {body.depth:.3f} m at {angles}"
+    return f"{body.name}, {body.depth:.3f} m deep, at {angles}"
 
 
 def _relaxation(relaxation: Relaxation) -> str:
-    bracket = relaxation.bracket
+    bracket, by = relaxation.bracket, relaxation.change.unit == "share"
+
+    def amount(value: float) -> str:
+        return f"{100.0 * value:.0f} % smaller" if by else f"{value:.2f} rad more at either limit"
+
     if bracket.found is not None:
-        too_little = (
-            "" if not bracket.refuted else f" ({_amount(relaxation, bracket.refuted)} proved too little)"
-        )
-        return f"enough by {_amount(relaxation, bracket.found)}{too_little}"
-    known = "proved" if relaxation.never_enough else "not found"
-    return f"not by this alone ({known} up to {_amount(relaxation, bracket.most)})"
-
-
-def _amount(relaxation: Relaxation, amount: float) -> str:
-    if relaxation.change.unit == "share":
-        return f"{100.0 * amount:.0f} % of their size"
-    return f"{amount:.2f} rad at either limit"
+        too_little = f" ({amount(bracket.refuted)} is proved too little)" if bracket.refuted else ""
+        return f"{amount(bracket.found)} is enough{too_little}"
+    known = "proved" if relaxation.never_enough else "nothing found"
+    return f"not enough alone ({known} up to {amount(bracket.most)})"
 
 
 def facts_of(diagnosis: Diagnosis) -> dict[str, Any]:
-    """The same as plain numbers, texts, lists and dictionaries, by the names that machines read."""
+    """The findings as numbers, texts, lists and dictionaries, by the names that machines read."""
     facts: dict[str, Any] = {
         "answer": diagnosis.answer.value,
         "reason": diagnosis.reason,
@@ -161,27 +143,35 @@ def facts_of(diagnosis: Diagnosis) -> dict[str, Any]:
         "margin_m": diagnosis.margin,
         "sentences": sentences_of(diagnosis),
     }
-    findings = diagnosis.passages
+    findings, goal = diagnosis.passages, diagnosis.goal
     if findings is not None:
-        facts["walls_moved_back_m"] = _bracket_facts(findings.growth)
+        facts["walls_moved_back_m"] = _bracket_facts(findings.widening)
         facts["way_sticks_out_m"] = findings.needed
         facts["widening_passages_is_enough"] = findings.are_enough
-        if findings.bare is not None:
-            pairs = [list(pair) for pair in findings.bare.pairs]
-            facts["without_walls"] = {"answer": findings.bare.answer.value, "pairs_in_the_way": pairs}
+        if findings.open_floor is not None:
+            pairs = [list(pair) for pair in findings.open_floor.pairs]
+            answer = findings.open_floor.answer.value
+            facts["without_walls"] = {"answer": answer, "pairs_in_the_way": pairs}
         facts["passages"] = [_passage_facts(passage) for passage in findings.passages]
-    if diagnosis.goal is not None:
-        facts["goal"] = _goal_facts(diagnosis.goal)
+    if goal is not None:
+        facts["goal"] = {
+            "configuration": goal.configuration.tolist(),
+            "contacts": [
+                {"body": c.body, "sticks_out_m": c.depth, "wall": c.wall.tolist()} for c in goal.contacts
+            ],
+            "overlaps": [{"bodies": list(o.bodies), "depth_m": o.depth} for o in goal.overlaps],
+            "walls_moved_back_m": _bracket_facts(goal.widening),
+        }
     if diagnosis.mixed:
         facts["mixed"] = [mixed_facts(cell) for cell in diagnosis.mixed]
     facts["relaxations"] = [
         {
-            "name": r.change.name,
-            "unit": r.change.unit,
-            **_bracket_facts(r.bracket),
-            "proved_never_enough": r.never_enough,
+            "name": relaxation.change.name,
+            "unit": relaxation.change.unit,
+            **_bracket_facts(relaxation.bracket),
+            "proved_never_enough": relaxation.never_enough,
         }
-        for r in diagnosis.relaxations
+        for relaxation in diagnosis.relaxations
     ]
     return facts
 
@@ -195,14 +185,14 @@ def _bracket_facts(bracket: Bracket) -> dict[str, Any]:
     }
 
 
-def _passage_facts(passage: Passage) -> dict[str, Any]:
+def _passage_facts(passage: BlockingPassage) -> dict[str, Any]:
     stretch, gap = passage.stretch, passage.stretch.gap
     return {
-        "walls": None if gap is None else [_list(gap.first), _list(gap.second)],
+        "walls": None if gap is None else [gap.first.tolist(), gap.second.tolist()],
         "width_m": None if gap is None else gap.width,
         "missing_m_proved_above": None if passage.refuted is None else 2.0 * passage.refuted,
         "missing_m_found_enough": 2.0 * passage.enough,
-        "configuration": _list(stretch.configuration),
+        "configuration": stretch.configuration.tolist(),
         "joints_at_limit": list(stretch.limits),
         "bodies": [
             {
@@ -213,19 +203,6 @@ def _passage_facts(passage: Passage) -> dict[str, Any]:
             for body in stretch.bodies
         ],
     }
-
-
-def _goal_facts(goal: BlockedPose) -> dict[str, Any]:
-    return {
-        "configuration": _list(goal.configuration),
-        "contacts": [{"body": c.body, "sticks_out_m": c.depth, "wall": _list(c.wall)} for c in goal.contacts],
-        "overlaps": [{"bodies": list(o.bodies), "depth_m": o.depth} for o in goal.overlaps],
-        "walls_moved_back_m": _bracket_facts(goal.retreat),
-    }
-
-
-def _list(values: FloatArray) -> list[float]:
-    return [float(value) for value in values]
 
 
 def _point(values: FloatArray) -> str:

@@ -17,19 +17,18 @@ from coop_drake.tree.pose import FloatArray
 
 __all__ = [
     "base_bodies",
-    "body_size",
     "object_bodies",
     "shrink_into_themselves",
     "shrunk_bodies",
     "widened_joints",
 ]
 
-_SLIDE_PER_RADIAN = 0.25
-"""A prismatic joint is widened by so much for every radian of a revolute one [m/rad]."""
+SLIDE_PER_RADIAN = 0.25
+"""Widening of a prismatic joint for every radian of a revolute one: the length of a short link [m/rad]."""
 
 
 def base_bodies(tree: ComponentTree) -> frozenset[str]:
-    """Names of the bases: of every robot the largest body at the end of its arm that is not in the hand."""
+    """Names of the bases: of every robot the largest body of the components that carry no other one."""
     parents = {component.parent for component in tree.components}
     names = []
     for robot in sorted({joint.robot for joint in tree.joints}):
@@ -49,19 +48,11 @@ def object_bodies(tree: ComponentTree) -> frozenset[str]:
     return frozenset(body.name for body in tree.components[0].bodies if body.robot is None)
 
 
-def body_size(body: Body) -> tuple[float, float]:
-    """Longer and shorter side of the least rectangle about a body, equal for a disc [m]."""
-    if len(body.shapes) == 1 and len(body.shapes[0].vertices) == 1:
-        return 2.0 * body.shapes[0].radius, 2.0 * body.shapes[0].radius
-    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(_outline(body)))
-    sides = sorted(float(np.hypot(*side)) for side in np.diff(corners[:3], axis=0))
-    return sides[-1], sides[0]
-
-
 def shrunk_bodies(tree: ComponentTree, names: Collection[str], factor: float) -> ComponentTree:
     """Scale some bodies about a point of their footprint; joints and grasps stay where they are.
 
-    It is the middle, or where all of the footprint is not seen from there, a point from which it is.
+    The point is the centroid of the convex hull if all of the footprint is visible from there, else the
+    centroid of the footprint's kernel, the set of points from which all of it is visible.
 
     Args:
         tree: The team.
@@ -79,7 +70,7 @@ def shrunk_bodies(tree: ComponentTree, names: Collection[str], factor: float) ->
 
 
 def shrink_into_themselves(tree: ComponentTree, names: Collection[str]) -> bool:
-    """Whether some bodies, the smaller they are, need less of the same room: those like a U do not."""
+    """Whether smaller copies of some bodies lie inside larger ones; a U's, for instance, do not."""
     bodies = [body for component in tree.components for body in component.bodies if body.name in names]
     return not any(_kernel(_outline(body)).is_empty for body in bodies)
 
@@ -100,7 +91,7 @@ def widened_joints(tree: ComponentTree, amount: float) -> ComponentTree:
 
 def _widened(joint: TreeJoint, amount: float) -> TreeJoint:
     if joint.kind == "prismatic":
-        slide = _SLIDE_PER_RADIAN * amount
+        slide = SLIDE_PER_RADIAN * amount
         return replace(joint, lower=joint.lower - slide, upper=joint.upper + slide)
     turn = min(amount, max(0.0, pi - 0.5 * (joint.upper - joint.lower)))
     return replace(joint, lower=joint.lower - turn, upper=joint.upper + turn)
@@ -113,7 +104,7 @@ def _outline(body: Body) -> BaseGeometry:
 
 
 def _kernel(outline: BaseGeometry) -> BaseGeometry:
-    """Points from which all of an outline is seen: those to the left of all its edges."""
+    """Points from which all of an outline is visible: those to the left of all its edges."""
     if not isinstance(outline, Polygon) or outline.interiors:
         return Polygon()
     kernel: BaseGeometry = outline.convex_hull
@@ -127,7 +118,7 @@ def _kernel(outline: BaseGeometry) -> BaseGeometry:
 
 
 def _middle(outline: BaseGeometry) -> FloatArray:
-    """The point towards which an outline is shrunk, shape (2,) [m]."""
+    """The point about which an outline is scaled, shape (2,) [m]."""
     centre, kernel = outline.convex_hull.centroid, _kernel(outline)
     place = centre if kernel.is_empty or kernel.covers(centre) else kernel.centroid
     middle: FloatArray = shapely.get_coordinates(place)[0]

@@ -1,4 +1,4 @@
-"""What sticks out, where, by how much; which walls face each other."""
+"""Which bodies leave the floor, where, by how much; which walls face each other."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ ROOM = box(0.0, 0.0, 4.0, 1.0)
 
 
 def lone(shape) -> ComponentTree:
-    return ComponentTree((Component("thing", None, None, (Body("thing", None, (shape,)),)),), frozenset())
+    return ComponentTree((Component("load", None, None, (Body("load", None, (shape,)),)),), frozenset())
 
 
 def test_a_body_too_tall_for_a_room_sticks_out_on_both_sides():
@@ -43,13 +43,13 @@ def test_the_depth_of_an_overlap_is_the_way_out():
     joint = TreeJoint("arm::slide", "prismatic", 0, 0, PlanarPose(), 1.0, (1.0, 0.0), 0.0, 3.0)
     tree = ComponentTree(
         (
-            Component("thing", None, None, (Body("thing", None, (rectangle(-0.5, 0.5, -0.5, 0.5),)),)),
+            Component("load", None, None, (Body("load", None, (rectangle(-0.5, 0.5, -0.5, 0.5),)),)),
             Component("arm", 0, joint, (Body("arm", 0, (disc(0.2),)),)),
         ),
         frozenset(),
     )
     (found,) = overlaps(tree, np.array([0.0, 0.0, 0.0, 0.65]))
-    assert found.bodies == ("thing", "arm")
+    assert found.bodies == ("load", "arm")
     assert found.depth == pytest.approx(0.05)
     assert overlaps(tree, np.array([0.0, 0.0, 0.0, 0.71])) == []
     assert overlaps(team_tree(), np.zeros(5)) == []

@@ -8,11 +8,21 @@ import pytest
 from shapely import box, union_all
 
 from coop_drake.answers import PlannerSettings, PlanningProblem
-from coop_drake.diagnosis import Answer, diagnose, diagnosis_figure, facts_of, sentences_of
-from coop_drake.diagnosis.bodies import without_walls
-from coop_drake.diagnosis.passages import stretches
-from coop_drake.diagnosis.relaxations import try_changes
-from coop_drake.diagnosis.trials import Trials
+from coop_drake.diagnosis import (
+    Answer,
+    diagnose,
+    diagnosing,
+    diagnosis_figure,
+    facts_of,
+    relaxations,
+    sentences_of,
+)
+from coop_drake.diagnosis.diagnosing import SLICES, find_passages
+from coop_drake.diagnosis.open_floor import on_open_floor
+from coop_drake.diagnosis.path_collisions import colliding_stretches
+from coop_drake.diagnosis.relaxations import changes, try_changes
+from coop_drake.diagnosis.variants import BudgetedPlanner
+from coop_drake.diagnosis.widened_floor import WidenedFloor
 from coop_drake.drawing import save_figure
 from coop_drake.planning import Channel, find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
@@ -93,10 +103,11 @@ def test_a_smaller_object_is_bracketed_and_holds_when_planned_again(rod):
     assert not isinstance(answer, Channel)
 
 
-def test_a_joint_range_at_fault_is_found_out():
+def test_a_joint_range_at_fault_is_found_out(monkeypatch):
+    monkeypatch.setattr(relaxations, "changes", lambda tree: changes(tree)[-1:])  # The others are as slow.
     problem = two_rooms(0.3, bent_tree(), (1.1,))
     assert not isinstance(find_channel(problem)[0], Channel)
-    kinds = try_changes(problem, Trials(60, 10_000), refuted=True)
+    kinds = try_changes(problem, BudgetedPlanner(60, 10_000), refuted=True)
     wider = {relaxation.change.name: relaxation for relaxation in kinds}["wider joint range"]
     assert 0.0 <= wider.bracket.refuted < wider.bracket.found < 1.0
     answer, _ = find_channel(replace(problem, tree=wider.change.tree(wider.bracket.found + 0.05)))
@@ -105,10 +116,10 @@ def test_a_joint_range_at_fault_is_found_out():
 
 def test_the_joint_interval_of_a_body_at_fault_is_that_of_its_own_joint():
     problem = two_rooms(0.3, bent_tree(), (1.1,))
-    way = np.array(
+    path = np.array(
         [[-2.5, 0.0, 0.4, 1.1], [0.0, 0.0, -0.5, 1.0], [0.2, 0.0, -0.5, 1.2], [2.5, 0.0, 0.4, 1.1]]
     )
-    (stretch,) = stretches(problem, way)
+    (stretch,) = colliding_stretches(problem, path)
     bodies = {body.name: body for body in stretch.bodies}
     assert bodies["bar"].axes == ("theta",)
     assert bodies["arm"].axes == ("theta", "arm::hinge")
@@ -128,7 +139,8 @@ def test_two_passages_in_a_row_are_both_named_each_with_what_it_misses():
     floor += [box(3.9, 0.91, 6.1, 1.09), box(6, -1.2, 9, 1.2)]
     problem = two_rooms(ROD, rod_tree())
     problem = replace(problem, workspace=union_all(floor), goal_pose=np.array([7.5, 0.0, 0.4]))
-    findings = diagnose(problem).passages
+    floor = WidenedFloor(problem.workspace, problem.start[:2], 0.25)
+    findings = find_passages(problem, floor, BudgetedPlanner(SLICES, 10_000), refuted=True)
     assert findings.are_enough
     assert [passage.stretch.gap.width for passage in findings.passages] == pytest.approx([0.15, 0.18])
     for passage, missing in zip(findings.passages, (0.05, 0.02), strict=True):
@@ -145,7 +157,7 @@ def test_a_team_in_its_own_way_is_told_which_bodies():
     )
     start, goal = np.array([0.0, 0.0, 0.0, -0.5]), np.array([0.5, 0.0, 0.0])
     problem = PlanningProblem(box(-2, -2, 2, 2), ComponentTree(components, frozenset()), start, goal, (0.5,))
-    bare = without_walls(problem, Trials(20, 10_000))
+    bare = on_open_floor(problem, BudgetedPlanner(20, 10_000))
     assert bare.answer is not Answer.FOUND
     assert bare.pairs == (("block", "arm"),)
 
@@ -158,11 +170,13 @@ def test_a_blocked_goal_names_the_body_the_wall_and_the_depth():
     # The hand reaches to x = 7, where the wall is, and the base of that arm stands behind it.
     assert {contact.robot for contact in goal.contacts} == {0}
     assert all(contact.wall[0] == pytest.approx(7.0) for contact in goal.contacts)
-    assert goal.retreat.refuted <= goal.contacts[0].depth <= goal.retreat.found + 1e-3
+    assert goal.widening.refuted <= goal.contacts[0].depth <= goal.widening.found + 1e-3
     assert any("At the goal robot_0" in sentence for sentence in sentences_of(diagnosis))
 
 
-def test_an_undecided_question_says_what_remained_mixed():
+def test_an_undecided_question_says_what_remained_mixed(monkeypatch):
+    monkeypatch.setattr(diagnosing, "find_passages", lambda *_, **__: None)  # They have tests of their own.
+    monkeypatch.setattr(diagnosing, "try_changes", lambda *_, **__: [])
     problem = two_rooms(0.2001, rod_tree())
     tiny = replace(problem, settings=PlannerSettings(max_slices=8))
     diagnosis = diagnose(tiny)

@@ -1,4 +1,4 @@
-"""Floors with more room: walls moved back, everywhere or round one place, but never broken through."""
+"""Wider floors: walls moved back, everywhere or around some places, but never removed."""
 
 from __future__ import annotations
 
@@ -12,28 +12,39 @@ from shapely.geometry.base import BaseGeometry
 
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Growth"]
+__all__ = ["WidenedFloor"]
 
-_SAMPLES = 6_000
-_FINEST = 0.01
-_OPPOSITE = 1.6
-_CORE = 5e-4
-_HAIR = 1e-6
-_MITRE = 5.0
-_BEYOND = 1.5
+SAMPLES, FINEST = 6_000, 0.01
+"""Walls are sampled at this many points, but no closer than this [-, m]."""
+
+OPPOSITE = 1.6
+"""Samples on opposite faces are so many times as far apart as from the middle line; 2 at most [-]."""
+
+CORE = 5e-4
+"""Half of the thickness that is left of a wall, and tolerance of its middle line [m]."""
+
+TINY = 1e-6
+"""Deviation within which corners are left out [m]."""
+
+MITRE = 5.0
+"""Corners stay sharp until they move by more than so many times the distance of the walls [-]."""
+
+BEYOND = 1.5
+"""A middle line ends at the floor if so many times its distance from the walls further on is floor [-]."""
 
 
-class Growth:
+class WidenedFloor:
     """Moves the walls of a floor back.
 
-    Every wall recedes along its normal, corners stay sharp. A wall that stands between two parts of the floor
-    keeps its middle line however thin it is: moving walls back never opens a way through them. Where such
-    a line ends, at the jamb of a door or at the end of a partition, it recedes with the wall's end.
+    Every wall moves along its normal, and corners stay sharp. Of a wall between two parts of the floor the
+    middle line, found by a Voronoi graph of points on the walls, remains however thin the wall is: moving
+    walls back never opens a path through them. Where such a line ends at the floor, at the jamb of a door or
+    at the end of a partition, it becomes shorter with the wall.
 
     Args:
         workspace: The floor W [m].
-        inside: A point of W that the grown floor must hold, shape (2,) [m].
-        most: Largest amount that will be asked for [m].
+        inside: A point of W that the wider floor must hold, shape (2,) [m].
+        most: Largest distance that will be asked for [m].
     """
 
     def __init__(self, workspace: Polygon, inside: FloatArray, most: float) -> None:
@@ -44,62 +55,62 @@ class Growth:
         return self._joined(self._grown(amount))
 
     def around(self, zones: list[tuple[BaseGeometry, float]]) -> Polygon:
-        """The floor with walls moved back inside some zones only, each by its own amount [m]."""
+        """The floor with walls moved back inside some zones only, in each by its own distance [m]."""
         parts = [self._grown(amount).intersection(zone) for zone, amount in zones if amount > 0.0]
         return self._joined(shapely.union_all([self._workspace, *parts]))
 
     def _grown(self, amount: float) -> BaseGeometry:
         if amount <= 0.0:
             return self._workspace
-        grown = self._workspace.buffer(amount, join_style="mitre", mitre_limit=_MITRE)
+        grown = self._workspace.buffer(amount, join_style="mitre", mitre_limit=MITRE)
         return shapely.union(shapely.difference(grown, self._middle_lines(amount)), self._workspace)
 
     def _middle_lines(self, amount: float) -> BaseGeometry:
-        """What is left of the walls' middle lines when their ends have receded."""
+        """What is left of the walls' middle lines when walls and their ends have moved."""
         lines, ends = self._spine
-        receded = [end.buffer(amount - room) for end, room in ends if amount > room]
+        receded = [end.buffer(amount - half) for end, half in ends if amount > half]
         left = shapely.difference(lines, shapely.union_all(receded)) if receded else lines
-        return left.buffer(_CORE, quad_segs=1)
+        return left.buffer(CORE, quad_segs=1)
 
     def _joined(self, shape: BaseGeometry) -> Polygon:
-        """The part that holds the start, without hairs."""
+        """The part that holds the start, without superfluous corners."""
         parts = [part for part in shapely.get_parts(shape) if isinstance(part, Polygon)]
         best = max(parts, key=lambda part: (part.contains(self._inside), part.area))
-        tidy = best.simplify(_HAIR)
+        tidy = best.simplify(TINY)
         return tidy if isinstance(tidy, Polygon) and tidy.is_valid else best
 
     @cached_property
     def _spine(self) -> tuple[BaseGeometry, list[tuple[Point, float]]]:
-        """Middle lines of all walls that could be broken through, and their ends at jambs with their room.
+        """Middle lines of the walls, and their ends at the floor, each with half of the wall's thickness [m].
 
-        Where a line ends because the wall grows thick it is drawn on, half-way to the floor beyond.
+        A line that ends because the wall becomes too thick is extended half-way to the floor beyond.
         """
-        edges, room = self._ridges
+        edges, halves = self._ridges
         if len(edges) == 0:
             return LineString(), []
         corners = edges.reshape(-1, 2)
         _, first, counts = np.unique(np.round(corners, 9), axis=0, return_index=True, return_counts=True)
-        jambs, roots = [], []
+        free_ends, extensions = [], []
         for index in first[counts == 1]:
-            end, space = corners[index], float(room[index // 2])
-            ahead = self._ahead(end, corners, space)
-            if self._workspace.contains(Point(end + _BEYOND * space * ahead)):
-                jambs.append((Point(end), space))
+            end, half = corners[index], float(halves[index // 2])
+            ahead = self._ahead(end, corners, half)
+            if self._workspace.contains(Point(end + BEYOND * half * ahead)):
+                free_ends.append((Point(end), half))
             else:
-                roots.append(self._onwards(end, ahead))
-        lines = shapely.union_all([*(LineString(edge) for edge in edges), *roots])
-        return shapely.line_merge(lines).simplify(_CORE), jambs
+                extensions.append(self._onwards(end, ahead))
+        lines = shapely.union_all([*(LineString(edge) for edge in edges), *extensions])
+        return shapely.line_merge(lines).simplify(CORE), free_ends
 
     @staticmethod
-    def _ahead(end: FloatArray, corners: FloatArray, room: float) -> FloatArray:
+    def _ahead(end: FloatArray, corners: FloatArray, half: float) -> FloatArray:
         """Direction in which a middle line ends, shape (2,)."""
-        near = corners[np.hypot(*(corners - end).T) <= 2.0 * max(room, _FINEST)]
+        near = corners[np.hypot(*(corners - end).T) <= 2.0 * max(half, FINEST)]
         back = end - near.mean(axis=0)
         ahead: FloatArray = back / max(float(np.hypot(*back)), 1e-12)
         return ahead
 
     def _onwards(self, end: FloatArray, ahead: FloatArray) -> LineString:
-        """From an end half-way to the floor beyond, if there is any."""
+        """Segment from an end half-way to the floor beyond, if there is any."""
         ray = LineString([end, end + 2.0 * self.most * ahead])
         blocked = shapely.intersection(ray, self._workspace)
         length = 2.0 * self.most if blocked.is_empty else blocked.distance(Point(end))
@@ -107,7 +118,7 @@ class Growth:
 
     @cached_property
     def _ridges(self) -> tuple[FloatArray, FloatArray]:
-        """Edges of the walls' Voronoi graph between opposite faces, shape (n, 2, 2), and their rooms (n,)."""
+        """Voronoi edges between opposite faces of walls, (n, 2, 2), and half the walls' thickness, (n,)."""
         samples = self._samples()
         try:
             graph = Voronoi(samples)
@@ -118,19 +129,19 @@ class Growth:
         kept = (ends >= 0).all(axis=1)
         edges, faces = graph.vertices[ends[kept]], faces[kept]
         middles = edges.mean(axis=1)
-        room = np.hypot(*(middles - samples[faces[:, 0]]).T)
+        half = np.hypot(*(middles - samples[faces[:, 0]]).T)
         apart = np.hypot(*(samples[faces[:, 1]] - samples[faces[:, 0]]).T)
-        near = (room <= self.most) & (apart >= _OPPOSITE * room)
-        edges, room = edges[near], room[near]
+        near = (half <= self.most) & (apart >= OPPOSITE * half)
+        edges, half = edges[near], half[near]
         outside = ~shapely.contains_xy(self._workspace, edges[:, 0]) & ~shapely.contains_xy(
             self._workspace, edges[:, 1]
         )
-        return edges[outside], room[outside]
+        return edges[outside], half[outside]
 
     def _samples(self) -> FloatArray:
-        """Points of the walls, close enough to tell the faces of thin ones apart, shape (n, 2)."""
+        """Points of the walls, shape (n, 2)."""
         boundary = self._workspace.boundary
-        spacing = max(_FINEST, boundary.length / _SAMPLES)
+        spacing = max(FINEST, boundary.length / SAMPLES)
         points = shapely.get_coordinates(shapely.segmentize(boundary, spacing))
         samples: FloatArray = np.unique(np.round(points, 9), axis=0)
         return samples

@@ -1,4 +1,4 @@
-"""What an undecided search left neither free nor blocked, and what to change."""
+"""The cells that an undecided search proved neither free nor blocked, and which key to change."""
 
 from __future__ import annotations
 
@@ -9,23 +9,24 @@ from coop_drake.answers.mixed_cell import MixedCell
 
 __all__ = ["mixed_facts", "mixed_sentences"]
 
-_SHOWN = 3
+SHOWN = 3
+"""Cells that are described, the widest first [-]."""
 
 
 def mixed_sentences(cells: Sequence[MixedCell]) -> list[str]:
-    """Where cells remained mixed, at which resolution, and which keys of ``planner`` to change.
+    """Where mixed cells remained, at which resolution, and which keys of ``planner`` to change.
 
     Args:
         cells: The cells of the last channel that are not free, the widest first.
     """
     sentences = [
-        f"{len(cells)} cells on the last channel remained neither free nor blocked; "
+        f"{len(cells)} cells on the last channel were proved neither free nor blocked; "
         f"the widest spans {100.0 * cells[0].share:.2g} % of an axis."
     ]
-    for cell in cells[:_SHOWN]:
+    for cell in cells[:SHOWN]:
         x_min, y_min, x_max, y_max = cell.polygon.bounds
         sentences.append(
-            f"Mixed: x {x_min:.3f} to {x_max:.3f} m, y {y_min:.3f} to {y_max:.3f} m, {_intervals(cell)}."
+            f"One is x {x_min:.3f} to {x_max:.3f} m, y {y_min:.3f} to {y_max:.3f} m, {_intervals(cell)}."
         )
     if all(cell.finest for cell in cells):
         sentences.append(

@@ -1,16 +1,16 @@
-"""What a diagnosis says: plain data, nothing in it that was not computed."""
+"""The findings of a diagnosis: plain data, all of it computed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from coop_drake.answers.mixed_cell import MixedCell
-from coop_drake.diagnosis.blocking import Passage
-from coop_drake.diagnosis.bodies import WithoutWalls
 from coop_drake.diagnosis.bracket import Bracket
 from coop_drake.diagnosis.contacts import Contact, Overlap
+from coop_drake.diagnosis.open_floor import OpenFloor
+from coop_drake.diagnosis.passages import BlockingPassage
 from coop_drake.diagnosis.relaxations import Relaxation
-from coop_drake.diagnosis.trials import Answer
+from coop_drake.diagnosis.variants import Answer
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["BlockedPose", "Diagnosis", "PassageFindings"]
@@ -18,23 +18,23 @@ __all__ = ["BlockedPose", "Diagnosis", "PassageFindings"]
 
 @dataclass(frozen=True)
 class PassageFindings:
-    """What blocks the way from start to goal.
+    """What blocks every path from start to goal.
 
     Attributes:
-        growth: How far every wall must move back [m].
-        way: A way on the floor with so much more room, shape (m, 3 + n), None if there is none.
-        needed: How far that way sticks out of the floor as it is, sampled, not proved [m].
-        passages: The passages that block, in the order of the way.
-        are_enough: Whether widening these passages alone was found enough.
-        bare: What is known without walls, asked where no growth was found enough.
+        widening: How far every wall must move back [m].
+        path: A path on the floor that is wider by so much, shape (m, 3 + n), None if there is none.
+        needed: How far that path leaves the floor as it is, at its configurations, not proved [m].
+        passages: The passages that block, in the order of the path.
+        are_enough: Whether a channel was found with only these passages widened.
+        open_floor: What is known without walls, where no widening was enough.
     """
 
-    growth: Bracket
-    way: FloatArray | None = None
+    widening: Bracket
+    path: FloatArray | None = None
     needed: float | None = None
-    passages: tuple[Passage, ...] = ()
+    passages: tuple[BlockingPassage, ...] = ()
     are_enough: bool = False
-    bare: WithoutWalls | None = None
+    open_floor: OpenFloor | None = None
 
 
 @dataclass(frozen=True)
@@ -42,16 +42,16 @@ class BlockedPose:
     """A goal at which the team collides whatever its free joints.
 
     Attributes:
-        configuration: The least bad configuration at the goal among those tried, shape (3 + n,).
-        contacts: What sticks out of the floor there.
+        configuration: The configuration at the goal with the least collision of those tried, shape (3 + n,).
+        contacts: Which bodies leave the floor there.
         overlaps: Bodies that overlap there.
-        retreat: How far every wall must move back for the goal to be free of walls and bodies [m].
+        widening: How far every wall must move back for the team to be free at the goal [m].
     """
 
     configuration: FloatArray
     contacts: tuple[Contact, ...]
     overlaps: tuple[Overlap, ...]
-    retreat: Bracket
+    widening: Bracket
 
 
 @dataclass(frozen=True)
@@ -59,13 +59,13 @@ class Diagnosis:
     """Why there is no plan, or that there is one.
 
     Attributes:
-        answer: What the planner answers to the question as it is.
+        answer: What the planner answers to the problem as it is.
         reason: Its reason in a sentence, empty if it found a channel.
         margin: Margin of the channel found, None if none was [m].
-        passages: What blocks the way, None if nothing does or the goal itself is blocked.
+        passages: What blocks every path, None if nothing does or the goal itself is blocked.
         goal: What blocks the goal, None if nothing does.
         relaxations: Changes to the team that were tried.
-        mixed: For an undecided question what remained neither free nor blocked, the widest first.
+        mixed: For an undecided problem the cells neither proved free nor blocked, the widest first.
         slices: Slices that the whole diagnosis took.
     """
 
