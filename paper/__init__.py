@@ -3,7 +3,7 @@
 from paper.comparison import GainFigures, compare_gains
 from paper.corridor import corridor_plan, corridor_scenario
 from paper.errata_figure import write_errata_figure
-from paper.exhibits import Exhibit, Statement, Verdict
+from paper.exhibits import Agreement, Exhibit, Statement
 from paper.material import Material, gather
 from paper.pages import write_report
 from paper.report import exhibits
@@ -13,11 +13,11 @@ from paper.table_1 import CORRECTED, PRINTED
 __all__ = [
     "CORRECTED",
     "PRINTED",
+    "Agreement",
     "Exhibit",
     "GainFigures",
     "Material",
     "Statement",
-    "Verdict",
     "compare_gains",
     "corridor_plan",
     "corridor_scenario",

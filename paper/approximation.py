@@ -17,13 +17,16 @@ from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Approximation", "approximations", "two_components"]
 
-_PER_AXIS = 9  # Configurations of a slice that are compared along every axis.
-_ARC = 256  # Segments of a quarter of a circle in exact footprints.
+_PER_AXIS = 9
+"""Number of configurations of a slice that are compared along every axis."""
+
+_ARC = 256
+"""Number of segments of a quarter of a circle in exact footprints."""
 
 
 @dataclass(frozen=True)
 class Approximation:
-    """What a slice makes of the footprint; the object's origin stands at p_WL = 0.
+    """The over- and the under-approximation (6) of the footprint in a slice, at p_WL = 0.
 
     Attributes:
         intervals: The slice: intervals of (theta, q) [rad].
@@ -41,7 +44,7 @@ class Approximation:
 
     @property
     def encloses(self) -> bool:
-        """Whether under lies in every exact footprint, and every exact one in over."""
+        """Whether every exact footprint contains ``under`` and lies in ``over``."""
         return all(
             shape.buffer(self.rounding).covers(self.under) and self.over.buffer(self.rounding).covers(shape)
             for shape in self.exact
@@ -49,12 +52,12 @@ class Approximation:
 
     @property
     def gap(self) -> float:
-        """Area by which over exceeds under [m^2]."""
+        """Area of the over-approximation minus that of the under-approximation [m^2]."""
         return float(self.over.area - self.under.area)
 
 
 def two_components(tree: ComponentTree) -> ComponentTree:
-    """The object with one robot: what it holds, and what its first joint moves.
+    """Return a tree of two components: the object with what is welded to it, and what one joint moves.
 
     Args:
         tree: A team of robots with a joint each.
@@ -95,7 +98,7 @@ def _approximation(swept: SweptTree, intervals: Intervals, rounding: float) -> A
 
 
 def _configurations(intervals: Intervals) -> Iterator[FloatArray]:
-    """Configurations spread evenly over a slice, its corners among them, shape (1 + n,)."""
+    """Yield configurations spread evenly over a slice, its corners included, shape (1 + n,)."""
     ends = [sorted(set(np.linspace(lower, upper, _PER_AXIS))) for lower, upper in intervals]
     for axes in product(*ends):
         yield np.array(axes)

@@ -1,4 +1,4 @@
-"""The picture of Figure 3: a system, and over and under what its slices keep it between."""
+"""The figure beside the paper's Figure 3: a system, its over- and its under-approximations."""
 
 from __future__ import annotations
 
@@ -22,8 +22,11 @@ from paper.approximation import Approximation
 
 __all__ = ["approximation_figure"]
 
-_ROOM = 0.12  # Around the widest over-approximation [m].
-_COARSE = 2e-3  # What drawn outlines may be off [m].
+_BORDER = 0.12
+"""Border around the widest over-approximation [m]."""
+
+_OUTLINE_TOLERANCE = 2e-3
+"""Distance by which outlines may move when they are simplified [m]."""
 
 
 def approximation_figure(tree: ComponentTree, made: Sequence[Approximation]) -> Figure:
@@ -42,8 +45,8 @@ def approximation_figure(tree: ComponentTree, made: Sequence[Approximation]) -> 
     system, *upper = figure.subplots(2, 1 + len(made), sharex=True, sharey=True).flat
     below = upper[len(made) :]
     x_min, y_min, x_max, y_max = union_all([one.over for one in made]).bounds
-    system.set_xlim(x_min - _ROOM, x_max + _ROOM)
-    system.set_ylim(y_min - _ROOM, y_max + _ROOM)
+    system.set_xlim(x_min - _BORDER, x_max + _BORDER)
+    system.set_ylim(y_min - _BORDER, y_max + _BORDER)
     draw_team(system, tree, np.zeros(3 + len(tree.joints)))
     system.legend(handles=team_legend(tree), loc="lower left", fontsize=8, borderpad=0.2)
     _name(system, "(a) the system")
@@ -53,7 +56,7 @@ def approximation_figure(tree: ComponentTree, made: Sequence[Approximation]) -> 
         over, under = upper[number], below[1 + number]
         draw_polygon(over, one.over, facecolor=BLUE, edgecolor=BLUE, alpha=0.25)
         draw_polygon(under, one.under, facecolor=GREEN, edgecolor=GREEN, alpha=0.7, zorder=4)
-        outlines = [line for shape in one.exact for line in _outlines(shape.simplify(_COARSE))]
+        outlines = [line for shape in one.exact for line in _outlines(shape.simplify(_OUTLINE_TOLERANCE))]
         for ax in (over, under):
             ax.add_collection(LineCollection(outlines, colors=GREY, linewidths=0.4, alpha=0.35))
             draw_polygon(ax, one.over, facecolor="none", edgecolor=BLUE, linewidth=1.2)
@@ -63,7 +66,7 @@ def approximation_figure(tree: ComponentTree, made: Sequence[Approximation]) -> 
 
 
 def _outlines(shape: BaseGeometry) -> list[FloatArray]:
-    """Outer rings of a shape of one part or several, each shape (n, 2)."""
+    """Return the outer rings of a shape of one part or several, each of shape (n, 2)."""
     return [get_coordinates(part.exterior) for part in getattr(shape, "geoms", [shape])]
 
 

@@ -28,7 +28,7 @@ ERRATA = {
     "ET1": "Two numbers of Table 1 have a wrong sign: row 3 prints 0.367 for −0.367, row 24 −0.050 for "
     "0.050.",
 }
-"""By the ids of docs/errata.md."""
+"""Errata by their ids in docs/errata.md."""
 
 ASSUMPTIONS = {
     "R1": "The floor is drawn anew: Figure 4 gives no coordinates. Two rooms, a corridor with a bend, a hall "
@@ -50,5 +50,5 @@ ASSUMPTIONS = {
 
 
 def explanation(key: str) -> str:
-    """The sentence behind an id of an erratum or an assumption."""
+    """Return the sentence that explains the id of an erratum or an assumption."""
     return ERRATA[key] if key in ERRATA else ASSUMPTIONS[key]

@@ -1,4 +1,4 @@
-"""Table 1 through the closed loop with two gain sets: peaks, margins and times beside each other."""
+"""The cells of Table 1 in closed loop with two gain sets: peaks, margins and durations."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["GainFigures", "compare_gains"]
 
 @dataclass(frozen=True)
 class GainFigures:
-    """What one gain set made of Table 1.
+    """The results of one gain set in the cells of Table 1.
 
     Attributes:
         name: The gain set.
@@ -68,7 +68,7 @@ def compare_gains(
     names: Sequence[str] = tuple(GAIN_SETS),
     progress: Callable[[str, float], None] | None = None,
 ) -> list[GainFigures]:
-    """Play the thirty cells once with every gain set.
+    """Simulate the thirty cells once with every gain set.
 
     Args:
         scenario: Of a team of two robots with a joint each, which knows the gain sets.

@@ -1,4 +1,4 @@
-"""The paper's thirty intervals with positions beside them: a straight corridor through an empty hall.
+"""A plan with the intervals of Table 1: its cells lie in a straight line in an empty hall.
 
 The paper prints the intervals of its cells and not their polygons. Here every cell is a square, and each is
 one step further along the hall, so that angles, joints and the position all have to move.
@@ -22,12 +22,12 @@ from paper.table_1 import ANGLE_TOLERANCE, CORRECTED, GOAL_ANGLE, START
 
 __all__ = ["corridor_plan", "corridor_scenario"]
 
-_STEP, _HALF, _MARGIN, _ROOM = 0.3, 0.5, 0.05, 4.0
-"""From cell to cell, half a cell's side, what its core keeps, and the hall round all cells [m]."""
+_STEP, _HALF, _MARGIN, _BORDER = 0.3, 0.5, 0.05, 4.0
+"""Distance of neighbouring cells, half a cell's side, inset of its core, and border of the hall [m]."""
 
 
 def corridor_scenario(scenario: Scenario) -> Scenario:
-    """The team of a scenario in the hall, from the start of Table 1 to its goal.
+    """Return the scenario's team in the hall, from the start of Table 1 to its goal.
 
     Args:
         scenario: Of a team of two robots with a joint each.
@@ -36,7 +36,7 @@ def corridor_scenario(scenario: Scenario) -> Scenario:
         ScenarioError: The team is another.
     """
     length = _STEP * (len(CORRECTED) - 1)
-    hall = box(-_ROOM, -_ROOM, length + _ROOM, _ROOM)
+    hall = box(-_BORDER, -_BORDER, length + _BORDER, _BORDER)
     names = list(scenario.start.joints)
     sizes = [len(values) for values in scenario.start.joints.values()]
     if sizes != [1] * (len(START) - 1):
@@ -53,7 +53,7 @@ def corridor_scenario(scenario: Scenario) -> Scenario:
 
 
 def corridor_plan(problem: PlanningProblem, gain_set: GainSet, name: str) -> Plan:
-    """The thirty cells, by hand: no search, and free only because the hall is empty.
+    """Return the thirty cells as a plan, which no search made; they are free because the hall is empty.
 
     Args:
         problem: Of :func:`corridor_scenario`.

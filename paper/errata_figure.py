@@ -1,4 +1,4 @@
-"""What the paper's formulas do as they are printed, beside what they do as corrected: a picture of errata."""
+"""The figure of eight errata: results of formulas as printed (red) and as corrected (blue)."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from coop_drake.laws.readiness import EROSION, clearance_margin
 from coop_drake.tree.pose import FloatArray
 from paper import printed
 from paper.funnel_errata_panels import (
+    draw_funnel_bounds,
     draw_hand_over_acceleration,
     draw_log_decay,
     draw_log_term,
-    draw_walls,
 )
 from paper.governor_run import (
     Clearance,
@@ -32,8 +32,10 @@ from paper.governor_run import (
 __all__ = ["errata_figure", "write_errata_figure"]
 
 _TABLE_2 = (50.0, 5.0, 5.0, 0.0)
-_TOLERANCE = 1e-7  # Of the integration; a line in a picture needs no more.
-_ROOM = box_clearance(np.array([0.0, -1.0]), np.array([4.0, 1.0]))
+_TOLERANCE = 1e-7
+"""Tolerance of the integration, relative and absolute: enough for a line in a picture."""
+
+_WIDE = box_clearance(np.array([0.0, -1.0]), np.array([4.0, 1.0]))
 _NARROW = box_clearance(np.array([2.0, -1.0]), np.array([2.3, 1.0]))
 
 
@@ -51,7 +53,7 @@ def errata_figure() -> Figure:
     caption = (
         "Errata. Red as the paper prints it, blue as corrected. Above, the position: the spring's energy "
         "(E15a), the wall that the goal's boundary would be (E15b), a hand-over to a cell 30 cm wide (E10), "
-        "and the torque that two robots give together (E21). Below, an angle in its funnel: walls (E17a), "
+        "and the torque that two robots give together (E21). Below, an angle in its funnel: bounds (E17a), "
         "the acceleration on entering (E17b), the log term towards a goal (E18), the log that should "
         "decay (E20)."
     )
@@ -59,7 +61,7 @@ def errata_figure() -> Figure:
     above, below = figure.subplots(2, 4)
     for ax, draw in zip(above, (_draw_wall, _draw_goal, _draw_take_over, _draw_torque), strict=True):
         draw(ax)
-    draw_walls(below[0])
+    draw_funnel_bounds(below[0])
     draw_hand_over_acceleration(below[1], EROSION)
     draw_log_term(below[2])
     draw_log_decay(below[3])
@@ -75,10 +77,10 @@ def _from_rest(
     target: FloatArray,
     seconds: float,
     *,
-    clearance: Clearance = _ROOM,
+    clearance: Clearance = _WIDE,
     margin: Margin = energy_margin,
 ) -> GovernorRun:
-    """From rest at (x, y) to a target with Table 2's gains."""
+    """Run from rest at (x, y) to a target with the gains of Table 2."""
     return run_governor(
         clearance,
         straight_field(target),
@@ -93,7 +95,7 @@ def _from_rest(
 
 
 def _draw_wall(ax: Axes) -> None:
-    """A target 2 cm before a wall: as printed, the spring may store more than it can before the wall."""
+    """E15a: a target 2 cm before a wall; as printed, the spring may store too much energy."""
     for margin, colour in ((printed.energy_margin, VERMILLION), (energy_margin, BLUE)):
         run = _from_rest(2.0, 0.0, np.array([3.98, 0.0]), 6.0, margin=margin)
         ax.plot(run.times, 100.0 * (4.0 - run.position[:, 0]), color=colour)
@@ -103,13 +105,13 @@ def _draw_wall(ax: Axes) -> None:
 
 
 def _draw_goal(ax: Axes) -> None:
-    """The boundary of F has the goal's in it: the way in is closed."""
+    """E15b: the boundary of F contains that of the goal, so that the governor never enters the goal."""
     target, radius = np.array([3.0, 0.0]), 0.3
 
     def to_boundary_of_f(point: FloatArray) -> float:
-        return min(_ROOM(point), abs(float(np.hypot(*(point - target))) - radius))
+        return min(_WIDE(point), abs(float(np.hypot(*(point - target))) - radius))
 
-    for clearance, colour in ((to_boundary_of_f, VERMILLION), (_ROOM, BLUE)):
+    for clearance, colour in ((to_boundary_of_f, VERMILLION), (_WIDE, BLUE)):
         run = _from_rest(1.0, 0.2, target, 12.0, clearance=clearance)
         ax.plot(run.times, np.hypot(*(run.position - target).T), color=colour)
     ax.axhline(radius, color=GREY, linestyle="--")
@@ -117,7 +119,7 @@ def _draw_goal(ax: Axes) -> None:
 
 
 def _draw_take_over(ax: Axes) -> None:
-    """A fast object enters a narrow cell: as printed the cell takes over at once, and is left again."""
+    """E10: a fast object enters a narrow cell; as printed, it leaves the cell again."""
     target = np.array([2.15, 0.0])
     run = _from_rest(0.5, 0.0, target, 12.0)
     inside = next(i for i, p in enumerate(run.position) if _NARROW(p) > 0.0)
@@ -149,7 +151,7 @@ def _certified(run: GovernorRun, index: int) -> bool:
 
 
 def _draw_torque(ax: Axes) -> None:
-    """Two grasps on one side, a force of 5 N that turns: the torque that arrives, none being asked for."""
+    """E21: two grasps on one side share a force of 5 N; the torque that results, where none is commanded."""
     offsets = np.array([[0.4, 0.0], [0.0, 0.25]])
     directions = np.linspace(0.0, 2.0 * np.pi, 73)
     torques = []

@@ -1,15 +1,15 @@
-"""What the report is made of: statements of the paper beside our figures, gathered by table and figure."""
+"""The parts of the report: statements of the paper beside our figures, by table and figure of the paper."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
 
-__all__ = ["Exhibit", "Picture", "Statement", "Verdict"]
+__all__ = ["Agreement", "Exhibit", "Picture", "Statement"]
 
 
-class Verdict(Enum):
-    """Whether our run bears the paper out; the values are what a reader sees."""
+class Agreement(Enum):
+    """Whether our run agrees with the paper; the values are shown to the reader."""
 
     AGREES = "agrees"
     DIFFERS = "differs"
@@ -18,7 +18,7 @@ class Verdict(Enum):
 
 @dataclass(frozen=True)
 class Statement:
-    """One thing that the paper states, or shows without a number, and what our runs made of it.
+    """One statement of the paper, or one figure that it does not give, and the results of our runs.
 
     Attributes:
         paper: What the paper states, in our words.
@@ -33,11 +33,11 @@ class Statement:
     because: tuple[str, ...] = ()
 
     @property
-    def verdict(self) -> Verdict:
-        """The same in a word."""
+    def agreement(self) -> Agreement:
+        """Whether the statement agrees, for the reader."""
         if self.agrees is None:
-            return Verdict.NO_FIGURE
-        return Verdict.AGREES if self.agrees else Verdict.DIFFERS
+            return Agreement.NO_FIGURE
+        return Agreement.AGREES if self.agrees else Agreement.DIFFERS
 
 
 @dataclass(frozen=True)
@@ -55,12 +55,12 @@ class Picture:
 
 @dataclass(frozen=True)
 class Exhibit:
-    """A table or a figure of the paper, reproduced.
+    """A table or a figure of the paper with what our runs give.
 
     Attributes:
         name: As the paper numbers it.
         title: What it shows, in a few words.
-        told: What the paper tells about it, in our words.
+        caption: What the paper shows in it, in our words.
         statements: What can be compared.
         pictures: Ours.
         tables: Markdown files with the numbers, below the report's folder.
@@ -68,26 +68,26 @@ class Exhibit:
 
     name: str
     title: str
-    told: str
+    caption: str
     statements: tuple[Statement, ...]
     pictures: tuple[Picture, ...] = ()
     tables: tuple[str, ...] = ()
 
     @property
-    def verdict(self) -> Verdict:
-        """Differs if any statement does; agrees if any does and none differs."""
-        verdicts = {statement.verdict for statement in self.statements}
-        for verdict in (Verdict.DIFFERS, Verdict.AGREES):
-            if verdict in verdicts:
-                return verdict
-        return Verdict.NO_FIGURE
+    def agreement(self) -> Agreement:
+        """Differs if any statement differs; agrees if any agrees and none differs."""
+        agreements = {statement.agreement for statement in self.statements}
+        for agreement in (Agreement.DIFFERS, Agreement.AGREES):
+            if agreement in agreements:
+                return agreement
+        return Agreement.NO_FIGURE
 
     @property
     def differing(self) -> tuple[Statement, ...]:
-        """Statements that our runs do not bear out."""
-        return tuple(statement for statement in self.statements if statement.verdict is Verdict.DIFFERS)
+        """Statements with which our runs do not agree."""
+        return tuple(statement for statement in self.statements if statement.agreement is Agreement.DIFFERS)
 
     @property
     def because(self) -> tuple[str, ...]:
-        """Errata and assumptions of all its statements, each once, in order."""
+        """Ids of the errata and assumptions of all its statements, each once, in order."""
         return tuple(dict.fromkeys(key for statement in self.statements for key in statement.because))

@@ -1,4 +1,4 @@
-"""Figures 3 to 5: approximations, start and goal, and the way of the object over the floor."""
+"""Figures 3 to 5: approximations, start and goal, and the path of the object over the floor."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from paper.exhibits import Statement
 from paper.runs import Run
 from paper.stated import GOAL, START
 
-__all__ = ["approximation_statements", "end_statements", "way_statements"]
+__all__ = ["approximation_statements", "end_statements", "path_statements"]
 
 
 def approximation_statements(made: Sequence[Approximation]) -> tuple[Statement, ...]:
-    """Compare the approximations of the four slices with what (6) says of them.
+    """Compare the approximations of the four slices with (6).
 
     Args:
         made: In the order of the panels.
@@ -74,8 +74,8 @@ def end_statements(problem: PlanningProblem) -> tuple[Statement, ...]:
     )
 
 
-def way_statements(problem: PlanningProblem, runs: Sequence[Run]) -> tuple[Statement, ...]:
-    """Say where the object's way ended and how close to walls and one another the bodies came.
+def path_statements(problem: PlanningProblem, runs: Sequence[Run]) -> tuple[Statement, ...]:
+    """State where the object's path ended, and the smallest distances of bodies to walls and to each other.
 
     Args:
         problem: The reconstruction.
@@ -84,7 +84,7 @@ def way_statements(problem: PlanningProblem, runs: Sequence[Run]) -> tuple[State
     offs = [float(np.hypot(*(run.log.object_pose[-1, :2] - GOAL[:2]))) for run in runs]
     walls = [float(run.log.workspace_clearance.min()) for run in runs]
     bodies = [float(run.log.body_clearance.min()) for run in runs]
-    narrow = [_share_without_room(problem, run) for run in runs]
+    narrow = [_tight_fraction(problem, run) for run in runs]
     lengths = [float(np.hypot(*np.diff(run.log.object_pose[:, :2], axis=0).T).sum()) for run in runs]
     return (
         Statement(
@@ -119,8 +119,8 @@ def way_statements(problem: PlanningProblem, runs: Sequence[Run]) -> tuple[State
     )
 
 
-def _share_without_room(problem: PlanningProblem, run: Run) -> float:
-    """Share of the way on which a wall is nearer to the object than the straight team reaches."""
+def _tight_fraction(problem: PlanningProblem, run: Run) -> float:
+    """Return the fraction of the path on which a wall is within the straight team's reach."""
     way = run.log.object_pose[:, :2]
     lengths = np.hypot(*np.diff(way, axis=0).T)
     middles = points(0.5 * (way[1:] + way[:-1]))

@@ -1,4 +1,4 @@
-"""A point mass behind its reference governor, with the clearance and the margin as the caller has them."""
+"""Runs of a point mass behind its reference governor, with any clearance and any energy margin."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Clearance = Callable[[FloatArray], float]
 
 
 class Margin(Protocol):
-    """Delta E from the energy, the clearance and the stiffness."""
+    """A law of Delta E from the energy, the clearance and the stiffness."""
 
     def __call__(self, energy: float, clearance: float, stiffness: float, /) -> float:
         """Return Delta E [m^2/s^2]."""
@@ -28,7 +28,7 @@ class Margin(Protocol):
 
 @dataclass(frozen=True)
 class GovernorRun:
-    """Samples of one run.
+    """The samples of one run.
 
     Attributes:
         times: Shape (T,) [s].

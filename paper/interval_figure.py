@@ -1,4 +1,4 @@
-"""The picture of Table 1: every cell's intervals as bars, the paper's beside ours."""
+"""The figure of Table 1: every cell's intervals as bars, the paper's beside ours."""
 
 from __future__ import annotations
 

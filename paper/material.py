@@ -1,4 +1,4 @@
-"""What the report is made from: the transport with every gain set, the paper's cells played, and Figure 3."""
+"""The results that the report is made from: runs with every gain set, the paper's cells, and Figure 3."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["Material", "gather"]
 
 @dataclass(frozen=True)
 class Material:
-    """All that the report is made from.
+    """The results that the report is made from.
 
     Attributes:
         problem: The reconstruction's question.
@@ -45,7 +45,7 @@ class Material:
 def gather(
     scenario: Scenario, *, store: MapStore | None = None, progress: Progress | None = None
 ) -> Material:
-    """Plan and simulate all that is compared.
+    """Plan and simulate what the report compares.
 
     Args:
         scenario: The reconstruction: two robots with a joint each, and the gain sets that are compared.

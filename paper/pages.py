@@ -1,4 +1,4 @@
-"""The report as files: pictures, tables in Markdown, a Markdown report, and one page that holds it all."""
+"""The files of the report: pictures, tables in Markdown, the report in Markdown and as one HTML page."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from paper.approximation import two_components
 from paper.approximation_figure import approximation_figure
 from paper.background import explanation
 from paper.errata_figure import write_errata_figure
-from paper.exhibits import Exhibit, Statement, Verdict
+from paper.exhibits import Agreement, Exhibit, Statement
 from paper.interval_figure import interval_figure
 from paper.material import Material
 from paper.report import exhibits
@@ -83,7 +83,7 @@ def _write_tables(material: Material, found: Sequence[Exhibit], folder: Path) ->
 
 
 def _both_tables(plan: Plan) -> str:
-    """Table 1 of our plan, and the paper's beside what it prints."""
+    """Return Table 1 of our plan, and of the paper as corrected beside what it prints."""
     lines = [
         "",
         f"The paper's Table 1: its {len(CORRECTED)} cells [rad]; where a sign is corrected, in brackets as "
@@ -105,17 +105,17 @@ def _parameter_table(statements: Sequence[Statement]) -> str:
     lines = [
         "Table 2. Parameters of the simulation.",
         "",
-        "| the paper | ours | verdict |",
+        "| the paper | ours | agreement |",
         "| --- | --- | --- |",
     ]
-    lines += [f"| {one.paper} | {one.ours[0]} | {one.verdict.value} |" for one in statements]
+    lines += [f"| {one.paper} | {one.ours[0]} | {one.agreement.value} |" for one in statements]
     return "\n".join(lines) + "\n"
 
 
-def _counts(found: Sequence[Exhibit]) -> dict[Verdict, int]:
-    """How many statements of every verdict there are."""
-    verdicts = [statement.verdict for exhibit in found for statement in exhibit.statements]
-    return {verdict: verdicts.count(verdict) for verdict in Verdict}
+def _counts(found: Sequence[Exhibit]) -> dict[Agreement, int]:
+    """Return the number of statements that agree, differ or give no number."""
+    agreements = [statement.agreement for exhibit in found for statement in exhibit.statements]
+    return {agreement: agreements.count(agreement) for agreement in Agreement}
 
 
 def _embedded(picture: Path) -> str:

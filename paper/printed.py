@@ -1,4 +1,4 @@
-"""The paper's formulas as they are printed: what the errata are held against, and used nowhere else."""
+"""The paper's formulas as they are printed, with their errors: for the errata's tests and figure only."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["angle_walls", "axis_law", "energy_margin", "projector", "rate_term", "wrench_share"]
+__all__ = ["angle_bounds", "axis_law", "energy_margin", "projector", "rate_term", "wrench_share"]
 
 
 def energy_margin(energy: float, distance: float, stiffness: float) -> float:
@@ -16,10 +16,10 @@ def energy_margin(energy: float, distance: float, stiffness: float) -> float:
     return stiffness * distance - energy
 
 
-def angle_walls(
+def angle_bounds(
     time: float, *, theta_l: float, theta_u: float, goal_l: float, goal_u: float, decay_rate: float
 ) -> tuple[float, float]:
-    """Return both walls as printed in (17), where ``theta_u`` does not occur: erratum E17a."""
+    """Return both bounds as printed in (17), where ``theta_u`` does not occur: erratum E17a."""
     del theta_u
     decay = float(np.exp(-decay_rate * time))
     return goal_l + (theta_l - goal_l) * decay, goal_u + (theta_l - goal_u) * decay
@@ -28,7 +28,7 @@ def angle_walls(
 def axis_law(
     x: float,
     rate: float,
-    walls: Sequence[float],
+    bounds: Sequence[float],
     *,
     log_gain: float = 1.0,
     position_gain: float = 1.0,
@@ -40,13 +40,13 @@ def axis_law(
     Args:
         x: Position.
         rate: Its rate.
-        walls: (lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration).
+        bounds: (lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration).
         log_gain: Factor of the log term; there is none in print.
         position_gain: k1.
         rate_gain: k2.
         first_rate: What stands in the first numerator of b; rho' unless given.
     """
-    lo, up, lo1, up1, lo2, up2 = walls
+    lo, up, lo1, up1, lo2, up2 = bounds
     s = np.log((x - lo) / (up - x))
     a = 1.0 / (x - lo) + 1.0 / (up - x)
     b = (lo1 if first_rate is None else first_rate) / (x - lo) + up1 / (up - x)

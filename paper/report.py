@@ -1,4 +1,4 @@
-"""Everything the paper shows of its example, reproduced: exhibits in the paper's order."""
+"""The exhibits of the report: all tables and figures of the paper's example, in the paper's order."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from paper.exhibits import Exhibit, Picture, Statement
 from paper.floor_statements import (
     approximation_statements,
     end_statements,
-    way_statements,
+    path_statements,
 )
 from paper.material import Material
 from paper.runs import GAIN_SETS
@@ -29,7 +29,7 @@ __all__ = ["exhibits"]
 
 
 def exhibits(material: Material) -> tuple[Exhibit, ...]:
-    """Judge every table and figure.
+    """Compare every table and figure with our runs.
 
     Args:
         material: Of a team of two robots with a joint each.
@@ -86,7 +86,7 @@ def _floor_figures(material: Material) -> tuple[Exhibit, ...]:
             "Figure 5",
             "the way over the floor",
             "The object's path as a blue line, and footprints of the team along it.",
-            way_statements(material.problem, material.runs),
+            path_statements(material.problem, material.runs),
             _both("fig05_path"),
         ),
     )
@@ -130,10 +130,12 @@ def _time_figures(material: Material) -> tuple[Exhibit, ...]:
     )  # fmt: skip
 
 
-def _over_time(number: str, title: str, told: str, statements: Sequence[Statement], picture: str) -> Exhibit:
-    return Exhibit(f"Figure {number}", title, told, tuple(statements), _both(picture))
+def _over_time(
+    number: str, title: str, caption: str, statements: Sequence[Statement], picture: str
+) -> Exhibit:
+    return Exhibit(f"Figure {number}", title, caption, tuple(statements), _both(picture))
 
 
 def _both(picture: str) -> tuple[Picture, ...]:
-    """The same picture of every gain set's run."""
+    """Return one picture per gain set."""
     return tuple(Picture(f"{gains}/{picture}.png", heading) for gains, heading in GAIN_SETS.items())

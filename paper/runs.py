@@ -18,12 +18,12 @@ __all__ = ["GAIN_SETS", "Run", "part_of", "reproduce_runs"]
 Progress = Callable[[str, float], None]
 
 GAIN_SETS = {"table_2": "the paper's gains (Table 2)", "scheduled": "scheduled gains"}
-"""Gain sets that are compared, and how they are called in headings."""
+"""Gain sets that are compared, and their names in headings."""
 
 
 @dataclass(frozen=True)
 class Run:
-    """One gain set's transport.
+    """The transport with one gain set.
 
     Attributes:
         gains: Name of the gain set.
@@ -68,7 +68,7 @@ def reproduce_runs(
 
 
 def part_of(progress: Progress | None, number: int, count: int) -> Progress | None:
-    """The progress of one of several simulations as progress of them all."""
+    """Return a progress callback for one of several simulations, which reports the progress of all."""
     if progress is None:
         return None
 

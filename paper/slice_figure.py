@@ -1,4 +1,4 @@
-"""One slice of the angles: what the team may and must cover in it, and what that leaves of the floor."""
+"""Slices of the angles: over- and under-approximations of the footprint, and the cells that follow."""
 
 from __future__ import annotations
 

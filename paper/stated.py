@@ -1,4 +1,4 @@
-"""What the paper states about its example in figures: start, goal, number of cells, Table 2, Figure 3."""
+"""Numbers that the paper states about its example: start, goal, number of cells, Table 2, Figure 3."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from math import pi
 __all__ = ["CELLS", "FIGURE_3_SLICES", "GOAL", "START", "TABLE_2", "Parameter"]
 
 START = (0.9, 2.0, 1.57, 0.0, 0.0)
-"""(x, y, theta, q_11, q_21) at the beginning [m, rad]."""
+"""(x, y, theta, q_11, q_21) at the start [m, rad]."""
 
 GOAL = (5.0, 8.0, 4.663)
-"""(x, y, theta) at the end [m, rad]."""
+"""(x, y, theta) at the goal [m, rad]."""
 
 CELLS = 30
 

@@ -40,7 +40,7 @@ PRINTED = np.array(
     ]
 )
 
-# Two signs are misprinted: any other width is the joint's range halved some times, plus the overlap.
+# Two signs are misprinted: every other width is the joint's range halved several times, plus the overlap.
 CORRECTED = PRINTED.copy()
 CORRECTED[2, 5] = -0.367
 CORRECTED[23, 5] = 0.050

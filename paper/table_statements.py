@@ -18,7 +18,8 @@ from paper.table_1 import CORRECTED, GOAL_ANGLE
 
 __all__ = ["interval_statements", "parameter_statements", "played_statements"]
 
-_SAME = 1e-9  # Rounding of a parameter on its way through a model file.
+_SAME = 1e-9
+"""Relative rounding error of a parameter that is written to a model file and read again."""
 
 
 Bounds = tuple[FloatArray, FloatArray]
@@ -55,7 +56,7 @@ def interval_statements(plan: Plan) -> tuple[Statement, ...]:
 
 
 def _posture_statements(ours: Bounds, paper: Bounds) -> tuple[Statement, ...]:
-    """Compare how the arms are held: where they must be bent, where they may be straight, and at the end."""
+    """Compare the joints: where the arms must be bent, where they may be straight, and how they end."""
     bent, straight = _bent(*ours), _straight(*ours)
     folded = " and ".join(f"q{name} in {_interval(paper, axis)}" for axis, name in ((1, "₁₁"), (2, "₂₁")))
     return (
@@ -81,12 +82,12 @@ def _posture_statements(ours: Bounds, paper: Bounds) -> tuple[Statement, ...]:
 
 
 def _overlap(lower: FloatArray, upper: FloatArray) -> float:
-    """The least that two neighbours share on any axis; negative if they do not meet."""
+    """Return the smallest overlap of neighbouring intervals on any axis; negative if two do not overlap."""
     return float((np.minimum(upper[1:], upper[:-1]) - np.maximum(lower[1:], lower[:-1])).min())
 
 
 def _bent(lower: FloatArray, upper: FloatArray) -> int:
-    """How many cells keep some joint from zero."""
+    """Return the number of cells whose intervals exclude zero for some joint."""
     return int(np.any((lower[:, 1:] > 0.0) | (upper[:, 1:] < 0.0), axis=1).sum())
 
 
@@ -99,12 +100,12 @@ def _interval(bounds: Bounds, axis: int) -> str:
 
 
 def _meet(ours: Bounds, paper: Bounds, axis: int) -> bool:
-    """Whether the last intervals of an axis have a value in common."""
+    """Return whether the last intervals of an axis have a value in common."""
     return bool(ours[0][-1, axis] <= paper[1][-1, axis] and paper[0][-1, axis] <= ours[1][-1, axis])
 
 
 def played_statements(played: Sequence[GainFigures]) -> tuple[Statement, ...]:
-    """Say how the paper's own cells went through the loop.
+    """State the results of the paper's own cells in closed loop.
 
     Args:
         played: What every gain set made of them.

@@ -126,7 +126,7 @@ def wrench_statements(runs: Sequence[Run], *, torque: bool) -> tuple[Statement, 
 
 
 def _between(paper: str, runs: Sequence[Run], axis: int, because: tuple[str, ...]) -> Statement:
-    """Say whether an axis (theta, q...) kept inside its funnel, and how close it came to a wall."""
+    """State whether an axis (theta, q...) stayed inside its funnel, and its smallest distance to a bound."""
     margins = [_margin(run, axis) for run in runs]
     return Statement(
         paper, tuple(f"nearest {1e3 * margin:.1f} mrad" for margin in margins), min(margins) > 0.0, because

@@ -40,7 +40,7 @@ def _reproduce(scenario: Path | None, out: Path, reporter: Reporter) -> ExitCode
     # Here and not above: no other command should wait for Drake, and only a clone has the package `paper`.
     from coop_drake.cli.maps import map_cache
     from coop_drake.scenario import load_scenario
-    from paper import Verdict, gather, write_report
+    from paper import Agreement, gather, write_report
 
     task = load_scenario(scenario if scenario is not None else "base")
     with reporter.stage("simulating") as progress:
@@ -48,12 +48,12 @@ def _reproduce(scenario: Path | None, out: Path, reporter: Reporter) -> ExitCode
     with reporter.stage("drawing") as progress:
         found = write_report(material, out, progress)
     statements = [statement for exhibit in found for statement in exhibit.statements]
-    for verdict in Verdict:
-        reporter.facts[verdict.name.lower()] = sum(one.verdict is verdict for one in statements)
-    reporter.facts["exhibits"] = {exhibit.name: exhibit.verdict.value for exhibit in found}
+    for agreement in Agreement:
+        reporter.facts[agreement.name.lower()] = sum(one.agreement is agreement for one in statements)
+    reporter.facts["exhibits"] = {exhibit.name: exhibit.agreement.value for exhibit in found}
     reporter.table(
         "The paper's example, reproduced",
-        [(f"{exhibit.name}: {exhibit.title}", exhibit.verdict.value) for exhibit in found],
+        [(f"{exhibit.name}: {exhibit.title}", exhibit.agreement.value) for exhibit in found],
     )
     reporter.say(
         f"Open {escape(str(out / 'index.html'))} in a browser; {escape(str(out / 'report.md'))} is the same"

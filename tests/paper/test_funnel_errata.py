@@ -30,7 +30,7 @@ def scalars(bounds):
 
 def test_e17a_walls_that_start_together_leave_no_room():
     """(17) starts the upper bound at theta_l; Table 1's first cell, with theta = 1.57."""
-    lower, upper = printed.angle_walls(
+    lower, upper = printed.angle_bounds(
         0.0, theta_l=1.47, theta_u=1.867, goal_l=1.667, goal_u=1.867, decay_rate=2.0
     )
     assert upper - lower == pytest.approx(0.0, abs=1e-15)

@@ -12,7 +12,7 @@ from PIL import Image
 
 from coop_drake.laws import FixedGains
 from coop_drake.plant.team import ObjectInertia
-from paper import GainFigures, Material, Verdict, exhibits, pages, write_report
+from paper import Agreement, GainFigures, Material, exhibits, pages, write_report
 from paper.approximation import approximations, two_components
 from paper.background import ASSUMPTIONS, ERRATA
 from paper.runs import GAIN_SETS, Run
@@ -57,16 +57,18 @@ def test_every_table_and_figure_of_the_example_has_its_exhibit(material):
     found = judged(material)
     figures_of_the_example = [f"Figure {number}" for number in range(3, 14)]
     assert list(found) == ["Table 1", "Table 1, played", "Table 2", *figures_of_the_example]
-    assert found["Table 1"].verdict is Verdict.DIFFERS  # Five synthetic cells are not thirty.
-    assert {found[name].verdict for name in ("Table 2", "Figure 3", "Figure 4", "Figure 7")} == {
-        Verdict.AGREES
+    assert found["Table 1"].agreement is Agreement.DIFFERS  # Five synthetic cells are not thirty.
+    assert {found[name].agreement for name in ("Table 2", "Figure 3", "Figure 4", "Figure 7")} == {
+        Agreement.AGREES
     }
 
 
 def test_a_gain_or_mass_that_is_not_the_paper_s_differs(material):
-    assert judged(replace(material, table_2=FixedGains(damping=6.0)))["Table 2"].verdict is Verdict.DIFFERS
+    assert (
+        judged(replace(material, table_2=FixedGains(damping=6.0)))["Table 2"].agreement is Agreement.DIFFERS
+    )
     heavy = ObjectInertia(2.0, 1.0, np.zeros(2))
-    assert judged(replace(material, inertia=heavy))["Table 2"].verdict is Verdict.DIFFERS
+    assert judged(replace(material, inertia=heavy))["Table 2"].agreement is Agreement.DIFFERS
 
 
 @pytest.mark.parametrize(
@@ -81,8 +83,8 @@ def test_a_gain_or_mass_that_is_not_the_paper_s_differs(material):
     ],
 )
 def test_one_run_that_departs_is_enough_to_differ(material, exhibit, changes):
-    assert judged(material)[exhibit].verdict is Verdict.AGREES
-    assert judged(with_log(material, **changes))[exhibit].verdict is Verdict.DIFFERS
+    assert judged(material)[exhibit].agreement is Agreement.AGREES
+    assert judged(with_log(material, **changes))[exhibit].agreement is Agreement.DIFFERS
 
 
 def test_an_approximation_that_leaves_something_out_is_noticed(material):
@@ -90,7 +92,7 @@ def test_an_approximation_that_leaves_something_out_is_noticed(material):
     small = replace(first, over=first.over.buffer(-0.01))
     assert first.encloses
     assert not small.encloses
-    assert judged(replace(material, made=(small, *others)))["Figure 3"].verdict is Verdict.DIFFERS
+    assert judged(replace(material, made=(small, *others)))["Figure 3"].agreement is Agreement.DIFFERS
 
 
 @pytest.fixture(scope="module")
@@ -123,9 +125,9 @@ def test_the_page_stands_alone_and_every_reason_is_explained(material, report):
     assert links == set(re.findall(r'id="([^"]+)"', page))
     for file in re.findall(r'href="([^"#]+\.\w+)"', page):
         assert (report / file).is_file()
-    for verdict in Verdict:
-        count = sum(one.verdict is verdict for exhibit in found for one in exhibit.statements)
-        assert f"{count} {verdict.value}" in page
+    for agreement in Agreement:
+        count = sum(one.agreement is agreement for exhibit in found for one in exhibit.statements)
+        assert f"{count} {agreement.value}" in page
 
 
 def test_the_markdown_says_the_same_and_its_pictures_are_there(material, report):
