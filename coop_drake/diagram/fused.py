@@ -30,12 +30,12 @@ __all__ = ["FusedControllers", "add_fused_controllers", "build_team_controller"]
 
 @dataclass(frozen=True)
 class FusedControllers:
-    """What drives a team in the fused mode.
+    """The parts that drive a team in the fused mode.
 
     Attributes:
-        driver: Computes everything.
-        governor: Keeps p_G.
-        efforts: What drives each robot where efforts are held; empty in continuous time.
+        driver: The block that computes all controllers.
+        governor: The integrator of p_G.
+        efforts: The held effort of each robot in a sampled loop; empty in continuous time.
     """
 
     driver: TeamController
@@ -57,7 +57,7 @@ def add_fused_controllers(
         scenario: The scenario.
         station: Built for the fused mode.
         planner: The supervisor.
-        knowledge: What every robot knows.
+        knowledge: What every robot knows before the run.
 
     Raises:
         ScenarioError: The scenario asks for what only named blocks do.
@@ -85,11 +85,11 @@ def add_fused_controllers(
 
 
 def build_team_controller(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> TeamController:
-    """The block that computes what the controllers of all robots compute.
+    """Build the block that computes what the controllers of all robots compute.
 
     Args:
         team: The simulated team, one tree rooted at the object.
-        knowledge: What every robot knows.
+        knowledge: What every robot knows before the run.
     """
     known = knowledge[0]
     axes = [i for robot in team.robots for i in (0, *range(1 + robot.q_slice.start, 1 + robot.q_slice.stop))]
@@ -152,9 +152,9 @@ def _report(
 def _hold(
     builder: DiagramBuilder, station: TransportStation, parts: Demultiplexer, period: float
 ) -> tuple[OutputPort, ...]:
-    """Hold every robot's effort between samples; base wrenches are in W, for the station's actuation.
+    """Hold every robot's effort between samples; base wrenches are in W, as the station's inputs.
 
-    Nothing stands behind the holds, or Drake would compute it at every evaluation, time having passed.
+    The holds connect to the station directly: Drake would evaluate a block behind them at every step.
     """
     joints = [len(robot.joints) for robot in station.team.robots]
     bases = _split(builder, "base_wrenches", parts.get_output_port(0), [3] * len(joints))
@@ -178,7 +178,7 @@ def _hold(
 def _split(
     builder: DiagramBuilder, name: str, whole: OutputPort, sizes: Sequence[int]
 ) -> list[OutputPort | None]:
-    """Parts of a port, None for those of no size."""
+    """Split a port; parts of size zero are None."""
     split = builder.AddNamedSystem(name, Demultiplexer([size for size in sizes if size]))
     builder.Connect(whole, split.get_input_port())
     ports = iter(range(split.num_output_ports()))

@@ -1,4 +1,4 @@
-"""One robot's sub-Diagram: all that it computes, from what it alone knows."""
+"""One robot's sub-Diagram: all that it computes, from what it knows and measures itself."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ TELEMETRY = (
     "object_acceleration",
     "hand_command",
 )
-"""Outputs of blocks that are exported to be looked at, by the log or a user."""
+"""Outputs of blocks that are exported for the log and for users."""
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class RobotKnowledge:
         X_LE: Its grasp in L.
         joints: Where its joints stand in q.
         object_inertia: Mass properties of the object.
-        load_share: Its part of the work, in [0, 1].
+        load_share: Its share of the load, in [0, 1].
         plan: The plan.
         cells: What the governor needs of every cell.
         position_tolerance: How close to the goal counts as arrived [m].
@@ -73,10 +73,10 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
     ======= ===================== =========== ==========================================================
     input   ``robot_state``       2 (3 + n)   its own state (z_k, z_k')
     input   ``object_pose``       3           the object's measured pose
-    input   ``current_cell``      2           (index, entry time), told by the cell planner
+    input   ``current_cell``      2           (index, entry time), from the cell planner
     output  ``robot_effort``      3 + n       its base wrench and joint torques
-    output  ``ready``             2           (index, margin), told to the cell planner
-    output  see ``TELEMETRY``                 to be looked at, by no other robot
+    output  ``ready``             2           (index, margin), for the cell planner
+    output  see ``TELEMETRY``                 for the log and for users, not for other robots
     ======= ===================== =========== ==========================================================
 
     Args:
@@ -136,7 +136,7 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
 def _add_governor_state(
     builder: DiagramBuilder, knowledge: RobotKnowledge, command: OutputPort
 ) -> OutputPort:
-    """Keep p_G, whose rate is the first half of the governor's command."""
+    """Add the integrator of p_G, whose rate is the first half of the governor's command."""
     halves = builder.AddNamedSystem("governor_rate", Demultiplexer([2, 2]))
     builder.Connect(command, halves.get_input_port())
     state = builder.AddNamedSystem("governor_state", _governor_state(knowledge))
@@ -145,7 +145,7 @@ def _add_governor_state(
 
 
 def _governor_state(knowledge: RobotKnowledge) -> Integrator | DiscreteTimeIntegrator:
-    """Keeps p_G; the discrete one is set to the start when a context is made."""
+    """Build the integrator of p_G; a discrete one gets its initial value when a context is made."""
     if knowledge.period is None:
         return Integrator(knowledge.plan.start[:2])
     return DiscreteTimeIntegrator(2, knowledge.period)
@@ -154,7 +154,7 @@ def _governor_state(knowledge: RobotKnowledge) -> Integrator | DiscreteTimeInteg
 def _connect_by_name(
     builder: DiagramBuilder, blocks: Mapping[str, LeafSystem], outputs: Mapping[str, OutputPort]
 ) -> None:
-    """Join every input to the output of its name; inputs that no block makes come from outside."""
+    """Connect every input to the output of the same name; export inputs that no block computes."""
     outside: set[str] = set()
     for block in blocks.values():
         for port in (block.get_input_port(i) for i in range(block.num_input_ports())):

@@ -91,7 +91,7 @@ def build_driven_station(scenario: Scenario) -> TransportStation:
 
 
 def _measure(builder: DiagramBuilder, team: TeamPlant) -> None:
-    """Measure the object's pose and every robot's own state."""
+    """Add the sensors of the object's pose and of every robot's own state."""
     names = ["object_pose", *(f"robot_{robot.index}_state" for robot in team.robots)]
     if isinstance(team, SeparateTeam):
         sensor = parts = builder.AddNamedSystem("team_sensor", build_separate_sensor(team))
@@ -105,12 +105,13 @@ def _measure(builder: DiagramBuilder, team: TeamPlant) -> None:
 
 
 def _drive_robots(builder: DiagramBuilder, team: TeamPlant) -> None:
-    """Let every robot's effort act: wrenches of W on the bases, torques on the joints."""
+    """Add inputs for the effort of every robot: wrenches in W on the bases, torques on the joints."""
     plant, efforts = team.plant, builder.AddNamedSystem("efforts", _efforts(team))
     for i in range(efforts.num_input_ports()):
         builder.ExportInput(efforts.get_input_port(i), efforts.get_input_port(i).get_name())
     thrusters = _add_thrusters(builder, team)
-    # Thrusters push along the axes of the poses they are told: those of W, for all that the bases turn.
+    # Thrusters push along the axes of the poses that they receive. These are the identity, so that they push
+    # along the axes of W, however the bases turn.
     axes = AbstractValue.Make([RigidTransform()] * plant.num_bodies())
     world = builder.AddNamedSystem("world_axes", ConstantValueSource(axes))
     builder.Connect(world.get_output_port(), thrusters.get_body_poses_input_port())
@@ -120,7 +121,7 @@ def _drive_robots(builder: DiagramBuilder, team: TeamPlant) -> None:
 
 
 def _efforts(team: TeamPlant) -> Selector:
-    """Sorts the efforts of all robots into wrenches on bases and torques of joints."""
+    """Build the block that sorts the efforts of all robots into wrenches on bases and torques of joints."""
     sizes = [3 + len(robot.joints) for robot in team.robots]
     return build_selector(
         {f"robot_{robot.index}_effort": size for robot, size in zip(team.robots, sizes, strict=True)},
@@ -132,7 +133,7 @@ def _efforts(team: TeamPlant) -> Selector:
 
 
 def _drive_bases(builder: DiagramBuilder, team: TeamPlant) -> None:
-    """Let wrenches act that are told in the axes of the bases, and all joints' torques in one."""
+    """Add inputs for wrenches in the axes of the bases, and for the torques of all joints together."""
     plant, thrusters = team.plant, _add_thrusters(builder, team)
     builder.Connect(plant.get_body_poses_output_port(), thrusters.get_body_poses_input_port())
     builder.ExportInput(thrusters.get_command_input_port(), "base_forces")
@@ -141,10 +142,10 @@ def _drive_bases(builder: DiagramBuilder, team: TeamPlant) -> None:
 
 
 def _add_thrusters(builder: DiagramBuilder, team: TeamPlant) -> Propeller:
-    """Let Drake's own block put wrenches on bases: thrusts along x and y, a moment about z.
+    """Add Drake's Propeller for the wrenches on bases: thrusts along x and y, a moment about z.
 
-    A base wrench given as a generalized force would move the team alike, but the grasp's reaction could not
-    be read from the plant.
+    A base wrench given as a generalized force would move the team in the same way, but the reaction at the
+    grasp could then not be read from the plant.
     """
     thrusters = [
         PropellerInfo(robot.base_body.index(), RigidTransform(R_BP), thrust, moment)

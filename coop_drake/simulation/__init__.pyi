@@ -1,8 +1,8 @@
 from .clearance import Clearance, TeamClearance
 from .invariants import ACCELERATION_TOLERANCE, WRENCH_TOLERANCE, Invariants, Margins
-from .ledger import Ledger, communication
 from .log import SimulationLog
 from .maps import build_maps, certificate_rows
+from .message_statistics import MessageStatistics, communication
 from .run import configure_simulator, simulate
 from .telemetry import Sample
 
@@ -11,8 +11,8 @@ __all__ = [
     "WRENCH_TOLERANCE",
     "Clearance",
     "Invariants",
-    "Ledger",
     "Margins",
+    "MessageStatistics",
     "Sample",
     "SimulationLog",
     "TeamClearance",

@@ -1,4 +1,4 @@
-"""What must hold at every accepted step, as margins that are positive where it holds."""
+"""Invariants that every accepted step must satisfy, as margins that are positive where they hold."""
 
 from __future__ import annotations
 
@@ -16,14 +16,18 @@ from coop_drake.simulation.telemetry import Sample
 
 __all__ = ["ACCELERATION_TOLERANCE", "GRASP_TOLERANCE", "WRENCH_TOLERANCE", "Invariants", "Margins"]
 
-#: Largest difference between realised and commanded acceleration of the object [m/s^2, rad/s^2].
 ACCELERATION_TOLERANCE = 1e-9
-#: Largest distance between a hand and its grasp where grasps are constraints [m]: clearances are those of
-#: bodies whose hands are in place, and would be wrong by more. At steps of a millisecond constraints give by
-#: some 1e-8 m for each newton.
+"""Largest difference between realised and commanded acceleration of the object [m/s^2, rad/s^2]: a hundred
+times the rounding errors of a run."""
+
 GRASP_TOLERANCE = 1e-4
-#: Largest difference between a grasp's measured and commanded wrench [N, N m].
+"""Largest distance between an end effector and its grasp where grasps are constraints [m]. Clearances are
+computed for end effectors in place and would be wrong by this distance. With steps of a millisecond, a
+constraint yields by some 1e-8 m for each newton."""
+
 WRENCH_TOLERANCE = 1e-8
+"""Largest difference between a grasp's measured and commanded wrench [N, N m]: a hundred times the rounding
+errors."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ class Margins:
 
 
 class _Measured(NamedTuple):
-    """What the compiled ``margins`` returns."""
+    """The values that the compiled ``margins`` returns."""
 
     wall: float
     piece: int
@@ -110,7 +114,7 @@ class Invariants:
             energy_margin=sample.energy_margin,
             acceleration_error=sample.acceleration_error,
             wrench_error=measured.wrench_error,
-            violation=_told(sample, broken) if broken else "",
+            violation=_described(sample, broken) if broken else "",
         )
 
     def _broken(self, sample: Sample, measured: _Measured) -> Iterator[str]:
@@ -129,10 +133,10 @@ class Invariants:
             axis = self._axes[measured.slice_axis]
             yield f"distance of {axis} to its slice is {measured.slice:.3g} rad or m"
         if not sample.grasp_error <= GRASP_TOLERANCE:
-            yield f"distance of a hand to its grasp is {sample.grasp_error:.3g} m"
+            yield f"distance of an end effector to its grasp is {sample.grasp_error:.3g} m"
 
 
-def _told(sample: Sample, broken: list[str]) -> str:
+def _described(sample: Sample, broken: list[str]) -> str:
     return f"at t = {sample.time:.6g} s in cell {sample.cell}: {'; '.join(broken)}"
 
 

@@ -1,4 +1,4 @@
-"""Keeps Drake from warning about joint limits that the funnels keep."""
+"""Suppresses Drake's warning about joint limits, which the funnels keep."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ __all__ = ["joint_limits_kept_by_funnels"]
 
 @contextmanager
 def joint_limits_kept_by_funnels() -> Iterator[None]:
-    """Let Drake warn of everything but this: in continuous time it does not simulate joint limits.
+    """Suppress Drake's warning that it does not simulate joint limits in continuous time, and no other.
 
-    Slices end at the limits and funnels inside slices, which every accepted step is checked for.
+    Slices lie within the joint limits and funnels within slices; the invariants check this at every step.
     """
     logger = logging.getLogger("drake")
     logger.addFilter(_matters)

@@ -40,7 +40,8 @@ class SimulationLog:
         object_wrench: Total wrench commanded to the object at its centre of mass, shape (T, 3) [N, N m].
         commanded_wrenches: Share (31) of every robot at its grasp, shape (T, N, 3) [N, N m].
         measured_wrenches: Wrench that the grasp weld transmits to the object there, shape (T, N, 3) [N, N m].
-        grasp_error: Largest distance between a robot's hand Ek and its place on the object, shape (T,) [m].
+        grasp_error: Largest distance between a robot's end effector Ek and its grasp on the object, shape
+            (T,) [m].
         base_wrenches: Actuation of every base at Bk, shape (T, N, 3) [N, N m].
         joint_torques: Actuation of every joint, shape (T, n) [N m or N].
         ready_margins: Margin that every robot reports; ready where not negative, shape (T, N) [-].

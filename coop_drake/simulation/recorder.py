@@ -12,19 +12,19 @@ __all__ = ["Recorder"]
 
 
 class Recorder:
-    """Keeps every accepted step of a run."""
+    """Collects the accepted steps of a run."""
 
     def __init__(self) -> None:
         self._rows: list[tuple[Sample, Margins]] = []
 
     def add(self, sample: Sample, margins: Margins) -> None:
-        """Keep one step."""
+        """Add one step."""
         self._rows.append((sample, margins))
 
     def to_log(
         self, *, reached: bool, violation: str, joint_names: tuple[str, ...], robot_names: tuple[str, ...]
     ) -> SimulationLog:
-        """The log of all steps kept.
+        """Return the log of all steps.
 
         Args:
             reached: Whether the object came to rest at the goal.

@@ -1,4 +1,4 @@
-"""What is computed of every accepted step, compiled, in few calls: handing an array over costs most."""
+"""Margins and distances of every accepted step, compiled in few calls: handing an array over costs most."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def margins(
     z: FloatArray, cell: FloatArray, lower: FloatArray, upper: FloatArray,
     funnel_lower: FloatArray, funnel_upper: FloatArray, commanded: FloatArray, measured: FloatArray,
 ) -> tuple[float, int, float, int, float, float, int, float, int, float]:  # fmt: skip
-    """What ``team_distances`` returns, then the other margins, for the axes also which one is nearest.
+    """Return what ``team_distances`` returns, then the margins of cell, funnels, slice and wrenches.
 
     Args:
         team: With the next two as in ``team_distances``.
@@ -55,10 +55,10 @@ def margins(
         cell: Edges of the cell's safe set, shape (edges, 4) [m].
         lower: Of the cell's slice, shape (1 + n,) [rad or m].
         upper: Of the cell's slice, shape (1 + n,) [rad or m].
-        funnel_lower: Lower walls of the funnels, shape (1 + n,) [rad or m].
-        funnel_upper: Upper walls of the funnels, shape (1 + n,) [rad or m].
-        commanded: Wrenches of the hands, shape (N, 3) [N, N m].
-        measured: The same as the grasps transmit them, shape (N, 3) [N, N m].
+        funnel_lower: Lower funnel bounds, shape (1 + n,) [rad or m].
+        funnel_upper: Upper funnel bounds, shape (1 + n,) [rad or m].
+        commanded: Commanded wrenches of the end effectors, shape (N, 3) [N, N m].
+        measured: Wrenches that the grasps transmit, shape (N, 3) [N, N m].
 
     Returns:
         Distances; signed distance of the object to its cell's boundary [m]; smallest margin to a funnel and
@@ -67,18 +67,18 @@ def margins(
     wall, piece, between, pair = team_distances(team, walls, z)
     in_cell = signed_distance(cell, z[0], z[1])
     funnel, funnel_axis = _narrowest(z, funnel_lower, funnel_upper)
-    room, slice_axis = _narrowest(z, lower, upper)
+    margin, slice_axis = _narrowest(z, lower, upper)
     error = largest_difference(measured, commanded)
-    return wall, piece, between, pair, in_cell, funnel, funnel_axis, room, slice_axis, error
+    return wall, piece, between, pair, in_cell, funnel, funnel_axis, margin, slice_axis, error
 
 
 @compiled
 def largest_difference(rows: FloatArray, others: FloatArray) -> float:
-    """Largest component of a difference, no number if one of them is none.
+    """Return the largest magnitude of a component of a difference, NaN if a component is NaN.
 
     Args:
         rows: Shape (N, k).
-        others: What they are compared with, shape (N, k), or (1, k) for the same with all.
+        others: Rows to compare with, shape (N, k), or (1, k) to compare all with the same row.
     """
     largest = 0.0
     for i in range(rows.shape[0]):
@@ -92,7 +92,7 @@ def largest_difference(rows: FloatArray, others: FloatArray) -> float:
 
 @compiled
 def _narrowest(z: FloatArray, lower: FloatArray, upper: FloatArray) -> tuple[float, int]:
-    """Smallest distance of an axis to its interval's ends, and the axis; the first that is no number."""
+    """Return the smallest distance of an axis to its interval's ends, and the axis; NaN if one is NaN."""
     least, axis = inf, 0
     for i in range(lower.size):
         margin = min(z[2 + i] - lower[i], upper[i] - z[2 + i])

@@ -1,4 +1,4 @@
-"""Reads from a running closed loop everything that the log keeps."""
+"""Reads from a running closed loop all that the log contains."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class _PortRow:
         self._size = 0
 
     def add(self, system: System, output: str) -> Any:
-        """Append an output; returns where in the row it stands, integers."""
+        """Append an output and return its indices in the row."""
         first = self._size
         self._readers.append(port_reader(system, output, self._root))
         self._size += system.GetOutputPort(output).size()
@@ -140,7 +140,7 @@ class _PortRow:
 
 
 class _Places(NamedTuple):
-    """Where in a row of ports the parts of a sample stand, as integers of the parts' shapes."""
+    """Indices in a row of ports of the parts of a sample, as integer arrays of the parts' shapes."""
 
     instant: Any
     base_poses: Any
@@ -168,7 +168,7 @@ def _realised(loop: ClosedLoop, ports: _PortRow) -> Any:
 
 
 def _named_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
-    """Add everything that is read of a loop of named blocks."""
+    """Add all outputs that are read from a loop of named blocks."""
     robots = loop.team.robots
     states = [ports.add(loop.station.diagram, f"robot_{robot.index}_state") for robot in robots]
     efforts = [ports.add(controller, "robot_effort") for controller in loop.controllers]
@@ -193,7 +193,7 @@ def _named_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
 
 
 def _fused_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
-    """Add everything that is read of a loop of fused blocks."""
+    """Add all outputs that are read from a loop of fused blocks."""
     assert loop.fused is not None
     fused, robots = loop.fused, len(loop.team.robots)
     added = ports.add(fused.driver, "telemetry").astype(float)
@@ -222,5 +222,5 @@ def _fused_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
 
 
 def port_reader(system: System, output: str, root: Context) -> Callable[[], Any]:
-    """A function that evaluates one output; looking ports and contexts up takes longer than reading them."""
+    """Return a function that evaluates one output; it looks port and context up only once, to save time."""
     return partial(system.GetOutputPort(output).Eval, system.GetMyContextFromRoot(root))

@@ -1,4 +1,4 @@
-"""Looks at every accepted step of a run, records it, and decides when the run ends."""
+"""Checks and records every accepted step of a run, and decides when the run ends."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Watch:
         invariants: What must hold.
         position_tolerance: How close to the goal counts as arrived [m].
         root: Context of the whole diagram in the simulator.
-        progress: Told the stage and the fraction done, if given.
+        progress: Called with the stage and the fraction done, if given.
         onlooker: Called with every accepted step, if given.
     """
 
@@ -48,11 +48,11 @@ class Watch:
 
     @property
     def ended(self) -> bool:
-        """Whether there is nothing left to simulate."""
+        """Whether the run has ended."""
         return self.reached or bool(self.violation)
 
     def __call__(self, _: Context) -> EventStatus | None:
-        """Look at one accepted step."""
+        """Check and record one accepted step."""
         sample = self._telemetry.read()
         margins = self._invariants.check(sample)
         self.recorder.add(sample, margins)
@@ -71,7 +71,7 @@ class Watch:
         return EventStatus.ReachedTermination(self._loop.diagram, self.violation or "arrived")
 
     def give_up(self, why: str) -> None:
-        """End the run without arrival; the message names what it was waiting for.
+        """End the run without arrival; the message names the condition that was not met.
 
         Args:
             why: What happened, for example ``stalled``.
@@ -79,7 +79,7 @@ class Watch:
         self._end(why, lambda plan, last: f"it waits until {blocking_margin(plan, last, self._tolerance)}")
 
     def fail(self, why: str) -> None:
-        """End a run that cannot be integrated further; the message names what was next to break.
+        """End a run that cannot be integrated further; the message names the axis nearest to a bound.
 
         Args:
             why: What happened.

@@ -1,4 +1,4 @@
-"""What all LeafSystems of this package have in common: they can be let go of."""
+"""Base class of all LeafSystems of this package; it lets their memory be freed."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ __all__ = ["Block"]
 
 
 class Block(LeafSystem):
-    """A LeafSystem that does not stay in memory for ever.
+    """A LeafSystem whose memory can be freed.
 
-    Drake's ports keep their system alive, and the system its ports' callbacks, across languages, where
-    Python's collector cannot see it: a block that keeps handles of its ports is never freed, nor is the
-    Diagram that it is part of, nor its plant. ``release`` cuts what it keeps.
+    Drake's ports keep their system alive, and the system keeps the callbacks of its ports alive. Python's
+    garbage collector cannot see this cycle, because half of it is in C++. Without ``release``, neither the
+    block nor the Diagram that it is part of, nor the plant, would ever be freed.
     """
 
     def __init__(self) -> None:
@@ -44,17 +44,17 @@ class Block(LeafSystem):
         super().DeclarePeriodicDiscreteUpdateEvent(period_sec, offset_sec, self._loosely(update))
 
     def release(self) -> None:
-        """Forget everything; neither the block nor its Diagram may be used any more."""
+        """Drop all references; neither the block nor its Diagram may be used any more."""
         for callback in self._callbacks:
             callback.__setstate__((_nothing, (), {}, {}))  # type: ignore[attr-defined]
         self.__dict__.clear()
 
     def _loosely(self, method: Callable[..., Any]) -> Callable[..., Any]:
-        """The same method, as a callback that can be emptied."""
+        """Return the method as a callback that ``release`` can empty."""
         callback = partial(method)
         self._callbacks.append(callback)
         return callback
 
 
 def _nothing(*_: object) -> None:
-    """What is left of a callback."""
+    """Do nothing: what a callback does after its release."""

@@ -1,4 +1,4 @@
-"""The supervisor that walks through the plan's cells when every robot is ready."""
+"""The supervisor that switches to the plan's next cell when every robot is ready."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class CellPlanner(Block):
     holds samples starts at index -1 for the same reason. All robots read one output and switch together.
 
     ======= =================== ==== =================================================================
-    input   ``robot_<k>_ready`` 2    cell index that robot k speaks of, signed margin of readiness [-]
+    input   ``robot_<k>_ready`` 2    cell index that the report of robot k is about, its margin [-]
     output  ``current_cell``    2    index of the current cell, time at which it was entered [-, s]
     output  ``arrived``         1    1 when all robots are ready to leave the last cell, else 0 [-]
     ======= =================== ==== =================================================================
@@ -55,11 +55,11 @@ class CellPlanner(Block):
             self.DeclarePeriodicDiscreteUpdateEvent(period_sec=period, offset_sec=0.0, update=self._advance)
 
     def _left_by_all(self, context: Context) -> float:
-        """Index of the cell that all robots are ready to leave, -1 if they are not."""
+        """Return the index of the cell that all robots are ready to leave, -1 if some robot is not ready."""
         cell = -1.0
         for k, port in enumerate(self._ready):
             index, margin = port.Eval(context)
-            # Most steps end here, at the first robot: the state is not read before it must be.
+            # Most steps end here, at the first robot; reading the state first would cost time in every step.
             if not margin >= 0.0 or (k > 0 and index != cell):
                 return -1.0
             cell = index
@@ -70,7 +70,7 @@ class CellPlanner(Block):
         if 0.0 <= cell < self._cells - 1 and cell == context.get_discrete_state_vector().value()[0]:
             discrete_state.get_mutable_vector().SetFromVector([cell + 1.0, context.get_time()])
             return EventStatus.Succeeded()
-        # What follows from the state stays valid: nobody computes it again.
+        # "Did nothing" keeps the cached values that depend on the state valid.
         return self._nothing
 
     def _write_cell(self, context: Context, output: BasicVector) -> None:

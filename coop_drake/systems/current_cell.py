@@ -1,4 +1,4 @@
-"""The two messages of the team: the current cell, told to every robot, and the ready report of each."""
+"""The two messages of the team: the current cell, sent to every robot, and each robot's ready report."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from coop_drake.tree.pose import FloatArray
 
 __all__ = ["CURRENT_CELL_SIZE", "READY_SIZE", "index_of"]
 
-#: (index, time of entry).
 CURRENT_CELL_SIZE = 2
-#: (index of the cell that the report is about, margin).
+"""Size of the message of the current cell: its index [-] and the time of its entry [s]."""
+
 READY_SIZE = 2
+"""Size of a ready report: the index of the cell that it is about and the margin [-]."""
 
 
 def index_of(current_cell: FloatArray, cells: int) -> int:
-    """Index of the current cell.
+    """Return the index of the current cell.
 
     Args:
         current_cell: Value of a ``current_cell`` port, shape (2,).

@@ -13,7 +13,6 @@ from coop_drake.systems.current_cell import READY_SIZE
 
 __all__ = ["MessageChannel", "clear_channel", "whole_periods"]
 
-#: Stands for no report, as before the first arrives: it is about no cell, so it never counts.
 _NOTHING = (-1.0, -1.0)
 
 
@@ -73,7 +72,7 @@ class MessageChannel(Block):
         discrete_state.get_mutable_vector().SetFromVector(arrivals.ravel())
 
     def _thrown(self, context: Context) -> tuple[bool, bool]:
-        """Whether a report arrives now, and whether it will again; no dice where chance has no part."""
+        """Return whether a report arrives, and whether it is repeated, drawn with their probabilities."""
         if self._loss == 0.0 and self._repeat == 0.0:
             return True, False
         dice = Random(self._seed << 32 | round(context.get_time() / self._period))
@@ -84,7 +83,7 @@ class MessageChannel(Block):
 
 
 def clear_channel(period: float) -> LinearSystem:
-    """A channel that neither loses nor delays anything: Drake's own hold, with nothing heard at first.
+    """Build a channel that neither loses nor delays reports: a zero-order hold, empty at first.
 
     Its input and output are those of :class:`MessageChannel`, reports of shape (2,), under Drake's names.
 
@@ -98,5 +97,5 @@ def clear_channel(period: float) -> LinearSystem:
 
 
 def whole_periods(time: float, period: float) -> int:
-    """How many periods a time takes, rounded up but for rounding errors."""
+    """Return the number of periods that a time takes, rounded up unless it is whole up to rounding errors."""
     return int(np.ceil(time / period - 1e-9))

@@ -14,7 +14,7 @@ __all__ = ["ObjectEstimator"]
 
 
 class ObjectEstimator(Block):
-    """Joins the object's pose with its twist A_k^-1 J_k z_k', which own motion tells through the grasp: (27).
+    """Joins the object's pose with its twist A_k^-1 J_k z_k' from the robot's own motion: (27) and (29).
 
     ======= ================= ========== ===================================================== =====
     input   ``robot_state``   2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)        W

@@ -17,7 +17,7 @@ __all__ = ["ReadyMonitor"]
 
 
 class ReadyMonitor(Block):
-    """Judges whether object and own joints may enter the next cell; in the last cell, whether they arrived.
+    """Reports whether object and own joints may enter the next cell; in the last cell, whether they arrived.
 
     ======= ====================== ========== ====================================================== =====
     input   ``object_state``       6          pose and twist of L, angle unwrapped                   W
@@ -27,7 +27,7 @@ class ReadyMonitor(Block):
     output  ``ready``              2          index of the current cell, signed margin [-]
     ======= ====================== ========== ====================================================== =====
 
-    No state. The report is all that a robot ever tells others: one bit's worth, and which cell it is about.
+    No state. The report is all that a robot sends to others: whether it is ready, and for which cell.
 
     Args:
         cells: Governor's data of every cell.

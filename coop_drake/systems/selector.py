@@ -1,4 +1,4 @@
-"""Drake's block that sorts elements of vectors, from names and places."""
+"""Builds Drake's Selector, which rearranges elements of vectors, from names and indices."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ __all__ = ["build_selector"]
 
 
 def build_selector(inputs: Mapping[str, int], outputs: Mapping[str, Sequence[tuple[int, int]]]) -> Selector:
-    """Build a Selector.
+    """Build a Selector, whose outputs are made of elements of its inputs.
 
     Args:
         inputs: Names and sizes of the inputs.
-        outputs: Names of the outputs, and for each of its elements the input's number and the place in it.
+        outputs: Names of the outputs, and for each element of an output the input's index and the index in
+            it.
     """
     return Selector(
         SelectorParams(

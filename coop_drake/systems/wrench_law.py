@@ -13,7 +13,7 @@ __all__ = ["WrenchLaw"]
 
 
 class WrenchLaw(Block):
-    """Turns the object's desired acceleration into one robot's share of the work: (21), (28) and (31).
+    """Turns the object's desired acceleration into one robot's share of the load: (21), (28) and (31).
 
     ======= ======================= ===== ====================================================== =====
     input   ``object_state``        6     pose and twist of L                                    W
@@ -21,7 +21,7 @@ class WrenchLaw(Block):
                                           L's origin [m/s^2]
     input   ``axis_acceleration``   1 + n desired angular acceleration [rad/s^2]; those of the   W
                                           joints, not used here
-    output  ``object_acceleration`` 3     both that are used, in one [m/s^2, rad/s^2]            W
+    output  ``object_acceleration`` 3     the desired accelerations of L [m/s^2, rad/s^2]         W
     output  ``hand_command``        6     acceleration of Ek that goes with it [m/s^2, rad/s^2], W
                                           then the wrench on the object at Ek [N, N m]
     ======= ======================= ===== ====================================================== =====
@@ -33,7 +33,7 @@ class WrenchLaw(Block):
         p_LLcm: The object's centre of mass in L, shape (2,) [m].
         mass: M_L [kg].
         inertia: I_L about the centre of mass [kg m^2].
-        share: The robot's part of the work, in [0, 1]; the team's sum to one.
+        share: The robot's share of the load, in [0, 1]; the team's shares sum to one.
         joints: Number of the robot's joints n.
 
     Raises:

@@ -63,12 +63,12 @@ def test_all_margins_are_positive_on_every_accepted_step(run):
 
 def test_robots_say_little_and_all_of_it_counts(run):
     plan, log = run
-    ledger = communication(log)
+    statistics = communication(log)
     robots = len(log.robot_names)
-    assert all(count >= len(plan.cells) for count in ledger.reports)
-    assert ledger.announcements == robots * (len(plan.cells) - 1)
-    assert ledger.message_bytes == 3 * sum(ledger.reports) + 2 * ledger.announcements
-    assert ledger.messages < 10 * robots * len(plan.cells)
+    assert all(count >= len(plan.cells) for count in statistics.reports)
+    assert statistics.announcements == robots * (len(plan.cells) - 1)
+    assert statistics.message_bytes == 3 * sum(statistics.reports) + 2 * statistics.announcements
+    assert statistics.messages < 10 * robots * len(plan.cells)
 
 
 def test_the_cells_are_walked_one_by_one_and_all_agree_when(run):

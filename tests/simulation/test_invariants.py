@@ -67,7 +67,7 @@ def moved(index, value):
         ({"z": moved(2, 0.32)}, "distance of object angle to its funnel is -0.02 rad or m"),
         ({"z": moved(4, 0.26)}, "distance of robot_1::joint_1 to its funnel is -0.01 rad or m"),
         ({"z": moved(3, -0.35)}, "distance of robot_0::joint_1 to its slice is -0.05 rad or m"),
-        ({"grasp_error": 2e-4}, "distance of a hand to its grasp is 0.0002 m"),
+        ({"grasp_error": 2e-4}, "distance of an end effector to its grasp is 0.0002 m"),
         ({"energy_margin": -1e-3}, "Delta E is -0.001 m^2/s^2"),
         ({"acceleration_error": 2e-9}, "realised less commanded acceleration is 2e-09 m/s^2"),
         ({"measured_wrenches": np.full((2, 3), 1.001)}, "measured less commanded grasp wrench is 0.001 N"),

@@ -15,11 +15,11 @@ def run(cells, *robots):
 
 
 def test_each_robot_reports_once_a_cell_and_hears_once_of_every_new_cell():
-    ledger = communication(run([0, 0, 1, 1], [-1, 0, -1, 1], [2, 2, -1, 3]))
-    assert ledger.reports == (2, 2)
-    assert ledger.announcements == 2
-    assert ledger.messages == 6
-    assert ledger.message_bytes == 4 * 3 + 2 * 2
+    statistics = communication(run([0, 0, 1, 1], [-1, 0, -1, 1], [2, 2, -1, 3]))
+    assert statistics.reports == (2, 2)
+    assert statistics.announcements == 2
+    assert statistics.messages == 6
+    assert statistics.message_bytes == 4 * 3 + 2 * 2
 
 
 def test_what_is_taken_back_is_told_too():
@@ -32,5 +32,5 @@ def test_a_robot_that_is_ready_on_entry_says_so_again():
 
 @pytest.mark.parametrize("margin", [1.0, -1.0])
 def test_a_run_that_never_leaves_its_first_cell(margin):
-    ledger = communication(run([0, 0], [margin, margin], [-1.0, -1.0]))
-    assert (ledger.reports, ledger.announcements) == ((int(margin > 0), 0), 0)
+    statistics = communication(run([0, 0], [margin, margin], [-1.0, -1.0]))
+    assert (statistics.reports, statistics.announcements) == ((int(margin > 0), 0), 0)

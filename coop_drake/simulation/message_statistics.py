@@ -1,4 +1,4 @@
-"""Counts what the robots told each other in a run."""
+"""Counts the messages that the robots of a run sent to each other."""
 
 from __future__ import annotations
 
@@ -9,21 +9,23 @@ import numpy as np
 
 from coop_drake.simulation.log import SimulationLog
 
-__all__ = ["Ledger", "communication"]
+__all__ = ["MessageStatistics", "communication"]
 
-#: A report on the air: the index of the cell that it is about, and whether its sender is ready to leave it.
 REPORT = struct.Struct("<H?")
-#: An announcement on the air: the index of the cell that is now the current one.
+"""Payload of a report [3 bytes]: the index of the cell that it is about, and whether its sender is ready to
+leave."""
+
 ANNOUNCEMENT = struct.Struct("<H")
+"""Payload of an announcement [2 bytes]: the index of the cell that is now the current one."""
 
 
 @dataclass(frozen=True)
-class Ledger:
-    """The messages of one transport, were each sent only when it says something new.
+class MessageStatistics:
+    """The messages of one transport if a message is sent only when its content changes.
 
     Attributes:
         reports: Reports of every robot to the cell planner, shape (N,).
-        announcements: New cells, told by the cell planner to each robot.
+        announcements: New cells, announced by the cell planner to each robot.
         message_bytes: Payload of all of them [bytes].
     """
 
@@ -33,16 +35,16 @@ class Ledger:
 
     @property
     def messages(self) -> int:
-        """All messages of the team."""
+        """Number of all messages of the team."""
         return sum(self.reports) + self.announcements
 
 
-def communication(log: SimulationLog) -> Ledger:
+def communication(log: SimulationLog) -> MessageStatistics:
     """Count the messages that a run needed.
 
-    A robot reports when it becomes ready to leave the current cell, and when it takes that back; that it is
-    not ready for a cell just entered goes without saying. The cell planner announces each cell but the first
-    to every robot.
+    A robot reports when it becomes ready to leave the current cell, and when it is no longer ready. After a
+    switch to the next cell no report is needed, because every robot then counts as not ready. The cell
+    planner announces each cell but the first to every robot.
 
     Args:
         log: The run.
@@ -54,4 +56,4 @@ def communication(log: SimulationLog) -> Ledger:
     reports = (ready != before).sum(axis=0)
     announcements = (int(entered.sum()) - 1) * len(reports)
     size = int(reports.sum()) * REPORT.size + announcements * ANNOUNCEMENT.size
-    return Ledger(tuple(int(count) for count in reports), announcements, size)
+    return MessageStatistics(tuple(int(count) for count in reports), announcements, size)
