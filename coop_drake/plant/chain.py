@@ -1,4 +1,4 @@
-"""Checks and orders one robot's bodies and joints, from the base outwards; the base is the model's root."""
+"""Finds the base of a robot, which is the root of its model, and its joints from the base outwards."""
 
 from math import inf, isfinite, pi
 
@@ -11,7 +11,7 @@ from coop_drake.scenario import RobotAssembly, Scenario
 MOVABLE = ("revolute", "prismatic")
 
 _ENDLESS = 1e3
-"""Limits from here on mean none; files often write 1e16 for a joint without limits [rad or m]."""
+"""Limits of this size or more count as none; files often write 1e16 for a joint without limits [rad or m]."""
 
 
 def scoped(plant: MultibodyPlant, element: RigidBody | Joint) -> str:
@@ -22,7 +22,7 @@ def scoped(plant: MultibodyPlant, element: RigidBody | Joint) -> str:
 def find_base(
     scenario: Scenario, robot: RobotAssembly, plant: MultibodyPlant
 ) -> tuple[RigidBody, tuple[Joint, ...]]:
-    """Find a robot's base body and its joints, and refuse what is no holonomic planar manipulator.
+    """Find a robot's base body and its joints, and refuse models that are no holonomic planar manipulators.
 
     Args:
         scenario: For messages.
@@ -30,8 +30,8 @@ def find_base(
         plant: A plant that holds the robot's models, finalized or not.
 
     Returns:
-        The base body, and the movable joints in the order of q_k: from the base outwards, a joint before
-        those that it carries.
+        The base body, and the movable joints in the order of q_k: from the base outwards, every joint before
+        the joints that it carries.
 
     Raises:
         ScenarioError: A joint to the world, a joint that is neither fixed nor revolute nor prismatic, a joint
@@ -104,7 +104,7 @@ def _check_kind(scenario: Scenario, robot: RobotAssembly, plant: MultibodyPlant,
 
 
 def _outwards(base: RigidBody, joints: list[Joint]) -> tuple[Joint, ...]:
-    """Depth first from the base; siblings in the order of the file."""
+    """The movable joints, depth first from the base; siblings in the order of the file."""
     ordered: list[Joint] = []
     stack = [int(base.index())]
     while stack:

@@ -20,22 +20,22 @@ from coop_drake.tree.component_tree import Body, Component, ComponentTree, Conve
 from coop_drake.tree.pose import PlanarPose
 
 _LARGEST = 1e4
-"""Footprints that reach further are slips of the pen [m]."""
+"""Largest distance of a footprint from its joint; more is taken for an error in the file [m]."""
 
 
 def read_component_tree(team: TeamPlant) -> ComponentTree:
     """Read footprints and joints of the team, as the planner needs them.
 
     Bodies that are welded together make one component; the object's comes first. The frame C of a component
-    stands at its joint, parallel to L when every joint is zero. A joint is seen from the object outwards, so
-    a joint whose file leads from base to hand turns the other way, sign = -1. Bodies that can neither be
-    seen nor collide are left out.
+    stands at its joint, parallel to L when every joint is zero. Joints lead from the object outwards: a joint
+    that leads from base to end effector in its file has sign = -1. Bodies without visual and collision
+    geometry are left out.
 
     Args:
         team: The team's plant.
 
     Raises:
-        ScenarioError: A body that shows but cannot collide, or a shape without a bounded footprint.
+        ScenarioError: A body with visual but no collision geometry, or a shape without a bounded footprint.
     """
     return _TreeReader(team).tree()
 
@@ -51,7 +51,7 @@ class _Link:
 
 
 class _TreeReader:
-    """Walks the plant from the object outwards at the configuration zero."""
+    """Reads the plant from the object outwards, with all positions zero."""
 
     def __init__(self, team: TeamPlant) -> None:
         self.team = team
@@ -73,7 +73,7 @@ class _TreeReader:
         queue = [(root, RigidTransform())]
         components = [self._component(root, None, None, RigidTransform())]
         used: set[int] = set()
-        for at, (members, X_WP) in enumerate(queue):  # grows while it is walked
+        for at, (members, X_WP) in enumerate(queue):  # the queue grows in the loop
             for index, joint in enumerate(self.team.joints):
                 link = None if index in used else self._link(joint, members)
                 if link is not None:
@@ -85,7 +85,7 @@ class _TreeReader:
         return ComponentTree(tuple(components), self.may_overlap)
 
     def _check_solid(self, components: list[Component]) -> None:
-        """A team whose models nobody can run into is a slip: geometry under visual names alone, or none."""
+        """Refuse a robot or an object without any collision geometry."""
         solid = {body.robot for component in components for body in component.bodies}
         for robot, models in enumerate(self.team.assembly.robots):
             if robot not in solid:
@@ -95,7 +95,7 @@ class _TreeReader:
             raise refusal(self.team.scenario, None, name, "an object with collision geometry")
 
     def _welded_to(self, body: RigidBody) -> tuple[RigidBody, ...]:
-        """All bodies rigidly tied to one, itself included; the object's first, then in the plant's order."""
+        """All bodies welded to one, itself included: the object's bodies first, then in the plant's order."""
         found = {int(body.index()): body}
         grew = True
         while grew:

@@ -1,4 +1,4 @@
-"""Configurations z of the team in and out of a plant's context."""
+"""Writes configurations z of the team into a plant's context, and reads them from it."""
 
 import numpy as np
 from pydrake.systems.framework import Context

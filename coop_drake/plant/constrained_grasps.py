@@ -21,9 +21,9 @@ class ConstrainedGrasp:
     """One robot's hold on the object.
 
     Attributes:
-        gripper_frame: Ek, fixed on the robot's hand.
+        gripper_frame: Ek, fixed on the robot's end effector.
         object_body: The object's body that is grasped.
-        X_OE: Where Ek is to be on that body.
+        X_OE: Pose of Ek on that body while the grasp holds.
         base_joint: Moves Bk against the world.
     """
 
@@ -33,18 +33,20 @@ class ConstrainedGrasp:
     base_joint: PlanarJoint
 
     def constrain(self, plant: MultibodyPlant) -> None:
-        """Weld hand and object together, before the plant is finalized."""
-        hand = self.gripper_frame
-        plant.AddWeldConstraint(self.object_body, self.X_OE, hand.body(), hand.GetFixedPoseInBodyFrame())
+        """Add the constraint that welds end effector and object; the plant must not be finalized yet."""
+        gripper = self.gripper_frame
+        plant.AddWeldConstraint(
+            self.object_body, self.X_OE, gripper.body(), gripper.GetFixedPoseInBodyFrame()
+        )
 
     def error(self, context: Context) -> float:
-        """Distance between Ek on the hand and on the object [m]."""
+        """Distance between Ek on the end effector and on the object [m]."""
         p_WE = self.gripper_frame.CalcPoseInWorld(context).translation()
         wanted = self.object_body.EvalPoseInWorld(context).multiply(self.X_OE.translation())
         return float(np.linalg.norm(p_WE - wanted))
 
     def lever(self, context: Context) -> FloatArray:
-        """From Bk to Ek in W, shape (2,) [m]."""
+        """Vector from Bk to Ek in W, shape (2,) [m]."""
         p_WE = self.gripper_frame.CalcPoseInWorld(context).translation()
         p_WB = self.base_joint.child_body().EvalPoseInWorld(context).translation()
         lever: FloatArray = (p_WE - p_WB)[:2]
@@ -52,10 +54,10 @@ class ConstrainedGrasp:
 
 
 class ConstrainedGrasps:
-    """The robots' hold on the object where it is a constraint: nearly rigid.
+    """Grasps that are weld constraints, which are nearly rigid.
 
-    Drake does not say what a constraint transmits. It is what is left of a base's wrench when the force that
-    the robot's own motion takes is subtracted.
+    Drake does not report the forces of a constraint. The wrench on the object is the base's wrench less the
+    force that the robot's own motion takes.
 
     Args:
         plant: Finalized.

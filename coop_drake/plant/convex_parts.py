@@ -1,4 +1,4 @@
-"""Cuts a polygon into few convex parts whose union is exactly the polygon."""
+"""Divides a polygon into few convex parts whose union is exactly the polygon."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from coop_drake.tree.pose import FloatArray
 Ring = list[tuple[float, float]]
 
 _STRAIGHT = 1e-12
+"""Cross product of two edges up to which a corner counts as straight [m^2]."""
 
 
 def convex_parts(outline: Polygon) -> list[Polygon]:
-    """Triangulate and join neighbours while they stay convex.
+    """Triangulate a polygon and merge neighbouring parts while they stay convex.
 
-    Corners of the parts are corners of the outline, so nothing is lost or added.
+    The corners of the parts are corners of the outline, so their union is exact.
 
     Args:
         outline: A valid polygon.
@@ -42,7 +43,7 @@ def convex_parts(outline: Polygon) -> list[Polygon]:
 
 
 def _ring(polygon: Polygon) -> Ring:
-    """Counter-clockwise corners, the least one first."""
+    """Counter-clockwise corners, the smallest (x, y) first."""
     corners = [(float(x), float(y)) for x, y in polygon.exterior.coords[:-1]]
     if not polygon.exterior.is_ccw:
         corners.reverse()
@@ -51,7 +52,7 @@ def _ring(polygon: Polygon) -> Ring:
 
 
 def _merge(first: Ring, second: Ring) -> Ring | None:
-    """Join two rings along an edge they share, if the result is convex."""
+    """Merge two rings along a common edge; None if they have none or the result is not convex."""
     for index, start in enumerate(first):
         end = first[(index + 1) % len(first)]
         if end not in second:

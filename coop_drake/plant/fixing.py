@@ -1,4 +1,4 @@
-"""Joints that the scenario fixes: wheels, fingers and whatever would leave the plane."""
+"""Fixes joints that the scenario names: wheels, fingers and joints that would leave the plane."""
 
 from collections.abc import Mapping
 from fnmatch import fnmatchcase
@@ -16,21 +16,24 @@ from coop_drake.plant.parsing import joints_of
 from coop_drake.scenario import Assembly, Scenario
 
 _ROUNDING = 1e-6
+"""Rounding of values and limits in files, by which a value may exceed a limit or miss a right angle [rad or
+m]."""
 
 
 def fix_joints(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant) -> None:
-    """Put a weld in place of every joint that the scenario fixes.
+    """Replace every joint that the scenario fixes by a weld.
 
-    A name is that of a joint, or a pattern with ``*`` and ``?``; a joint's own name goes before patterns, and
-    null keeps it from being fixed by one.
+    A name is that of a joint, or a pattern with ``*`` and ``?``. A joint's own name takes precedence over
+    patterns; the value null excludes the joint from them.
 
     Args:
-        scenario: Says which joints, and where they stand.
-        assembly: Who is who.
-        plant: Not finalized; robots that are not in it are passed over.
+        scenario: Names the joints and their values.
+        assembly: The models of every robot.
+        plant: Not finalized; robots that it does not hold are skipped.
 
     Raises:
-        ScenarioError: No joint, or one joint twice, is meant by a name, or the value cannot be taken.
+        ScenarioError: A name matches no joint, or two patterns match the same one, or a value is not
+            possible.
     """
     models = {plant.GetModelInstanceName(joint.model_instance()) for joint in joints_of(plant)}
     for robot in assembly.robots:
@@ -51,7 +54,7 @@ def _model(plant: MultibodyPlant, joint: Joint) -> str:
 def _meant(
     scenario: Scenario, key: str, values: Mapping[str, float | None], joints: list[str]
 ) -> dict[str, float]:
-    """Values by the joints' own names, in the joints' order."""
+    """The values by the names of the joints, in the joints' order."""
     known = ", ".join(joints) or "none"
     chosen: dict[str, str] = {name: name for name in values if name in joints}
     for pattern in (name for name in values if name not in joints):
@@ -84,7 +87,7 @@ def _fix(scenario: Scenario, key: str, plant: MultibodyPlant, joint: Joint, valu
         if int(actuator.joint().index()) == int(joint.index()):
             plant.RemoveJointActuator(actuator)
     name = str(joint.name())
-    parent, child, X_FM = joint.frame_on_parent(), joint.frame_on_child(), _moved(joint, value)
+    parent, child, X_FM = joint.frame_on_parent(), joint.frame_on_child(), _pose_at(joint, value)
     try:
         plant.RemoveJoint(joint)
     except RuntimeError as error:
@@ -93,8 +96,8 @@ def _fix(scenario: Scenario, key: str, plant: MultibodyPlant, joint: Joint, valu
     plant.AddJoint(WeldJoint(name, parent, child, X_FM))
 
 
-def _moved(joint: Joint, value: float) -> RigidTransform:
-    """Pose of the joint's outer frame in its inner one."""
+def _pose_at(joint: Joint, value: float) -> RigidTransform:
+    """Pose of the joint's child frame in its parent frame at a value of the joint."""
     if joint.type_name() == "revolute":
         quarters = round(value / (0.5 * pi))
         if abs(value - quarters * 0.5 * pi) <= _ROUNDING:  # 1.570796 in a file means a right angle.

@@ -1,4 +1,4 @@
-"""Projections of collision shapes to the floor, each a convex hull grown by a radius."""
+"""Projects collision shapes to the floor; a footprint is a convex hull enlarged by a radius."""
 
 from math import cos, pi, sin
 
@@ -15,18 +15,20 @@ SUPPORTS = 64
 """Tangent lines that enclose a curved outline: the polygon exceeds it by at most 0.13 % of its radius."""
 
 DIGITS = 12
-"""Decimals of a metre that are kept: what lies beyond is round-off of rotations in the files."""
+"""Decimals of a metre that are kept; the rest is rounding of rotations in the files."""
 
 _FLAT = 1e-9
+"""Smallest horizontal part of a unit axis that is not taken for rounding [-]."""
 _THIN = 1e-6
+"""Radius that a footprint without an area gets [m]."""
 
 
 def project(shape: Shape, X_CG: RigidTransform) -> ConvexShape:
     """Project a collision shape to the plane.
 
-    Spheres, capsules, boxes, hulls, and cylinders that stand or lie are exact. Ellipsoids and tilted
-    cylinders are enclosed by ``SUPPORTS`` tangents. A mesh counts as its convex hull, as in Drake's
-    proximity queries; where that has many corners, fewer enclose it, 3 mm beyond it at most.
+    Footprints of spheres, capsules, boxes, hulls and upright or lying cylinders are exact. Ellipsoids and
+    tilted cylinders are enclosed by ``SUPPORTS`` tangents. A mesh counts as its convex hull, as in Drake's
+    proximity queries; a hull of many corners is enclosed by one of fewer, at most 3 mm larger.
 
     Args:
         shape: The shape in its geometry frame G.

@@ -1,4 +1,4 @@
-"""How the robots hold the object, and what is read of it: wrenches, and how far a hand is from its grasp."""
+"""The grasps of the robots, and what is read of them: wrenches, and errors of position."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ __all__ = ["Grasps", "WeldedGrasps"]
 
 
 class Grasps(Protocol):
-    """The robots' hold on the object, in the scenario's order."""
+    """The grasps of all robots, in the scenario's order."""
 
     def wrenches(self, context: Context, base_wrenches: FloatArray) -> FloatArray:
         """Wrench on the object at every Ek in W, shape (N, 3) [N, N m].
 
         Args:
             context: The plant's, inside the diagram's, all inputs connected.
-            base_wrenches: What acts on every base at Bk in W, shape (N, 3) [N, N m].
+            base_wrenches: Wrench on every base at Bk in W, shape (N, 3) [N, N m].
         """
         ...
 
@@ -36,11 +36,11 @@ class Grasps(Protocol):
 
 
 class WeldedGrasps:
-    """Grasps that are joints of one tree: exact, and their wrenches are the joints' reactions.
+    """Grasps that are joints of one tree: they are exact, and their wrenches are the joints' reactions.
 
     Args:
         plant: Finalized.
-        robots: Who grasps what; the object is the parent of every grasp.
+        robots: The frames of every grasp; the object is its parent.
     """
 
     def __init__(self, plant: MultibodyPlant, robots: Sequence[RobotAssembly]) -> None:
@@ -59,7 +59,7 @@ class WeldedGrasps:
         return np.array([(-row[3], -row[4], -row[2]) for row in rows])
 
     def errors(self, context: Context) -> FloatArray:
-        """As in :class:`Grasps`: the hand is a body of the tree that the object is the root of."""
+        """As in :class:`Grasps`; zero, because the end effectors are bodies of the object's tree."""
         return np.zeros(len(self._places))
 
 

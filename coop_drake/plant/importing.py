@@ -1,4 +1,4 @@
-"""Robot models from elsewhere, made ready: all in one folder, meshes as convex hulls that Drake can read."""
+"""Imports robot models: everything in one folder, meshes as convex hulls that Drake can read."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ _DROPPED = (
 )
 _GROUP = "own_links"
 _NEARLY_RIGHT = 1e-5
-"""Files round right angles; axes that hang askew by as little would spoil the plane's equations [rad]."""
+"""Largest error of a right angle in a file, which is corrected: tilted axes would leave the plane [rad]."""
 
 _MOMENTS = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 @dataclass(frozen=True)
 class ImportedRobot:
-    """A model with all that it needs.
+    """An imported model with all files that it needs.
 
     Attributes:
         name: Name of the model file, without a folder.
         files: Contents by paths relative to one folder, the model's own among them.
-        notes: What was changed, in words.
+        notes: Sentences about what was changed.
     """
 
     name: str
@@ -55,17 +55,17 @@ class ImportedRobot:
 def import_robot(path: Path, packages: Mapping[str, Path] | None = None) -> ImportedRobot:
     """Read a URDF or SDF file and make it self-contained.
 
-    Every mesh becomes its convex hull, as Drake's proximity queries and the footprints take it anyway. Links
-    that can be seen but not collide get their picture's hull to collide with. Seen from above links of one
-    robot mostly lie upon each other, so they are filtered from colliding with one another: their joints'
-    limits are trusted. Sensors, transmissions and mimics are left out.
+    Every mesh becomes its convex hull, which Drake's proximity queries and the footprints use in any case.
+    Links with visual but no collision geometry get the hull of the visual one. Seen from above the links of
+    one robot mostly cover each other, so collisions between them are filtered: the joints' limits must
+    exclude them. Sensors, transmissions and mimics are left out.
 
     Args:
         path: The model.
-        packages: Where ``package://`` addresses lead; folders above the model are known by their names.
+        packages: Folders of ``package://`` addresses; folders above the model are known by their names.
 
     Raises:
-        ScenarioError: The model or a mesh cannot be read; with file, element and remedy.
+        ScenarioError: The model or a mesh cannot be read; with file, element and what is allowed.
     """
     root = _parse(path)
     work = _Work(path, dict(packages or {}))
@@ -102,7 +102,7 @@ def _all(root: Element, tag: str) -> Iterator[Element]:
 
 @dataclass
 class _Work:
-    """One model on its way."""
+    """A model while it is imported, with the files and notes so far."""
 
     path: Path
     packages: dict[str, Path]
@@ -113,7 +113,7 @@ class _Work:
     squared: int = 0
 
     def notes(self) -> Iterator[str]:
-        """What was changed."""
+        """Yield sentences about what was changed."""
         if self.dropped:
             yield f"left out: {', '.join(sorted(self.dropped))}"
         if self.thickened:
@@ -125,7 +125,7 @@ class _Work:
         yield "links of the robot are filtered from colliding with one another"
 
     def drop(self, element: Element) -> None:
-        """Remove what is no part of a planar body."""
+        """Remove elements that no planar rigid body needs."""
         for child in list(element):
             colour = child.get("rgba") if child.tag == "color" else None
             if child.tag in _DROPPED or (colour is not None and len(colour.split()) != 4):
@@ -141,7 +141,7 @@ class _Work:
                 self.drop(child)
 
     def _squared(self, rpy: str) -> str:
-        """Angles with those made right that a file rounds; axes that should be upright then are."""
+        """The angles, with rounded right angles corrected."""
         angles = []
         for text in rpy.split():
             angle = self._number(text, "rpy")
@@ -152,7 +152,7 @@ class _Work:
         return " ".join(angles)
 
     def _number(self, text: str, where: str) -> float:
-        """A number of the file."""
+        """A finite number of the file."""
         try:
             number = float(text)
         except ValueError:
@@ -162,7 +162,7 @@ class _Work:
         return number
 
     def make_solid(self, link: Element) -> None:
-        """Turn a link's meshes into hulls, and its pictures into what collides if nothing else does."""
+        """Replace a link's meshes by hulls; without collision geometry its visual geometry is copied."""
         name = str(link.get("name"))
         for kind in ("collision", "visual"):
             for place, element in enumerate(link.findall(kind)):
@@ -221,7 +221,7 @@ class _Work:
                 mesh.remove(child)
 
     def _found(self, address: str) -> Path:
-        """Where a mesh lies."""
+        """Path of the file of a mesh."""
         if address.startswith(("package://", "model://")):
             package, _, inside = address.partition("://")[2].partition("/")
             folders = [folder for folder in self.path.resolve().parents if folder.name == package]
@@ -238,7 +238,7 @@ class _Work:
 
 
 def _vertices(path: Path) -> FloatArray:
-    """Corners of a mesh, shape (n, 3)."""
+    """Vertices of a mesh, shape (n, 3) [m]."""
     import trimesh
 
     mesh = trimesh.load_mesh(path, process=False)
@@ -249,7 +249,7 @@ def _vertices(path: Path) -> FloatArray:
 
 
 def _hull(points: FloatArray) -> bytes:
-    """The convex hull as an OBJ file; a flat one gets a millimetre of thickness."""
+    """The convex hull as an OBJ file; flat points get a thickness of a millimetre."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -269,7 +269,7 @@ def _hull(points: FloatArray) -> bytes:
 
 
 def _filter_own(root: Element, links: list[str]) -> None:
-    """Exempt pairs of the robot's own links from collisions."""
+    """Filter collisions between the robot's own links."""
     is_sdf = root.tag == "sdf"
     model = root.find("model") if is_sdf else root
     if model is None:

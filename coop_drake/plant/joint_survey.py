@@ -1,4 +1,4 @@
-"""Which joints of a model stay in the plane, and which a scenario must fix."""
+"""Tells which joints of a model move in the plane, and which a scenario must fix."""
 
 from __future__ import annotations
 

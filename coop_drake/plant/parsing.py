@@ -1,4 +1,4 @@
-"""Models from directives into a plant: no gravity, one actuator for each joint of q."""
+"""Adds models to a plant by directives: without gravity, with one actuator for each joint of q."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -30,7 +30,7 @@ def add_models(
         scene_graph: Receives the geometry, if any is wanted.
 
     Raises:
-        ScenarioError: Drake refuses a model or a directive, or would replace a mass or size by its own.
+        ScenarioError: Drake refuses a model or a directive, or would replace a mass or a size by a default.
     """
     for index in indices:
         model = assembly.directives[index].add_model
@@ -49,7 +49,7 @@ def _refusal(scenario: Scenario, assembly: Assembly, at: int, complaint: str) ->
 
 
 def _culprit(assembly: Assembly, indices: Sequence[int], complaint: str) -> int:
-    """Index of the directive whose file Drake names, or else of the first that it refuses when added."""
+    """Index of the directive whose file Drake's message names, otherwise of the first that Drake refuses."""
     models = [(index, assembly.directives[index].add_model) for index in indices]
     named = [index for index, model in models if model and model.file.removeprefix("file://") in complaint]
     if len({_subject(assembly, index) for index in named}) == 1:
@@ -63,7 +63,7 @@ def _culprit(assembly: Assembly, indices: Sequence[int], complaint: str) -> int:
 
 
 def _subject(assembly: Assembly, index: int) -> str:
-    """What a directive is about, in a few words."""
+    """The file or the names that a directive is about."""
     directive = assembly.directives[index]
     if directive.add_model:
         return str(directive.add_model.file.removeprefix("file://"))
@@ -88,7 +88,7 @@ def finalize(scenario: Scenario, plant: MultibodyPlant) -> None:
 
 
 def bodies_of(plant: MultibodyPlant, models: Sequence[str]) -> list[RigidBody]:
-    """Bodies of some models and of the models nested inside them, in the plant's order."""
+    """The bodies of the named models and of the models nested inside them, in the plant's order."""
     return [
         plant.get_body(index)
         for name in models
@@ -109,15 +109,15 @@ def joints_of(plant: MultibodyPlant) -> list[Joint]:
 
 
 def refusal(scenario: Scenario, robot: RobotAssembly | None, value: str, allowed: str) -> ScenarioError:
-    """An error that points at the directive that adds the robot, or at the object."""
+    """An error whose key is the directive that adds the robot, or the object."""
     return ScenarioError(str(scenario.path), robot.key if robot else "object", value, allowed)
 
 
 def set_actuators(plant: MultibodyPlant, joints: Sequence[Joint]) -> None:
-    """Give every joint of q exactly one actuator, so that the actuation input is the torques in q's order.
+    """Give every joint of q exactly one actuator, so that the actuation input holds the torques in q's order.
 
-    Drake adds actuators only to joints whose file grants them effort; here every arm joint is driven. Effort
-    limits and rotor inertias that a file states are kept; Drake saturates torques at the limits.
+    Drake adds actuators only to joints with an effort limit above zero in their file; here every arm joint is
+    driven. Effort limits and rotor inertias of the file are kept; Drake saturates torques at the limits.
 
     Args:
         plant: Not finalized yet.

@@ -1,4 +1,4 @@
-"""Where bodies are on the floor at one configuration, exactly: clearances to walls and to each other."""
+"""Exact clearances of bodies to the walls and to each other at one configuration."""
 
 from collections.abc import Iterator
 
@@ -31,7 +31,7 @@ def wall_clearance(body: Body, X_WC: PlanarPose, workspace: Polygon) -> float:
 
 
 def _excess(outside: BaseGeometry, workspace: Polygon) -> float:
-    """How far the corners of what is outside lie from the workspace [m]."""
+    """Largest distance from the workspace of a corner of the part outside of it [m]."""
     return max((float(Point(p).distance(workspace)) for p in get_coordinates(outside)), default=0.0)
 
 

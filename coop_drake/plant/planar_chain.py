@@ -1,4 +1,4 @@
-"""Drake's models as the planar chains that the compiled kernels read."""
+"""Reads planar chains, the form that the compiled laws take, from Drake's models."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ __all__ = ["BaseChain", "base_chain", "robot_chain"]
 
 @dataclass(frozen=True)
 class BaseChain:
-    """How a robot's base hangs on the object, through its grasp and its joints.
+    """The chain from the object through a robot's grasp and joints to its base.
 
     Attributes:
         chain: Rows as in ``coop_drake.laws.robot_dynamics``, the object first, the base's frame last.
@@ -50,7 +50,7 @@ class BaseChain:
 
 
 def robot_chain(robot: RobotPlant) -> FloatArray:
-    """A robot's own model, from its base to its hand; masses are those of its context.
+    """The chain of a robot's own model, from its base to its end effector; masses are those of its context.
 
     Args:
         robot: The robot.
@@ -79,7 +79,7 @@ def robot_chain(robot: RobotPlant) -> FloatArray:
 
 
 def base_chain(team: TeamPlant, robot: RobotModel) -> BaseChain:
-    """The way from the object to a robot's base in the team's plant, whose tree begins at the object.
+    """The chain from the object to a robot's base in the team's plant, whose tree begins at the object.
 
     Args:
         team: The team.
@@ -96,7 +96,7 @@ def base_chain(team: TeamPlant, robot: RobotModel) -> BaseChain:
     )
     for row, joint in enumerate(path, 1):
         x, y, *motion = _joint(context, joint)
-        chain[row, [X, Y, TURN, SLIDE_X, SLIDE_Y]] = x, y, *(-part for part in motion)  # from hand to base
+        chain[row, [X, Y, TURN, SLIDE_X, SLIDE_Y]] = x, y, *(-part for part in motion)  # from gripper to base
         chain[row, PARENT] = row - 1
         chain[row, [POSITION, RATE]] = joint.position_start(), rates + joint.velocity_start()
     chain[-1, [X, Y]] = _origin(context, robot.base_body.body_frame())
@@ -113,7 +113,7 @@ def base_chain(team: TeamPlant, robot: RobotModel) -> BaseChain:
 
 
 def _to_base(plant: MultibodyPlant, robot: RobotModel) -> list[Joint]:
-    """The joints between a robot's hand and its base, from the hand inwards."""
+    """The joints between a robot's end effector and its base, the outermost first."""
     leading = {
         int(body.index()): joint
         for joint in robot.joints
@@ -139,7 +139,7 @@ def _origin(context: Context, frame: Frame) -> FloatArray:
 
 
 def _joint(context: Context, joint: Joint) -> tuple[float, float, float, float, float]:
-    """Where a joint is, the sense in which it turns (0 if it slides) and the direction in which it slides."""
+    """Position of a joint, the sense of its rotation (0 if prismatic) and its direction (0 if revolute)."""
     X_WF = joint.frame_on_parent().CalcPoseInWorld(context)
     x, y, _ = X_WF.translation()
     revolute = joint.type_name() == "revolute"
@@ -152,7 +152,7 @@ def _joint(context: Context, joint: Joint) -> tuple[float, float, float, float, 
 def _inertia(
     plant: MultibodyPlant, context: Context, bodies: list[RigidBody]
 ) -> tuple[float, float, float, float]:
-    """Mass, centre of mass and inertia about it of bodies that move as one."""
+    """Mass, centre of mass and inertia about it of bodies that are welded together."""
     whole = plant.CalcSpatialInertia(context, plant.world_frame(), [body.index() for body in bodies])
     if whole.get_mass() == 0.0:
         return 0.0, 0.0, 0.0, 0.0
@@ -162,7 +162,7 @@ def _inertia(
 
 
 def _rotor(plant: MultibodyPlant, context: Context, joint: Joint) -> float:
-    """What the rotors that drive a joint add to its inertia."""
+    """Reflected inertia of the rotors that drive a joint."""
     actuators = [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
     return sum(
         float(actuator.calc_reflected_inertia(context))

@@ -1,4 +1,4 @@
-"""Everything moves in the plane: frames and revolute axes stand upright, prismatic axes lie flat."""
+"""Planarity checks: bases stand upright, revolute axes are vertical and prismatic axes are horizontal."""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ from coop_drake.scenario import Assembly, RobotAssembly, Scenario
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
 TILT = 1e-5
-"""Largest sine of a tilt that passes for round-off in a file; pi / 2 written with six digits passes [-]."""
+"""Largest sine of a tilt that counts as rounding in a file: pi / 2 with six digits is accepted [-]."""
 
 
 def planar_pose(X: RigidTransform) -> PlanarPose:
@@ -29,7 +29,7 @@ def is_upright(axis: FloatArray) -> bool:
 
 
 def object_frame(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant) -> tuple[Frame, RigidBody]:
-    """Find L: the frame of the object's model, or of its first body where the file format has no model frame.
+    """Find L: the frame of the object's model, or of its root body where the file format has no model frame.
 
     Raises:
         ScenarioError: The object has movable joints, a joint to the world, or several loose bodies.
@@ -67,13 +67,13 @@ def check_planar(
     context: Context,
     chains: Sequence[tuple[RigidBody, tuple[Joint, ...]]],
 ) -> None:
-    """Refuse bases and joints that would leave the plane.
+    """Refuse bases that are tilted and joints that would move bodies out of the plane.
 
     Args:
         scenario: For messages.
         assembly: The team.
         plant: Finalized.
-        context: Any configuration; the object's frame is upright in all of them.
+        context: Any configuration; the object's frame is upright in each of them.
         chains: Base and joints of each robot.
 
     Raises:
@@ -100,7 +100,7 @@ def check_planar(
 
 
 def check_masses(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant, context: Context) -> None:
-    """Refuse masses with which some motion would cost no effort, and joints tied to each other.
+    """Refuse masses for which some motion takes no effort, and constraints between joints.
 
     Raises:
         ScenarioError: The mass matrix is singular, the object has no mass, or a file adds constraints.

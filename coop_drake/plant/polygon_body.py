@@ -18,11 +18,12 @@ from coop_drake.tree.pose import FloatArray
 Point = Sequence[float]
 
 _COLOUR = "0.76 0.60 0.42 1"
+"""Colour of the body, red, green, blue and opacity, as of the shipped object."""
 
 
 @dataclass(frozen=True)
 class PlanarMass:
-    """Exact mass properties of an upright prism of even density.
+    """Exact mass properties of an upright prism of uniform density.
 
     Attributes:
         mass: Mass [kg].
@@ -80,7 +81,7 @@ def polygon_body_files(
         mass: Mass [kg].
         name: Name of the model; the files are named after it.
         height: Height [m].
-        inertia: Inertia about the vertical through the centre of mass [kg m^2]; even density if None.
+        inertia: Inertia about the vertical through the centre of mass [kg m^2]; uniform density if None.
         elevation: Height of the body's middle over the floor, the shipped robots' grasp height [m].
         grasps: Grasp frames, each (x, y, facing) [m, rad]; they are named ``grasp_0``, ``grasp_1``, ...
 
@@ -217,7 +218,7 @@ def main(arguments: Sequence[str] | None = None) -> Path:
 
 
 def _rows(text: str, count: int) -> list[list[float]]:
-    """Numbers in rows: commas between rows, spaces inside."""
+    """Parse rows of numbers: commas between rows, spaces between numbers."""
     rows = [[float(number) for number in row.split()] for row in text.split(",") if row.strip()]
     for row in rows:
         if len(row) != count:

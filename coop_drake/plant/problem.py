@@ -1,4 +1,4 @@
-"""From scenario and plant to the question that the planner answers."""
+"""Builds the planning problem from a scenario and its plant."""
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder

@@ -1,4 +1,4 @@
-"""The team as it would be built: the object and every robot on their own, held together by constraints."""
+"""The team as separate trees: the object and every robot, connected by weld constraints at the grasps."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ __all__ = ["SeparateTeam", "build_separate_team"]
 class SeparateTeam(TeamPlant):
     """A team whose plant has a tree for the object and one for every robot, in discrete time.
 
-    z is (x, y, theta, q...) here too; where the bases are follows from it as long as the grasps hold.
+    z is (x, y, theta, q...) here too; the poses of the bases follow from it as long as the grasps hold.
 
     Attributes:
         tree: The same team as one tree rooted at the object.
@@ -41,11 +41,11 @@ class SeparateTeam(TeamPlant):
 
     @property
     def as_tree(self) -> TeamPlant:
-        """The same team as one tree rooted at the object, which is how it is planned for."""
+        """The team as one tree rooted at the object, which the planner uses."""
         return self.tree
 
     def plant_state(self, z: FloatArray, z_rate: FloatArray) -> FloatArray:
-        """Positions and velocities of the whole plant with every hand exactly at its grasp.
+        """Positions and velocities of the whole plant with every end effector exactly at its grasp.
 
         Args:
             z: (x, y, theta, q...), shape (3 + n,) [m, rad].
@@ -65,8 +65,9 @@ class SeparateTeam(TeamPlant):
 def build_separate_team(scenario: Scenario, builder: DiagramBuilder) -> SeparateTeam:
     """Add a plant to a diagram in which the object and every robot are trees of their own.
 
-    Each moves on a planar joint, and a weld constraint holds every hand at its grasp. Bodies do not touch
-    each other in it: clearances are checked elsewhere, and a run ends before they would.
+    Each has a planar joint, and a weld constraint holds every end effector at its grasp. The plant computes
+    no
+    contact: clearances are checked elsewhere, and a run ends before bodies would touch.
 
     Args:
         scenario: The scenario; its ``plant.time_step`` is the plant's.

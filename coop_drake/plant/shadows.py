@@ -1,4 +1,4 @@
-"""Fewer and simpler footprints that stand for the same: models from elsewhere bring dozens to a component."""
+"""Reduces footprints: imported models have dozens of them on a component, many with many corners."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from coop_drake.tree.pose import FloatArray
 __all__ = ["enclosed_in_fewer", "without_covered"]
 
 _FEW = 16
-"""Footprints of so many corners, or fewer, stay as they are."""
+"""Footprints with at most this many corners are not simplified."""
 
 _GROWTH = 0.003
-"""How far a footprint may grow where that saves corners [m]."""
+"""Largest growth of a footprint where corners are removed [m]."""
 
 
 def enclosed_in_fewer(points: FloatArray) -> FloatArray:
@@ -43,10 +43,10 @@ def enclosed_in_fewer(points: FloatArray) -> FloatArray:
 
 
 def without_covered(bodies: tuple[Body, ...], may_overlap: frozenset[tuple[str, str]]) -> tuple[Body, ...]:
-    """Bodies of one component without the shapes that another body of the same robot covers.
+    """Remove the shapes of a component that a shape of another body of the same robot covers.
 
-    A shape may go if whatever would hit it would hit the other one as well: the other body is exempt from
-    collision with nothing that its own body is not exempt from, too.
+    A shape can be removed if everything that would collide with it also collides with the other one: the
+    other body must not be exempt from a collision that the shape's own body is not exempt from.
 
     Args:
         bodies: Bodies that are rigid with each other, in the component's frame.
@@ -87,6 +87,6 @@ def _core(shape: ConvexShape) -> BaseGeometry:
 
 
 def _covers(larger: ConvexShape, shape: ConvexShape) -> bool:
-    """Both are convex, so that the smaller one's corners decide."""
+    """Whether a convex shape contains another, which its corners decide."""
     corners = shapely.points(shape.vertices)
     return bool(np.all(shapely.distance(corners, _core(larger)) <= larger.radius - shape.radius))

@@ -1,4 +1,4 @@
-"""Models to start from: a box to carry, and a disc base with an arm of a few links."""
+"""Writes the models of a new scenario: a box to carry, and a disc base with an arm of a few links."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ __all__ = ["object_model", "robot_model"]
 
 _LINK_WIDTH = 0.1
 _LINK_HEIGHT = 0.08
+"""Width and height of a link, as in the shipped models [m]."""
 _ARM_HEIGHT = 0.4
+"""Height of arms and grasps over the floor, as in the shipped models [m]."""
 _BEND = 1.87
-"""Joints turn so far to both sides [rad]."""
+"""Limit of the joints on both sides, as in the shipped models [rad]."""
 
 _BASE_COLOUR, _LINK_COLOUR, _OBJECT_COLOUR = "0.13 0.36 0.62 1", "0.45 0.66 0.86 1", "0.76 0.60 0.42 1"
 
@@ -43,7 +45,7 @@ def robot_model(name: str, links: Sequence[float], base_radius: float) -> str:
 
     Args:
         name: Name of the model.
-        links: Lengths from the base's centre to the hand, with a revolute joint between each two [m].
+        links: Lengths from the base's centre to the end effector, with a revolute joint between each two [m].
         base_radius: Radius of the base [m].
     """
     disc = (

@@ -58,7 +58,7 @@ class RobotModel:
         base_body: Bk, the body that the base wrench acts on.
         joints: In the order of q_k, from the base outwards.
         joint_names: Their scoped names.
-        gripper_frame: Ek, fixed on the robot's hand.
+        gripper_frame: Ek, fixed on the robot's end effector.
         X_LE: Pose of the grasp in the object's frame.
         q_slice: Where q_k stands in q.
     """
@@ -89,8 +89,8 @@ class TeamPlant:
         object_joint: Moves L against the world; its coordinates are (x, y, theta).
         object_inertia: Mass properties of the object.
         robots: In the scenario's order.
-        grasps: What is read of the robots' hold on the object.
-        assembly: Who is who in the directives.
+        grasps: Reads wrenches and errors of the grasps.
+        assembly: The object and the robots in the directives.
         scenario: What it was built from.
     """
 
@@ -107,7 +107,7 @@ class TeamPlant:
 
     @property
     def as_tree(self) -> TeamPlant:
-        """The same team as one tree rooted at the object, which is how it is planned for."""
+        """The team as one tree rooted at the object, which the planner uses."""
         return self
 
     def plant_state(self, z: FloatArray, z_rate: FloatArray) -> FloatArray:

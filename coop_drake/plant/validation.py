@@ -1,4 +1,4 @@
-"""What a scenario must satisfy once its bodies and joints are known."""
+"""Checks of a scenario that need its bodies and joints: joint values, start and goal."""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,7 +11,7 @@ from coop_drake.scenario import Scenario
 
 
 def check_joints(scenario: Scenario, team: TeamPlant) -> None:
-    """Refuse joint values that do not fit the robots.
+    """Refuse joint values that do not match the robots' joints and limits.
 
     Raises:
         ScenarioError: An unknown robot, a wrong number of values, a value outside its joint's limits.
@@ -57,7 +57,7 @@ def check_places(scenario: Scenario, problem: PlanningProblem) -> None:
     """Refuse a start in collision, and a goal where the object alone leaves the floor.
 
     Raises:
-        ScenarioError: Naming the bodies and how deep they are.
+        ScenarioError: With the bodies and their clearance.
     """
     file = str(scenario.path)
     for first, second, clearance in collisions(problem.tree, problem.start, problem.workspace):
