@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import MISSING, dataclass
 from functools import cache
+from numbers import Real
 from types import UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -194,7 +195,7 @@ def _scalar(value: object, kind: type, key: str) -> bool | int | float | str:
             raise DataError(key, value, SCALARS[kind])
         return value  # type: ignore[return-value]
     try:
-        number = float(value) if type(value) in (int, float, str) else math.nan  # type: ignore[arg-type]
+        number = math.nan if isinstance(value, bool) or not isinstance(value, (Real, str)) else float(value)
     except (ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number) or (kind is int and not number.is_integer()):

@@ -63,3 +63,8 @@ def test_select_keeps_the_axes_asked_for():
     assert own.log_gain.tolist() == [4.0, 6.0]
     assert own.energy_bound.tolist() == [7.0, 9.0]
     assert own.rate_gain == 8.0
+
+
+def test_gains_may_be_computed_with_numpy():
+    gains = ScheduledGains(wall_stiffness=np.float64(20.5), min_stiffness=np.int64(50))
+    assert (gains.wall_stiffness, gains.min_stiffness) == (20.5, 50.0)
