@@ -178,7 +178,7 @@ def test_an_undecided_question_says_what_remained_mixed(monkeypatch):
     monkeypatch.setattr(diagnosing, "find_passages", lambda *_, **__: None)  # They have tests of their own.
     monkeypatch.setattr(diagnosing, "try_changes", lambda *_, **__: [])
     problem = two_rooms(0.2001, rod_tree())
-    tiny = replace(problem, settings=PlannerSettings(max_slices=8))
+    tiny = replace(problem, settings=PlannerSettings(max_slices=8, strategy="cells"))
     diagnosis = diagnose(tiny)
     assert diagnosis.answer is Answer.UNDECIDED
     assert diagnosis.mixed
