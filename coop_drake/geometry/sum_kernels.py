@@ -8,6 +8,7 @@ from coop_drake.compiled import compiled
 from coop_drake.tree.pose import FloatArray, IntArray
 
 _NEEDLE = 1e-12
+"""A corner whose edges turn back with a smaller sine than this is a needle [-]: rounding decides its side."""
 
 
 @compiled
@@ -34,16 +35,16 @@ def fitting_cycles(
     furthest = _furthest(points, first, convex)
     starts = np.zeros(len(first), np.int64)
     drawn = np.empty((0, 2))
-    x, y = np.ptp(convex[:, 0]), np.ptp(convex[:, 1])
+    width, height = _width(convex, 0), _width(convex, 1)
     for writing in range(2):
         size = 0
         for r in range(len(first) - 1):
             before = first[r + 1] - 1
-            small = rooms[r, 0] <= x and rooms[r, 1] <= y
+            small = rooms[r, 0] <= width and rooms[r, 1] <= height
             for i in range(first[r], first[r] if small else first[r + 1]):
                 after = i + 1 if i + 1 < first[r + 1] else first[r]
                 k, last = furthest[before], furthest[i]
-                turn = _bends_in(points[before], points[i], points[after])
+                turn = _bends_in(points, before, i, after)
                 while True:
                     if writing == 1:
                         drawn[size, 0] = points[i, 0] - convex[k, 0]
@@ -76,10 +77,27 @@ def _furthest(points: FloatArray, first: IntArray, convex: FloatArray) -> IntArr
 
 
 @compiled
-def _bends_in(before: FloatArray, here: FloatArray, after: FloatArray) -> bool:
-    """Whether a wall's corner points into the floor; a needle counts for one, which blocks no more."""
-    ax, ay = here[0] - before[0], here[1] - before[1]
-    bx, by = after[0] - here[0], after[1] - here[1]
+def _width(ring: FloatArray, axis: int) -> float:
+    """Width of a ring, shape (n, 2), along the first (0) or second (1) coordinate [m]."""
+    low, high = ring[0, axis], ring[0, axis]
+    for k in range(len(ring)):
+        low, high = min(low, ring[k, axis]), max(high, ring[k, axis])
+    width: float = high - low
+    return width
+
+
+@compiled
+def _bends_in(points: FloatArray, before: int, here: int, after: int) -> bool:
+    """Whether a corner of the outline points into the floor, or is a needle, which blocks no more than that.
+
+    Args:
+        points: Vertices, shape (E, 2) [m].
+        before: The vertex before the corner.
+        here: The corner.
+        after: The vertex after it.
+    """
+    ax, ay = points[here, 0] - points[before, 0], points[here, 1] - points[before, 1]
+    bx, by = points[after, 0] - points[here, 0], points[after, 1] - points[here, 1]
     cross, dot = ax * by - ay * bx, ax * bx + ay * by
     bends: bool = cross <= 0.0 or (dot < 0.0 and cross <= -_NEEDLE * dot)
     return bends

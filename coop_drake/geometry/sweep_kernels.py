@@ -205,7 +205,8 @@ def over_prismatic(vertices: FloatArray, x0: float, y0: float, x1: float, y1: fl
     """
     edges = edge_directions(vertices)
     angles = np.empty(len(edges) + 4)
-    angles[: len(edges)] = edges
+    for i in range(len(edges)):
+        angles[i] = edges[i]
     heading = atan2(y1 - y0, x1 - x0)
     for quarter in range(4):
         angles[len(edges) + quarter] = heading + 0.5 * pi * (quarter - 1.0)

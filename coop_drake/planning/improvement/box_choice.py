@@ -9,11 +9,11 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.laws.gain_schedule import Schedule
 from coop_drake.planning.boxes.box_kernels import BoxArrays, clearances_in_box
-from coop_drake.planning.improvement.box_crossing import cross_box
+from coop_drake.planning.improvement.box_crossing import cross_box, smallest
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.tree.pose import FloatArray, IntArray
 
-__all__ = ["Waypoints", "choose_boxes", "fits"]
+__all__ = ["Waypoints", "choose_boxes"]
 
 LONGEST = 20.0
 """A box that takes longer than this is not used [s]: two of them with a waypoint between are faster."""
@@ -60,27 +60,6 @@ class Waypoints(NamedTuple):
 
 
 @compiled
-def fits(
-    boxes: BoxArrays, grid: ObstacleGrid, lower: FloatArray, upper: FloatArray, path: FloatArray, least: float
-) -> bool:
-    """Whether the swept team keeps a clearance of ``least`` [m] at every row of a path, and no bodies touch.
-
-    Other arguments as in ``clearances_in_box``.
-    """
-    clearances = clearances_in_box(boxes, grid, lower, upper, path, 0, len(path) - 1, LARGEST_CLEARANCE)
-    return len(clearances) > 0 and _least(clearances) >= least
-
-
-@compiled
-def _least(values: FloatArray) -> float:
-    """The smallest of some values, shape (k,)."""
-    least = np.inf
-    for k in range(len(values)):
-        least = min(least, values[k])
-    return least
-
-
-@compiled
 def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
     """Find the sequence of boxes along waypoints that is crossed in the shortest time.
 
@@ -95,17 +74,18 @@ def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
         waypoint, index of the padding).
     """
     n, count, m = len(waypoints.path), len(waypoints.pads), waypoints.path.shape[1] - 2
-    best = np.full((n, count), np.inf)
-    states = np.zeros((n, count, 3 + 2 * m))
-    before = np.full((n, count, 2), -1, np.int64)
+    best, states = np.empty((n, count)), np.zeros((n, count, 3 + 2 * m))
+    before = np.empty((n, count, 2), np.int64)
     for p in range(count):
-        best[0, p] = 0.0
+        for i in range(n):
+            best[i, p] = np.inf if i > 0 else 0.0
+            before[i, p, 0], before[i, p, 1] = -1, -1
         for a in range(m):
             states[0, p, 3 + a] = waypoints.path[0, 2 + a]
     low, high, lower, upper = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
     for i in range(n - 1):
         for p in range(count):
-            if not best[i, p] < _least(best[i]) + LARGEST_DELAY:
+            if not best[i, p] < smallest(best[i]) + LARGEST_DELAY:
                 continue
             for a in range(m):
                 low[a], high[a] = waypoints.path[i, 2 + a], waypoints.path[i, 2 + a]
@@ -120,7 +100,7 @@ def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
                 clearances = clearances_in_box(
                     waypoints.boxes, waypoints.grid, lower, upper, waypoints.path, i, j, LARGEST_CLEARANCE
                 )
-                if len(clearances) == 0 or _least(clearances) < waypoints.least:
+                if len(clearances) == 0 or smallest(clearances) < waypoints.least:
                     break
                 _reach(waypoints, i, p, j, lower, upper, clearances, best, states, before)
     return best[n - 1, 0], _box_rows(before)

@@ -26,7 +26,7 @@ from coop_drake.laws.readiness import axis_arrival, clearance_margin, interval_m
 from coop_drake.planning.execution.transport_kernels import PERIOD, axis_frequency
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["cross_box"]
+__all__ = ["cross_box", "smallest"]
 
 MOST_STEPS = 64
 """Largest number of integration steps of an axis between two checks of readiness [-], to bound the time."""
@@ -139,6 +139,15 @@ def _may_leave(
 
 
 @compiled
+def smallest(values: FloatArray) -> float:
+    """The smallest of some values, shape (k,); numpy's ``min`` takes longer to compile."""
+    least = np.inf
+    for k in range(len(values)):
+        least = min(least, values[k])
+    return least
+
+
+@compiled
 def cross_box(
     state: FloatArray,
     places: FloatArray,
@@ -169,7 +178,7 @@ def cross_box(
         Time that passed [s]; infinite beyond the limit.
     """
     m = len(lower)
-    gains = scheduled_governor(schedule, max(clearances.min(), LEAST_CLEARANCE))
+    gains = scheduled_governor(schedule, max(smallest(clearances), LEAST_CLEARANCE))
     table = np.empty((m, LAW_COLUMNS))
     for a in range(m):
         ends = lower[a], upper[a], goals[0, a], goals[1, a]

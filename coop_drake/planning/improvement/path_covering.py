@@ -14,13 +14,13 @@ from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.laws import GainSet
 from coop_drake.laws.gain_schedule import schedule_of
-from coop_drake.planning.boxes.box_kernels import BoxArrays, padded
+from coop_drake.planning.boxes.box_kernels import BoxArrays, longest_box
 from coop_drake.planning.boxes.boxes import Regions
 from coop_drake.planning.boxes.certify import PathBox, box_arrays
 from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.cells.slices import nearest_turn
 from coop_drake.planning.execution.channel_ends import final_intervals
-from coop_drake.planning.improvement.box_choice import Waypoints, choose_boxes, fits
+from coop_drake.planning.improvement.box_choice import Waypoints, choose_boxes
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_inside
 from coop_drake.tree.pose import FloatArray
@@ -123,8 +123,8 @@ def _waypoints(
     def between(first: float, last: float, halvings: int) -> list[FloatArray] | None:
         """Waypoints after the first place, the last one at the last place."""
         pair = np.stack([configuration(first), configuration(last)])
-        lower, upper = padded(boxes, pair, 0, 1, pad)
-        if fits(boxes, grid, lower, upper, pair, least):
+        furthest = longest_box(boxes, grid, pair, 0, 1, pad, least, 0.0)[1]
+        if furthest == 1:
             return [pair[1]]
         if halvings == 0:
             return None

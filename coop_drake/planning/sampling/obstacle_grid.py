@@ -94,8 +94,7 @@ def _lists(
 ) -> tuple[IntArray, IntArray, FloatArray]:
     """For each square the edges within a radius of its middle, nearest first."""
     first = np.zeros(rows * columns + 1, np.int64)
-    fill = np.zeros(1, np.int64)
-    listed, away = np.zeros(0, np.int64), np.zeros(0)
+    fill, listed, away = np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
     for writing in range(2):
         for e in range(len(edges)):
             x0, y0, x1, y1 = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
@@ -122,8 +121,10 @@ def _lists(
                     away[k], listed[k] = gap, e
                     fill[square] += 1
         if writing == 0:
-            first = np.cumsum(first)
-            fill = first[:-1].copy()
+            fill = np.empty(rows * columns, np.int64)
+            for square in range(rows * columns):
+                fill[square] = first[square]
+                first[square + 1] += first[square]
             listed, away = np.empty(first[-1], np.int64), np.empty(first[-1])
     return first, listed, away
 
