@@ -56,6 +56,14 @@ class Verdict(Enum):
     RESOLUTION = "below resolution"
     BUDGET = "budget spent"
 
+    def explanation(self, slices: int) -> str:
+        """Why an exploration of so many slices ended without an answer, in a sentence."""
+        why = {
+            Verdict.BUDGET: "the budget of slices is spent",
+            Verdict.RESOLUTION: "every undecided slice is as narrow as the resolution",
+        }
+        return f"no answer after {slices} slices: {why.get(self, self.value)}"
+
 
 @dataclass(frozen=True)
 class Outcome:

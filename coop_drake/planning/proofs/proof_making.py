@@ -150,6 +150,8 @@ def _reached(
     start: Point,
 ) -> dict[int, list[bool]]:
     """Which cells a sequence of touching cells of neighbouring leaves connects to the start."""
+    import networkx as nx  # Plans do not need it, and its import takes a tenth of a second.
+
     flat = [(leaf, i) for leaf in cells for i in range(len(cells[leaf]))]
     place = {entry: k for k, entry in enumerate(flat)}
     pairs = np.array(
@@ -164,14 +166,9 @@ def _reached(
     ).reshape(-1, 2)
     polygons = np.array([cells[leaf][i] for leaf, i in flat], dtype=object)
     touching = pairs[shapely.intersects(polygons[pairs[:, 0]], polygons[pairs[:, 1]])]
-    neighbours: list[list[int]] = [[] for _ in flat]
-    for a, b in touching:
-        neighbours[a].append(int(b))
-        neighbours[b].append(int(a))
-    left = [k for k, (leaf, _) in enumerate(flat) if leaf in starts and polygons[k].intersects(start)]
-    reached = set(left)
-    while left:
-        onwards = [k for k in neighbours[left.pop()] if k not in reached]
-        reached.update(onwards)
-        left += onwards
+    graph: nx.Graph[int] = nx.Graph()
+    graph.add_edges_from(touching.tolist())
+    first = [k for k, (leaf, _) in enumerate(flat) if leaf in starts and polygons[k].intersects(start)]
+    graph.add_nodes_from(first)
+    reached: set[int] = set().union(*(nx.node_connected_component(graph, k) for k in first))
     return {leaf: [place[leaf, i] in reached for i in range(len(cells[leaf]))] for leaf in cells}

@@ -103,5 +103,5 @@ def _no_channel(problem: PlanningProblem, exploration: AnyExploration, outcome: 
             return NoChannel(False, "a proof of infeasibility was found but cannot be written down")
         reason = f"the over-approximations of {outcome.slices} slices separate start from goal"
         return NoChannel(True, reason, proof)
-    reason = f"no answer after {outcome.slices} slices: {outcome.verdict.value}"
+    reason = outcome.verdict.explanation(outcome.slices)
     return NoChannel(False, reason, mixed=exploration.undecided(outcome.path))

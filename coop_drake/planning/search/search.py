@@ -220,9 +220,9 @@ class _Search:
     def _undecided(self, verdict: Verdict) -> NoChannel:
         bound, slices = clearance_bound(self._problem)
         self._other_slices += slices
-        reason = f"no answer after {self._slices()} slices: {verdict.value}"
+        reason = verdict.explanation(self._slices())
         if bound is not None:
-            reason += f"; no path keeps {self._unit * bound:g} m from the walls, which is proved"
+            reason += f"; it is proved that no path keeps {self._unit * bound:g} m from the walls"
         return NoChannel(False, reason, mixed=self._proofs.undecided())
 
     def _slices(self) -> int:
