@@ -5,45 +5,6 @@ The palette is that of Okabe and Ito, whose colours stay apart for colour-blind 
 
 from __future__ import annotations
 
-__all__ = [
-    "AT_FAULT",
-    "BLOCKED",
-    "BLOCK_OF_DIAGRAM",
-    "BLUE",
-    "CHANNEL",
-    "EDGE",
-    "FLOOR",
-    "FLOOR_IN_SPACE",
-    "GREEN",
-    "GREY",
-    "GRID",
-    "GUIDE",
-    "HALVED",
-    "INK",
-    "LIGHT_GREY",
-    "NOT_AT_FAULT",
-    "OBJECT",
-    "ORANGE",
-    "OUTSIDE",
-    "PAPER",
-    "PARTLY_FREE",
-    "PILLAR",
-    "PROVED_FREE",
-    "PURPLE",
-    "REACHED",
-    "SHELF",
-    "SKY",
-    "UNDECIDED",
-    "UNDECIDED_CHANNEL",
-    "UNREACHED",
-    "VERMILLION",
-    "WALL",
-    "WALL_IN_SPACE",
-    "blend",
-    "red_green_blue",
-    "robot_colour",
-]
-
 # Text, lines and paper.
 INK = "#222222"
 GREY = "#777777"

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import networkx as nx
 from pydrake.systems.framework import Diagram, InputPortIndex, OutputPortIndex, System
 
-__all__ = ["Block", "Signal", "SignalFlow", "signal_flow"]
+__all__ = ["INPUTS", "OUTPUTS", "Block", "Signal", "SignalFlow", "signal_flow"]
+
+INPUTS, OUTPUTS = "from outside", "to outside"
+"""Names of the blocks that stand for a Diagram's own ports."""
 
 
 @dataclass(frozen=True)
@@ -15,11 +19,11 @@ class Block:
     """One block.
 
     Attributes:
-        name: As the Diagram calls it.
-        kind: The class behind it; empty for the Diagram's own inputs and outputs.
+        name: Its name in the Diagram.
+        kind: Its class; empty for Diagrams, and for the Diagram's own inputs and outputs.
         inputs: Names of the connected input ports, in the ports' order.
         outputs: Names of the connected output ports, in the ports' order.
-        column: Place in the flow from left to right.
+        column: Its place from left to right.
     """
 
     name: str
@@ -31,14 +35,7 @@ class Block:
 
 @dataclass(frozen=True)
 class Signal:
-    """One connection.
-
-    Attributes:
-        source: Block that it comes from.
-        output: That block's port.
-        sink: Block that it goes to.
-        input: That block's port.
-    """
+    """One connection, from an output port of a block to an input port of another."""
 
     source: str
     output: str
@@ -48,21 +45,17 @@ class Signal:
 
 @dataclass(frozen=True)
 class SignalFlow:
-    """A Diagram's content.
+    """The content of a Diagram.
 
     Attributes:
-        name: The Diagram's.
+        name: The Diagram's name in the picture.
         blocks: Its blocks.
-        signals: Its connections, in the order of the blocks and ports that they come from and go to.
+        signals: Its connections, in the order of the blocks and ports that they join.
     """
 
     name: str
     blocks: tuple[Block, ...]
     signals: tuple[Signal, ...]
-
-
-INPUTS, OUTPUTS = "from outside", "to outside"
-"""Names of the blocks that stand for a Diagram's own ports."""
 
 
 def signal_flow(diagram: Diagram, name: str, *, telemetry: frozenset[str] = frozenset()) -> SignalFlow:
@@ -71,82 +64,71 @@ def signal_flow(diagram: Diagram, name: str, *, telemetry: frozenset[str] = froz
     Args:
         diagram: The Diagram; the inside of its blocks is not read.
         name: Its name in the picture.
-        telemetry: Outputs that only logs read; they are left out.
+        telemetry: Outputs of the Diagram that only logs read; they are left out.
     """
-    signals = [
-        Signal(
-            source.get_name(),
-            source.get_output_port(output).get_name(),
-            sink.get_name(),
-            sink.get_input_port(entry).get_name(),
-        )
-        for (sink, entry), (source, output) in diagram.connection_map().items()
-    ]
-    signals += _from_outside(diagram) + _to_outside(diagram, telemetry)
-    sources, sinks = _port_orders(diagram)
-    signals.sort(key=lambda s: (sources[s.source, s.output], sinks[s.sink, s.input]))
-    kinds = {system.get_name(): _kind(system) for system in diagram.GetSystems()}
-    held = {
-        (system.get_name(), system.get_output_port(output).get_name())
-        for system in diagram.GetSystems()
-        for output in range(system.num_output_ports())
-        if not system.HasDirectFeedthrough(output)
-    }
-    columns = _columns(signals, held)
-    blocks = tuple(
+    systems = {system.get_name(): system for system in diagram.GetSystems()}
+    outputs = [(INPUTS, port) for port in _inputs(diagram)]
+    outputs += [(block, port) for block, system in systems.items() for port in _outputs(system)]
+    inputs = [(block, port) for block, system in systems.items() for port in _inputs(system)]
+    inputs += [(OUTPUTS, port) for port in _outputs(diagram)]
+    # Drake lists connections in an order that changes from run to run.
+    signals = sorted(
+        (signal for signal in _signals(diagram) if signal.input not in telemetry or signal.sink != OUTPUTS),
+        key=lambda s: (outputs.index((s.source, s.output)), inputs.index((s.sink, s.input))),
+    )
+    ends = {(signal.sink, signal.input) for signal in signals}
+    blocks = (
         Block(
             block,
-            kinds.get(block, ""),
-            tuple(sorted({s.input for s in signals if s.sink == block}, key=lambda name: sinks[block, name])),
+            _kind(systems.get(block)),
+            tuple(port for owner, port in inputs if owner == block and (block, port) in ends),
             tuple(dict.fromkeys(s.output for s in signals if s.source == block)),
-            columns[block],
+            column,
         )
-        for block in sorted(columns, key=lambda block: (columns[block], block))
+        for block, column in _columns(signals, systems)
     )
-    return SignalFlow(name, blocks, tuple(signals))
+    return SignalFlow(name, tuple(blocks), tuple(signals))
 
 
-def _port_orders(diagram: Diagram) -> tuple[dict[tuple[str, str], int], dict[tuple[str, str], int]]:
-    """Return the ranks of all (block, port) that signals come from, and go to; Drake's order changes."""
-    outputs = [(INPUTS, diagram.get_input_port(k).get_name()) for k in range(diagram.num_input_ports())]
-    inputs = [(OUTPUTS, diagram.get_output_port(k).get_name()) for k in range(diagram.num_output_ports())]
-    for system in diagram.GetSystems():
-        name = system.get_name()
-        outputs += [(name, system.get_output_port(k).get_name()) for k in range(system.num_output_ports())]
-        inputs += [(name, system.get_input_port(k).get_name()) for k in range(system.num_input_ports())]
-    return {port: k for k, port in enumerate(outputs)}, {port: k for k, port in enumerate(inputs)}
+def _inputs(system: System) -> list[str]:
+    return [system.get_input_port(k).get_name() for k in range(system.num_input_ports())]
 
 
-def _from_outside(diagram: Diagram) -> list[Signal]:
-    return [
-        Signal(INPUTS, port.get_name(), system.get_name(), system.get_input_port(entry).get_name())
-        for port in map(diagram.get_input_port, range(diagram.num_input_ports()))
-        for system, entry in diagram.GetInputPortLocators(InputPortIndex(int(port.get_index())))
-    ]
+def _outputs(system: System) -> list[str]:
+    return [system.get_output_port(k).get_name() for k in range(system.num_output_ports())]
 
 
-def _to_outside(diagram: Diagram, telemetry: frozenset[str]) -> list[Signal]:
-    signals = []
-    for port in map(diagram.get_output_port, range(diagram.num_output_ports())):
-        if port.get_name() not in telemetry:
-            system, output = diagram.get_output_port_locator(OutputPortIndex(int(port.get_index())))
-            inside = system.get_output_port(output).get_name()
-            signals.append(Signal(system.get_name(), inside, OUTPUTS, port.get_name()))
-    return signals
+def _signals(diagram: Diagram) -> Iterator[Signal]:
+    """Yield all connections inside a Diagram, and those with its own ports."""
+    for (sink, entry), (source, output) in diagram.connection_map().items():
+        yield Signal(source.get_name(), _outputs(source)[output], sink.get_name(), _inputs(sink)[entry])
+    for k, port in enumerate(_inputs(diagram)):
+        for sink, entry in diagram.GetInputPortLocators(InputPortIndex(k)):
+            yield Signal(INPUTS, port, sink.get_name(), _inputs(sink)[entry])
+    for k, port in enumerate(_outputs(diagram)):
+        source, output = diagram.get_output_port_locator(OutputPortIndex(k))
+        yield Signal(source.get_name(), _outputs(source)[output], OUTPUTS, port)
 
 
-def _kind(system: System) -> str:
-    return "" if isinstance(system, Diagram) else type(system).__name__.rstrip("_")
+def _kind(system: System | None) -> str:
+    return "" if system is None or isinstance(system, Diagram) else type(system).__name__.rstrip("_")
 
 
-def _columns(signals: list[Signal], held: set[tuple[str, str]]) -> dict[str, int]:
-    """Return the longest distances of blocks from the sources, not counting signals from a state."""
+def _columns(signals: list[Signal], systems: dict[str, System]) -> list[tuple[str, int]]:
+    """Return the blocks with their columns: the longest distances from the sources.
+
+    A signal that its block computes from a state alone does not count: it closes a loop.
+    """
+    held = {
+        (block, port)
+        for block, system in systems.items()
+        for k, port in enumerate(_outputs(system))
+        if not system.HasDirectFeedthrough(k)
+    }
     graph: nx.DiGraph[str] = nx.DiGraph()
     for signal in signals:
         graph.add_nodes_from((signal.source, signal.sink))
         if (signal.source, signal.output) not in held:
             graph.add_edge(signal.source, signal.sink)
-    columns: dict[str, int] = {}
-    for column, generation in enumerate(nx.topological_generations(graph)):
-        columns.update(dict.fromkeys(generation, column))
-    return columns
+    generations = enumerate(nx.topological_generations(graph))
+    return [(block, column) for column, members in generations for block in sorted(members)]
