@@ -27,15 +27,15 @@ Blocks = Literal["named", "fused"]
 
 @dataclass(frozen=True)
 class ClosedLoop:
-    """The wired loop and handles on its parts.
+    """The closed loop and its parts.
 
     Attributes:
-        diagram: The whole.
+        diagram: The Diagram of the whole loop.
         station: The simulated team.
         cell_planner: The supervisor.
         controllers: One sub-Diagram for each robot, as the others see it.
-        deployed: What stands round the controllers, empty where the team is ideal.
-        fused: What drives the team in the fused mode, which has no controllers of single robots.
+        deployed: Controllers with sensors, actuators and radio, empty where the team is ideal.
+        fused: The block that drives the team in the fused mode, which has no controllers of single robots.
         plan: The plan that they follow.
     """
 
@@ -49,7 +49,7 @@ class ClosedLoop:
 
     @property
     def laws(self) -> tuple[Diagram, ...]:
-        """The controllers themselves, without what a deployment puts round them."""
+        """The controllers alone, without the sensors, actuators and radio of a deployment."""
         return tuple(deployed.controller for deployed in self.deployed) or self.controllers
 
     @property
@@ -58,7 +58,7 @@ class ClosedLoop:
         return self.station.team
 
     def create_context(self) -> Context:
-        """A context at the plan's start: at rest, in the first cell, every governor on the object."""
+        """Create a context at the plan's start: at rest, in the first cell, every p_G at the object."""
         context = self.diagram.CreateDefaultContext()
         team = self.team
         set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.plan.start)
@@ -70,7 +70,7 @@ class ClosedLoop:
         return context
 
     def release(self) -> None:
-        """Let go of all memory when the last context has gone; nothing of the loop may be used any more."""
+        """Free all memory after the last context is gone; no part of the loop may be used any more."""
         _release(self.diagram)
 
 
@@ -90,7 +90,7 @@ def build_closed_loop(
     blocks: Blocks = "named",
     replacements: Replacements | None = None,
 ) -> ClosedLoop:
-    """Wire the loop; nothing but ready reports crosses between robots.
+    """Build the closed loop; only ready reports cross between robots.
 
     Args:
         scenario: The scenario.

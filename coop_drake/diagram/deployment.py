@@ -1,4 +1,4 @@
-"""What stands between a robot's controller and the world when the team is not ideal."""
+"""Sensors, actuators and radio of a robot when the team is not ideal."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ from coop_drake.tree.pose import FloatArray
 __all__ = ["DeployedController", "build_radio", "deploy"]
 
 
-#: Nothing gives more than this, whatever the law asks for once it has lost its funnel [N, N m]: a plant
-#: driven to infinity would end the process instead of the run.
 _STRONGEST = 1e5
+"""Limit of every effort where the scenario gives none [N, N m]. A controller outside its funnel may ask for
+any effort; without a limit the plant's state would overflow, which ends the process instead of the run."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class DeployedController:
     seed: int
 
     def prepare(self, root: Context) -> None:
-        """Seed the noise; let p_G and what was measured before the start be what they are at the start."""
+        """Seed the noise, and set p_G and delayed measurements to their values at the start."""
         pose = self.diagram.GetInputPort("object_pose").Eval(self.diagram.GetMyContextFromRoot(root))
         governor = self.controller.GetSubsystemByName("governor_state")
         governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), pose[:2])
@@ -63,7 +63,7 @@ class DeployedController:
 
 
 def deploy(controller: Diagram, deployment: Deployment, robot: int) -> DeployedController:
-    """Put a limit round a robot's controller, and noise, delays, a hold and a radio as far as switched on.
+    """Add an effort limit to a robot's controller, and the noise, delays, hold and radio of a deployment.
 
     In the order of the signals: ``robot_state`` and ``object_pose`` get noise, then a delay; ``robot_effort``
     is held for a period, then limited; ``ready`` goes through a :class:`MessageChannel`, or a hold where
@@ -93,7 +93,7 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int) -> DeployedC
 
 
 def build_radio(deployment: Deployment, robot: int) -> MessageChannel | LinearSystem:
-    """The channel of a robot's reports in a team that is sampled."""
+    """Build the channel of a robot's reports in a sampled team."""
     messages, period = deployment.messages, deployment.period or 0.0
     if messages == Messages():
         return clear_channel(period)
@@ -111,7 +111,7 @@ def _seed(deployment: Deployment, robot: int) -> int:
 
 
 class _Wrapping:
-    """Adds blocks to a builder as far as a deployment asks for them.
+    """Adds to a builder the blocks that a deployment asks for.
 
     Args:
         builder: Receives them.
@@ -146,7 +146,7 @@ class _Wrapping:
         self._builder.ExportInput(entry, name)
 
     def actuate(self, effort: OutputPort, joints: int) -> OutputPort:
-        """The effort as the actuators give it."""
+        """Return the effort after hold and limits."""
         if self._deployment.period is not None:
             hold = self._builder.AddNamedSystem(
                 "effort_hold", ZeroOrderHold(self._deployment.period, 3 + joints)
@@ -159,7 +159,7 @@ class _Wrapping:
         return saturation.get_output_port()
 
     def send(self, ready: OutputPort, robot: int) -> OutputPort:
-        """The reports of a robot as the cell planner hears them."""
+        """Return the reports of a robot as the cell planner receives them."""
         if self._deployment.period is None:
             return ready
         channel = self._builder.AddNamedSystem("radio", build_radio(self._deployment, robot))
@@ -168,14 +168,14 @@ class _Wrapping:
 
 
 def _noise(deployment: Deployment, joints: int) -> FloatArray:
-    """Standard deviations of (x, y, angle, joints..., their rates), shape (2 (3 + n),)."""
+    """Return the standard deviations of (x, y, angle, joints..., their rates), shape (2 (3 + n),)."""
     m = deployment.measurements
     positions = [m.position_noise, m.position_noise, *[m.angle_noise] * (1 + joints)]
     return np.array([*positions, *[m.rate_noise] * (3 + joints)])
 
 
 def _limits(deployment: Deployment, joints: int) -> FloatArray:
-    """Largest base wrench and joint torques, shape (3 + n,)."""
+    """Return the largest base wrench and joint torques, shape (3 + n,)."""
     limits = deployment.actuators
     force, torque, effort = (
         _STRONGEST if limit is None else limit

@@ -1,4 +1,4 @@
-"""What every robot is given before a run, from scenario, plan and maps."""
+"""Prepares what every robot knows before a run, from scenario, plan and maps."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["robot_knowledge"]
 def robot_knowledge(
     scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], team: TeamPlant
 ) -> list[RobotKnowledge]:
-    """What each robot of a team knows.
+    """Return what each robot of a team knows before a run.
 
     Args:
         scenario: The scenario.

@@ -68,7 +68,7 @@ Replacements = Mapping[str, Callable[[RobotKnowledge], LeafSystem]]
 
 
 def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements | None = None) -> Diagram:
-    """Wire one robot's controller.
+    """Build one robot's controller.
 
     ======= ===================== =========== ==========================================================
     input   ``robot_state``       2 (3 + n)   its own state (z_k, z_k')

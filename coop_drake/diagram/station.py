@@ -32,7 +32,7 @@ class TransportStation:
 
 
 def build_station(scenario: Scenario) -> TransportStation:
-    """Build the team's plant, as the scenario wants it, with an actuation and a state port for each robot.
+    """Build the team's plant as in the scenario, with an actuation and a state port for each robot.
 
     ======= =========================== ========== =========================================================
     input   ``robot_<k>_effort``        3 + n_k    base wrench and joint torques of robot k

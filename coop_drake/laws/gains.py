@@ -100,7 +100,7 @@ class FixedGains:
 
 @dataclass(frozen=True)
 class ScheduledGains:
-    """Gains that follow the cell: stiff where it is narrow, gentle where the funnel has little to close.
+    """Rules by which gains follow the cell: K grows where it is narrow, lambda where funnels shrink little.
 
     Attributes:
         wall_stiffness: K times the neck's width, K = clamp(wall_stiffness / b) [m/s^2].

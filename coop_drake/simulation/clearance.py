@@ -1,4 +1,4 @@
-"""How far every body is from the walls and from the bodies that it must not touch."""
+"""Distances of all bodies to the walls of the floor and to the bodies that they must not touch."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Clearance:
 
     Attributes:
         distance: Signed distance, negative where bodies penetrate [m].
-        place: What it lies between, for example ``robot_0::base and the walls``.
+        place: Between what, for example ``robot_0::base and the walls``.
     """
 
     distance: float
@@ -51,11 +51,11 @@ class TeamClearance:
 
     @property
     def kernel_arguments(self) -> tuple[TeamArrays, FloatArray]:
-        """What the compiled distances read of team and floor, see ``team_distances``."""
+        """The arguments of ``team_distances`` for this team and floor."""
         return self._arrays
 
     def __call__(self, configuration: FloatArray) -> tuple[Clearance, Clearance]:
-        """Smallest distance to the walls, and between bodies that must not touch (infinite if none are).
+        """Return the smallest distance to the walls, and between bodies that must not touch.
 
         Args:
             configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
@@ -64,11 +64,11 @@ class TeamClearance:
         return Clearance(wall, self.wall_place(piece)), Clearance(between, self.pair_place(pair))
 
     def wall_place(self, piece: int) -> str:
-        """What a piece's distance to the walls lies between."""
+        """Return a phrase for the two sides of a piece's distance to the walls."""
         return f"{self._names[piece]} and the walls"
 
     def pair_place(self, pair: int) -> str:
-        """What the distance of a pair lies between."""
+        """Return a phrase for the two sides of a pair's distance."""
         pairs = self._arrays[0].pairs
         if not len(pairs):
             return "no two bodies"

@@ -1,4 +1,4 @@
-"""What a run leaves behind: named numpy arrays, one row per accepted step; no pydrake."""
+"""The log of a run: named numpy arrays, one row for each accepted step."""
 
 from __future__ import annotations
 

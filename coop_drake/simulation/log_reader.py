@@ -1,4 +1,4 @@
-"""The arrays of a log file: all there, of numbers, and of shapes that fit each other."""
+"""Reads the arrays of a log file and checks that they are complete and have consistent shapes."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "joint_names": ("n",),
     "robot_names": ("N",),
 }
-"""Shapes as the log's docstring has them; every other array has one number for every time."""
+"""Shapes of the arrays as in the docstring of the log; every other array has shape (T,)."""
 _KINDS = {"reached": "b", "violation": "U", "joint_names": "U", "robot_names": "U"}
-"""Kinds of what is no number."""
+"""Kinds of the arrays that do not hold numbers, as numpy names them."""
 
 
 def read_arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray[Any, Any]]:

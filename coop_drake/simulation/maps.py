@@ -1,4 +1,4 @@
-"""The harmonic maps of a plan, side by side on all cores."""
+"""Builds the harmonic maps of a plan, in parallel on all cores."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def build_maps(
         tolerance: Largest certified error accepted; a scenario's is ``maps.tolerance`` [-].
         store: Where maps are looked up first and kept; by default all are solved.
         workers: How many maps are solved at the same time; by default one a core, eight at most.
-        progress: Told the stage and the fraction done, if given.
+        progress: Called with the stage and the fraction done, if given.
 
     Raises:
         FieldError: A map cannot be built or its certificate fails; the message names the cell.
@@ -69,7 +69,7 @@ def build_maps(
 
 
 def certificate_rows(maps: Sequence[HarmonicMap]) -> list[dict[str, Any]]:
-    """What every map is worth, as plain values by the names of `MapCertificate`, cells counted from 0."""
+    """Return the certificates of maps as plain values by the names of `MapCertificate`, cells from 0."""
     rows = []
     for cell, harmonic_map in enumerate(maps):
         vertices = len(harmonic_map.solution.arrays.edges)

@@ -1,4 +1,4 @@
-"""From a plan and its maps to a finished run: closed loop, simulation, log."""
+"""Simulates a plan: builds the closed loop, runs it and returns the log."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def simulate(
             but reports is what named blocks show.
         replacements: Blocks of a user's own in every robot's controller, by the name of the block that they
             replace, such as ``axis_ppc``; with named blocks only.
-        progress: Told the stage and the fraction done, if given.
+        progress: Called with the stage and the fraction done, if given.
         onlooker: Called with every accepted step, for example a live view; it changes nothing about the run.
 
     Raises:
@@ -100,7 +100,7 @@ def _simulated(
 
 
 def configure_simulator(simulator: Simulator, scenario: Scenario) -> None:
-    """Let a simulator integrate as a scenario wants it.
+    """Set a simulator's integrator as a scenario asks for.
 
     Args:
         simulator: Of a loop that was built for the scenario.

@@ -17,7 +17,7 @@ __all__ = ["largest_difference", "margins", "team_distances"]
 
 @compiled
 def team_distances(team: TeamArrays, walls: FloatArray, z: FloatArray) -> tuple[float, int, float, int]:
-    """Smallest distance to the walls and which piece's it is, then between bodies and which pair's it is.
+    """Return the smallest distance to the walls and its piece, then that between bodies and its pair.
 
     Args:
         team: The team.

@@ -31,7 +31,7 @@ class AxisLaw:
 
     @cached_property
     def table(self) -> FloatArray:
-        """What the compiled laws read, shape (m, ``LAW_COLUMNS``), see ``axis_table``."""
+        """The ``axis_table`` of these axes, shape (m, ``LAW_COLUMNS``)."""
         return axis_table(self.funnel, self.gains)
 
     @property

@@ -26,8 +26,8 @@ class AxisPpc(Block):
     output  ``funnels``              2 (1 + n)  lower, then upper funnel bounds now [rad or m]
     ======= ======================== ========== ====================================================== =====
 
-    No state: the funnels depend on the time since the cell was entered. One law holds for all axes, so one
-    block computes it for all that one robot is concerned with; ``robot_state`` is not read without joints.
+    No state: the funnels depend on the time since the cell was entered. The law is the same for all axes, so
+    one block computes all axes of a robot; ``robot_state`` is not read where the robot has no joints.
 
     Args:
         laws: One law of the axes (theta, q_k) for each cell of the plan.

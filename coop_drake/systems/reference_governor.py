@@ -22,7 +22,7 @@ __all__ = ["GovernedCell", "ReferenceGovernor"]
 
 @dataclass(frozen=True)
 class GovernedCell:
-    """What the governor needs to know of one cell.
+    """The data of one cell that the governor needs.
 
     Attributes:
         clearance: Signed distance to the boundary of the governed set [m].
@@ -36,13 +36,13 @@ class GovernedCell:
 
     @cached_property
     def kernel_arguments(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
-        """What the compiled governor reads of the cell; None if its field is not that of a harmonic map."""
+        """The arguments of ``govern`` for this cell; None if its field is not that of a harmonic map."""
         if not isinstance(self.field, VelocityField):
             return None
         return self.gains.governor_row, self.clearance.edges, *self.field.kernel_arguments
 
     def govern(self, object_state: FloatArray, governor_position: FloatArray, command: FloatArray) -> None:
-        """Write p_G' and the desired acceleration, both of (14), in this cell, whatever its field is.
+        """Write p_G' and the desired acceleration, both of (14), in this cell, with any velocity field.
 
         Args:
             object_state: Pose and twist of the object, shape (6,).
@@ -57,7 +57,7 @@ class GovernedCell:
 
 
 class ReferenceGovernor(Block):
-    """Leads the object to the cell's target no faster than is safe: (13)-(16).
+    """Leads the object to the cell's target, slow enough to stay in the cell: (13)-(16).
 
     ======= =========================== ==== ====================================================== =====
     input   ``object_state``            6    pose and twist of L                                    W
@@ -68,8 +68,8 @@ class ReferenceGovernor(Block):
     output  ``energy_margin``           1    Delta E [m^2/s^2]
     ======= =========================== ==== ====================================================== =====
 
-    No state of its own: p_G lives in the integrator that the rate feeds. One output holds both halves of
-    (14), because asking a block for two takes twice as long.
+    No state: an integrator outside keeps p_G. One output holds both parts of (14), because evaluating two
+    outputs takes twice as long.
 
     Args:
         cells: One entry for each cell of the plan.

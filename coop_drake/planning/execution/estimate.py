@@ -1,4 +1,4 @@
-"""How long a transport will take, estimated before it is mapped and simulated."""
+"""Estimates how long a transport takes, before its maps are solved and it is simulated."""
 
 from __future__ import annotations
 
@@ -29,17 +29,17 @@ __all__ = [
 ]
 
 SETTLING_TIME = 0.6
-"""Time that angles and joints need whatever the distance, for choices made before gains are [s]."""
+"""Time that angles and joints need at any distance, for choices made before gains are known [s]."""
 
 SPEED_PER_CLEARANCE = 3.0
-"""Speed over clearance with the paper's gains, for choices that are made before gains are [1/s]."""
+"""Speed over clearance with the paper's gains, for choices made before gains are known [1/s]."""
 
 LONGEST = 120.0
-"""A transition that takes longer than this is not integrated to its end [s]."""
+"""A transition that takes longer is not integrated to its end [s]; such a plan is of no use."""
 
 
 def speed_per_clearance(gains: TransitionGains) -> float:
-    """Speed of the governed object in a long aisle over its clearance there.
+    """Return the speed of the governed object in a long aisle over its clearance there.
 
     At a steady speed v behind the governor (14)-(16) the object lags by zeta v / K, so that
     E = v^2 (1 + zeta^2 / K) / 2, and v = K_G sqrt(Delta E / K) gives
@@ -56,7 +56,7 @@ def speed_per_clearance(gains: TransitionGains) -> float:
 
 
 def travel_time(length: float, neck: float, speed: float = SPEED_PER_CLEARANCE) -> float:
-    """Time that the object itself needs for a path whose clearance is the neck everywhere [s].
+    """Return the time that the object needs for a path whose clearance is the neck everywhere [s].
 
     Args:
         length: L, length of the path to the target [m].
@@ -67,12 +67,12 @@ def travel_time(length: float, neck: float, speed: float = SPEED_PER_CLEARANCE) 
 
 
 def transition_time(length: float, neck: float, speed: float = SPEED_PER_CLEARANCE) -> float:
-    """Rule of thumb for one transition, 0.6 s more than its travel [s]; arguments as above."""
+    """Return an approximate time of one transition, ``SETTLING_TIME`` more than its travel [s]."""
     return SETTLING_TIME + travel_time(length, neck, speed)
 
 
 def plan_time(plan: Plan) -> float:
-    """Estimated duration of the whole transport [s]."""
+    """Return the estimated duration of the whole transport [s]."""
     return sum(transition.estimated_time for transition in plan.transitions)
 
 
@@ -81,16 +81,16 @@ def timed(plan: Plan, paths: Sequence[LineString] | None = None) -> Plan:
 
     The closed loop is integrated from cell to cell: a point mass behind the governor (14)-(16) with the exact
     distance to the boundary of Q_i, a double integrator in its funnel for every axis, and the conditions of
-    readiness. The state is carried along, for object and axes do not stop where cells are handed over. p_G
-    follows the widest path instead of a harmonic map, which would have to be computed first.
+    readiness. The state is kept from cell to cell, because object and axes do not stop at a switch. p_G
+    follows the widest path instead of a harmonic map, which would have to be solved first.
 
     Args:
-        plan: The plan; the estimates that it has are not looked at.
+        plan: The plan; its present estimates are not read.
         paths: For each transition the path from where its cell is entered to its target; the widest ones
             inside the tidied cells if not given.
 
     Returns:
-        The plan with estimates; the rule of thumb where a transition is not left within two minutes.
+        The plan with estimates; ``transition_time`` where a transition is not left within two minutes.
     """
     paths = paths if paths is not None else _widest_paths(plan)
     crossings = [
@@ -131,5 +131,5 @@ def _widest_paths(plan: Plan) -> list[LineString]:
 
 
 def _at_rest(position: FloatArray, axes: FloatArray) -> FloatArray:
-    """State (p, p', p_G, axes, axis rates) without motion."""
+    """Return the state (p, p', p_G, axes, axis rates) at rest."""
     return np.concatenate([position, np.zeros(2), position, axes, np.zeros(len(axes))])
