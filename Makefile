@@ -5,6 +5,8 @@ PYTHON ?= $(shell for python in python3 python3.11 python3.12 python3.13; do \
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+READY_TO_DEVELOP := $(VENV)/.ready-to-develop
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 CODE := coop_drake tests benchmarks notebooks docs paper
 # The kernels are small; threads of BLAS would only get into each other's way.
 export OMP_NUM_THREADS ?= 1
@@ -14,30 +16,35 @@ export OMP_NUM_THREADS ?= 1
 demo: $(READY)  ## plan, simulate and record the paper's transport
 	$(BIN)/coop-drake run models/base.scenario.yaml
 
-test: $(READY)  ## run every test
-	$(BIN)/python -m pytest -n 2
+test: $(READY_TO_DEVELOP)  ## run every test, and show which lines none of them runs
+	$(BIN)/python -m pytest -n 2 --cov --cov-report=term-missing
 
-lint: $(READY)  ## formatting, lint, types, direction of imports, documentation
+lint: $(READY_TO_DEVELOP)  ## formatting, lint, types, direction of imports, documentation
 	$(BIN)/ruff format --check $(CODE)
 	$(BIN)/ruff check $(CODE)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m docs.generate out/docs
 
-bench: $(READY)  ## measure speed and accuracy as ratios, into out/bench.json
+bench: $(READY_TO_DEVELOP)  ## measure speed and accuracy as ratios, into out/bench.json
 	$(BIN)/python -m benchmarks
 
-docs: $(READY)  ## build the documentation into out/docs, warnings being errors
+docs: $(READY_TO_DEVELOP)  ## build the documentation into out/docs, warnings being errors
 	$(BIN)/python -m docs.generate out/docs
 
-notebooks: $(READY)  ## execute every notebook into out/notebooks
+notebooks: $(READY_TO_DEVELOP)  ## execute every notebook into out/notebooks
 	$(BIN)/python -m notebooks out/notebooks
 
 $(READY): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "coop_drake needs Python 3.11 or newer; name one with make PYTHON=..." >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[dev,bench]'
+	$(PIP) -e .
 	-$(BIN)/coop-drake warm models/base.scenario.yaml
+	touch $@
+
+# What running takes is installed first, so that `make demo` does not wait for what developing takes.
+$(READY_TO_DEVELOP): $(READY)
+	$(PIP) -e '.[dev,bench]'
 	touch $@
 
 clean:  ## remove the environment and everything generated

@@ -60,12 +60,13 @@ def called(arguments: Sequence[str]) -> str:
 
 
 def run_program(command: Sequence[str]) -> str:
-    """Run a program with one thread of BLAS, and return its standard output.
+    """Run a program with one thread of BLAS and with bytecode kept, as users do; return its standard output.
 
     Raises:
         WorkerError: It failed.
     """
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=_ROOT, env=environment)
     if done.returncode not in _ANSWERED:
         raise WorkerError(f"{' '.join(command)} failed:\n{done.stderr[-1000:]}")

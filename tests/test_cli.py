@@ -111,7 +111,7 @@ def drawn(monkeypatch):
         def wait(self):
             pass
 
-    monkeypatch.setattr(run, "FigureProcess", NoFigures)
+    monkeypatch.setattr(run, "FigureProcesses", NoFigures)
     return runs
 
 

@@ -46,6 +46,13 @@ def _ended(error: BaseException) -> int:
     return left.value.exit_code
 
 
+def test_a_missing_package_is_answered_with_the_extra_that_installs_it(capsys):
+    assert _ended(ModuleNotFoundError("No module named 'trimesh'", name="trimesh")) == 2
+    assert "pip install 'coop-drake[robots]'" in " ".join(capsys.readouterr().err.split())
+    with pytest.raises(ModuleNotFoundError):
+        _ended(ModuleNotFoundError("No module named 'kma'", name="kma"))
+
+
 def test_ctrl_c_inside_compiled_code_and_imports_is_no_bug(capsys):
     for error in (SystemError("a result with an exception set"), ImportError("initialization failed")):
         error.__cause__ = KeyboardInterrupt()

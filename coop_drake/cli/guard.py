@@ -13,6 +13,15 @@ from coop_drake.errors import CoopDrakeError, FieldError, FloorPlanError, Scenar
 
 __all__ = ["reporting"]
 
+_EXTRAS = {
+    "collada": "robots",
+    "defusedxml": "robots",
+    "ezdxf": "floor-plans",
+    "svgelements": "floor-plans",
+    "trimesh": "robots",
+}
+"""The extra of coop-drake that installs a package which only some commands import."""
+
 
 @contextmanager
 def reporting(*, machine: bool = False, quiet: bool = False) -> Iterator[Reporter]:
@@ -49,6 +58,9 @@ def _explain(error: BaseException, reporter: Reporter) -> bool:
         details = {"file": error.file, "place": error.place, "remedy": error.remedy, "finding": error.finding}
     elif isinstance(error, FieldError | StallError):
         code = ExitCode.FAILED_RUN
+    elif isinstance(error, ModuleNotFoundError) and error.name in _EXTRAS:
+        extra = _EXTRAS[error.name]
+        text = f"the package {error.name} is not installed; expected: pip install 'coop-drake[{extra}]'"
     elif isinstance(error, OSError):
         text = _system_error(error)
     elif not isinstance(error, CoopDrakeError):

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 from rich.markup import escape
 
 from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.figure_process import FigureProcess
 from coop_drake.cli.guard import reporting
 from coop_drake.cli.maps import map_cells, write_certificates
 from coop_drake.cli.options import (
@@ -27,6 +26,7 @@ from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import simulation_facts, summary_rows
 from coop_drake.cli.task import Task, read_task
+from coop_drake.viz.figure_processes import FigureProcesses
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
@@ -87,7 +87,7 @@ def carry_out(
     """
     maps = map_cells(task, plan, reporter, fresh=fresh_maps)
     onlooker = _open_live_view(task, plan, reporter) if live else None
-    with FigureProcess() as figures:  # It imports matplotlib while this process simulates.
+    with FigureProcesses() as figures:  # They import matplotlib while this process simulates.
         log = _simulate(task, plan, maps, folder, reporter, blocks, onlooker)
         _draw(task, plan, log, folder, reporter, figures)
     reporter.table(task.name, summary_rows(reporter.facts))
@@ -130,9 +130,9 @@ def _draw(
     log: SimulationLog,
     folder: ResultFolder,
     reporter: Reporter,
-    figures: FigureProcess,
+    figures: FigureProcesses,
 ) -> None:
-    """Write the recording here while the other process draws the figures."""
+    """Write the recording here while other processes draw the figures."""
     from coop_drake.viz import write_recording
 
     figures.draw(task.problem.workspace, task.problem.tree, plan, log, folder.path)
