@@ -60,4 +60,4 @@ def _verify(certificate: Path, task: Task, reporter: Reporter) -> ExitCode:
 
 def _row(check: Check) -> tuple[str, str]:
     tightest = "" if check.tightest is None else f", {check.tightest:.3g} {check.unit}"
-    return check.name, f"{check.count}{tightest}"
+    return check.name, f"{check.count} check{'s' if check.count != 1 else ''}{tightest}"
