@@ -53,7 +53,7 @@ _FILL = 0.86
 """Part of the picture that the floor fills; the headline and the player take the rest."""
 
 _LIGHTS = {"AmbientLight": 2.7, "FillLight": 1.6, "PointLightNegativeX": 0.0, "PointLightPositiveX": 0.0}
-"""Intensities of Meshcat's lights: from everywhere alike, so that nothing casts the floor into shade."""
+"""Intensities of Meshcat's lights: from everywhere alike, so that the floor has no shadows."""
 
 _SKY, _HORIZON = [1.0, 1.0, 1.0], [0.90, 0.92, 0.95]
 """Red, green and blue of the background at its top and at its bottom."""

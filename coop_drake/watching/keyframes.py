@@ -1,4 +1,4 @@
-"""Keyframes of a recording: for each all that figures and scene draw, worked out before anything is drawn."""
+"""Keyframes of a recording: all that the figures and the scene draw, worked out before drawing."""
 
 from __future__ import annotations
 

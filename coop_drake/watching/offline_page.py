@@ -39,7 +39,7 @@ class OfflineWindow(ViewerWindow):
 
     Args:
         title: Title of the page.
-        content: What the page's own script shows beside the scene; anything that JSON can say.
+        content: What the page shows beside the scene; any value that JSON can represent.
     """
 
     def __init__(self, title: str, content: Mapping[str, Any]) -> None:

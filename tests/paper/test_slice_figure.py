@@ -1,4 +1,4 @@
-"""Slices as pictures: a narrow slice proves more of the floor free, and leaves less in doubt."""
+"""The figure of slices: a narrow slice proves more of the floor free, and leaves less undecided."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_footprints_are_drawn_to_one_scale(figure):
     assert figure.axes[0].get_xlim() == figure.axes[2].get_xlim()
 
 
-def test_a_sliding_joint_is_told_in_metres():
+def test_a_sliding_joint_is_labelled_in_metres():
     problem = case("base")
     problem = replace(problem, tree=with_sliding_joint(problem.tree))
     left = slice_figure(problem, [((1.5, 1.6), (-0.1, 0.1), (-0.05, 0.05))]).axes[0]

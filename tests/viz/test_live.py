@@ -1,4 +1,4 @@
-"""A live view shows the steps that it is told of, and keeps to real time."""
+"""The live view shows the steps that it receives, and keeps to real time."""
 
 from __future__ import annotations
 
@@ -84,5 +84,5 @@ def test_a_run_that_is_ahead_of_time_waits(shown, monkeypatch):
     assert waited == [pytest.approx(1.0)]
 
 
-def test_nobody_looking_is_told_after_the_wait(shown):
+def test_without_a_browser_the_wait_ends_and_returns_false(shown):
     assert not shown[0].wait_for_viewer(0.0)

@@ -45,7 +45,7 @@ def text(page):
     return page.read_text()
 
 
-def test_the_page_asks_nobody_for_anything(text):
+def test_the_page_needs_no_network(text):
     assert not re.search(r'<(?:script|link|img|iframe)[^>]+(?:src|href)="(?!data:)', text)
     assert not re.search(r"\b(?:fetch|import|open|WebSocket)\([\"'`](?:https?|wss?):", text)
 
@@ -117,10 +117,10 @@ def test_collision_geometry_moves_with_the_bodies_where_it_is_asked_for():
 def test_the_page_says_how_it_ended():
     problem, scenario = case("base"), load_scenario(MODELS / "base.scenario.yaml")
     plan, log = synthetic_plan(problem), synthetic_log(problem)
-    told = {"duration": 12.0, "colours": [Rgba(0, 0, 1), Rgba(1, 0, 0)], "of_a_metre": 5.0}
+    facts = {"duration": 12.0, "colours": [Rgba(0, 0, 1), Rgba(1, 0, 0)], "of_a_metre": 5.0}
     lost = dataclasses.replace(log, violation="too near at t = 12 s", reached=False)
-    assert page_content(scenario, plan, log, **told)["verdict"] == "arrived after 12.0 s"
-    assert page_content(scenario, plan, lost, **told)["verdict"] == "too near at t = 12 s"
+    assert page_content(scenario, plan, log, **facts)["verdict"] == "arrived after 12.0 s"
+    assert page_content(scenario, plan, lost, **facts)["verdict"] == "too near at t = 12 s"
 
 
 def test_an_arrow_is_as_long_as_the_force_is_strong(text):

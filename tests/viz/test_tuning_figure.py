@@ -32,7 +32,7 @@ def test_the_best_score_falls_from_the_first_run_within_all_limits(found):
     np.testing.assert_allclose(line.get_xydata(), [(2.0, 0.75), (3.0, 0.75)])
 
 
-def test_what_breaks_a_limit_and_what_is_chosen_are_told_apart(found):
+def test_what_breaks_a_limit_and_what_is_chosen_are_distinguished(found):
     plane, _ = tuning_figure(found).axes
     drawn = {line.get_label(): line.get_xydata().tolist() for line in plane.lines if len(line.get_xdata())}
     assert drawn["breaks a limit"] == [[20.0, 200.0]]

@@ -36,8 +36,8 @@ def test_a_recording_leaves_pictures_and_a_page_and_none_of_an_older_one(room, t
     assert facts["bytes"].keys() == {*pictures, *names[1:]}
 
 
-def test_no_way_is_told_by_the_exit_code_and_a_margin_proves_nothing(tmp_path, monkeypatch):
-    # What is drawn is looked at above.
+def test_the_exit_code_says_that_there_is_no_path_and_a_margin_proves_nothing(tmp_path, monkeypatch):
+    # The files are tested above.
     monkeypatch.setattr(watching, "write_pictures", lambda recording, frames, directory, progress: [])
     monkeypatch.setattr(
         watching, "write_scene", lambda recording, frames, path, progress: write_atomically(path, b"")
