@@ -9,13 +9,13 @@ _BASE = "models/base.scenario.yaml"
 EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "run": (
         (f"run {_BASE}", "plan, simulate and record into out/base/"),
-        (f"run {_BASE} --gains table_2 --out out/paper", "with the paper's gains, elsewhere"),
+        (f"run {_BASE} --gains table_2 --out out/paper", "with the paper's gains, into another folder"),
         (f"run {_BASE} --live", "watch it in a browser while it is simulated"),
         (f"run {_BASE} --json --quiet", "one JSON object for machines"),
     ),
     "plan": (
         (f"plan {_BASE}", "write out/base/plan.json and table_1.md"),
-        ("plan models/closed.scenario.yaml", "exit code 3 and a certificate: there is no way"),
+        ("plan models/closed.scenario.yaml", "exit code 3 and a proof that there is no plan"),
     ),
     "simulate": (
         (f"simulate {_BASE}", "carry out out/base/plan.json"),

@@ -64,7 +64,7 @@ def floor_plan_command(
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Read a floor plan from elsewhere: preview it, or turn it into a scenario's workspace."""
+    """Read a floor plan that another program wrote: preview it, or turn it into a scenario's workspace."""
     targets = out or []
     for target in targets:
         if target.suffix.lower() not in (*_PICTURES, *_SECTIONS):

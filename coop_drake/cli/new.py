@@ -23,7 +23,11 @@ __all__ = ["new_command"]
 
 _QUESTIONS: tuple[tuple[str, str, Any], ...] = (
     ("robots", "How many robots", 2),
-    ("arm", "Lengths of an arm's links from base to hand [m], a joint between each two", "0.35,0.4"),
+    (
+        "arm",
+        "Lengths of an arm's links from the base on [m], with a joint between each two",
+        "0.35,0.4",
+    ),
     ("base_radius", "Radius of a base [m]", 0.25),
     ("length", "Length of the object [m]", 0.8),
     ("width", "Width of the object [m]", 0.5),
@@ -38,7 +42,7 @@ def new_command(
         typer.Option(
             "--arm",
             metavar="L1,L2,…",
-            help="Links from base to hand in metres, joints between them; 0.35,0.4.",
+            help="Links from base to end effector in metres, joints between them; 0.35,0.4.",
         ),
     ] = None,
     base_radius: Annotated[
@@ -53,7 +57,9 @@ def new_command(
     door: Annotated[
         float | None,
         typer.Option(
-            "--door", metavar="M", help="Width of the door between two rooms in metres; a roomy one."
+            "--door",
+            metavar="M",
+            help="Width of the door between two rooms in metres; wide by default.",
         ),
     ] = None,
     floor_plan: Annotated[

@@ -1,4 +1,4 @@
-"""The command robot: makes a model from elsewhere ready, and says which joints stay in the plane."""
+"""The command robot: prepares a model that others wrote, and lists which joints stay in the plane."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def robot_command(
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make a robot model from elsewhere ready: meshes as hulls, all in one folder, joints judged."""
+    """Prepare a robot model that others wrote: meshes become hulls, all files go into one folder."""
     packages = {name: Path(folder) for name, folder in _pairs(package, "--package")}
     values = {name: _number(value) for name, value in _pairs(fix, "--fix")}
     with reporting(machine=machine, quiet=quiet) as reporter:

@@ -21,8 +21,10 @@ if TYPE_CHECKING:
 
 __all__ = ["watch_command"]
 
-_FEWEST, _MOST = 2, 500  # Keyframes.
+_FEWEST, _MOST = 2, 500
+"""Numbers of keyframes that make a moving picture and still fit into a page that browsers open [-]."""
 _OURS = ("think_[0-9][0-9][0-9][0-9].png", "think.png", "think.gif", "think.html")
+"""Files of an older recording, which are removed before a new one is written."""
 
 
 def _checked_margin(value: float | None) -> float | None:
