@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import pi
 
-import numba
 import numpy as np
 
+from coop_drake.compiled import compiled
 from coop_drake.planning.sampling.collision_kernels import is_free
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.tree.pose import FloatArray, IntArray
@@ -17,7 +17,7 @@ __all__ = ["rrt_connect"]
 _TRAPPED, _ADVANCED, _REACHED = 0, 1, 2
 
 
-@numba.njit(cache=True)
+@compiled
 def _turn(first: FloatArray, last: FloatArray) -> FloatArray:
     """The way from one configuration to another; theta (axis 2) takes its shorter side."""
     way = last - first
@@ -25,7 +25,7 @@ def _turn(first: FloatArray, last: FloatArray) -> FloatArray:
     return way
 
 
-@numba.njit(cache=True)
+@compiled
 def _nearest(nodes: FloatArray, count: int, z: FloatArray, scale: FloatArray) -> int:
     """Index of the node nearest to z; in these spaces a k-d tree was no faster than looking at all."""
     best, index = np.inf, 0
@@ -43,7 +43,7 @@ def _nearest(nodes: FloatArray, count: int, z: FloatArray, scale: FloatArray) ->
     return index
 
 
-@numba.njit(cache=True)
+@compiled
 def _extend(
     team: TeamArrays,
     grid: ObstacleGrid,
@@ -69,7 +69,7 @@ def _extend(
     return (_REACHED if share == 1.0 else _ADVANCED), motions
 
 
-@numba.njit(cache=True)
+@compiled
 def rrt_connect(
     team: TeamArrays,
     grid: ObstacleGrid,
@@ -131,7 +131,7 @@ def rrt_connect(
     return np.empty((0, len(start))), checks
 
 
-@numba.njit(cache=True)
+@compiled
 def _joined(nodes: FloatArray, parents: IntArray, counts: IntArray) -> FloatArray:
     """Path through the newest nodes of both trees, which stand for one configuration."""
     chain = np.empty((counts[0] + counts[1], nodes.shape[2]))

@@ -19,21 +19,21 @@ STRIDE = 0.5
 """Distance of the discs along the path, over the clearance there [-]."""
 
 SHORTEST_STRIDE = 5e-3
-"""And at least this, where there is hardly any clearance [m]."""
+"""The stride is at least this where the clearance is small [m]."""
 
 VERTICES = 16
 """Vertices of a disc."""
 
 _ANGLES = np.arange(VERTICES) * (2.0 * pi / VERTICES)
 CIRCLE = np.stack((np.cos(_ANGLES), np.sin(_ANGLES)), axis=1)
-"""They themselves, about the origin, shape (VERTICES, 2)."""
+"""Vertices of a unit disc about the origin, shape (VERTICES, 2) [-]."""
 
 
 def corridor_around(polygon: Polygon, path: LineString, widening: float) -> Polygon:
     """Keep what lies within ``widening`` times the clearance of each point of a path.
 
     A field that is harmonic in the corridor follows the path more closely than one that fills every bay, and
-    nothing is lost on the path itself: its distance to the corridor's boundary is its clearance as before.
+    the path keeps its clearance: its distance to the corridor's boundary is its distance to the region's.
 
     Args:
         polygon: The region [m].
@@ -62,9 +62,9 @@ def _stops(edges: FloatArray, path: FloatArray) -> FloatArray:
         length = sqrt(dx * dx + dy * dy)
         while left < length:
             px, py = x + left / length * dx, y + left / length * dy
-            room = signed_distance(edges, px, py)
-            stops.append((px, py, room))
-            left += max(STRIDE * room, SHORTEST_STRIDE)
+            clearance = signed_distance(edges, px, py)
+            stops.append((px, py, clearance))
+            left += max(STRIDE * clearance, SHORTEST_STRIDE)
         left -= length
     x, y = path[-1, 0], path[-1, 1]
     stops.append((x, y, signed_distance(edges, x, y)))

@@ -27,8 +27,8 @@ class FreeSpace:
     are those of the difference. Only a part of W that lies inside p + F would count as free, so parts that
     are smaller than F are left out. One clipping pass does all.
 
-    Where the clipping library fails, what is called free is too small and what is not called blocked too
-    large: nothing stands in for an under-space, another library's answer or a box for an over-space.
+    Where the clipping library fails, the result is on the safe side: an under-space is replaced by the empty
+    set, an over-space by another library's result or by a box that holds every position.
 
     Args:
         rings: Outer rings counter-clockwise, holes clockwise, each of shape (n, 2) [m].
@@ -58,12 +58,12 @@ class FreeSpace:
 
     @classmethod
     def under(cls, workspace: Polygon | MultiPolygon) -> FreeSpace:
-        """The workspace shrunk by a hair, so that rounding never leaves it."""
+        """The workspace shrunk by ``SAFE_SIDE``, so that rounding never leaves it."""
         return cls(polygon_rings(checked_buffer(workspace, -SAFE_SIDE)))
 
     @classmethod
     def over(cls, workspace: Polygon | MultiPolygon) -> FreeSpace:
-        """The workspace grown by a hair, so that rounding never loses a position."""
+        """The workspace grown by ``SAFE_SIDE``, so that rounding never loses a position."""
         return cls(polygon_rings(checked_buffer(workspace, SAFE_SIDE)), over=True)
 
     def minus(self, footprint: FloatArray) -> CrossSection:
@@ -88,7 +88,7 @@ class FreeSpace:
         return CrossSection(cycles, FillRule.Positive)
 
     def _plausible(self, found: CrossSection, start: FloatArray) -> bool:
-        """Whether a difference lies where it must; one that blocks everything is always asked about again."""
+        """Whether a difference lies where it must; one that blocks every position is checked by GEOS."""
         if found.is_empty():
             return not self._over
         x_min, y_min, x_max, y_max = found.bounds()

@@ -1,4 +1,4 @@
-"""What stands in where a geometry library fails: it never claims that something is free, or blocked."""
+"""Replacements for results of geometry libraries that fail; they never prove a position free or blocked."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from coop_drake.tree.pose import FloatArray
 
 _FAILURES = (RuntimeError, ValueError, ArithmeticError)
 _ROUNDING = 1e-6
-"""Areas that should be equal may differ by this share."""
+"""Areas that should be equal may differ by this fraction [-]: more than rounding, less than a failure."""
 
 
 def shared(first: CrossSection, second: CrossSection, *, over: bool) -> CrossSection:
-    """What two regions share; where clipping fails, the smaller one if they are over-regions, or nothing.
+    """Intersection of two regions; where clipping fails, the smaller over-region or the empty under-region.
 
     Args:
         first: A region.
@@ -58,7 +58,7 @@ def meet(first: CrossSection, second: CrossSection, *, otherwise: bool) -> bool:
 
 
 def checked_buffer(workspace: Polygon | MultiPolygon, distance: float) -> Polygon | MultiPolygon:
-    """Workspace grown or shrunk by a distance; where that fails, its bounding box or nothing.
+    """Workspace grown or shrunk by a distance; where that fails, its bounding box or the empty polygon.
 
     Args:
         workspace: W [m].

@@ -1,4 +1,7 @@
-"""Compiled over-sweeps: convex sets as supporting lines, swept joint by joint from a piece to the object."""
+"""Compiled over-sweeps, eq. (6): a convex piece is swept by one joint after the other, up to the object.
+
+Every set is given by its support function in some directions, and enclosed by the lines that support it.
+"""
 
 from __future__ import annotations
 
@@ -12,21 +15,38 @@ from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays
 
 _TURN = 2.0 * pi
+
 _SAME_ANGLE = 1e-5
+"""Directions closer than this count as one [rad]: their lines would meet too far away to be computed."""
+
 _SAME_POINT = 1e-11
+"""Vertices closer than this count as one [m], well below ``SLACK``."""
+
 _LARGEST_TURN = 0.75 * pi
-_ARC_SHARE = 10.0
+"""Largest angle between neighbouring directions [rad]: below pi, so that neighbouring lines meet."""
+
+_PARTS_PER_ANGLE = 10.0
+"""Squared number of parts of an arc over its half-angle [1/rad]: the error of the parts is small against
+the growth of the sweep itself."""
 
 
 @compiled
 def arc_parts(half_width: float) -> int:
-    """How many chords or tangents stand in for an arc: their error vanishes faster than the slice's."""
-    return max(1, ceil(sqrt(_ARC_SHARE * min(half_width, pi))))
+    """Number of chords or tangents that replace an arc: their error vanishes faster than the slice's width.
+
+    Args:
+        half_width: Half of the arc's angle [rad].
+    """
+    return max(1, ceil(sqrt(_PARTS_PER_ANGLE * min(half_width, pi))))
 
 
 @compiled
 def disc_turn(half_width: float) -> float:
-    """Largest angle between neighbouring normals of a polygon that stands in for a disc [rad]."""
+    """Largest angle between neighbouring normals of a polygon that replaces a disc [rad].
+
+    Args:
+        half_width: Half of the widest interval of the sweep [rad or m]: the wider, the coarser the polygon.
+    """
     return min(0.6, max(0.05, 0.9 * sqrt(half_width))) if half_width > 0.0 else 0.6
 
 
@@ -135,7 +155,7 @@ def edge_directions(vertices: FloatArray) -> FloatArray:
 
 @compiled
 def _furthest(vertices: FloatArray, i: int) -> bool:
-    """Whether a vertex is no nearer to the origin than the points of its edges close by."""
+    """Whether vertex i of a ring is no nearer to the origin than the points next to it on its two edges."""
     after = i + 1 if i + 1 < len(vertices) else 0
     x, y = vertices[i, 0], vertices[i, 1]
     ax, ay, bx, by = vertices[i - 1, 0], vertices[i - 1, 1], vertices[after, 0], vertices[after, 1]

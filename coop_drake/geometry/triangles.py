@@ -110,7 +110,18 @@ def _nearest(
     points: NDArray[np.complex128], own: NDArray[np.complex128], walls: NDArray[np.complex128],
     along: NDArray[np.complex128], squared: FloatArray,
 ) -> FloatArray:  # fmt: skip
-    """The same for some of them, with the wall of each, shape (points, 2), and what is known of all walls."""
+    """Distance of each point to the nearest wall that does not touch its own wall.
+
+    Args:
+        points: Points on walls, shape (points,) [m].
+        own: Ends of the wall of each, shape (points, 2) [m].
+        walls: Ends of all walls, shape (walls, 2) [m].
+        along: Vectors from their first to their second end, shape (walls,) [m].
+        squared: Squared lengths of these, shape (walls,) [m^2].
+
+    Returns:
+        Distances, shape (points,) [m].
+    """
     touching = (own[:, None, :, None] == walls[None, :, None, :]).any(axis=(2, 3))
     offset = points[:, None] - walls[:, 0]
     part = np.clip((np.conj(along) * offset).real / squared, 0.0, 1.0)

@@ -12,9 +12,15 @@ from coop_drake.geometry.sweep_kernels import arc_parts, closed_directions, edge
 from coop_drake.tree.pose import FloatArray
 
 _TURN = 2.0 * pi
+
 _SAME_ANGLE = 1e-12
+"""Lines whose normals differ by less count as parallel, and the inner one is kept [rad]."""
+
 _PARALLEL = 1e-12
+"""Lines whose normals have a smaller sine between them count as parallel [-]."""
+
 _SHORTEST = 1e-9
+"""Shorter edges are left out [m]: they are within the rounding ``SLACK``."""
 
 
 @compiled
@@ -79,7 +85,7 @@ def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> Fl
     """Find points that a convex polygon covers at every angle of an interval about the origin.
 
     Every half-plane becomes its two extreme turns and, where it holds the pivot, chords of the circle that
-    it envelops. A half-plane without the pivot and a turn by pi or more leave nothing.
+    it envelops. A half-plane without the pivot and a turn by pi or more have no common points.
 
     Args:
         vertices: Convex ring, counter-clockwise, shape (n, 2) [m].

@@ -44,6 +44,6 @@ def axis_levers(tree: ComponentTree) -> tuple[float, ...]:
 def configuration_scale(tree: ComponentTree) -> FloatArray:
     """What a unit of each axis of z counts in distances between configurations, shape (3 + n,) [m/unit].
 
-    It is the lever, but never nothing: a joint that moves no solid body still has to be moved.
+    It is the lever, but at least ``_LEAST_LEVER``: a joint that moves no solid body still has to be moved.
     """
     return np.maximum([1.0, 1.0, *axis_levers(tree)], _LEAST_LEVER)

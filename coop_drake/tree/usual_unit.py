@@ -20,7 +20,7 @@ _UNUSUAL = 1.5
 def usual_unit(tree: ComponentTree) -> float:
     """Length in which a team has the usual size: 1 m unless it is about three times larger or smaller.
 
-    It is a power of two, so that nothing is rounded where lengths change their unit.
+    It is a power of two, so that no length is rounded when its unit changes.
     """
     shapes = [shape for component in tree.components for body in component.bodies for shape in body.shapes]
     sizes = [float(np.hypot(*np.ptp(shape.vertices, axis=0))) / 2.0 + shape.radius for shape in shapes]

@@ -28,10 +28,10 @@ _STEP_SHARE = 0.5
 """Step along a path over the clearance there [-]: below 1, so that every place lies in a free disc."""
 
 _BOX_TIME = 0.6
-"""Time that handing over to a box takes, while angles settle [s], as simulations of shipped teams show."""
+"""Time that the hand-over to a box is assumed to take, while angles settle [s]; it only ranks boxes."""
 
 _SPEED = 3.0
-"""Speed over clearance while a box is passed [1/s], as the same simulations show."""
+"""Speed over clearance that is assumed while a box is passed [1/s]; it only ranks boxes."""
 
 
 class BoxArrays(NamedTuple):

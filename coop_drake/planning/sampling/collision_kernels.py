@@ -1,4 +1,7 @@
-"""Compiled exact checks of single configurations: they steer the sampler and prove nothing."""
+"""Compiled checks of single configurations and straight segments, and the clearance of a convex piece.
+
+They guide the search; proofs use them on over-sweeps only, in ``boxes``.
+"""
 
 from __future__ import annotations
 
@@ -177,7 +180,7 @@ def segment_is_free(
     scale: FloatArray,
     step: float,
 ) -> float:
-    """Share of a straight segment up to the first configuration that is not free; 1 if all are.
+    """Fraction of a straight segment that is free, up to the last configuration checked before a collision.
 
     Args:
         team: The team.

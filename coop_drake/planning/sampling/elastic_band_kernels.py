@@ -1,4 +1,4 @@
-"""Compiled improvement of candidate paths: shorter in every axis, further from the grid."""
+"""Compiled elastic-band smoothing: paths become shorter in every axis and move away from obstacles."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, place
 
 STRIDES = (7, 3, 5, 1, 6, 2, 4, 0)
-"""Order in which samples of a move are looked at, each time every eighth one."""
+"""Order in which the samples of a move are checked, each offset with every eighth sample after it."""
 
 
 @compiled
 def _price(team: TeamArrays, grid: ObstacleGrid, z: FloatArray, gap: float, rate: FloatArray) -> float:
-    """Price of a sample: inverse to its clearance up to a limit, infinite where it is not free."""
+    """Cost of a sample: rate[0] / (rate[1] + min(clearance, rate[2])), infinite where it is not free."""
     poses = place(team, z)
     clearance = team_clearance(team, grid, poses, rate[2])
     if clearance <= 0.0 or not bodies_apart(team, poses, gap):

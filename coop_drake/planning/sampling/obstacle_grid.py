@@ -1,4 +1,4 @@
-"""The walls near any place, for the compiled checks: a grid whose squares list their edges, nearest first."""
+"""A grid over a floor: each square lists the obstacle edges near it, nearest first, for compiled checks."""
 
 from __future__ import annotations
 
@@ -17,11 +17,17 @@ from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
 
 FAR = 0.2
-"""Distances from walls that are larger than this one do not matter [m]."""
+"""Larger clearances count as this one [m], which limits how many edges the squares list."""
 
 _MOST_SQUARES = 40_000
+"""Greatest number of squares, about: it limits the time and the memory that a grid takes."""
+
 _SQUARES_PER_REACH = 6.0
-_OFF_THE_EDGES = np.array([0.317, 0.291])  # Middles of squares must not lie on walls; these hardly ever do.
+"""Squares in the distance within which edges are listed [-]: lists of neighbouring squares differ little."""
+
+_OFF_THE_EDGES = np.array([0.317, 0.291])
+"""Shift of the grid against the floor's corner, in squares [-]: middles of squares then hardly ever lie on
+edges, where it is undefined whether they are inside."""
 
 
 class ObstacleGrid(NamedTuple):
@@ -57,10 +63,10 @@ def lay_grid(rings: Sequence[FloatArray], reach: float) -> ObstacleGrid:
 
     Args:
         rings: Closed rings of the floor, holes too, in any direction, shape (n, 2) each [m].
-        reach: How far from a place its walls are wanted [m].
+        reach: Distance up to which edges near a point are listed [m].
 
     Returns:
-        The walls; of a floor without rings a grid without squares, on which nothing is inside.
+        The grid; of a floor without rings a grid without squares, on which no point is inside.
     """
     if not rings:
         none = np.empty(0, np.int64)
@@ -156,5 +162,5 @@ def grid_for_team(workspace: Polygon | MultiPolygon, team: TeamArrays) -> Obstac
 
 
 def grid_inside(workspace: Polygon | MultiPolygon, reach: float) -> ObstacleGrid:
-    """Lay a grid over a floor shrunk by a hair: what stays on it is on the floor in spite of rounding."""
+    """Lay a grid over a floor shrunk by ``SAFE_SIDE``: what is inside it is on the floor, despite rounding."""
     return lay_grid(FreeSpace.under(workspace).rings, reach + FAR)

@@ -14,12 +14,17 @@ from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
 
 _SQUARES = 2_500
+"""Squares of the grid in which nodes are found again: some nodes in each of them."""
+
 _GUIDED = 0.85
+"""Fraction of the samples that are drawn around the guiding path [-]; the others are uniform."""
+
 _LEAST_SPREAD = 0.1
+"""Smallest fraction of the spread that a guided sample uses [-]: some samples stay close to the guide."""
 
 
 class _Tree(NamedTuple):
-    """Nodes of a random tree, found again by the square of a grid that their position lies in.
+    """Nodes of a random tree, and a grid that finds the nodes near a position.
 
     Attributes:
         nodes: Configurations, shape (N, d).
@@ -39,14 +44,14 @@ class _Tree(NamedTuple):
 
 
 @compiled
-def _empty_tree(room: int, lower: FloatArray, upper: FloatArray) -> _Tree:
-    """A tree without nodes on a floor between two corners."""
+def _empty_tree(capacity: int, lower: FloatArray, upper: FloatArray) -> _Tree:
+    """A tree without nodes, with memory for ``capacity`` of them, on a floor between two corners."""
     width, height = upper[0] - lower[0], upper[1] - lower[1]
     side = max(sqrt(width * height / _SQUARES), 1e-9)
     rows, columns = int(height / side) + 1, int(width / side) + 1
     return _Tree(
-        np.empty((room, len(lower))), np.full(room, -1), np.full(rows * columns, -1), np.full(room, -1),
-        np.array([lower[0], lower[1], side]), rows,
+        np.empty((capacity, len(lower))), np.full(capacity, -1), np.full(rows * columns, -1),
+        np.full(capacity, -1), np.array([lower[0], lower[1], side]), rows,
     )  # fmt: skip
 
 
@@ -112,7 +117,7 @@ def _grow(
     scale: FloatArray,
     step: float,
 ) -> tuple[int, bool]:
-    """Add a node on the way from the nearest one to z; returns the new count and whether z was reached."""
+    """Add a node between the nearest one and z; returns the new number of nodes and whether z was reached."""
     near = _nearest(tree, z, scale)
     length = 0.0
     move, aim = np.empty(len(z)), np.empty(len(z))
@@ -191,8 +196,8 @@ def connect(
         Path from start to a goal, theta unwrapped, shape (m, d), without rows if none was found; and the
         number of samples drawn.
     """
-    room = 2 * len(uniforms) + len(roots) + 1
-    trees = (_empty_tree(room, lower, upper), _empty_tree(room, lower, upper))
+    capacity = 2 * len(uniforms) + len(roots) + 1
+    trees = (_empty_tree(capacity, lower, upper), _empty_tree(capacity, lower, upper))
     counts = np.array([1, len(roots)])
     for side in range(2):
         for k in range(counts[side]):
