@@ -162,5 +162,5 @@ def grid_for_team(workspace: Polygon | MultiPolygon, team: TeamArrays) -> Obstac
 
 
 def grid_inside(workspace: Polygon | MultiPolygon, reach: float) -> ObstacleGrid:
-    """Lay a grid over a floor shrunk by ``SAFE_SIDE``: what is inside it is on the floor, despite rounding."""
+    """Lay a grid over a floor shrunk by ``SAFE_SIDE``: all inside it is on the floor, despite rounding."""
     return lay_grid(FreeSpace.under(workspace).rings, reach + FAR)
