@@ -1,1 +1,1 @@
-"""The planner beside its peers, without its own parts, and on questions of growing size."""
+"""The planner compared with other planners, without its own parts and stages, and on growing questions."""

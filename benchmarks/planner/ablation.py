@@ -24,16 +24,17 @@ from coop_drake.planning.proofs.proofs import Proofs, explorer
 
 __all__ = ["VARIANTS", "Answered", "ablation_rows", "ablation_tasks", "answer"]
 
-_SLICES = 50_000
+SLICES = 50_000
 """Slices that a variant may make; the CPU time ends most of them sooner."""
-_FIRST_SHARE = 64
+FIRST_SLICES = 64
+"""Slices of each exploration in the first round of proofs; every further round doubles it."""
 Came = tuple[str, int, float | None]
 """An answer, the slices made, and when the first plan was certified if that was before the end [CPU s]."""
 
 
 @dataclass(frozen=True)
 class Answered:
-    """What a variant came to.
+    """The answer of a variant, and its work.
 
     Attributes:
         answer: ``found``, ``infeasible`` or ``undecided``.
@@ -67,7 +68,7 @@ def _task(name: str, problem: PlanningProblem, limit: float) -> Task:
 
 
 def ablation_rows(name: str, problem: PlanningProblem, limit: float) -> list[Row]:
-    """Ask every variant, each in a process of its own; ratios are to the whole planner's search."""
+    """Ask every variant in a process of its own; times are compared with the whole planner's search."""
     rows, whole = [], None
     for variant in VARIANTS:
         done = in_own_process(answer, problem, variant, limit=limit)
@@ -96,7 +97,7 @@ def answer(problem: PlanningProblem, variant: str) -> Answered:
 
 
 def _at_margin_zero(problem: PlanningProblem) -> PlanningProblem:
-    return replace(problem, settings=replace(problem.settings, margin=0.0, max_slices=_SLICES))
+    return replace(problem, settings=replace(problem.settings, margin=0.0, max_slices=SLICES))
 
 
 def _searched(strategy: Literal["portfolio", "paper"]) -> Callable[[PlanningProblem], Came]:
@@ -111,7 +112,7 @@ def _searched(strategy: Literal["portfolio", "paper"]) -> Callable[[PlanningProb
 
 
 def _proved(problem: PlanningProblem) -> Came:
-    proofs, share, verdict = Proofs(problem), _FIRST_SHARE, Verdict.BUDGET
+    proofs, share, verdict = Proofs(problem), FIRST_SLICES, Verdict.BUDGET
     while verdict is Verdict.BUDGET and share <= problem.settings.max_slices:
         verdict, share = proofs.run(share), 2 * share
     return _word(verdict), proofs.slices, None

@@ -1,6 +1,7 @@
-"""Whether anybody finds a way where we say that there is none: peers are given far more than ever before.
+"""Whether another planner finds a path where ours has proved that none exists.
 
-Sampling proves nothing, but a single path would refute us: ``contradictions`` must be 0.
+The other planners get far more time than in the comparison. Sampling proves nothing, but a single path would
+refute a proof, so ``contradictions`` must be 0.
 """
 
 from __future__ import annotations
@@ -29,15 +30,16 @@ QUESTIONS: dict[str, Callable[[], PlanningProblem]] = {
 }
 """Questions that have no answer."""
 
-_START_UP = 60.0
+START_UP = 60.0
+"""CPU time that a process may take before it searches: imports and compiling [s]."""
 
 
 @dataclass(frozen=True)
 class Patience:
-    """What is spent on contradicting us.
+    """Effort of the other planners.
 
     Attributes:
-        answer: CPU time of our answer [s].
+        answer: CPU time of our planner [s].
         ompl: CPU time of each of OMPL's runs [s].
         runs: How many runs of OMPL, and of the compiled trees, each with a seed of its own.
         checks: Configurations that each run of the trees may check.
@@ -55,7 +57,7 @@ def contradiction_tasks(patience: Patience | None = None) -> list[Task]:
     """One task for every question that has no answer.
 
     Args:
-        patience: What to spend on it.
+        patience: The effort.
     """
     spent = patience or Patience()
     return [_task(f"planner/no_way/{name}", ask, spent) for name, ask in QUESTIONS.items()]
@@ -69,19 +71,21 @@ def _task(name: str, ask: Callable[[], PlanningProblem], spent: Patience) -> Tas
 
 
 def contradiction_rows(name: str, problem: PlanningProblem, spent: Patience) -> list[Row]:
-    """Answer a question, then let peers search: a path that stands the dense check contradicts a "no".
+    """Answer a question, then let other planners search for a path.
+
+    A path that passes the dense check contradicts the answer "infeasible".
 
     Args:
         name: What the rows' names begin with.
         problem: The question.
-        spent: What to spend on it.
+        spent: The effort.
     """
     ours = in_own_process(plan_repeatedly, problem, 1, 0.0, limit=spent.answer).value
     answer = "none" if ours is None else ours[0].answer
     seeds = tuple(range(1, 1 + spent.runs))
-    runs = _runs(run_trees, problem, seeds, spent.checks, limit=_START_UP + spent.trees * len(seeds))
+    runs = _runs(run_trees, problem, seeds, spent.checks, limit=START_UP + spent.trees * len(seeds))
     if has_ompl():
-        runs += _runs(run_ompl, problem, seeds, spent.ompl, limit=_START_UP + spent.ompl * len(seeds))
+        runs += _runs(run_ompl, problem, seeds, spent.ompl, limit=START_UP + spent.ompl * len(seeds))
     paths = [run.path for run in runs if run.found]
     good = sum(not fault_of(problem, path) for path in paths)
     seconds = sum(run.cpu_seconds for run in runs)

@@ -24,19 +24,27 @@ __all__ = [
 ]
 
 _JOINT_LIMIT = 1.87
+"""Joints move between minus and plus this angle, as in the paper [rad]."""
 _BASE_RADIUS = 0.25
+"""Radius of a robot's base [m]."""
 _FOREARM = 0.35
+"""Distance of the base's centre from the joint next to it [m]."""
 _HALF_LINK = 0.05
+"""Half the width of a link [m]."""
 _BAR = ((0.4, 0.0, 0.0), (-0.4, 0.0, pi), (0.0, 0.25, pi / 2), (0.0, -0.25, -pi / 2))
 """Grasps (x, y, angle) of the carried bar of 0.8 m x 0.5 m [m, rad]."""
 _BAR_REACH = (0.4, 0.4, 0.25, 0.25)
+"""Distance of the innermost joint from each grasp [m]."""
 _START_X = {1: 0.9, 2: 0.9, 3: 1.6, 4: 1.3}
-"""Where the start room has place for so many robots [m]."""
+"""Start position x by the number of robots, where the start room is wide enough [m]."""
 _HEXAGON_APOTHEM = 0.4
+"""Distance of the hexagon's sides from its centre [m]."""
 _HEXAGON_TURNS = (0, 3, 1, 4, 2, 5)
 """Facets of the hexagon in the order in which robots take hold of them."""
 _AISLE = 1.8
+"""Width of the aisles between shelves [m]."""
 _SHELF = (1.2, 2.4)
+"""Size of a shelf [m]."""
 
 
 def first_question() -> PlanningProblem:

@@ -1,4 +1,4 @@
-"""The planner's own compiled footprint check, as a function of plain numbers, for planners of others."""
+"""The compiled footprint check as a function of numbers, for other planners."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from coop_drake.tree.team_arrays import team_arrays
 __all__ = ["compiled_check", "free_goals"]
 
 _TRIES_PER_GOAL = 40
+"""Random values of the free joints that are tried for each goal configuration."""
 
 
 def compiled_check(problem: PlanningProblem) -> Callable[..., bool]:
@@ -38,7 +39,7 @@ def compiled_check(problem: PlanningProblem) -> Callable[..., bool]:
 
 
 def free_goals(problem: PlanningProblem, check: Callable[..., bool], count: int, seed: int) -> FloatArray:
-    """Free configurations at the goal: fixed joints as asked, free ones at random; shape (m <= count, 3 + n).
+    """Free configurations at the goal, with random values of the free joints; shape (m <= count, 3 + n).
 
     Args:
         problem: The question.

@@ -12,9 +12,16 @@ from coop_drake.answers import PlanningProblem
 __all__ = ["growth_rows", "growth_tasks"]
 
 WIDTHS = (1.2, 1.0, 0.9, 0.85, 0.82, 0.8, 0.79, 0.78, 0.77)
+"""Widths of the corridor, down to one that is proved too narrow [m]."""
+
 ROBOTS = (2, 3, 4, 5, 6)
+"""Robots that carry the hexagon."""
+
 JOINTS = (1, 2, 3)
+"""Joints of each of two arms."""
+
 VERTICES = (50, 500, 5_000)
+"""Corners of a floor with shelves, about."""
 
 
 def growth_tasks(limit: float) -> list[Task]:
@@ -40,7 +47,7 @@ def _task(name: str, problem: PlanningProblem, limit: float) -> Task:
 
 
 def growth_rows(name: str, problem: PlanningProblem, limit: float) -> list[Row]:
-    """Plan once in a process of its own, kernels warm, and tell what it took.
+    """Plan once in a process of its own, with the kernels loaded, and measure time, slices, cells and memory.
 
     Args:
         name: What the rows' names begin with.

@@ -1,4 +1,4 @@
-"""Our planner, OMPL and bare trees on the same scenario files, in one run."""
+"""Our planner, OMPL and a compiled RRT-Connect on the same scenario files, in one run."""
 
 from __future__ import annotations
 
@@ -19,15 +19,22 @@ from coop_drake.answers import PlanningProblem
 
 __all__ = ["Effort", "head_to_head_tasks", "judged"]
 
-_IMPASSABLE_RUNS = 2
-_START_UP = 60.0
-_MOST_PER_FLOOR = 20.0
-_PATIENCE = 5.0
+IMPASSABLE_RUNS = 2
+"""Runs of other planners on a question without a path: they cannot answer it and use all their time."""
+
+START_UP = 60.0
+"""CPU time that a process may take before it searches: imports and compiling [s]."""
+
+MOST_PER_RUN = 20.0
+"""CPU time of one run of the compiled trees [s]."""
+
+PATIENCE = 5.0
+"""An answer that took longer is not repeated [CPU s]."""
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is spent on every case.
+    """Effort for every case.
 
     Attributes:
         seeds: Runs of every peer.
@@ -43,16 +50,17 @@ class Effort:
 
 
 def head_to_head_tasks(effort: Effort) -> list[Task]:
-    """For every case a task for each peer, and ours once the peers are through.
+    """For every case a task for each other planner, then a task for ours.
 
-    Peers cannot answer "no": where there is no way they run twice only, to show what they do about it.
+    The others cannot answer "infeasible"; on questions without a path they run only twice, to show what they
+    return.
 
     Args:
-        effort: How much to spend.
+        effort: The effort.
     """
     tasks = []
     for case in CASES:
-        seeds = range(1, 1 + (effort.seeds if case.passable else min(_IMPASSABLE_RUNS, effort.seeds)))
+        seeds = range(1, 1 + (effort.seeds if case.passable else min(IMPASSABLE_RUNS, effort.seeds)))
         tasks.append(_trees_task(case, seeds))
         if has_ompl():
             tasks.append(_ompl_task(case, seeds, effort.budget))
@@ -65,7 +73,7 @@ def _trees_task(case: Case, seeds: Sequence[int]) -> Task:
 
     def measure(rows: Rows) -> Rows:
         problem = case.problem()
-        limit = _START_UP + _MOST_PER_FLOOR * len(seeds)
+        limit = START_UP + MOST_PER_RUN * len(seeds)
         runs = in_own_process(run_trees, problem, tuple(seeds), limit=limit).value or ()
         return judged(name, problem, runs, f"{CHECKS:,} checks")
 
@@ -77,7 +85,7 @@ def _ompl_task(case: Case, seeds: Sequence[int], budget: float) -> Task:
 
     def measure(rows: Rows) -> Rows:
         problem = case.problem()
-        limit = _START_UP + (budget + 1.0) * len(seeds)
+        limit = START_UP + (budget + 1.0) * len(seeds)
         runs = in_own_process(run_ompl, problem, tuple(seeds), budget, limit=limit).value or ()
         shares = [run.check_seconds / run.cpu_seconds for run in runs if run.check_seconds is not None]
         share = [Row(f"{name}/check_share", median(shares), "of time")] if shares else []
@@ -87,14 +95,14 @@ def _ompl_task(case: Case, seeds: Sequence[int], budget: float) -> Task:
 
 
 def judged(name: str, problem: PlanningProblem, runs: Sequence[PeerRun], allowed: str) -> list[Row]:
-    """Rows of a peer; a path counts only if it stands the dense check.
+    """Rows of another planner; a path counts only if it passes the dense check.
 
-    The median is over all runs, failures counted as they ended; without any path there is none.
+    The median time is over all runs, also those without a path; if no run found a path there is no median.
 
     Args:
         name: What the rows' names begin with.
         problem: The question.
-        runs: Its runs; none if it ran out of all limits.
+        runs: Its runs; none if its process reached the limit.
         allowed: What each run might spend, in words.
     """
     claims = [run for run in runs if run.found]
@@ -119,8 +127,8 @@ def _our_task(case: Case, effort: Effort) -> Task:
     name, runs = f"planner/{case.name}", 1 + effort.repeats
 
     def measure(rows: Rows) -> Rows:
-        limit = effort.limit + runs * _PATIENCE
-        done = in_own_process(plan_repeatedly, case.problem(), runs, _PATIENCE, limit=limit)
+        limit = effort.limit + runs * PATIENCE
+        done = in_own_process(plan_repeatedly, case.problem(), runs, PATIENCE, limit=limit)
         if done.value is None:
             return [Row(f"{name}/answer", 0.0, f"none within {limit:g} CPU s")]
         cold, *warm = done.value
@@ -146,7 +154,7 @@ def _our_task(case: Case, effort: Effort) -> Task:
 
 
 def _standing(peer: str, case: Case, rows: Rows) -> tuple[str, float | None]:
-    """What a peer came to on a case, in words and as its median CPU time [s]."""
+    """The result of another planner on a case, in words and as its median CPU time [s]."""
     figures = {row.figure: row for row in rows if row.name.startswith(f"planner/{peer}/{case.name}/")}
     if "found" not in figures:
         return "", None

@@ -1,4 +1,4 @@
-"""OMPL's RRT-Connect with our compiled footprint check: what a user would take otherwise.
+"""OMPL's RRT-Connect with our compiled footprint check: the planner that a user would take instead.
 
 The state space is R^2 x SO(2) x R^n, one subspace per joint, every axis measured in metres by which it moves
 the team, so that distances are those of our sampler and motions are checked as densely. The range is set:
@@ -171,6 +171,6 @@ def _state(space: ob.CompoundStateSpace, z: FloatArray, scale: FloatArray) -> ob
 
 
 def _unwrapped(path: FloatArray) -> FloatArray:
-    """The same path with no turn of more than pi between neighbours."""
+    """The path with theta unwrapped, so that neighbours differ by pi at most."""
     path[:, 2] = np.unwrap(path[:, 2])
     return path

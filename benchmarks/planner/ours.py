@@ -1,4 +1,4 @@
-"""What our planner takes for one question, in this process."""
+"""Answers of our planner to one question, and the time they take, in this process."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["Planned", "compile_kernels", "plan_once_warm", "plan_repeatedly"]
 
 @dataclass(frozen=True)
 class Planned:
-    """One answer and what it took.
+    """One answer, its figures and its time.
 
     Attributes:
         answer: ``found``, ``infeasible`` or ``undecided``.
@@ -40,7 +40,7 @@ class Planned:
 
 
 def plan_repeatedly(problem: PlanningProblem, runs: int, patience: float) -> tuple[Planned, ...]:
-    """Ask the same question several times; the first time compiled kernels are still to be loaded.
+    """Ask the same question several times; the first time also loads the compiled kernels.
 
     Args:
         problem: The question.
@@ -61,7 +61,7 @@ def plan_once_warm(problem: PlanningProblem) -> Planned:
 
 
 def compile_kernels() -> None:
-    """Have every compiled kernel in numba's cache, so that no figure holds the time of compiling."""
+    """Compile every kernel into the cache, so that no figure contains the time of compiling."""
     for question in (first_question(), corridor_problem(), corridor_problem(0.77)):
         _ask(question)
     run_trees(first_question(), (1,), 100)

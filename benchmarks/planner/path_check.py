@@ -1,4 +1,4 @@
-"""Whether a path of a peer is one: checked far more densely, and by shapely instead of the compiled check."""
+"""A check of another planner's path, at far more configurations, with shapely and with the compiled check."""
 
 from __future__ import annotations
 
@@ -23,10 +23,11 @@ _DENSE = 0.002
 _EXACT = 0.05
 """Distance between shapely's checks [m]."""
 _ARRIVED = 1e-6
+"""A path that ends this close to the goal has arrived [m, rad]: it absorbs rounding."""
 
 
 def fault_of(problem: PlanningProblem, path: FloatArray) -> str:
-    """Say what is wrong with a path; empty if nothing is.
+    """Say what is wrong with a path; an empty string if it is valid.
 
     It must begin at the start and end at the goal, modulo whole turns, keep the joints' limits, and no
     configuration on the straight segments between its own may touch a wall or bring two bodies together.
@@ -71,7 +72,7 @@ def _densified(path: FloatArray, scale: FloatArray, step: float) -> FloatArray:
 
 
 def _exact_fault(problem: PlanningProblem, path: FloatArray) -> str:
-    """What shapely finds wrong: pieces outside the floor, or pieces of two bodies that meet."""
+    """Faults that shapely finds: pieces outside the floor, or pieces of two bodies that intersect."""
     tree, floor = problem.tree, problem.workspace
     shapely.prepare(floor)
     edge = floor.boundary

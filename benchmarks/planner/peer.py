@@ -1,4 +1,4 @@
-"""What a sampling planner that stands beside ours came to, and what all of them are given."""
+"""The result of another sampling planner, and the settings that all of them share."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ GOALS = 24
 
 @dataclass(frozen=True)
 class PeerRun:
-    """One attempt of a peer.
+    """One run of another planner.
 
     Attributes:
         seed: Its seed.

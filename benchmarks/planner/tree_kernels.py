@@ -1,4 +1,4 @@
-"""RRT-Connect as in the textbooks, compiled: two trees, steps of fixed length, motions free or not."""
+"""RRT-Connect as in the textbooks, compiled: two trees, steps of fixed length, binary collision checks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _TRAPPED, _ADVANCED, _REACHED = 0, 1, 2
 
 @compiled
 def _turn(first: FloatArray, last: FloatArray) -> FloatArray:
-    """The way from one configuration to another; theta (axis 2) takes its shorter side."""
+    """Difference of two configurations; theta (axis 2) turns in the shorter direction."""
     way = last - first
     way[2] -= 2.0 * pi * np.rint(way[2] / (2.0 * pi))
     return way
@@ -27,7 +27,7 @@ def _turn(first: FloatArray, last: FloatArray) -> FloatArray:
 
 @compiled
 def _nearest(nodes: FloatArray, count: int, z: FloatArray, scale: FloatArray) -> int:
-    """Index of the node nearest to z; in these spaces a k-d tree was no faster than looking at all."""
+    """Index of the node nearest to z; a k-d tree was no faster than comparing with all nodes."""
     best, index = np.inf, 0
     for i in range(count):
         total = 0.0
@@ -55,7 +55,7 @@ def _extend(
     reach: float,
     step: float,
 ) -> tuple[int, int]:
-    """Take one step towards z: what came of it, and how many configurations were checked."""
+    """Take one step towards z; return its result and the number of configurations checked."""
     near = _nearest(nodes, count, z, scale)
     way = _turn(nodes[near], z)
     length = np.sqrt(((way * scale) ** 2).sum())

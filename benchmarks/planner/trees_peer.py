@@ -1,4 +1,4 @@
-"""A compiled RRT-Connect in the whole configuration space, alone: uncertified, the least that sampling takes.
+"""A compiled RRT-Connect in the whole configuration space, without proofs: the shortest time for sampling.
 
 It does what OMPL's does, with the same check, the same range and the same motions, but in one compiled loop:
 what a sampling planner takes for a path that nobody has proved when no time is lost in Python.
