@@ -100,7 +100,7 @@ def _draw_wall(ax: Axes) -> None:
         run = _from_rest(2.0, 0.0, np.array([3.98, 0.0]), 6.0, margin=margin)
         ax.plot(run.times, 100.0 * (4.0 - run.position[:, 0]), color=colour)
     ax.axhline(0.0, color=GREY, linestyle="--")
-    ax.set(title="E15a: through the wall", xlabel="time [s]", ylabel="distance to the wall [cm]")
+    ax.set(title="E15a: it crosses the wall", xlabel="time [s]", ylabel="distance to the wall [cm]")
     ax.set_ylim(-12.0, 60.0)
 
 
@@ -115,7 +115,7 @@ def _draw_goal(ax: Axes) -> None:
         run = _from_rest(1.0, 0.2, target, 12.0, clearance=clearance)
         ax.plot(run.times, np.hypot(*(run.position - target).T), color=colour)
     ax.axhline(radius, color=GREY, linestyle="--")
-    ax.set(title="E15b: never in the goal", xlabel="time [s]", ylabel="distance to the target [m]")
+    ax.set(title="E15b: it stops before the goal", xlabel="time [s]", ylabel="distance to the target [m]")
 
 
 def _draw_take_over(ax: Axes) -> None:
@@ -139,7 +139,7 @@ def _draw_take_over(ax: Axes) -> None:
         ax.plot(run.times[index], run.position[index, 0], "o", color=colour, markersize=4)
     for wall in (2.0, 2.3):
         ax.axhline(wall, color=GREY, linestyle="--")
-    ax.set(title="E10: out of the next cell", xlabel="time [s]", ylabel="x [m], walls dashed")
+    ax.set(title="E10: it leaves the next cell", xlabel="time [s]", ylabel="x [m], cell dashed")
 
 
 def _certified(run: GovernorRun, index: int) -> bool:
@@ -162,4 +162,4 @@ def _draw_torque(ax: Axes) -> None:
         torques.append([total_wrench(np.array(s), offsets, np.zeros(2), 0.0)[2] for s in (wrong, right)])
     for torque, colour in zip(np.transpose(torques), (VERMILLION, BLUE), strict=True):
         ax.plot(np.degrees(directions), torque, color=colour)
-    ax.set(title="E21: unwanted torque", xlabel="direction of 5 N [°]", ylabel="torque [N m], 0 wanted")
+    ax.set(title="E21: a torque nobody commands", xlabel="direction of 5 N [°]", ylabel="torque [N m]")

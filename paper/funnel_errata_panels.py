@@ -44,7 +44,7 @@ def draw_funnel_bounds(ax: Axes) -> None:
         ax.plot(_TIMES, bounds, color=colour)
         ax.fill_between(_TIMES, bounds[:, 0], bounds[:, 1], color=colour, alpha=0.12, linewidth=0)
     ax.plot(0.0, START[0], "o", color=GREY, markersize=5, label="start")
-    ax.set(title="E17a: no room at first", xlabel="time [s]", ylabel="angle [rad]")
+    ax.set(title="E17a: the start lies outside", xlabel="time [s]", ylabel="angle [rad]")
     ax.legend(loc="lower right")
 
 
@@ -57,7 +57,7 @@ def draw_hand_over_acceleration(ax: Axes, erosion: float) -> None:
     ax.loglog(distances, pull, color=VERMILLION)
     ax.loglog(distances[allowed], pull[allowed], color=BLUE, linewidth=2.5)
     ax.set(
-        title="E17b: thrown off on entering",
+        title="E17b: unbounded on entry",
         xlabel="distance to the slice's end [rad]",
         ylabel="acceleration [rad/s²]",
     )
@@ -74,7 +74,7 @@ def draw_log_term(ax: Axes) -> None:
             terms = [printed.axis_law(x, 0.0, bounds, log_gain=gain)[0] for gain in (log_gain, 0.0)]
             pulls.append(abs(terms[0] - terms[1]))
         ax.semilogy(2.0 * _TIMES, pulls, color=colour)
-    ax.set(title="E18: pulled ever harder", xlabel="time [s]", ylabel="log term [rad/s²]")
+    ax.set(title="E18: grows without bound", xlabel="time [s]", ylabel="log term [rad/s²]")
 
 
 def draw_log_decay(ax: Axes) -> None:
@@ -91,4 +91,4 @@ def draw_log_decay(ax: Axes) -> None:
         with np.errstate(invalid="ignore"):
             s = np.log((run.y[0] - bounds[:, 0]) / (bounds[:, 1] - run.y[0]))
         ax.plot(run.t, s, color=colour)
-    ax.set(title="E20: pressed to a wall", xlabel="time [s]", ylabel="s, 0 in the middle")
+    ax.set(title="E20: it drifts to the bound", xlabel="time [s]", ylabel="s, 0 in the middle")
