@@ -162,4 +162,4 @@ def _draw_torque(ax: Axes) -> None:
         torques.append([total_wrench(np.array(s), offsets, np.zeros(2), 0.0)[2] for s in (wrong, right)])
     for torque, colour in zip(np.transpose(torques), (VERMILLION, BLUE), strict=True):
         ax.plot(np.degrees(directions), torque, color=colour)
-    ax.set(title="E21: a torque nobody commands", xlabel="direction of 5 N [°]", ylabel="torque [N m]")
+    ax.set(title="E21: uncommanded torque", xlabel="direction of 5 N [°]", ylabel="torque [N m]")
