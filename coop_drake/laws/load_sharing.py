@@ -77,7 +77,7 @@ def wrench_share(
         alpha: Desired angular acceleration theta'' [rad/s^2].
         mass: M [kg].
         inertia: I about the centre of mass [kg m^2].
-        share: w, the robot's share of the load, in [0, 1] [-].
+        share: w, the robot's share of the load, from 0 to 1 [-].
 
     Returns:
         Force on the object [N, N] and torque about the grasp [N m].
