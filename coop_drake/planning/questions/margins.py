@@ -22,6 +22,7 @@ SMALLEST_MARGIN = 0.005
 """Smaller margins are not tried: they are within the accuracy of a real floor [m]."""
 
 _OCTAGON = normals(np.arange(0.5, 8.0, dtype=np.float64) * (pi / 4.0)) / np.cos(pi / 8.0)
+"""Corners of a regular octagon about the unit disc, shape (8, 2) [-]."""
 END_FRACTION = 0.2
 """Around a start or goal close to a wall the floor is shrunk by this fraction of its own clearance [-]."""
 

@@ -43,6 +43,7 @@ SPEED, TURN_RATE, JOINT_RATE = 1.2, 0.5, 0.6
 """Highest average speeds of position, theta and joints in simulated transports [m/s, rad/s]."""
 
 _NO_PATH = np.empty((0, 3))
+"""The result of a search for a path that found none: no rows."""
 
 
 @dataclass(frozen=True)
