@@ -7,7 +7,9 @@ need.
 
 from __future__ import annotations
 
+import atexit
 import json
+import os
 import sys
 from collections.abc import Callable
 from typing import Annotated
@@ -97,7 +99,11 @@ def main() -> None:
         if "--json" in arguments:
             sys.stdout.write(json.dumps({"error": error.format_message()}) + "\n")
         code = ExitCode.BAD_INPUT
-    sys.exit(int(code or 0))
+    # All files are closed. To take down Drake and LLVM object by object would cost 0.4 s of every command.
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(int(code or 0))
 
 
 @app.callback(invoke_without_command=True)
