@@ -13,10 +13,17 @@ __all__ = [
     "StallError",
     "TuningError",
     "UnmappableError",
+    "shortened",
 ]
 
 _LONGEST_VALUE = 200
 """Characters of a value that a message shows; a whole section of a file would fill the screen."""
+
+
+def shortened(value: object) -> str:
+    """Return a value as text for a message, shortened if it is long."""
+    text = repr(value)
+    return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}…"
 
 
 class CoopDrakeError(Exception):
@@ -40,8 +47,7 @@ class ScenarioError(CoopDrakeError):
     @property
     def shown(self) -> str:
         """The offending value as text, shortened if it is long."""
-        text = repr(self.value)
-        return text if len(text) <= _LONGEST_VALUE else f"{text[:_LONGEST_VALUE]}…"
+        return shortened(self.value)
 
     def __reduce__(self) -> tuple[type[ScenarioError], tuple[str, str, object, str]]:
         """Pickle the data instead of the message, so that the error can come from another process."""

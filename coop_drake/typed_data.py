@@ -2,8 +2,8 @@
 
 The type of a field says what may stand there: ``bool``, ``int``, ``float``, ``str``, ``Literal``, ``tuple``,
 ``dict`` with names as keys, a dataclass, any of these ``| None``, or a union of dataclasses, which the
-mapping's entry ``_tag`` tells apart (in YAML the tag ``!ClassName``). ``Annotated`` adds :class:`Limits` to a
-number, or a :class:`Codec` to a type that is none of these.
+mapping's entry ``_tag`` tells apart (in YAML the tag ``!ClassName``). ``Annotated`` adds :class:`Limits` or
+``EXACT`` to a number, or a :class:`Codec` to a type that is none of these, such as the arrays of ``Vector``.
 """
 
 import dataclasses
@@ -15,13 +15,20 @@ from numbers import Real
 from types import UnionType
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
-__all__ = ["LARGEST", "Codec", "DataError", "FieldType", "Limits", "NotNegative", "Positive", "below"]
-__all__ += ["check_fields", "classes_by_tag", "convert", "convert_class", "field_types", "to_plain"]
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["EXACT", "LARGEST", "Codec", "DataError", "FieldType", "Limits", "NotNegative", "Number"]
+__all__ += ["Positive", "Vector", "below", "check_fields", "classes_by_tag", "convert", "convert_class"]
+__all__ += ["field_types", "to_plain"]
 
 T = TypeVar("T")
 
 LARGEST = 1e6
 """Largest magnitude of a number [m, rad, s, N or unit of a gain]; beyond is taken for a typing error."""
+
+EXACT = "exact"
+"""Marks a number that is written as JSON writes numbers, never as a text, and may exceed ``LARGEST``."""
 
 SCALARS = {bool: "true or false", int: "a whole number", float: "a finite number", str: "a text"}
 """Types of single values, and the words for them in messages."""
@@ -74,6 +81,7 @@ class Limits:
 
 Positive = Annotated[float, Limits(above=0.0)]
 NotNegative = Annotated[float, Limits(at_least=0.0)]
+Number = Annotated[float, EXACT]
 
 
 class Codec(NamedTuple):
@@ -188,32 +196,35 @@ def convert(value: object, kind: Any, key: str = "") -> Any:
     return convert_class(value, kind, key)
 
 
-def _scalar(value: object, kind: type, key: str) -> bool | int | float | str:
-    """Convert a single value; a number may be written as a text, because YAML 1.1 takes ``1e-3`` for one."""
+def _scalar(value: object, kind: type, key: str, *, exact: bool = False) -> bool | int | float | str:
+    """Convert a single value; a number that is not exact may be a text: YAML 1.1 takes ``1e-3`` for one."""
     if kind is not float and kind is not int:
         if type(value) is not kind:
             raise DataError(key, value, SCALARS[kind])
         return value  # type: ignore[return-value]
+    accepted: Any = (Real, str) if not exact else int if kind is int else (int, float)
     try:
-        number = math.nan if isinstance(value, bool) or not isinstance(value, (Real, str)) else float(value)
+        number = float(value) if isinstance(value, accepted) and not isinstance(value, bool) else math.nan
     except (ValueError, OverflowError):
         number = math.nan
     if not math.isfinite(number) or (kind is int and not number.is_integer()):
         raise DataError(key, value, SCALARS[kind])
-    if abs(number) > LARGEST:
+    if abs(number) > LARGEST and not exact:
         raise DataError(key, value, f"a number between {-LARGEST:g} and {LARGEST:g}")
     return int(number) if kind is int else number
 
 
 def _annotated(value: object, kind: Any, extras: tuple[Any, ...], key: str) -> Any:
-    """Convert a value whose type carries limits or a codec."""
-    if isinstance(extras[0], Codec):
-        return extras[0].read(value, key)
-    number = convert(value, kind, key)
-    for limits in extras:
-        if not limits.contain(number):
-            raise DataError(key, number, limits.describe("whole number" if kind is int else "number"))
-    return number
+    """Convert a number, or a value with a codec; limits of an array are those of its numbers."""
+    coded = isinstance(extras[0], Codec)
+    found: Any = extras[0].read(value, key) if coded else _scalar(value, kind, key, exact=EXACT in extras)
+    for limits in [extra for extra in extras if isinstance(extra, Limits)]:
+        arrayed = isinstance(found, np.ndarray)
+        numbers = {f"{key}[{k}]": n for k, n in enumerate(found.tolist())} if arrayed else {key: found}
+        for place, number in numbers.items():
+            if not limits.contain(number):
+                raise DataError(place, number, limits.describe("whole number" if kind is int else "number"))
+    return found
 
 
 def _union(value: object, kind: Any, key: str) -> Any:
@@ -247,3 +258,11 @@ def to_plain(value: Any, kind: Any) -> Any:
     tag = {"_tag": f"!{type(value).__name__}"} if classes_by_tag(kind) else {}
     fields = [(name, getattr(value, name), field.kind) for name, field in field_types(type(value)).items()]
     return tag | {name: to_plain(entry, kind) for name, entry, kind in fields if entry is not None}
+
+
+def _read_vector(value: object, key: str) -> NDArray[np.float64]:
+    return np.array(convert(value, tuple[Number, ...], key), dtype=np.float64)
+
+
+Vector = Annotated[NDArray[np.float64], Codec(_read_vector, np.ndarray.tolist)]
+"""A list of exact numbers in files, an array of shape (n,) in programs."""

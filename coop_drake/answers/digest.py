@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import fields
 from hashlib import sha256
 from typing import Any
 
-import numpy as np
 import shapely
-from shapely import Polygon
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape, TreeJoint
 
-__all__ = ["as_json", "content_digest", "problem_digest"]
+__all__ = ["content_digest", "problem_digest"]
 
 DECIMALS = 9
 """Decimals of a problem's numbers that its digest sees [m, rad]: last bits differ between libraries."""
@@ -43,19 +40,8 @@ def problem_digest(problem: PlanningProblem) -> str:
     )
 
 
-def as_json(value: Any) -> Any:
-    """Give an array, a polygon or a dataclass as what JSON knows; keys are in the order of the fields."""
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, Polygon):
-        rings = (value.exterior, *value.interiors)  # Without their closing vertices.
-        outer, *holes = (shapely.get_coordinates(ring)[:-1].tolist() for ring in rings)
-        return {"outer": outer, "holes": holes}
-    return {field.name: getattr(value, field.name) for field in fields(value)}
-
-
 def _digest(value: Any) -> str:
-    text = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True, default=as_json)
+    text = json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
     return sha256(text.encode()).hexdigest()
 
 

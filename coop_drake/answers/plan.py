@@ -8,14 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
-import msgspec
-from shapely import Polygon
-
-from coop_drake.answers.document import NonNegative, Positive
 from coop_drake.answers.proof import InfeasibilityProof
+from coop_drake.answers.region import Region
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.laws.gains import TransitionGains
-from coop_drake.tree.pose import FloatArray
+from coop_drake.typed_data import EXACT, NotNegative, Number, Positive, Vector
 
 if TYPE_CHECKING:
     from coop_drake.laws.funnels import Funnel
@@ -33,11 +30,11 @@ class Cell:
         tidied: Q_i inside S_i, simply connected, fit for a map and for the governor [m].
     """
 
-    lower: FloatArray
-    upper: FloatArray
-    safe: Polygon
-    core: Polygon
-    tidied: Polygon
+    lower: Vector
+    upper: Vector
+    safe: Region
+    core: Region
+    tidied: Region
 
 
 @dataclass(frozen=True)
@@ -57,16 +54,16 @@ class Transition:
         goal_region: Region of Q_i and Q_(i+1) around the target; for the last cell around the goal [m].
     """
 
-    target: FloatArray
-    goal_lower: FloatArray
-    goal_upper: FloatArray
-    inradius: Positive
-    neck: Positive
-    length: NonNegative
-    estimated_time: NonNegative
+    target: Vector
+    goal_lower: Vector
+    goal_upper: Vector
+    inradius: Annotated[Positive, EXACT]
+    neck: Annotated[Positive, EXACT]
+    length: Annotated[NotNegative, EXACT]
+    estimated_time: Annotated[NotNegative, EXACT]
     only_angles: bool
     gains: TransitionGains
-    goal_region: Polygon
+    goal_region: Region
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,12 +84,12 @@ class Plan:
 
     problem: str = ""
     gain_set: str
-    margin: NonNegative
+    margin: Annotated[NotNegative, EXACT]
     joint_names: tuple[str, ...]
-    start: FloatArray
-    goal_pose: FloatArray
-    goal_joints: tuple[float | None, ...]
-    cells: Annotated[tuple[Cell, ...], msgspec.Meta(min_length=1)]
+    start: Vector
+    goal_pose: Vector
+    goal_joints: tuple[Number | None, ...]
+    cells: tuple[Cell, ...]
     transitions: tuple[Transition, ...]
 
     def funnel(self, index: int) -> Funnel:

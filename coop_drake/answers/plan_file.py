@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
-
-from coop_drake.answers.digest import as_json
-from coop_drake.answers.document import Document, Head, document_text
+from coop_drake.answers.document import Document, document_text
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_checks import check_plan
 from coop_drake.files import write_atomically
-from coop_drake.laws import TransitionGains
+from coop_drake.typed_data import to_plain
 
 __all__ = ["FORMAT", "load_plan", "read_plan", "save_plan"]
 
@@ -34,7 +31,7 @@ def save_plan(plan: Plan, path: Path | str) -> Path:
     Returns:
         The path written.
     """
-    head = {"format": FORMAT, "version": VERSION, **as_json(plan)}
+    head = {"format": FORMAT, "version": VERSION, **to_plain(plan, Plan)}
     rows = {key: head.pop(key) for key in ("cells", "transitions")}
     return write_atomically(path, document_text(head, rows).encode())
 
@@ -64,29 +61,21 @@ def read_plan(document: Document) -> Plan:
     Raises:
         PlanError: Names the file, the key, the value and what is allowed there.
     """
-    head = document.read_head(Head, format=[FORMAT], version=[VERSION])
-    plan = document.read(Plan, head)
+    document.check_entry("format", FORMAT)
+    document.check_entry("version", VERSION)
+    plan = document.read(Plan, head=("format", "version", "digest"))
     axes = 1 + len(plan.joint_names)
-    document.check_length("start", plan.start, 2 + axes)
-    document.check_length("goal_pose", plan.goal_pose, 3)
-    document.check_length("goal_joints", plan.goal_joints, axes - 1)
-    document.check_length("transitions", plan.transitions, len(plan.cells))
-    for k, cell in enumerate(plan.cells):
-        document.check_intervals(f"cells[{k}].", cell.lower, cell.upper, axes)
-    for k, transition in enumerate(plan.transitions):
-        where = f"transitions[{k}]."
-        document.check_intervals(f"{where}goal_", transition.goal_lower, transition.goal_upper, axes)
-        document.check_length(f"{where}target", transition.target, 2)
-        _check_gains(document, f"{where}gains.", transition.gains, axes)
+    if not plan.cells:
+        document.refuse("cells", [], "at least one cell")
+    document.check_length("start", 2 + axes)
+    document.check_length("goal_pose", 3)
+    document.check_length("goal_joints", axes - 1)
+    document.check_length("transitions", len(plan.cells))
+    for k in range(len(plan.cells)):
+        document.check_intervals(f"cells[{k}].", axes)
+        document.check_intervals(f"transitions[{k}].goal_", axes)
+        document.check_length(f"transitions[{k}].target", 2)
+        for name, gain in document.entry(f"transitions[{k}].gains").items():
+            if isinstance(gain, list):
+                document.check_length(f"transitions[{k}].gains.{name}", axes)
     return plan
-
-
-def _check_gains(document: Document, key: str, gains: TransitionGains, axes: int) -> None:
-    """Gains are positive, one of each or one for every axis; the smoothing may be zero."""
-    for name, gain in vars(gains).items():
-        if isinstance(gain, np.ndarray):
-            document.check_length(f"{key}{name}", gain, axes)
-            for axis in np.flatnonzero(gain <= 0.0):
-                document.refuse(f"{key}{name}[{axis}]", "a finite number > 0.0")
-        elif isinstance(gain, float) and (gain < 0.0 or (gain == 0.0 and name != "smoothing")):
-            document.refuse(f"{key}{name}", f"a finite number {'>=' if name == 'smoothing' else '>'} 0.0")

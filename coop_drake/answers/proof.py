@@ -8,16 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-import msgspec
-from shapely import Polygon
-
-from coop_drake.answers.document import Positive
-from coop_drake.tree.pose import FloatArray
+from coop_drake.answers.region import Region
+from coop_drake.typed_data import EXACT, Limits, Positive, Vector
 
 __all__ = ["BlockedGoalProof", "DiscProof", "InfeasibilityProof", "OverCell", "OverSlice", "SlicesProof"]
 
-
-RobotIndex = Annotated[int, msgspec.Meta(ge=0)]
+Index = Annotated[int, Limits(at_least=0), EXACT]
 
 
 @dataclass(frozen=True)
@@ -30,7 +26,7 @@ class OverCell:
     """
 
     reached: bool
-    polygon: Polygon
+    polygon: Region
 
 
 @dataclass(frozen=True)
@@ -42,8 +38,8 @@ class AngleBox:
         upper: Upper ends, shape (1 + m,).
     """
 
-    lower: FloatArray
-    upper: FloatArray
+    lower: Vector
+    upper: Vector
 
 
 @dataclass(frozen=True)
@@ -71,8 +67,8 @@ class SlicesProof:
         slices: The cover.
     """
 
-    robots: tuple[RobotIndex, ...]
-    slices: Annotated[tuple[OverSlice, ...], msgspec.Meta(min_length=1)]
+    robots: tuple[Index, ...]
+    slices: tuple[OverSlice, ...]
 
 
 @dataclass(frozen=True)
@@ -86,9 +82,9 @@ class DiscProof:
         cells: Regions of the centre's positions in W that cover all those at which the disc fits.
     """
 
-    component: Annotated[int, msgspec.Meta(ge=0)]
-    centre: FloatArray
-    radius: Positive
+    component: Index
+    centre: Vector
+    radius: Annotated[Positive, EXACT]
     cells: tuple[OverCell, ...]
 
 
@@ -103,8 +99,8 @@ class BlockedGoalProof:
             position.
     """
 
-    robots: tuple[RobotIndex, ...]
-    slices: Annotated[tuple[AngleBox, ...], msgspec.Meta(min_length=1)]
+    robots: tuple[Index, ...]
+    slices: tuple[AngleBox, ...]
 
 
 InfeasibilityProof = SlicesProof | DiscProof | BlockedGoalProof

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from coop_drake.answers.digest import as_json, problem_digest
-from coop_drake.answers.document import Document, Head, document_text
+from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.document import Document, document_text
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import BlockedGoalProof, DiscProof, InfeasibilityProof, SlicesProof
 from coop_drake.files import write_atomically
+from coop_drake.typed_data import to_plain
 
 __all__ = ["FORMAT", "SavedProof", "load_proof", "read_proof", "save_proof"]
 
@@ -25,16 +27,6 @@ KINDS: dict[str, type[InfeasibilityProof]] = {
     "blocked goal": BlockedGoalProof,
 }
 """How the document names the kinds of proof."""
-
-
-class ProofHead(Head):
-    """What every proof of infeasibility begins with.
-
-    Attributes:
-        kind: Which kind of proof follows.
-    """
-
-    kind: str
 
 
 @dataclass(frozen=True)
@@ -62,14 +54,9 @@ def save_proof(proof: InfeasibilityProof, problem: PlanningProblem, path: Path |
         The path written.
     """
     kind = next(name for name, kind in KINDS.items() if isinstance(proof, kind))
-    head = {
-        "format": FORMAT,
-        "version": VERSION,
-        "problem": problem_digest(problem),
-        "kind": kind,
-        **as_json(proof),
-    }
-    rows = {key: head.pop(key) for key in ("cells", "slices") if key in head}
+    own = {"format": FORMAT, "version": VERSION, "problem": problem_digest(problem), "kind": kind}
+    head = own | to_plain(proof, KINDS[kind])
+    rows: dict[str, Any] = {key: head.pop(key) for key in ("cells", "slices") if key in head}
     return write_atomically(path, document_text(head, rows).encode())
 
 
@@ -97,12 +84,15 @@ def read_proof(document: Document) -> SavedProof:
     Raises:
         PlanError: Names the file, the key, the value and what is allowed there.
     """
-    head = document.read_head(ProofHead, format=[FORMAT], version=[VERSION], kind=KINDS)
-    proof = document.read(KINDS[head.kind], head)
+    document.check_entry("format", FORMAT)
+    document.check_entry("version", VERSION)
+    kind = KINDS[document.check_entry("kind", *KINDS)]
+    proof = document.read(kind, head=("format", "version", "problem", "kind", "digest"))
     if isinstance(proof, DiscProof):
-        document.check_length("centre", proof.centre, 2)
+        document.check_length("centre", 2)
+    elif not proof.slices:
+        document.refuse("slices", [], "at least one slice")
     else:
         for k, part in enumerate(proof.slices):
-            axes = max(1, len(part.lower))
-            document.check_intervals(f"slices[{k}].", part.lower, part.upper, axes, points=True)
-    return SavedProof(head.problem, proof)
+            document.check_intervals(f"slices[{k}].", max(1, len(part.lower)), points=True)
+    return SavedProof(document.content["problem"], proof)

@@ -1,19 +1,24 @@
 """Gain sets: fixed gains (the paper's Table 2) or scheduled by cell; and the gains of one transition."""
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coop_drake.typed_data import DataError, Limits, NotNegative, Positive, check_fields
+from coop_drake.typed_data import EXACT, DataError, Limits, NotNegative, Positive, Vector, check_fields
 
 FloatArray = NDArray[np.float64]
 FunnelShape = Literal["exponential", "smooth"]
-FUNNEL_SHAPES: tuple[FunnelShape, ...] = get_args(FunnelShape)
 
 EnergyFactor = Annotated[float, Limits(at_least=1.0)]
 """A multiple of the energy at rest; below 1 no transition could begin [-]."""
+
+Gain = Annotated[Positive, EXACT]
+"""A gain of one transition, of any size: it may be a product of numbers of a gain set."""
+
+AxisGains = Annotated[Vector, Limits(above=0.0)]
+"""Gains of one transition, one for each of the axes (theta, q...), shape (1 + n,)."""
 
 
 @dataclass(frozen=True)
@@ -33,16 +38,16 @@ class TransitionGains:
         energy_bound: Largest PPC energy V accepted when this transition is entered, shape (1 + n,).
     """
 
-    stiffness: float
-    damping: float
-    governor_gain: float
-    smoothing: float
+    stiffness: Gain
+    damping: Gain
+    governor_gain: Gain
+    smoothing: Annotated[NotNegative, EXACT]
     funnel: FunnelShape
-    decay_rate: FloatArray
-    log_gain: FloatArray
-    position_gain: float
-    rate_gain: float
-    energy_bound: FloatArray
+    decay_rate: AxisGains
+    log_gain: AxisGains
+    position_gain: Gain
+    rate_gain: Gain
+    energy_bound: AxisGains
 
     @property
     def governor_row(self) -> FloatArray:

@@ -9,7 +9,7 @@ import shapely
 
 from coop_drake.answers import plan_file, proof_file
 from coop_drake.answers.digest import content_digest
-from coop_drake.answers.document import Document, Head
+from coop_drake.answers.document import Document
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
@@ -43,7 +43,7 @@ def verify_file(
         RefusalError: It is one, but a statement in it does not hold: names the place.
     """
     document = Document.load(path, "a plan or a proof of infeasibility")
-    form = document.read_head(Head, format=(plan_file.FORMAT, proof_file.FORMAT)).format
+    form = document.check_entry("format", plan_file.FORMAT, proof_file.FORMAT)
     try:
         if form == plan_file.FORMAT:
             plan = plan_file.read_plan(document)

@@ -101,15 +101,18 @@ FAR = {"outer": [[90, 90], [91, 90], [91, 91]], "holes": []}
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (drop("goal_pose"), r"goal_pose: is missing; expected a value of this name"),
-        (drop("cells", 1, "upper"), r"cells\[1\].upper: is missing"),
-        (put(1, "colour"), r"colour: is unknown; expected the keys"),
+        (drop("goal_pose"), r"goal_pose: None is not allowed; expected a value; this key is required"),
+        (
+            drop("cells", 1, "upper"),
+            r"cells\[1\].upper: None is not allowed; expected a value; this key is required",
+        ),
+        (put(1, "colour"), r"colour: 1 is not allowed; expected one of the keys problem, gain_set, margin"),
         (put("song", "format"), r"format: 'song' is not allowed; expected 'coop_drake plan'"),
         (put(1, "version"), r"version: 1 is not allowed; expected 2"),
         (put(True, "version"), r"version: True is not allowed"),
-        (put(7, "gain_set"), r"gain_set: 7 is not allowed; expected a string"),
-        (put(-0.1, "margin"), r"margin: -0.1 is not allowed; expected a finite number >= 0.0"),
-        (put(float("nan"), "start", 2), r"start\[2\]: 'NaN' is not allowed; expected a finite number"),
+        (put(7, "gain_set"), r"gain_set: 7 is not allowed; expected a text"),
+        (put(-0.1, "margin"), r"margin: -0.1 is not allowed; expected zero or a positive number"),
+        (put(float("nan"), "start", 2), r"start\[2\]: nan is not allowed; expected a finite number"),
         (put("a", "start", 0), r"start\[0\]: 'a' is not allowed"),
         (put([0.0, 1.0], "goal_pose"), r"goal_pose: .* is not allowed; expected 3 entries, not 2"),
         (put([0.0] * 4, "goal_pose"), r"goal_pose: .* is not allowed; expected 3 entries, not 4"),
@@ -121,10 +124,13 @@ FAR = {"outer": [[90, 90], [91, 90], [91, 91]], "holes": []}
             r"cells\[0\].upper\[1\]: .* expected more than cells\[0\].lower\[1\], 9",
         ),
         (put(BOW, "cells", 2, "safe"), r"cells\[2\].safe: .* cross neither .*Self-intersection"),
-        (put([[0, 0]], "cells", 2, "safe", "outer"), r"cells\[2\].safe.outer: .* list of length >= 3"),
+        (
+            put([[0, 0]], "cells", 2, "safe", "outer"),
+            r"cells\[2\].safe.outer: .* a list of at least 3 corners",
+        ),
         (
             put([0, 0, 0], "cells", 2, "safe", "outer", 1),
-            r"cells\[2\].safe.outer\[1\]: .* expected a list of length 2",
+            r"cells\[2\].safe.outer\[1\]: .* expected a list of 2",
         ),
         (put(FAR, "cells", 1, "core"), r"cells\[1\].core: leaves cells\[1\].safe"),
         (put(FAR, "cells", 1, "tidied"), r"cells\[1\].tidied: leaves cells\[1\].safe"),
@@ -140,7 +146,7 @@ FAR = {"outer": [[90, 90], [91, 90], [91, 91]], "holes": []}
         (drop("transitions", 2), r"transitions: .* expected 3 entries, not 2"),
         (
             put(0.0, "transitions", 0, "neck"),
-            r"transitions\[0\].neck: 0.0 is not allowed; expected .* > 0.0",
+            r"transitions\[0\].neck: 0.0 is not allowed; expected a positive number",
         ),
         (
             put(1, "transitions", 0, "only_angles"),
@@ -148,11 +154,11 @@ FAR = {"outer": [[90, 90], [91, 90], [91, 91]], "holes": []}
         ),
         (
             put("loose", "transitions", 0, "gains", "funnel"),
-            r"transitions\[0\].gains.funnel: 'loose' .* 'exponential' or 'smooth'",
+            r"transitions\[0\].gains.funnel: 'loose' .* one of exponential, smooth",
         ),
         (
             put([1, 1, -1], "transitions", 0, "gains", "decay_rate"),
-            r"transitions\[0\].gains.decay_rate\[2\]: -1 is not allowed",
+            r"transitions\[0\].gains.decay_rate\[2\]: -1.0 is not allowed",
         ),
         (put([90.0, 90.0, 0, 0, 0], "start"), r"start: .* expected a configuration in cells\[0\]"),
         (put([90.0, 90.0, 0], "goal_pose"), r"goal_pose: .* expected a pose in the last cell"),
@@ -177,7 +183,9 @@ def test_files_that_are_no_json_or_not_there_are_refused(tmp_path):
     with pytest.raises(PlanError, match=r"plan\.json: line 1: .* expected the JSON of a plan"):
         load_plan(path)
     path.write_text('{"format": 1, "format": 1}')
-    with pytest.raises(PlanError, match=r"format: stands twice in one mapping; expected every key once"):
+    with pytest.raises(
+        PlanError, match=r"format: 1 is not allowed; expected every key once; this one stands twice"
+    ):
         load_plan(path)
     path.write_text("[1, 2]")
     with pytest.raises(PlanError, match=r"document: .* expected a mapping"):

@@ -1,0 +1,67 @@
+"""Regions in files: the rings of a polygon, without their closing corners."""
+
+from dataclasses import dataclass
+from itertools import chain
+from typing import Annotated
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from coop_drake.tree.pose import FloatArray
+from coop_drake.typed_data import Codec, DataError, Number, convert, convert_class
+
+__all__ = ["Region"]
+
+
+def _read_ring(value: object, key: str) -> FloatArray:
+    """Read the corners of a ring, shape (n, 2) [m]."""
+    if _holds_pairs(value):
+        corners = np.array(value, dtype=np.float64)
+        if len(corners) >= 3 and np.isfinite(corners).all():
+            return corners
+    convert(value, tuple[tuple[Number, Number], ...], key)  # This is slower; it names the wrong entry.
+    raise DataError(key, value, "a list of at least 3 corners")
+
+
+def _holds_pairs(value: object) -> bool:
+    """Whether a value is a list of pairs of numbers; numpy would take texts and truth values for numbers."""
+    if not isinstance(value, list) or set(map(type, value)) != {list} or set(map(len, value)) != {2}:
+        return False
+    return set(map(type, chain.from_iterable(value))) <= {int, float}
+
+
+Ring = Annotated[FloatArray, Codec(_read_ring, np.ndarray.tolist)]
+
+
+@dataclass(frozen=True)
+class Rings:
+    """A polygon as it stands in a file.
+
+    Attributes:
+        outer: Corners of the outer ring [m].
+        holes: Corners of the inner rings [m].
+    """
+
+    outer: Ring
+    holes: tuple[Ring, ...]
+
+
+def _read_region(value: object, key: str) -> Polygon:
+    rings = convert_class(value, Rings, key)
+    polygon = Polygon(rings.outer, rings.holes)
+    if not polygon.is_valid or polygon.area <= 0.0:
+        reason = shapely.is_valid_reason(polygon)
+        allowed = f"rings that cross neither themselves nor each other, but found: {reason}"
+        raise DataError(key, value, allowed)
+    return polygon
+
+
+def _write_region(polygon: Polygon) -> object:
+    rings = (polygon.exterior, *polygon.interiors)
+    outer, *holes = (shapely.get_coordinates(ring)[:-1].tolist() for ring in rings)
+    return {"outer": outer, "holes": holes}
+
+
+Region = Annotated[Polygon, Codec(_read_region, _write_region)]
+"""A polygon that a file holds as its rings [m]."""
