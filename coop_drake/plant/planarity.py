@@ -28,7 +28,7 @@ def is_upright(axis: FloatArray) -> bool:
     return bool(np.hypot(axis[0], axis[1]) <= TILT)
 
 
-def object_frame(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant) -> tuple[Frame, RigidBody]:
+def object_frame(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant) -> Frame:
     """Find L: the frame of the object's model, or of its root body where the file format has no model frame.
 
     Raises:
@@ -54,10 +54,9 @@ def object_frame(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant) 
     if len(roots) != 1:
         names = ", ".join(scoped(plant, body) for body in roots) or "none"
         raise refusal(scenario, None, names, "an object whose bodies hang together")
-    frame = (
-        plant.GetFrameByName("__model__", instance) if plant.HasFrameNamed("__model__", instance) else None
-    )
-    return (frame, frame.body()) if frame else (roots[0].body_frame(), roots[0])
+    if plant.HasFrameNamed("__model__", instance):
+        return plant.GetFrameByName("__model__", instance)
+    return roots[0].body_frame()
 
 
 def check_planar(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -23,6 +23,7 @@ from pydrake.systems.framework import Context
 from coop_drake.plant.chain import find_base
 from coop_drake.plant.fixing import fix_joints
 from coop_drake.plant.parsing import add_models, bodies_of, finalize, set_actuators
+from coop_drake.plant.read_once import read_once
 from coop_drake.scenario import Scenario, assemble
 from coop_drake.tree.pose import FloatArray
 
@@ -93,7 +94,7 @@ class RobotPlant:
 
 
 def build_robot_plant(scenario: Scenario, k: int) -> RobotPlant:
-    """Build the model that robot k has of itself.
+    """Build the model that robot k has of itself; all of one scenario share the plant, not its context.
 
     Args:
         scenario: The scenario.
@@ -102,6 +103,12 @@ def build_robot_plant(scenario: Scenario, k: int) -> RobotPlant:
     Raises:
         ScenarioError: As for the team's plant.
     """
+    robot = _read_robot(scenario, k)
+    return replace(robot, context=robot.plant.CreateDefaultContext())
+
+
+@read_once
+def _read_robot(scenario: Scenario, k: int) -> RobotPlant:
     assembly = assemble(scenario)
     robot = assembly.robots[k]
     plant = MultibodyPlant(0.0)

@@ -66,8 +66,7 @@ def build_separate_team(scenario: Scenario, builder: DiagramBuilder) -> Separate
     """Add a plant to a diagram in which the object and every robot are trees of their own.
 
     Each has a planar joint, and a weld constraint holds every end effector at its grasp. The plant computes
-    no
-    contact: clearances are checked elsewhere, and a run ends before bodies would touch.
+    no contact: clearances are checked elsewhere, and a run ends before bodies would touch.
 
     Args:
         scenario: The scenario; its ``plant.time_step`` is the plant's.
@@ -84,7 +83,7 @@ def build_separate_team(scenario: Scenario, builder: DiagramBuilder) -> Separate
     plant.SetUseSampledOutputPorts(False)
     add_models(scenario, assembly, _without_grasps(assembly), plant, scene_graph)
     fix_joints(scenario, assembly, plant)
-    frame, body = object_frame(scenario, assembly, plant)
+    frame = object_frame(scenario, assembly, plant)
     object_joint = plant.AddJoint(PlanarJoint("pose", plant.world_frame(), frame))
     chains = [find_base(scenario, robot, plant) for robot in assembly.robots]
     base_joints = tuple(
@@ -106,7 +105,7 @@ def build_separate_team(scenario: Scenario, builder: DiagramBuilder) -> Separate
     return SeparateTeam(
         plant=plant,
         scene_graph=scene_graph,
-        object_body=body,
+        object_body=frame.body(),
         object_frame=frame,
         object_joint=object_joint,
         object_inertia=tree.object_inertia,

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.parsing import GetScopedFrameByName
-from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     Frame,
+    FrameIndex,
     Joint,
+    JointIndex,
     ModelInstanceIndex,
     PlanarJoint,
     RigidBody,
@@ -24,6 +26,7 @@ from coop_drake.plant.fixing import fix_joints
 from coop_drake.plant.grasps import Grasps, WeldedGrasps
 from coop_drake.plant.parsing import add_models, bodies_of, finalize, set_actuators
 from coop_drake.plant.planarity import check_masses, check_planar, object_frame, planar_pose
+from coop_drake.plant.read_once import add_copy, read_once
 from coop_drake.scenario import Assembly, RobotAssembly, Scenario, assemble
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
@@ -158,11 +161,58 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
     Raises:
         ScenarioError: The models do not make a team of holonomic planar manipulators that hold one object.
     """
+    models = _read_team(scenario)
+    assembly = models.assembly
+    plant, scene_graph = add_copy(builder, models.plant, models.scene_graph)
+    frame = plant.get_frame(models.object_frame)
+    context = plant.CreateDefaultContext()
+    robots: list[RobotModel] = []
+    for robot in assembly.robots:
+        first = robots[-1].q_slice.stop if robots else 0
+        base, joints = find_base(scenario, robot, plant)
+        robots.append(_robot_model(robot, plant, context, frame, base, joints, len(robots), first))
+    return TeamPlant(
+        plant=plant,
+        scene_graph=scene_graph,
+        object_body=frame.body(),
+        object_frame=frame,
+        object_joint=plant.get_joint(models.object_joint),
+        object_inertia=_object_inertia(plant, context, bodies_of(plant, [assembly.object_model]), frame),
+        robots=tuple(robots),
+        grasps=WeldedGrasps(plant, assembly.robots),
+        assembly=assembly,
+        scenario=scenario,
+    )
+
+
+@dataclass(frozen=True)
+class _TeamModels:
+    """What Drake reads from the models of a team.
+
+    Attributes:
+        assembly: The object and the robots in the directives.
+        plant: Finalized and checked, in no diagram.
+        scene_graph: Its geometry.
+        object_frame: L.
+        object_joint: The joint that moves L against the world.
+    """
+
+    assembly: Assembly
+    plant: MultibodyPlant
+    scene_graph: SceneGraph
+    object_frame: FrameIndex
+    object_joint: JointIndex
+
+
+@read_once
+def _read_team(scenario: Scenario) -> _TeamModels:
     assembly = assemble(scenario)
-    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
+    plant, scene_graph = MultibodyPlant(0.0), SceneGraph()
+    plant.set_name("plant")
+    plant.RegisterAsSourceForSceneGraph(scene_graph)
     add_models(scenario, assembly, range(len(assembly.directives)), plant, scene_graph)
     fix_joints(scenario, assembly, plant)
-    frame, body = object_frame(scenario, assembly, plant)
+    frame = object_frame(scenario, assembly, plant)
     object_joint = plant.AddJoint(PlanarJoint("pose", plant.world_frame(), frame))
     chains = [find_base(scenario, robot, plant) for robot in assembly.robots]
     set_actuators(plant, [joint for _, joints in chains for joint in joints])
@@ -170,19 +220,10 @@ def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
     context = plant.CreateDefaultContext()
     check_planar(scenario, assembly, plant, context, chains)
     check_masses(scenario, assembly, plant, context)
-    robots: list[RobotModel] = []
-    for robot, (base, joints) in zip(assembly.robots, chains, strict=True):
-        first = robots[-1].q_slice.stop if robots else 0
-        robots.append(_robot_model(scenario, robot, plant, context, frame, base, joints, len(robots), first))
-    inertia = _object_inertia(plant, context, bodies_of(plant, [assembly.object_model]), frame)
-    grasps = WeldedGrasps(plant, assembly.robots)
-    return TeamPlant(
-        plant, scene_graph, body, frame, object_joint, inertia, tuple(robots), grasps, assembly, scenario
-    )
+    return _TeamModels(assembly, plant, scene_graph, frame.index(), object_joint.index())
 
 
 def _robot_model(
-    scenario: Scenario,
     robot: RobotAssembly,
     plant: MultibodyPlant,
     context: Context,
