@@ -8,10 +8,12 @@ import pytest
 
 from coop_drake.scenario import Scenario
 from coop_drake.typed_data import (
+    EXACT,
     LARGEST,
     DataError,
     Limits,
     Positive,
+    Vector,
     check_fields,
     convert,
     convert_class,
@@ -74,6 +76,28 @@ def test_the_first_departure_is_refused_with_its_place(data, key, allowed):
 def test_what_a_class_refuses_is_refused_where_it_stands():
     with pytest.raises(DataError, match=r"^radius: 0.0 is not allowed; expected a positive number$"):
         Disc(0.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "key"),
+    [
+        (Annotated[Positive, EXACT], "1.0", "a"),
+        (Annotated[Positive, EXACT], True, "a"),
+        (Annotated[Positive, EXACT], 0.0, "a"),
+        (Annotated[int, EXACT], 1.0, "a"),
+        (Annotated[int, EXACT], math.inf, "a"),
+        (Annotated[Vector, Limits(above=0.0)], [1.0, -1.0], "a[1]"),
+        (Annotated[Vector, Limits(above=0.0)], [1.0, "2.0"], "a[1]"),
+        (Vector, [[1.0]], "a[0]"),
+        (Vector, 1.0, "a"),
+    ],
+)
+def test_exact_numbers_are_numbers_of_json_of_any_size(kind, value, key):
+    assert convert(1e300, Annotated[Positive, EXACT]) == 1e300
+    assert to_plain(convert([1, 1e300], Vector), Vector) == [1.0, 1e300]
+    with pytest.raises(DataError) as caught:
+        convert(value, kind, "a")
+    assert caught.value.key == key
 
 
 def limited(cls, path=""):

@@ -5,16 +5,17 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn, TypeVar
 
 from coop_drake.answers.digest import content_digest
 from coop_drake.errors import PlanError, shortened
+from coop_drake.files import write_atomically
 from coop_drake.typed_data import DataError, convert, convert_class
 
-__all__ = ["Document", "document_text"]
+__all__ = ["Document", "write_document"]
 
 Content = TypeVar("Content")
 
@@ -63,8 +64,8 @@ class Document:
         return value
 
     def read(self, kind: type[Content], head: Collection[str]) -> Content:
-        """Read a dataclass from all entries but those of the head; no key may be unknown."""
-        body = {key: value for key, value in self.content.items() if key not in head}
+        """Read a dataclass from all entries but those of the head and the digest; no key may be unknown."""
+        body = {key: value for key, value in self.content.items() if key not in ("digest", *head)}
         try:
             for key in ("problem", "digest"):
                 convert(self.content.get(key), str, key)
@@ -102,21 +103,23 @@ class Document:
             self.refuse("digest", found, f"'{expected}': the content is not what was written")
 
 
-def document_text(head: Mapping[str, Any], rows: Mapping[str, Sequence[Any]]) -> str:
-    """Write a document so that people and tools that compare texts can follow it.
+def write_document(path: Path | str, content: Mapping[str, Any], rows: Collection[str]) -> Path:
+    """Write a document so that people and tools that compare texts can follow it; whole or not at all.
 
     Args:
-        head: Entries of one line each.
-        rows: Entries that are lists, with one line for every item.
+        path: Where to write it.
+        content: Plain data; the entry ``digest`` is added.
+        rows: Keys of the entries that are lists, with one line for every item; they stand last.
 
     Returns:
-        The text, with the entry ``digest`` at the end of the head.
+        The path written.
     """
-    digest = content_digest({**head, **rows})
-    lines = [f' "{key}": {_line(value)}' for key, value in {**head, "digest": digest}.items()]
-    for key, items in rows.items():
-        lines.append(f' "{key}": [\n  ' + ",\n  ".join(map(_line, items)) + "\n ]")
-    return "{\n" + ",\n".join(lines) + "\n}\n"
+    entries = {key: _line(value) for key, value in content.items() if key not in rows}
+    entries["digest"] = _line(content_digest(content))
+    lists = {key: ",\n  ".join(map(_line, content[key])) for key in rows if key in content}
+    entries |= {key: f"[\n  {lines}\n ]" for key, lines in lists.items()}
+    text = ",\n".join(f' "{key}": {entry}' for key, entry in entries.items())
+    return write_atomically(path, f"{{\n{text}\n}}\n".encode())
 
 
 def _line(value: Any) -> str:

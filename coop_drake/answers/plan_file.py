@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from coop_drake.answers.document import Document, document_text
+from coop_drake.answers.document import Document, write_document
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_checks import check_plan
-from coop_drake.files import write_atomically
 from coop_drake.typed_data import to_plain
 
 __all__ = ["FORMAT", "load_plan", "read_plan", "save_plan"]
@@ -31,9 +30,8 @@ def save_plan(plan: Plan, path: Path | str) -> Path:
     Returns:
         The path written.
     """
-    head = {"format": FORMAT, "version": VERSION, **to_plain(plan, Plan)}
-    rows = {key: head.pop(key) for key in ("cells", "transitions")}
-    return write_atomically(path, document_text(head, rows).encode())
+    content = {"format": FORMAT, "version": VERSION, **to_plain(plan, Plan)}
+    return write_document(path, content, rows=("cells", "transitions"))
 
 
 def load_plan(path: Path | str) -> Plan:
@@ -55,15 +53,12 @@ def load_plan(path: Path | str) -> Plan:
 def read_plan(document: Document) -> Plan:
     """Read a plan from a document; every key, length and number is checked, but not what they mean together.
 
-    Args:
-        document: The whole document.
-
     Raises:
         PlanError: Names the file, the key, the value and what is allowed there.
     """
     document.check_entry("format", FORMAT)
     document.check_entry("version", VERSION)
-    plan = document.read(Plan, head=("format", "version", "digest"))
+    plan = document.read(Plan, head=("format", "version"))
     axes = 1 + len(plan.joint_names)
     if not plan.cells:
         document.refuse("cells", [], "at least one cell")

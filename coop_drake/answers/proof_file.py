@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from coop_drake.answers.digest import problem_digest
-from coop_drake.answers.document import Document, document_text
+from coop_drake.answers.document import Document, write_document
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import BlockedGoalProof, DiscProof, InfeasibilityProof, SlicesProof
-from coop_drake.files import write_atomically
 from coop_drake.typed_data import to_plain
 
 __all__ = ["FORMAT", "SavedProof", "load_proof", "read_proof", "save_proof"]
@@ -55,9 +53,7 @@ def save_proof(proof: InfeasibilityProof, problem: PlanningProblem, path: Path |
     """
     kind = next(name for name, kind in KINDS.items() if isinstance(proof, kind))
     own = {"format": FORMAT, "version": VERSION, "problem": problem_digest(problem), "kind": kind}
-    head = own | to_plain(proof, KINDS[kind])
-    rows: dict[str, Any] = {key: head.pop(key) for key in ("cells", "slices") if key in head}
-    return write_atomically(path, document_text(head, rows).encode())
+    return write_document(path, own | to_plain(proof, KINDS[kind]), rows=("cells", "slices"))
 
 
 def load_proof(path: Path | str) -> SavedProof:
@@ -78,16 +74,13 @@ def load_proof(path: Path | str) -> SavedProof:
 def read_proof(document: Document) -> SavedProof:
     """Read a proof from a document; every key, length and number is checked, but not what it proves.
 
-    Args:
-        document: The whole document.
-
     Raises:
         PlanError: Names the file, the key, the value and what is allowed there.
     """
     document.check_entry("format", FORMAT)
     document.check_entry("version", VERSION)
     kind = KINDS[document.check_entry("kind", *KINDS)]
-    proof = document.read(kind, head=("format", "version", "problem", "kind", "digest"))
+    proof = document.read(kind, head=("format", "version", "problem", "kind"))
     if isinstance(proof, DiscProof):
         document.check_length("centre", 2)
     elif not proof.slices:
