@@ -68,7 +68,7 @@ def bracketed(
         refuted: Amount that is proved not to be enough beforehand, None if nothing is.
         improve: Given an amount that is enough and its outcome, looks for a smaller one.
     """
-    search = _Search(ask, improve, refuted)
+    search = _Bracketing(ask, improve, refuted)
     amount = min(amounts.first, amounts.most)
     while not search.step(amount) and amount < amounts.most and search.asked < amounts.asked:
         amount = min(2.0 * amount, amounts.most)
@@ -83,7 +83,7 @@ def bracketed(
     return Bracket(search.refuted, search.found, search.most, search.outcome)
 
 
-class _Search:
+class _Bracketing:
     """The amounts asked so far."""
 
     def __init__(

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.diagnosis.paths import is_free, path_through
-from coop_drake.errors import GeometryError
+from coop_drake.diagnosis.paths import is_free, widest_path
+from coop_drake.errors import GeometryError, PlanError
 from coop_drake.planning.boxes.boxes import explored_channel
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.proofs.proofs import Proofs
@@ -98,10 +98,10 @@ class BudgetedPlanner:
         if verdict is not Verdict.FOUND:
             return Outcome(variant, Answer.UNDECIDED)
         try:
-            path = path_through(variant, explored_channel(variant, proofs.boxes()), STEP)
-        except GeometryError:  # A cell with a cusp: the channel is proved free all the same.
+            path = widest_path(variant, explored_channel(variant, proofs.boxes()))
+        except (GeometryError, PlanError):  # A cell with a cusp: the channel is proved free all the same.
             return Outcome(variant, Answer.FOUND)
-        return Outcome(variant, Answer.FOUND, path)
+        return Outcome(variant, Answer.FOUND, densified(path, configuration_scale(variant.tree), STEP))
 
     def prove(self, problem: PlanningProblem, path: FloatArray) -> Outcome:
         """Try to prove a given path free in a variant; a failure proves nothing."""

@@ -68,7 +68,7 @@ def fault_of(path: Path) -> str:
     Args:
         path: A file that exists; its suffix says its format.
     """
-    reader = _Reader(path.suffix)
+    reader = _ModelText(path.suffix)
     try:
         reader.parser.Parse(path.read_bytes(), True)
     except expat.ExpatError as error:
@@ -80,7 +80,7 @@ def fault_of(path: Path) -> str:
     return ""
 
 
-class _Reader:
+class _ModelText:
     """Handlers of an XML parser that raise at the first fault."""
 
     def __init__(self, suffix: str) -> None:

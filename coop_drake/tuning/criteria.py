@@ -77,14 +77,14 @@ CRITERIA = {
         ),
         Criterion(
             "cell_margin",
-            "margin to the cells' walls",
+            "margin to the cells' boundaries",
             "m",
             lambda log: float(log.cell_clearance.min()),
             more_is_better=True,
         ),
         Criterion(
             "funnel_margin",
-            "margin to the funnels' walls",
+            "margin to the funnel bounds",
             "rad",
             lambda log: float(log.funnel_margin.min()),
             more_is_better=True,

@@ -58,8 +58,8 @@ def outer_sweep(
 
 def hull_vertices(points: FloatArray) -> FloatArray:
     """Vertices of the convex hull of points; shape (k, 2) to (m, 2)."""
-    chain = LineString(points) if len(points) > 1 else Point(points[0])
-    vertices: FloatArray = shapely.get_coordinates(chain.convex_hull)
+    line = LineString(points) if len(points) > 1 else Point(points[0])
+    vertices: FloatArray = shapely.get_coordinates(line.convex_hull)
     closed = len(vertices) > 1 and bool((vertices[0] == vertices[-1]).all())
     return vertices[:-1] if closed else vertices
 

@@ -25,7 +25,7 @@ from coop_drake.drawing.colours import (
     SKY,
     VERMILLION,
 )
-from coop_drake.viz.signal_flow import INPUTS, OUTPUTS, Block, Signal, SignalFlow, signal_flow
+from coop_drake.viz.signal_flow import INPUTS, OUTPUTS, DiagramBlock, Signal, SignalFlow, signal_flow
 
 __all__ = ["block_diagram_figure"]
 
@@ -113,7 +113,7 @@ def _wire(signal: Signal, column: int) -> str:
     return f"{signal.source}.{signal.output} at {column}"
 
 
-def _height(block: Block) -> float:
+def _height(block: DiagramBlock) -> float:
     return _TITLE + _ROW * max(len(block.inputs), len(block.outputs)) + 0.1
 
 
@@ -164,14 +164,14 @@ def _draw(ax: Axes, flow: SignalFlow, places: dict[str, _Place], width: float, h
         _draw_block(ax, block, places[block.name])
 
 
-def _ends(signal: Signal, blocks: dict[str, Block], places: dict[str, _Place]) -> tuple[Point, Point]:
+def _ends(signal: Signal, blocks: dict[str, DiagramBlock], places: dict[str, _Place]) -> tuple[Point, Point]:
     source, sink = places[signal.source], places[signal.sink]
     output = blocks[signal.source].outputs.index(signal.output)
     entry = blocks[signal.sink].inputs.index(signal.input)
     return (source.x + _WIDTH, source.port(output)), (sink.x - 0.03, sink.port(entry))
 
 
-def _passing(signal: Signal, blocks: dict[str, Block], places: dict[str, _Place]) -> list[Point]:
+def _passing(signal: Signal, blocks: dict[str, DiagramBlock], places: dict[str, _Place]) -> list[Point]:
     """Return both ends of the wire in every column that a signal passes [in]."""
     columns = range(blocks[signal.source].column + 1, blocks[signal.sink].column)
     wires = [places[_wire(signal, column)] for column in columns]
@@ -194,7 +194,7 @@ def _round_trip(start: Point, end: Point, lane: float, out: float) -> Path:
     return Path([start, (right, start[1]), (right, lane), (left, lane), (left, end[1]), end])
 
 
-def _draw_block(ax: Axes, block: Block, place: _Place) -> None:
+def _draw_block(ax: Axes, block: DiagramBlock, place: _Place) -> None:
     outside = block.name in (INPUTS, OUTPUTS)
     ax.add_patch(
         FancyBboxPatch(

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import networkx as nx
 from pydrake.systems.framework import Diagram, InputPortIndex, OutputPortIndex, System
 
-__all__ = ["INPUTS", "OUTPUTS", "Block", "Signal", "SignalFlow", "signal_flow"]
+__all__ = ["INPUTS", "OUTPUTS", "DiagramBlock", "Signal", "SignalFlow", "signal_flow"]
 
 INPUTS, OUTPUTS = "from outside", "to outside"
 """Names of the blocks that stand for a Diagram's own ports."""
 
 
 @dataclass(frozen=True)
-class Block:
+class DiagramBlock:
     """One block.
 
     Attributes:
@@ -54,7 +54,7 @@ class SignalFlow:
     """
 
     name: str
-    blocks: tuple[Block, ...]
+    blocks: tuple[DiagramBlock, ...]
     signals: tuple[Signal, ...]
 
 
@@ -78,7 +78,7 @@ def signal_flow(diagram: Diagram, name: str, *, telemetry: frozenset[str] = froz
     )
     ends = {(signal.sink, signal.input) for signal in signals}
     blocks = (
-        Block(
+        DiagramBlock(
             block,
             _kind(systems.get(block)),
             tuple(port for owner, port in inputs if owner == block and (block, port) in ends),

@@ -8,12 +8,12 @@ from coop_drake.planning.cells.events import (
     SliceAdded,
     SliceSplit,
 )
-from coop_drake.planning.cells.exploration import Exploration, Outcome
+from coop_drake.planning.cells.exploration import Exploration, ExplorationResult
 from coop_drake.planning.questions.margins import shrunk
 from tests.planning.test_search import rod_problem
 
 
-def watched(corridor: float, budget: int) -> tuple[list[Event], Outcome, Exploration]:
+def watched(corridor: float, budget: int) -> tuple[list[Event], ExplorationResult, Exploration]:
     problem, events = rod_problem(corridor), []
     swept = SweptTree(problem.tree)
     exploration = Exploration(

@@ -13,7 +13,7 @@ from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cell_graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.events import ChannelSearched, Event, SliceAdded, SliceSplit
-from coop_drake.planning.cells.exploration import Outcome, Verdict
+from coop_drake.planning.cells.exploration import ExplorationResult, Verdict
 from coop_drake.planning.cells.printed_algorithms import PaperExploration, refine
 from coop_drake.planning.cells.slices import Slices
 from coop_drake.planning.questions.margins import shrunk
@@ -23,7 +23,7 @@ from tests.support.cases import team_tree, transport
 
 def explored(
     corridor: float, budget: int = 400, **changes: object
-) -> tuple[PaperExploration, Outcome, list[Event]]:
+) -> tuple[PaperExploration, ExplorationResult, list[Event]]:
     problem = replace(rod_problem(corridor), **changes)
     swept, events = SweptTree(problem.tree), []
     exploration = PaperExploration(

@@ -12,10 +12,11 @@ from coop_drake.laws.gain_schedule import schedule_of
 from coop_drake.planning import make_plan, plan_time
 from coop_drake.planning.cells.cells import CellMaker
 from coop_drake.planning.execution.channel_ends import turned_to_start
+from coop_drake.planning.execution.channel_path import path_through
 from coop_drake.planning.execution.estimate import speed_per_clearance
 from coop_drake.planning.improvement.box_crossing import cross_box
 from coop_drake.planning.improvement.path_covering import cover_path
-from coop_drake.planning.improvement.quickest import path_through, quickest_plan
+from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.planning.search.search import find_channel
 from tests.support.cases import case
 from tests.support.free_positions import FreePositions

@@ -24,7 +24,7 @@ from coop_drake.tree.team_arrays import TeamArrays
 COARSENESS = 0.15
 """A box may fall short of the longest one by this fraction of its samples [-]: fewer boxes are tried."""
 
-_STEP_SHARE = 0.5
+_STEP_FRACTION = 0.5
 """Step along a path over the clearance there [-]: below 1, so that every place lies in a free disc."""
 
 _BOX_TIME = 0.6
@@ -170,7 +170,7 @@ def box_clearance(
                 if here <= 0.5 * enough:
                     return -1.0
             least = min(least, here)
-            passed += _STEP_SHARE * here
+            passed += _STEP_FRACTION * here
         passed -= length
     return least
 

@@ -7,13 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from math import inf
-from typing import TYPE_CHECKING
 
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.slices import Slices
-
-if TYPE_CHECKING:
-    import networkx as nx
 
 
 class Kind(IntEnum):
@@ -150,18 +146,3 @@ class CellGraph:
         while path[-1] in back:
             path.append(back[path[-1]])
         return [self.cells[i] for i in reversed(path)]
-
-    def as_networkx(self) -> nx.Graph[int]:
-        """The whole graph; nodes carry ``slice``, ``kind``, ``intervals`` and ``region``."""
-        import networkx as nx  # The search does not need it, and its import takes time.
-
-        graph: nx.Graph[int] = nx.Graph()
-        for index in sorted(self.by_slice):
-            for cell in self.by_slice[index]:
-                intervals = self._slices.all[index].intervals
-                graph.add_node(
-                    cell.index, slice=index, kind=cell.kind, intervals=intervals, region=cell.region
-                )
-        for index in list(graph.nodes):
-            graph.add_edges_from((index, other.index) for other in self.neighbours(self.cells[index]))
-        return graph

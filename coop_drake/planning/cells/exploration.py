@@ -66,7 +66,7 @@ class Verdict(Enum):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class ExplorationResult:
     """Result of one exploration.
 
     Attributes:
@@ -116,7 +116,7 @@ class Exploration:
         for index in self.slices.leaves():
             self._add(index, self.maker.over_cells(self.slices.all[index].intervals))
 
-    def run(self, budget: int, progress: Callable[[int], None] | None = None) -> Outcome:
+    def run(self, budget: int, progress: Callable[[int], None] | None = None) -> ExplorationResult:
         """Search and split until there is an answer or the budget of slices is spent.
 
         The path of least weight through FREE and undecided cells is searched, and slices on it are halved in
@@ -135,7 +135,7 @@ class Exploration:
             self._watch(ExplorationEnded(outcome.verdict.value, outcome.slices))
         return outcome
 
-    def _explored(self, budget: int, progress: Callable[[int], None] | None) -> Outcome:
+    def _explored(self, budget: int, progress: Callable[[int], None] | None) -> ExplorationResult:
         while True:
             path = self._cheapest_path()
             if self._watch is not None:
@@ -143,14 +143,14 @@ class Exploration:
                 self._watch(ChannelSearched(seen(path or ()), cost))
             made = len(self.slices.all)
             if path is None:
-                return Outcome(Verdict.INFEASIBLE, (), made)
+                return ExplorationResult(Verdict.INFEASIBLE, (), made)
             if all(cell.kind is Kind.FREE for cell in path):
-                return Outcome(Verdict.FOUND, tuple(path), made)
+                return ExplorationResult(Verdict.FOUND, tuple(path), made)
             if made >= budget:
-                return Outcome(Verdict.BUDGET, tuple(path), made)
+                return ExplorationResult(Verdict.BUDGET, tuple(path), made)
             splits = self.order.splits(path)
             if not splits:
-                return Outcome(Verdict.RESOLUTION, tuple(path), made)
+                return ExplorationResult(Verdict.RESOLUTION, tuple(path), made)
             for index, axis in splits:
                 self._split(index, axis)
             if progress is not None:

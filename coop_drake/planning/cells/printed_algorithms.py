@@ -22,7 +22,7 @@ from coop_drake.planning.cells.events import (
     Watch,
     seen,
 )
-from coop_drake.planning.cells.exploration import Outcome, Verdict
+from coop_drake.planning.cells.exploration import ExplorationResult, Verdict
 from coop_drake.planning.cells.mixed_cells import mixed_cells
 from coop_drake.planning.cells.slices import Slices
 from coop_drake.planning.cells.split_rules import finest_widths
@@ -72,7 +72,7 @@ class PaperExploration:
         self._paused = False
         self._add(0)
 
-    def run(self, budget: int, progress: Callable[[int], None] | None = None) -> Outcome:
+    def run(self, budget: int, progress: Callable[[int], None] | None = None) -> ExplorationResult:
         """Run Algorithm 1 until it returns or the budget of slices is spent; call again to continue."""
         if self._watch is not None and self._paused:
             self._watch(ExplorationResumed("the whole team"))
@@ -86,13 +86,13 @@ class PaperExploration:
             if progress is not None:
                 progress(len(self.slices.all))
 
-    def _once(self, budget: int) -> Outcome | None:
+    def _once(self, budget: int) -> ExplorationResult | None:
         """One pass of Algorithm 1's loop; None if the loop continues."""
         start = self._find_enclosing(self._start, budget)
-        if isinstance(start, Outcome):
+        if isinstance(start, ExplorationResult):
             return start
         goal = self._find_enclosing(self._goal, budget)
-        if isinstance(goal, Outcome):
+        if isinstance(goal, ExplorationResult):
             return goal
         (over_start, under_start), (over_goal, under_goal) = start, goal
         path = self._connect(self.under, under_start, under_goal)
@@ -106,7 +106,7 @@ class PaperExploration:
         failing = refine(path, [under_start], [under_goal], self.under)
         return None if self._subdivide_longest(failing) else self._outcome(Verdict.RESOLUTION, path)
 
-    def _find_enclosing(self, end: End, budget: int) -> tuple[GraphCell, GraphCell] | Outcome:
+    def _find_enclosing(self, end: End, budget: int) -> tuple[GraphCell, GraphCell] | ExplorationResult:
         """Subdivide until one slice has an over-cell and an under-cell that hold an end; return both."""
         angles, position = end
         while True:
@@ -166,8 +166,8 @@ class PaperExploration:
             cells = [*self.under.by_slice[index], *self.over.by_slice[index]]
             self._watch(SliceAdded(index, part.intervals, seen(cells)))
 
-    def _outcome(self, verdict: Verdict, path: Sequence[GraphCell]) -> Outcome:
-        return Outcome(verdict, tuple(path), len(self.slices.all))
+    def _outcome(self, verdict: Verdict, path: Sequence[GraphCell]) -> ExplorationResult:
+        return ExplorationResult(verdict, tuple(path), len(self.slices.all))
 
     def boxes(self, path: Sequence[GraphCell]) -> list[tuple[Intervals, Region]]:
         """Expanded intervals and region of every cell of a path of under-approximation cells."""

@@ -117,7 +117,7 @@ def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
 
 
 @dataclass(frozen=True)
-class _Route:
+class _TransitionGeometry:
     """The positions of one transition: its target, its goal region with its inradius, and its passage."""
 
     target: FloatArray
@@ -128,7 +128,7 @@ class _Route:
 
 def _route(
     problem: PlanningProblem, cells: Sequence[Cell], entry: FloatArray, target: FloatArray, index: int
-) -> _Route:
+) -> _TransitionGeometry:
     """The route from entry to target in the first cell; the second cell, if any, is entered there."""
     here = cells[0].tidied
     if len(cells) > 1:
@@ -136,7 +136,7 @@ def _route(
     else:
         region = component_at(_disc(target, problem.position_tolerance).intersection(here), Point(target))
     inradius = 0.0 if region.is_empty else BoundaryDistance(region)(target)
-    route = _Route(target, region, inradius, PassageFinder(here).find(entry, target))
+    route = _TransitionGeometry(target, region, inradius, PassageFinder(here).find(entry, target))
     narrowest = NARROWEST * usual_unit(problem.tree)
     wanted = (
         narrowest if len(cells) > 1 else min(narrowest, GOAL_REGION_FRACTION * problem.position_tolerance)
@@ -147,7 +147,7 @@ def _route(
     return route
 
 
-def _timed(problem: PlanningProblem, plan: Plan, routes: Sequence[_Route]) -> Plan:
+def _timed(problem: PlanningProblem, plan: Plan, routes: Sequence[_TransitionGeometry]) -> Plan:
     """The plan with estimated times; raises a StallError if one of them is too long."""
     plan = timed(plan, [route.passage.path for route in routes])
     for index, (route, transition) in enumerate(zip(routes, plan.transitions, strict=True)):
@@ -157,7 +157,7 @@ def _timed(problem: PlanningProblem, plan: Plan, routes: Sequence[_Route]) -> Pl
 
 
 def _transition(
-    gain_set: GainSet, cell: Cell, route: _Route, goals: Intervals, resting: FloatArray
+    gain_set: GainSet, cell: Cell, route: _TransitionGeometry, goals: Intervals, resting: FloatArray
 ) -> Transition:
     """A transition without its estimated time."""
     return Transition(
@@ -174,7 +174,7 @@ def _transition(
     )
 
 
-def _stall(problem: PlanningProblem, index: int, route: _Route, seconds: float) -> str:
+def _stall(problem: PlanningProblem, index: int, route: _TransitionGeometry, seconds: float) -> str:
     passage = route.passage
     x, y = passage.narrowest
     narrowest = NARROWEST * usual_unit(problem.tree)

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
-import numpy as np
-import shapely
 from shapely.errors import ShapelyError
 
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError
-from coop_drake.geometry.passage import PassageFinder
 from coop_drake.laws import GainSet
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
-from coop_drake.planning.execution.channel_ends import check_ends, goal_intervals, turned_to_start
-from coop_drake.planning.execution.targets import choose_targets
+from coop_drake.planning.execution.channel_ends import check_ends, turned_to_start
+from coop_drake.planning.execution.channel_path import path_through
 from coop_drake.planning.execution.transitions import Progress, make_plan
 from coop_drake.planning.improvement.path_covering import cover_path
-from coop_drake.tree.pose import FloatArray
 
 __all__ = ["quickest_plan"]
 
@@ -32,6 +26,9 @@ def quickest_plan(
     progress: Progress | None = None,
 ) -> Plan:
     """Make a plan along the path of a search's result, with other boxes if these can be found.
+
+    With the paper's fixed gains narrow scenarios often have no faster boxes; the plan then uses the boxes
+    that the search found.
 
     Args:
         problem: What was asked.
@@ -63,34 +60,3 @@ def quickest_plan(
             pass
     channel = found if isinstance(found, Channel) else found.channel()
     return make_plan(problem, channel, gain_set, gain_set_name=gain_set_name, progress=progress)
-
-
-def path_through(problem: PlanningProblem, channel: Channel) -> FloatArray:
-    """A path along the widest passages of a channel's boxes; angles move evenly from overlap to overlap.
-
-    Args:
-        problem: What was asked.
-        channel: The boxes, theta turned to the start.
-
-    Returns:
-        Free configurations from start to goal, theta unwrapped, shape (m, 3 + n).
-    """
-    targets = choose_targets(channel, problem.start[:2], problem.goal_pose[:2])
-    points = [problem.start[:2], *targets]
-    samples, axes = [problem.start], problem.start[2:]
-    for index, (box, (entry, target)) in enumerate(zip(channel.boxes, pairwise(points), strict=True)):
-        lower, upper = goal_intervals(problem, channel, index)
-        last = index + 1 == len(channel.boxes)
-        aim = np.clip(axes, lower, upper) if last else 0.5 * (lower + upper)
-        if last:
-            aim[0] = channel.goal_angle
-        passage = PassageFinder(box.polygon).find(entry, target)
-        corners = shapely.get_coordinates(passage.path)
-        at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(corners, axis=0).T))])
-        fractions = at / at[-1] if at[-1] > 0.0 else np.linspace(0.0, 1.0, len(at))
-        samples += [
-            np.array([*corner, *(axes + s * (aim - axes))])
-            for corner, s in zip(corners, fractions, strict=True)
-        ]
-        axes = aim
-    return np.array(samples)

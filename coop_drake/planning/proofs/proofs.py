@@ -13,7 +13,7 @@ from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.events import Watch
-from coop_drake.planning.cells.exploration import Exploration, Outcome, Verdict
+from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Verdict
 from coop_drake.planning.proofs.inscribed_disc import disc_refuted
 from coop_drake.planning.proofs.proof_making import slices_proof
 from coop_drake.planning.proofs.relaxation_test import RelaxationTest
@@ -62,7 +62,7 @@ class Proofs:
         self._all = tuple(sorted({joint.robot for joint in problem.tree.joints}))
         self._test = RelaxationTest(problem)
         self._explorations: dict[tuple[int, ...], Exploration] = {}
-        self._outcomes: dict[tuple[int, ...], Outcome] = {}
+        self._outcomes: dict[tuple[int, ...], ExplorationResult] = {}
         self._disc_tested = False
         self.refutation: Refutation | None = None
 

@@ -78,15 +78,15 @@ def improve(
         shift = (2.0 * u[4] - 1.0) * 0.3 / scale[axis]
         change = 0.0
         for k in range(i + 1, j):
-            share = (k - i) / (j - i)
+            fraction = (k - i) / (j - i)
             value = path[k, axis]
             if straight:
                 end = path[j, axis] if j < count else path[i, axis]
-                value = path[i, axis] + share * (end - path[i, axis])
+                value = path[i, axis] + fraction * (end - path[i, axis])
             elif j == count:
-                value += shift * min(1.0, 2.0 * share)
+                value += shift * min(1.0, 2.0 * fraction)
             else:
-                value += shift * min(1.0, 3.0 * min(share, 1.0 - share))
+                value += shift * min(1.0, 3.0 * min(fraction, 1.0 - fraction))
             for other in range(size):
                 fresh[k, other] = path[k, other]
             fresh[k, axis] = min(upper[axis], max(lower[axis], value))
@@ -100,7 +100,7 @@ def improve(
             )
         for k in range(i + 1, j):
             change += least - cost[k]
-        # Most moves fail: samples far apart from each other tell so soonest.
+        # Most moves fail: samples far apart from each other show this soonest.
         for first in STRIDES:
             for k in range(i + 1 + first, j, len(STRIDES)):
                 if change >= -1e-9:

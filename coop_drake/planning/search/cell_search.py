@@ -13,7 +13,7 @@ from coop_drake.planning.boxes.boxes import Box, explored_channel, make_channel
 from coop_drake.planning.boxes.channel import Channel, NoChannel
 from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.events import Watch
-from coop_drake.planning.cells.exploration import Exploration, Outcome, Verdict
+from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Verdict
 from coop_drake.planning.cells.printed_algorithms import PaperExploration
 from coop_drake.planning.proofs.proof_making import slices_proof
 from coop_drake.planning.questions.margins import marginal_workspace, margins
@@ -57,7 +57,7 @@ def search_by_cells(
 
 def _explore(
     problem: PlanningProblem, margin: float, progress: Progress | None, watch: Watch | None
-) -> tuple[AnyExploration, Outcome]:
+) -> tuple[AnyExploration, ExplorationResult]:
     """Explore at a margin, with all slices at margin zero and with a fraction of them at others."""
     budget = problem.settings.max_slices
     exploration = _exploration(problem, margin, watch)
@@ -94,7 +94,9 @@ def _boxes_at_margin(problem: PlanningProblem, found: list[tuple[Intervals, Regi
     ]
 
 
-def _no_channel(problem: PlanningProblem, exploration: AnyExploration, outcome: Outcome) -> NoChannel:
+def _no_channel(
+    problem: PlanningProblem, exploration: AnyExploration, outcome: ExplorationResult
+) -> NoChannel:
     """The answer of an exploration at margin zero that found no channel."""
     if outcome.verdict is Verdict.INFEASIBLE:
         robots = sorted({joint.robot for joint in problem.tree.joints})
