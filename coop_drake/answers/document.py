@@ -88,10 +88,10 @@ class Document:
 
     def check_intervals(self, key: str, axes: int, *, points: bool = False) -> None:
         """Refuse ends at ``key`` + lower, upper unless lower < upper on every axis (<= with points)."""
-        self.check_length(f"{key}lower", axes)
-        self.check_length(f"{key}upper", axes)
-        ends = zip(self.entry(f"{key}lower"), self.entry(f"{key}upper"), strict=True)
-        for axis, (lower, upper) in enumerate(ends):
+        for end in ("lower", "upper"):
+            self.check_length(f"{key}{end}", axes)
+        ends = (map(float, self.entry(f"{key}{end}")) for end in ("lower", "upper"))
+        for axis, (lower, upper) in enumerate(zip(*ends, strict=True)):
             if lower > upper or (lower == upper and not points):
                 least = f"{lower} or more" if points else f"more than {key}lower[{axis}], {lower}"
                 self.refuse(f"{key}upper[{axis}]", upper, least)
