@@ -6,6 +6,7 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.fields.quadrature import FloatArray
+from coop_drake.geometry.distances import nearest_fraction, ray_crosses
 
 __all__ = ["is_inside", "nearest_on_walls"]
 
@@ -23,11 +24,8 @@ def is_inside(numbers: FloatArray, first: int, count: int, x: float, y: float) -
     """
     inside = False
     for e in range(first, first + 4 * count, 4):
-        y0, y1 = numbers[e + 1], numbers[e + 3]
-        if (y0 > y) != (y1 > y):
-            side = (numbers[e + 2] - numbers[e]) * (y - y0) - (x - numbers[e]) * (y1 - y0)
-            if (side > 0.0) == (y1 > y0):
-                inside = not inside
+        if ray_crosses(x, y, numbers[e], numbers[e + 1], numbers[e + 2], numbers[e + 3]):
+            inside = not inside
     return inside
 
 
@@ -36,12 +34,9 @@ def nearest_on_walls(numbers: FloatArray, first: int, count: int, x: float, y: f
     """The point of the walls that is nearest to a point; arguments as in `is_inside`."""
     best, bx, by = np.inf, x, y
     for e in range(first, first + 4 * count, 4):
-        ax, ay = numbers[e], numbers[e + 1]
-        dx, dy = numbers[e + 2] - ax, numbers[e + 3] - ay
-        squared = dx * dx + dy * dy
-        t = ((x - ax) * dx + (y - ay) * dy) / squared if squared > 0.0 else 0.0
-        t = min(1.0, max(0.0, t))
-        px, py = ax + t * dx, ay + t * dy
+        x0, y0, x1, y1 = numbers[e], numbers[e + 1], numbers[e + 2], numbers[e + 3]
+        t = nearest_fraction(x, y, x0, y0, x1, y1)
+        px, py = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
         distance = (px - x) ** 2 + (py - y) ** 2
         if distance < best:
             best, bx, by = distance, px, py

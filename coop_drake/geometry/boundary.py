@@ -12,7 +12,7 @@ from shapely import Polygon
 
 from coop_drake.compiled import compiled
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.distances import segments_cross, squared_distance
+from coop_drake.geometry.distances import ray_crosses, segments_cross, squared_distance
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["BoundaryDistance", "edges_of", "signed_distance"]
@@ -38,7 +38,7 @@ def signed_distance(edges: FloatArray, x: float, y: float) -> float:
     for k in range(edges.shape[0]):
         x0, y0, x1, y1 = edges[k, 0], edges[k, 1], edges[k, 2], edges[k, 3]
         nearest = min(nearest, squared_distance(x, y, x0, y0, x1, y1))
-        if (y0 > y) != (y1 > y) and ((x - x0) * (y1 - y0) < (y - y0) * (x1 - x0)) == (y1 > y0):
+        if ray_crosses(x, y, x0, y0, x1, y1):
             inside = not inside
     return sqrt(nearest) if inside else -sqrt(nearest)
 

@@ -13,6 +13,8 @@ from coop_drake.tree.pose import FloatArray
 
 __all__ = [
     "meets_ring",
+    "nearest_fraction",
+    "ray_crosses",
     "ring_holds",
     "segments_cross",
     "separated",
@@ -29,15 +31,32 @@ def twice_area(ax: float, ay: float, bx: float, by: float, cx: float, cy: float)
 
 
 @compiled
+def nearest_fraction(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
+    """Where a segment is nearest to a point, as a fraction of its length from (x0, y0); 0 if it is a point."""
+    dx, dy = x1 - x0, y1 - y0
+    squared_length = dx * dx + dy * dy
+    s = ((x - x0) * dx + (y - y0) * dy) / squared_length if squared_length > 0.0 else 0.0
+    return min(max(s, 0.0), 1.0)
+
+
+@compiled
 def squared_distance(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
     """Squared distance of a point to the segment from (x0, y0) to (x1, y1), which may be a point [m^2]."""
-    dx, dy = x1 - x0, y1 - y0
-    px, py = x - x0, y - y0
-    squared_length = dx * dx + dy * dy
-    s = (px * dx + py * dy) / squared_length if squared_length > 0.0 else 0.0
-    s = min(max(s, 0.0), 1.0)
-    ex, ey = px - s * dx, py - s * dy
+    s = nearest_fraction(x, y, x0, y0, x1, y1)
+    ex, ey = x - x0 - s * (x1 - x0), y - y0 - s * (y1 - y0)
     return ex * ex + ey * ey
+
+
+@compiled
+def ray_crosses(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> bool:
+    """Whether the ray from (x, y) along the x axis crosses a segment.
+
+    A point is inside closed rings where its ray crosses an odd number of their edges. A vertex on the ray
+    counts as below it, so that the ray crosses one of the two edges of a boundary that it passes there.
+    """
+    if (y0 > y) == (y1 > y):
+        return False
+    return (twice_area(x0, y0, x1, y1, x, y) > 0.0) == (y1 > y0)
 
 
 @compiled

@@ -12,6 +12,7 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import signed_distance
+from coop_drake.geometry.distances import nearest_fraction
 from coop_drake.laws.axis_table import LOG_GAIN, bounds_of, track_row
 from coop_drake.laws.governor import (
     ATTRACTION_RATE,
@@ -54,9 +55,7 @@ def _steer(path: FloatArray, x: float, y: float, ahead: float, radius: float) ->
     nearest, segment, fraction = np.inf, 0, 0.0
     for k in range(path.shape[0] - 1):
         dx, dy = path[k + 1, 0] - path[k, 0], path[k + 1, 1] - path[k, 1]
-        squared = dx * dx + dy * dy
-        s = ((x - path[k, 0]) * dx + (y - path[k, 1]) * dy) / squared if squared > 0.0 else 0.0
-        s = min(max(s, 0.0), 1.0)
+        s = nearest_fraction(x, y, path[k, 0], path[k, 1], path[k + 1, 0], path[k + 1, 1])
         away = hypot(x - path[k, 0] - s * dx, y - path[k, 1] - s * dy)
         if away <= nearest:
             nearest, segment, fraction = away, k, s

@@ -11,7 +11,7 @@ from shapely import MultiPolygon, Polygon
 
 from coop_drake.compiled import compiled
 from coop_drake.geometry.convex import following
-from coop_drake.geometry.distances import squared_distance
+from coop_drake.geometry.distances import ray_crosses, squared_distance
 from coop_drake.geometry.minkowski import FreeSpace, polygon_rings
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
@@ -145,14 +145,10 @@ def _insides(edges: FloatArray, corner: FloatArray, side: float, rows: int, colu
         north = min(rows, int((max(y0, y1) - corner[1]) / side) + 1)
         for row in range(south, north):
             y = corner[1] + (row + 0.5) * side
-            if (y0 > y) == (y1 > y):
-                continue
-            x = x0 + (y - y0) * (x1 - x0) / (y1 - y0)
             for column in range(columns):
-                if corner[0] + (column + 0.5) * side < x:
-                    inside[column * rows + row] ^= 1
-                else:
+                if not ray_crosses(corner[0] + (column + 0.5) * side, y, x0, y0, x1, y1):
                     break
+                inside[column * rows + row] ^= 1
     return inside
 
 
