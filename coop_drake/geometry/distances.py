@@ -32,7 +32,7 @@ def twice_area(ax: float, ay: float, bx: float, by: float, cx: float, cy: float)
 
 @compiled
 def nearest_fraction(x: float, y: float, x0: float, y0: float, x1: float, y1: float) -> float:
-    """Where a segment is nearest to a point, as a fraction of its length from (x0, y0); 0 if it is a point."""
+    """Fraction of a segment's length, from (x0, y0), at which it is nearest to a point; 0 without length."""
     dx, dy = x1 - x0, y1 - y0
     squared_length = dx * dx + dy * dy
     s = ((x - x0) * dx + (y - y0) * dy) / squared_length if squared_length > 0.0 else 0.0

@@ -6,24 +6,20 @@ scipy's graphs and triangulations are imported where they are used: to read a sc
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from shapely import Polygon
 
-from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import BoundaryDistance, edges_of
-from coop_drake.geometry.distances import squared_distance
+from coop_drake.geometry.edge_pieces import IndexArray, cut_edges
 from coop_drake.tree.pose import FloatArray
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
 __all__ = ["Graph", "medial_graph", "widest_path"]
-
-IndexArray = NDArray[np.intp]
 
 SHORTEST_SAMPLE = 2e-3
 """The boundary is sampled no finer than this [m]; narrower passages are still measured exactly."""
@@ -155,49 +151,10 @@ def _samples_of(polygon: Polygon) -> tuple[FloatArray, IndexArray]:
     """Samples of every ring, shape (n, 2), and for each the index of the next one on its ring, shape (n,)."""
     sizes = [len(ring.coords) - 1 for ring in (polygon.exterior, *polygon.interiors)]
     coarsest = polygon.exterior.length / SAMPLES_PER_BOUNDARY
-    samples, owners = _sample_edges(edges_of(polygon), SHORTEST_SAMPLE, coarsest, SAMPLES_PER_CLEARANCE)
+    samples, owners = cut_edges(edges_of(polygon), SHORTEST_SAMPLE, coarsest, SAMPLES_PER_CLEARANCE)
     rings = np.repeat(np.arange(len(sizes)), sizes)[owners]
     successor = np.arange(1, len(samples) + 1)
     for ring in range(len(sizes)):
         members = np.flatnonzero(rings == ring)
         successor[members[-1]] = members[0]
     return samples, successor
-
-
-@compiled
-def _opposite_wall(edges: FloatArray, k: int, x: float, y: float) -> float:
-    """Distance of a point of edge k to the nearest edge that does not touch it [m]."""
-    gap = np.inf
-    for j in range(edges.shape[0]):
-        follows = edges[j, 0] == edges[k, 2] and edges[j, 1] == edges[k, 3]
-        precedes = edges[j, 2] == edges[k, 0] and edges[j, 3] == edges[k, 1]
-        if j != k and not follows and not precedes:
-            gap = min(gap, squared_distance(x, y, edges[j, 0], edges[j, 1], edges[j, 2], edges[j, 3]))
-    return sqrt(gap)
-
-
-@compiled
-def _sample_edges(
-    edges: FloatArray, shortest: float, coarsest: float, per_clearance: float
-) -> tuple[FloatArray, IndexArray]:
-    """Halve every edge until its pieces are short against their distance to the opposite wall.
-
-    Returns:
-        Starts of the pieces in order, shape (n, 2), and the edge of each, shape (n,).
-    """
-    samples = [(edges[0, 0], edges[0, 1])]
-    owners = [0]
-    for k in range(edges.shape[0]):
-        x0, y0, dx, dy = edges[k, 0], edges[k, 1], edges[k, 2] - edges[k, 0], edges[k, 3] - edges[k, 1]
-        length = sqrt(dx * dx + dy * dy)
-        stack = [(0.0, 1.0)]
-        while len(stack) > 0:
-            s, t = stack.pop()
-            gap = _opposite_wall(edges, k, x0 + 0.5 * (s + t) * dx, y0 + 0.5 * (s + t) * dy)
-            if (t - s) * length > max(shortest, min(coarsest, gap / per_clearance)):
-                stack.append((0.5 * (s + t), t))
-                stack.append((s, 0.5 * (s + t)))
-            else:
-                samples.append((x0 + s * dx, y0 + s * dy))
-                owners.append(k)
-    return np.array(samples[1:]), np.array(owners[1:])

@@ -11,7 +11,7 @@ from shapely import Polygon
 
 from coop_drake.compiled import compiled
 from coop_drake.geometry.distances import segments_cross, squared_distance, twice_area
-from coop_drake.geometry.medial import IndexArray
+from coop_drake.geometry.edge_pieces import IndexArray
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["sharpest_angle", "simplify_inward", "vertex_angles"]
