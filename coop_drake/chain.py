@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.errors import PlanError
 from coop_drake.laws.gains import GainSet, ScheduledGains
+from coop_drake.progress import Progress
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from coop_drake.verification import Verified
 
 __all__ = ["plan", "show", "verify", "why"]
-
-Progress = Callable[[str, float], None]
-"""Called with the name of a stage and the fraction of it that is done."""
 
 _SCHEDULED = "scheduled"
 """Name of the gain set of a problem that comes without a scenario."""

@@ -14,9 +14,10 @@ from coop_drake.diagnosis.open_floor import on_open_floor
 from coop_drake.diagnosis.passages import UniformWidening, blocking_passages
 from coop_drake.diagnosis.relaxations import try_changes
 from coop_drake.diagnosis.smaller_changes import clear_elsewhere, least_change
-from coop_drake.diagnosis.variants import Answer, BudgetedPlanner, Outcome, Progress
+from coop_drake.diagnosis.variants import Answer, BudgetedPlanner, Outcome
 from coop_drake.diagnosis.widened_floor import WidenedFloor
 from coop_drake.planning import Channel, find_channel
+from coop_drake.progress import Progress
 
 __all__ = ["diagnose", "find_passages"]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -14,10 +13,11 @@ from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.proofs.proofs import Proofs
 from coop_drake.planning.sampling.sampler import densified
 from coop_drake.planning.search.sampled_search import SampledSearch
+from coop_drake.progress import Progress
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Answer", "BudgetedPlanner", "Outcome", "Progress"]
+__all__ = ["Answer", "BudgetedPlanner", "Outcome"]
 
 STEP = 0.05
 """Distance of consecutive configurations of the paths that are looked at [m]."""
@@ -27,9 +27,6 @@ PATHS = 2
 
 BOXES_PER_SLICE = 20
 """Boxes whose certification takes about as long as sweeping one slice [-]."""
-
-Progress = Callable[[str, float], None]
-"""Called with a stage and the fraction of the budget that is spent."""
 
 
 class Answer(Enum):

@@ -12,9 +12,9 @@ from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import GainSet
 from coop_drake.planning.boxes.channel import NoChannel
-from coop_drake.planning.execution.transitions import Progress
 from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.planning.search.search import find_path
+from coop_drake.progress import Progress
 
 __all__ = ["plan"]
 

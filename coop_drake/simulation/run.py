@@ -12,6 +12,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.diagram import Blocks, ClosedLoop, Replacements, build_closed_loop
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import read_component_tree
+from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.invariants import Invariants
@@ -21,8 +22,6 @@ from coop_drake.simulation.telemetry import Sample
 from coop_drake.simulation.watch import Watch
 
 __all__ = ["configure_simulator", "simulate"]
-
-Progress = Callable[[str, float], None]
 
 
 def simulate(

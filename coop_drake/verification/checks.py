@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
-__all__ = ["Check", "Progress", "Verified"]
-
-Progress = Callable[[str, float], None]
-"""Called with the name of a phase and the fraction of it that is done."""
+__all__ = ["Check", "Verified"]
 
 
 @dataclass(frozen=True)

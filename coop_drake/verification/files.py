@@ -13,7 +13,8 @@ from coop_drake.answers.document import Document
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
-from coop_drake.verification.checks import Check, Progress, Verified
+from coop_drake.progress import Progress
+from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.plans import verify_plan
 from coop_drake.verification.problem_match import check_digest
 from coop_drake.verification.proofs import verify_proof

@@ -22,7 +22,8 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import LIMIT_ROOM, PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
-from coop_drake.verification.checks import Check, Progress, Verified
+from coop_drake.progress import Progress
+from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.figures import check_figures
 from coop_drake.verification.floor_edges import floor_edges
 from coop_drake.verification.free_cells import check_apart, check_clear_of_walls

@@ -23,8 +23,9 @@ import numpy as np
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import BlockedGoalProof, DiscProof, InfeasibilityProof, SlicesProof
 from coop_drake.errors import RefusalError
+from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
-from coop_drake.verification.checks import Check, Progress, Verified
+from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.covers import check_blocked, check_cover
 from coop_drake.verification.discs import check_disc
 from coop_drake.verification.free_positions import FreePositions

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import MeshcatAnimation
 from pydrake.math import RigidTransform
 
+from coop_drake.progress import Progress
 from coop_drake.simulation import SimulationLog
 from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.animation_tracks import Tracks
@@ -17,9 +16,7 @@ from coop_drake.viz.cells import cell_paths
 from coop_drake.viz.scene import TransportScene
 from coop_drake.viz.trail import INDICES, set_trail, trail_points
 
-__all__ = ["Progress", "animation_of"]
-
-Progress = Callable[[str, float], None]
+__all__ = ["animation_of"]
 
 _TRAIL = "/motion/trail"
 _ARROW_ANGLE = 0.06

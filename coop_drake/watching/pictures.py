@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import IO
@@ -13,13 +13,12 @@ from PIL import Image
 from coop_drake.drawing.canvas import save_figure
 from coop_drake.drawing.colours import PAPER
 from coop_drake.files import write_atomically
+from coop_drake.progress import Progress
 from coop_drake.watching.keyframe_figure import keyframe_figure
 from coop_drake.watching.keyframes import Keyframe
 from coop_drake.watching.recording import SearchRecording
 
 __all__ = ["on_sheet", "write_pictures"]
-
-Progress = Callable[[str, float], None]
 
 _ON_SHEET, _SHEET_COLUMNS = 6, 2
 """Number of pictures on the sheet, and of its columns."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 
@@ -28,11 +27,10 @@ from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.cells.printed_algorithms import PaperExploration
 from coop_drake.planning.questions.margins import marginal_workspace
 from coop_drake.planning.search.search import find_channel
+from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["BOXES", "SearchRecording", "Strategy", "record_search"]
-
-Progress = Callable[[str, float], None]
 
 BOXES = "boxes along a sampled path"
 """The question of the events that add the boxes of a channel one by one."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import groupby
 from math import pi
 from pathlib import Path
@@ -17,6 +17,7 @@ from coop_drake.drawing.solids import TriangleMesh, extruded_section, joined, tu
 from coop_drake.files import write_atomically
 from coop_drake.geometry.swept_tree import Interval
 from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.channel_path import PathPiece
 from coop_drake.watching.keyframes import Keyframe
@@ -28,8 +29,6 @@ from coop_drake.watching.scene_surroundings import Surface, put_mesh, put_surrou
 from coop_drake.watching.theta_layers import THETA, layers, on_turn
 
 __all__ = ["scene_page", "write_scene"]
-
-Progress = Callable[[str, float], None]
 
 _RATE = 4
 """Keyframes per second [1/s]: each can be looked at."""

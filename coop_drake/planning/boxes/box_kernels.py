@@ -18,6 +18,7 @@ from coop_drake.geometry.distances import separated
 from coop_drake.geometry.sweep_kernels import over_piece
 from coop_drake.planning.sampling.collision_kernels import ring_clearance
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
+from coop_drake.planning.travel_time import SETTLING_TIME, SPEED_PER_CLEARANCE
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
 
@@ -26,12 +27,6 @@ COARSENESS = 0.15
 
 _STEP_FRACTION = 0.5
 """Step along a path over the clearance there [-]: below 1, so that every place lies in a free disc."""
-
-_BOX_TIME = 0.6
-"""Time that the hand-over to a box is assumed to take, while angles settle [s]; it only ranks boxes."""
-
-_SPEED = 3.0
-"""Speed over clearance that is assumed while a box is passed [1/s]; it only ranks boxes."""
 
 
 class BoxArrays(NamedTuple):
@@ -291,7 +286,7 @@ def longest_box(
             )
             length += hypot(dx, dy)
             measured += 1
-        pace = (j - first) / (_BOX_TIME + length / (_SPEED * max(margin + found, 1e-3)))
+        pace = (j - first) / (SETTLING_TIME + length / (SPEED_PER_CLEARANCE * max(margin + found, 1e-3)))
         if pace > fastest:
             quickest, fastest = j, pace
     return quickest, best, trials

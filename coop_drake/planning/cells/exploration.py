@@ -28,9 +28,7 @@ from coop_drake.planning.cells.halves import Halves
 from coop_drake.planning.cells.mixed_cells import mixed_cells
 from coop_drake.planning.cells.slices import Slices, holds
 from coop_drake.planning.cells.split_rules import SplitOrder
-
-SETTLING_TIME = 0.6
-"""Weight of every FREE cell: the time that angles need to settle when cells are handed over [s]."""
+from coop_drake.planning.travel_time import SETTLING_TIME
 
 TIME_PER_INVERSE_BREADTH = 0.03
 """Weight of a FREE cell for its narrowness, times its breadth (area over perimeter) [s m]."""

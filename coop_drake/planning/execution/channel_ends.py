@@ -13,15 +13,16 @@ from coop_drake.errors import PlanError
 from coop_drake.planning.boxes.channel import Channel
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["check_ends", "final_intervals", "goal_intervals", "turned_to_start"]
+__all__ = ["Bounds", "check_ends", "final_intervals", "goal_intervals", "turned_to_start"]
 
 GOAL_FRACTION = 0.9
 """Fraction of a tolerance that a goal interval takes, so that its edges are within tolerance [-]."""
 
-Intervals = tuple[FloatArray, FloatArray]
+Bounds = tuple[FloatArray, FloatArray]
+"""Lower and upper ends of (theta, q...), shape (1 + n,) each [rad, m]."""
 
 
-def final_intervals(problem: PlanningProblem, goal_angle: float) -> Intervals:
+def final_intervals(problem: PlanningProblem, goal_angle: float) -> Bounds:
     """Intervals of (theta, q...) in which the goal is reached; infinite for joints that are free there.
 
     Args:
@@ -35,7 +36,7 @@ def final_intervals(problem: PlanningProblem, goal_angle: float) -> Intervals:
     return np.array(lower), np.array(upper)
 
 
-def goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Intervals:
+def goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Bounds:
     """Intervals of (theta, q...) to reach in a box: its overlap with the next box or with the goal.
 
     Raises:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import inf, isfinite, sqrt
+from math import isfinite, sqrt
 
 import numpy as np
 import shapely
@@ -16,23 +16,14 @@ from coop_drake.geometry.boundary import edges_of
 from coop_drake.geometry.passage import PassageFinder
 from coop_drake.laws import TransitionGains, axis_table
 from coop_drake.planning.execution.transport_kernels import cross_cell
+from coop_drake.planning.travel_time import transition_time
 from coop_drake.tree.pose import FloatArray
 
 __all__ = [
-    "SETTLING_TIME",
-    "SPEED_PER_CLEARANCE",
     "plan_time",
     "speed_per_clearance",
     "timed",
-    "transition_time",
-    "travel_time",
 ]
-
-SETTLING_TIME = 0.6
-"""Time that angles and joints need at any distance, for choices made before gains are known [s]."""
-
-SPEED_PER_CLEARANCE = 3.0
-"""Speed over clearance with the paper's gains, for choices made before gains are known [1/s]."""
 
 LONGEST = 120.0
 """A transition that takes longer is not integrated to its end [s]; such a plan is of no use."""
@@ -53,22 +44,6 @@ def speed_per_clearance(gains: TransitionGains) -> float:
     """
     K, K_G, zeta = gains.stiffness, gains.governor_gain, gains.damping
     return sqrt(K / (2.0 * K / K_G**2 + 1.0 + zeta**2 / K))
-
-
-def travel_time(length: float, neck: float, speed: float = SPEED_PER_CLEARANCE) -> float:
-    """Return the time that the object needs for a path whose clearance is the neck everywhere [s].
-
-    Args:
-        length: L, length of the path to the target [m].
-        neck: b, clearance that the path keeps [m].
-        speed: Speed over clearance [1/s].
-    """
-    return length / (speed * neck) if neck > 0.0 else inf
-
-
-def transition_time(length: float, neck: float, speed: float = SPEED_PER_CLEARANCE) -> float:
-    """Return an approximate time of one transition, ``SETTLING_TIME`` more than its travel [s]."""
-    return SETTLING_TIME + travel_time(length, neck, speed)
 
 
 def plan_time(plan: Plan) -> float:

@@ -13,7 +13,7 @@ from coop_drake.errors import GeometryError, PlanError
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.passage import PassageFinder, pole
 from coop_drake.planning.boxes.channel import Channel, FreeBox
-from coop_drake.planning.execution.estimate import transition_time
+from coop_drake.planning.travel_time import transition_time
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["choose_targets"]

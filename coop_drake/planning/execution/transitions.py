@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, pi, sin
 
@@ -19,9 +19,11 @@ from coop_drake.geometry.slits import component_at
 from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.laws import GainSet, TransitionGains, transition_gains
 from coop_drake.planning.boxes.channel import Channel, FreeBox
-from coop_drake.planning.execution.channel_ends import check_ends, goal_intervals, turned_to_start
-from coop_drake.planning.execution.estimate import timed, travel_time
+from coop_drake.planning.execution.channel_ends import Bounds, check_ends, goal_intervals, turned_to_start
+from coop_drake.planning.execution.estimate import timed
 from coop_drake.planning.execution.targets import choose_targets
+from coop_drake.planning.travel_time import travel_time
+from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.usual_unit import usual_unit
 
@@ -39,9 +41,6 @@ DISC_VERTICES = 32
 
 SAME_PLACE = 1e-9
 """A target this close to where its cell is entered leaves only angles to move [m]: it absorbs rounding."""
-
-Progress = Callable[[str, float], None]
-Intervals = tuple[FloatArray, FloatArray]
 
 
 def make_plan(
@@ -157,7 +156,7 @@ def _timed(problem: PlanningProblem, plan: Plan, routes: Sequence[_TransitionGeo
 
 
 def _transition(
-    gain_set: GainSet, cell: Cell, route: _TransitionGeometry, goals: Intervals, resting: FloatArray
+    gain_set: GainSet, cell: Cell, route: _TransitionGeometry, goals: Bounds, resting: FloatArray
 ) -> Transition:
     """A transition without its estimated time."""
     return Transition(
@@ -195,9 +194,7 @@ def _cell(box: FreeBox, entry: FloatArray, target: FloatArray, index: int) -> Ce
     return Cell(box.lower, box.upper, box.polygon, box.core, tidied)
 
 
-def _gains(
-    gain_set: GainSet, cell: Cell, neck: float, goal: Intervals, resting: FloatArray
-) -> TransitionGains:
+def _gains(gain_set: GainSet, cell: Cell, neck: float, goal: Bounds, resting: FloatArray) -> TransitionGains:
     return transition_gains(
         gain_set,
         neck=neck,

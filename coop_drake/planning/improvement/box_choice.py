@@ -11,6 +11,7 @@ from coop_drake.laws.gain_schedule import Schedule
 from coop_drake.planning.boxes.box_kernels import BoxArrays, clearances_in_box
 from coop_drake.planning.improvement.box_crossing import cross_box, smallest
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
+from coop_drake.planning.travel_time import SETTLING_TIME
 from coop_drake.tree.pose import FloatArray, IntArray
 
 __all__ = ["Waypoints", "choose_boxes"]
@@ -22,7 +23,7 @@ BOX_COST = 9e-4
 """Every box costs this over its padding besides its simulated time [rad s]: fewer boxes are better if the
 times are equal, and narrow funnels leave little tolerance for what the simulation leaves out."""
 
-LARGEST_DELAY = 0.6
+LARGEST_DELAY = SETTLING_TIME
 """Box sequences that reach a waypoint later than the fastest one by more than this are dropped [s]: the time
 that angles need to settle is the most that a wider box can save."""
 

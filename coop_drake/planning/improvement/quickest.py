@@ -11,8 +11,9 @@ from coop_drake.laws import GainSet
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
 from coop_drake.planning.execution.channel_ends import check_ends, turned_to_start
 from coop_drake.planning.execution.channel_path import path_through
-from coop_drake.planning.execution.transitions import Progress, make_plan
+from coop_drake.planning.execution.transitions import make_plan
 from coop_drake.planning.improvement.path_covering import cover_path
+from coop_drake.progress import Progress
 
 __all__ = ["quickest_plan"]
 

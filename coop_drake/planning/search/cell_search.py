@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.geometry.body_pairs import BodyPairs
@@ -17,6 +15,7 @@ from coop_drake.planning.cells.exploration import Exploration, ExplorationResult
 from coop_drake.planning.cells.printed_algorithms import PaperExploration
 from coop_drake.planning.proofs.proof_making import slices_proof
 from coop_drake.planning.questions.margins import marginal_workspace, margins
+from coop_drake.progress import Progress
 
 __all__ = ["search_by_cells"]
 
@@ -24,7 +23,6 @@ MARGIN_BUDGET_DIVISOR = 8
 """An exploration at a margin may make this fraction of the slices, one in eight: most of them fail, and a
 plan at margin zero exists already."""
 
-Progress = Callable[[str, float], None]
 AnyExploration = Exploration | PaperExploration
 
 

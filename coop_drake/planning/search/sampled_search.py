@@ -51,8 +51,6 @@ LIGHT_ATTEMPTS = 4
 MANY_SAMPLES = 32_000
 """Samples for every subsystem in later attempts: about a second each."""
 
-Progress = Callable[[float], None]
-
 
 @dataclass(frozen=True)
 class BoxSequence:
@@ -93,7 +91,7 @@ class SampledSearch:
         self.slices = 0
         self.object_blocked = 0
 
-    def attempt(self, progress: Progress | None = None) -> BoxSequence | None:
+    def attempt(self, progress: Callable[[float], None] | None = None) -> BoxSequence | None:
         """Sample one path and cover it at margin zero; every call uses other samples.
 
         Args:
@@ -108,7 +106,7 @@ class SampledSearch:
         except (GeometryError, ShapelyError):
             return None
 
-    def _attempt(self, number: int, progress: Progress | None) -> BoxSequence | None:
+    def _attempt(self, number: int, progress: Callable[[float], None] | None) -> BoxSequence | None:
         clearance = CLEARANCES[(number - 1) % len(CLEARANCES)]
         workspace = marginal_workspace(self._problem, clearance)
         sampler = Sampler(self._hierarchy, workspace, BODY_GAP, number - 1, progress)
@@ -123,7 +121,7 @@ class SampledSearch:
                 return found
         return None
 
-    def narrow_attempt(self, progress: Progress | None = None) -> BoxSequence | None:
+    def narrow_attempt(self, progress: Callable[[float], None] | None = None) -> BoxSequence | None:
         """Sample paths on larger floors, repair them until they fit the floor, and cover them at margin zero.
 
         This finds passages that are too narrow for samples.

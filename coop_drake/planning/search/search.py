@@ -30,6 +30,7 @@ from coop_drake.planning.questions.question_checks import check_question, goal_b
 from coop_drake.planning.search.cell_search import search_by_cells
 from coop_drake.planning.search.rescaling import Rescaling
 from coop_drake.planning.search.sampled_search import BoxSequence, SampledSearch
+from coop_drake.progress import Progress
 from coop_drake.tree.usual_unit import usual_unit
 
 __all__ = ["find_channel", "find_path"]
@@ -51,8 +52,6 @@ FIRST_EXPLORATION = 250
 
 FEW_ROBOTS = 1
 """Robots that are kept in explorations before paths through narrow passages are sampled."""
-
-Progress = Callable[[str, float], None]
 
 
 def find_channel(
