@@ -85,7 +85,7 @@ Number = Annotated[float, EXACT]
 
 
 class Codec(NamedTuple):
-    """How a type is read and written that this module does not know.
+    """How to read and write a type that this module does not know.
 
     Attributes:
         read: Makes the typed value of plain data and its key; raises :class:`DataError`.

@@ -11,9 +11,9 @@ from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import Limits, NotNegative, Positive
 
 LIMIT_ROOM = 0.01
-"""Room that a joint has about its start and goal, also beyond a limit: a funnel has two sides [rad].
+"""A joint may be planned this far around its start and its goal, even beyond a limit [rad].
 
-Prismatic joints have so much in units of the object's radius.
+A funnel needs room on both sides. For a prismatic joint it is this number times the object's radius.
 """
 
 ROUNDING = 1e-9
@@ -25,8 +25,9 @@ class PlannerSettings:
     """How hard the planner tries.
 
     Attributes:
-        margin: First margin rho tried [m]; smaller ones follow until a plan is found, 0 last. For teams of
-            another scale than usual one that they could not mean is replaced by the usual one, scaled.
+        margin: First margin rho tried [m]; smaller ones follow until a plan is found, 0 last. For very large
+            or very small teams, a margin that is unreasonable for their size is replaced by the default,
+            scaled to the team.
         slice_overlap: Overlap of neighbouring slices as a fraction of their width, for under-cells only.
         angle_resolution: Slices of angles are not split below this width [rad].
         length_resolution: Slices of prismatic joints are not split below this width [m].

@@ -73,7 +73,7 @@ class SlicesProof:
 
 @dataclass(frozen=True)
 class DiscProof:
-    """A disc inside one component cannot get from where the start puts it to where the goal wants it.
+    """A disc in one component cannot get from its place at the start to any place it may have at the goal.
 
     Attributes:
         component: Index of the component in the tree.

@@ -3,6 +3,9 @@
 A command is a function in the module of its name: ``coop-drake plan`` is ``plan_command`` in ``plan.py``.
 It imports Drake, the planner and matplotlib when it is called, so that no command waits for what it does not
 need.
+
+A new command is a module here, an entry in ``_PANELS``, its examples in ``examples.py`` (without them the
+import fails), and a row in the README.
 """
 
 from __future__ import annotations

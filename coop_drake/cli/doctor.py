@@ -76,7 +76,7 @@ def doctor_command(
 
 
 def examine() -> list[Finding]:
-    """Make every check; one that raises an error has found something wrong."""
+    """Run every check; an exception counts as a failed check."""
     enough = sys.version_info >= (3, 11)
     findings = [Finding("Python", platform.python_version(), enough, "install 3.11 or newer"), *_versions()]
     for what, check, remedy in _CHECKS:

@@ -39,9 +39,10 @@ class Amounts:
     Attributes:
         first: First amount; doubled until a channel is found.
         most: Largest amount.
-        resolution: The bracket is narrowed down to this.
-        fraction: Or to this fraction of the amount found, if that is more [-].
-        asked: How many amounts are tried at most.
+        resolution: The bracket is narrowed until its width is at most the larger of ``resolution`` and
+            ``fraction`` times the amount found.
+        fraction: See ``resolution`` [-].
+        asked: Largest number of amounts that are tried.
     """
 
     first: float

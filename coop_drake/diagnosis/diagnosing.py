@@ -71,12 +71,12 @@ def diagnose(problem: PlanningProblem, progress: Progress | None = None) -> Diag
 def find_passages(
     problem: PlanningProblem, floor: WidenedFloor, planner: BudgetedPlanner, *, refuted: bool
 ) -> PassageFindings:
-    """Move all walls back until there is a path, and see where it leaves the floor as it is.
+    """Move all walls back until there is a path, and find where that path leaves the original floor.
 
     Args:
         problem: The problem.
         floor: Its floor, with walls that can be moved back.
-        planner: Answers variants.
+        planner: Plans variants of the problem within a work budget.
         refuted: Whether the problem was proved infeasible as it is.
     """
 

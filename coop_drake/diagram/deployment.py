@@ -67,8 +67,8 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int) -> DeployedC
 
     In the order of the signals: ``robot_state`` and ``object_pose`` get noise, then a delay; ``robot_effort``
     is held for a period, then limited; ``ready`` goes through a :class:`MessageChannel`, or a hold where
-    nothing is lost or late. The limit is always there: that of the actuators, or where none is given one so
-    high that only a run that is lost meets it.
+    nothing is lost or late. The limit is always there: that of the actuators, or where none is given, one so
+    high that only a diverging run reaches it.
 
     Args:
         controller: From :func:`build_robot_controller`, with the same period.

@@ -58,8 +58,8 @@ def new_figure(
         height: Of the figure [in].
         caption: Text under the picture; it is broken into lines that fit the width.
         margins: Space for labels at the left, at the right and at the top of the axes [in]; the space below
-            them follows from the caption. By default the labels are measured, which takes as long as
-            drawing the figure twice more.
+            them follows from the caption. By default the labels are measured, which costs as much as
+            drawing the figure two more times.
     """
     figure = Figure(figsize=(width, height), layout=None if margins else "constrained")
     FigureCanvasAgg(figure)

@@ -1,5 +1,6 @@
-"""Every colour of every picture, as ``#rrggbb``: what it stands for, in figures, scenes and pages alike.
+"""Every colour of figures, scenes and pages, as ``#rrggbb``: what it stands for is the same in all of them.
 
+Only the team's bodies in a scene have other colours: those of their models (``models/*.sdf``).
 The palette is that of Okabe and Ito, whose colours stay apart for colour-blind readers and in print.
 """
 
@@ -32,6 +33,11 @@ WALL_IN_SPACE = "#808c9e"
 PILLAR = "#6b7585"
 SHELF = "#b88f5c"
 EDGE = "#21262e"
+
+# The bodies of models that this package writes: red, green, blue and opacity, as SDF files have them.
+OBJECT_IN_MODELS = "0.76 0.60 0.42 1"
+BASE_IN_MODELS = "0.13 0.36 0.62 1"
+LINK_IN_MODELS = "0.45 0.66 0.86 1"
 
 # What the planner knows of positions and slices, and the channel that it follows through them.
 PROVED_FREE = BLUE

@@ -45,11 +45,11 @@ def direction_error(harmonic_map: HarmonicMap, points: FloatArray) -> FloatArray
 
 
 def check_certainty(harmonic_map: HarmonicMap) -> None:
-    """Refuse a map that leaves the field's direction open in more than a hundredth of the region.
+    """Refuse a map whose error leaves the field's direction undetermined in more than 1 % of the region.
 
-    This happens in aisles between holes that are far longer than wide and whose images lie in line with the
-    goal's: there the Jacobian's determinant is of the size of exp(-pi length / width). The direction is
-    sampled in the leaves of the map's quadtree, which are smaller near walls.
+    This happens in long, narrow aisles between two holes when the images of the holes and of the goal lie in
+    one line: the Jacobian's determinant is then about exp(-pi length / width), less than the map's error.
+    The direction is tested at the centres of the squares of the map's quadtree, which are smaller near walls.
 
     Raises:
         FieldError: With the part of the region and the place there that is farthest from walls.

@@ -56,7 +56,7 @@ def seen_from(m: FlatMap, k: int, place: int, level: int, x: float, y: float) ->
 
 @compiled(reassociate=True)
 def solved_nodes(m: FlatMap, k: int, place: int) -> tuple[int, int]:
-    """First solved node of a regular panel or of a corner's block, and the node after its last."""
+    """Index range [first, end) of the solved nodes of a regular panel or of a corner's block."""
     if k >= 0:
         return integer(m, CORNER_INDEX, k, 7, 0), integer(m, CORNER_INDEX, k + 1, 7, 0)
     regular = integer(m, CORNER_INDEX, rows_of(m, CORNERS), 7, 0)

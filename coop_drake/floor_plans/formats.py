@@ -1,5 +1,9 @@
 """The floor-plan formats that can be read: to add one, write its reader and enter it in `READERS`.
 
+The formats are also listed for users: in the help of `cli/floor_plan.py`, in `scenario/model.py` (the key
+`file`; from it `python -m docs.generate` writes `docs/reference/scenario.md`), in `read_floor_plan` of
+`plan.py`, in the README and in `docs/how_to/floor_plan.md`.
+
 A reader takes the path of a file and the settings. It returns a `Drawing` (lines, each of them a wall; see
 `walls.py`) or an `OccupancyMap` (cells that are free or not; see `map_file.py`), and raises a
 `FloorPlanError` with place, finding and remedy where the file cannot be used. Everything after that, from

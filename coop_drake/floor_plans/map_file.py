@@ -53,7 +53,7 @@ class OccupancyMap:
         )
 
     def cell(self, point: tuple[float, float]) -> tuple[int, int]:
-        """Row and column of the cell that holds a point of W; they may lie outside."""
+        """Row and column of the cell that holds a point of W; both may be outside the map's array."""
         x, y, yaw = self.origin
         dx, dy = point[0] - x, point[1] - y
         column = (cos(yaw) * dx + sin(yaw) * dy) / self.resolution

@@ -11,12 +11,12 @@ SLACK = 1e-9
 
 
 def following(ring: FloatArray) -> FloatArray:
-    """Ring that starts one entry later; shape (n, ...) to the same."""
+    """Rotate a ring by one entry, so that entry i is what followed entry i; the shape (n, ...) stays."""
     return np.concatenate((ring[1:], ring[:1]))
 
 
 def preceding(ring: FloatArray) -> FloatArray:
-    """Ring that starts one entry earlier; shape (n, ...) to the same."""
+    """Rotate a ring by one entry, so that entry i is what preceded entry i; the shape (n, ...) stays."""
     return np.concatenate((ring[-1:], ring[:-1]))
 
 

@@ -37,7 +37,7 @@ def shared(first: CrossSection, second: CrossSection, *, over: bool) -> CrossSec
 
 
 def components(section: CrossSection, *, over: bool) -> list[CrossSection]:
-    """Connected parts of a region; where that fails, an over-region is one part, and another has none."""
+    """Connected parts of a region; if decomposing fails, the whole region if ``over``, otherwise none."""
     if section.is_empty():
         return []
     try:

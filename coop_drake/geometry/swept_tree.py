@@ -72,8 +72,9 @@ class SweptTree:
         Args:
             index: Index into ``pieces``.
             intervals: The slice.
-            stages: Number of joints to sweep, from the piece's own; None for all and theta, which gives
-                directions of W; fewer leave the piece in the frame of the component ``chain[stages]``.
+            stages: Number of joints to sweep, counted from the piece's own joint towards the object. None:
+                all joints and theta; the result is in W. Fewer: the result is in the frame of the component
+                ``chain[stages]``.
 
         Returns:
             Vertices, counter-clockwise, shape (n, 2) [m].

@@ -119,7 +119,8 @@ def scheduled_axis(
 
     lambda = clamp(sqrt(``funnel_acceleration`` / shrink)), shrink being the distance that the faster bound
     moves: a smooth bound starts with the acceleration lambda^2 times its shrink. kappa is the largest gain,
-    up to ``max_log_gain``, with which the log term kappa |a s| at rest stays below ``log_acceleration``.
+    up to ``max_log_gain``, with which the log term kappa |a s| at rest stays below ``log_acceleration``; a
+    and s are those of ``track_axis`` in ``ppc.py``.
     The bound on V is ``energy_factor`` times the energy at rest, plus ``energy_allowance`` times kappa.
 
     Args:

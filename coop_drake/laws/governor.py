@@ -3,7 +3,8 @@
 The governor moves a reference point p_G towards the target of the cell. A spring and a damper pull the
 object's origin p towards p_G. The governor slows down when the energy of this motion comes near what the
 clearance of p_G allows. The controllers, the planner's time estimate, the log, the figures and the tests
-all call these functions.
+all call these functions. One closed form is derived from them by hand and must follow a change:
+``speed_per_clearance`` in ``planning/execution/estimate.py``, which a test compares with a run.
 """
 
 from __future__ import annotations

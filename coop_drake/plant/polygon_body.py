@@ -10,15 +10,13 @@ from pathlib import Path
 import numpy as np
 from shapely import Polygon
 
+from coop_drake.drawing.colours import OBJECT_IN_MODELS
 from coop_drake.errors import GeometryError
 from coop_drake.files import write_atomically
 from coop_drake.plant.convex_parts import convex_parts
 from coop_drake.tree.pose import FloatArray
 
 Point = Sequence[float]
-
-_COLOUR = "0.76 0.60 0.42 1"
-"""Colour of the body, red, green, blue and opacity, as of the shipped object."""
 
 
 @dataclass(frozen=True)
@@ -180,7 +178,7 @@ def _model(
 
 def _shape(kind: str, mesh: str, index: int) -> str:
     declared = "            <drake:declare_convex/>\n" if kind == "collision" else ""
-    colour = f"        <material>\n          <diffuse>{_COLOUR}</diffuse>\n        </material>\n"
+    colour = f"        <material>\n          <diffuse>{OBJECT_IN_MODELS}</diffuse>\n        </material>\n"
     return (
         f'      <{kind} name="{kind}_{index}">\n        <geometry>\n          <mesh>\n'
         f"            <uri>{mesh}</uri>\n{declared}          </mesh>\n        </geometry>\n"

@@ -12,7 +12,7 @@ from coop_drake.tree.pose import FloatArray
 
 
 def planning_problem(scenario: Scenario, team: TeamPlant | None = None) -> PlanningProblem:
-    """Put start, goal, walls and bodies together, and refuse what cannot be meant.
+    """Put start, goal, walls and bodies together, and refuse inputs that are certainly mistakes.
 
     Args:
         scenario: The scenario.

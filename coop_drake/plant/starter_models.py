@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import pi
 
+from coop_drake.drawing.colours import BASE_IN_MODELS, LINK_IN_MODELS, OBJECT_IN_MODELS
+
 __all__ = ["object_model", "robot_model"]
 
 _LINK_WIDTH = 0.1
@@ -14,8 +16,6 @@ _ARM_HEIGHT = 0.4
 """Height of arms and grasps over the floor, as in the shipped models [m]."""
 _BEND = 1.87
 """Limit of the joints on both sides, as in the shipped models [rad]."""
-
-_BASE_COLOUR, _LINK_COLOUR, _OBJECT_COLOUR = "0.13 0.36 0.62 1", "0.45 0.66 0.86 1", "0.76 0.60 0.42 1"
 
 
 def object_model(length: float, width: float, mass: float = 1.0) -> str:
@@ -36,7 +36,9 @@ def object_model(length: float, width: float, mass: float = 1.0) -> str:
         f'    <frame name="grasp_{k}" attached_to="body"><pose>{x:.9g} {y:.9g} 0 0 0 {yaw!r}</pose></frame>'
         for k, (x, y, yaw) in enumerate(grasps)
     )
-    body = _link("body", f"0 0 {_ARM_HEIGHT} 0 0 0", "0 0 0", _box(length, width, 0.2), mass, _OBJECT_COLOUR)
+    body = _link(
+        "body", f"0 0 {_ARM_HEIGHT} 0 0 0", "0 0 0", _box(length, width, 0.2), mass, OBJECT_IN_MODELS
+    )
     return _sdf("object", f"{body}\n{frames}", "The carried object, with a grasp frame on every side.")
 
 
@@ -52,12 +54,12 @@ def robot_model(name: str, links: Sequence[float], base_radius: float) -> str:
         f"<cylinder><radius>{base_radius:.9g}</radius><length>0.5</length></cylinder>",
         (base_radius**2 / 4 + 0.25 / 12, base_radius**2 / 4 + 0.25 / 12, base_radius**2 / 2),
     )
-    parts = [_link("base", "0 0 0 0 0 0", "0 0 0.25", disc, 6.0, _BASE_COLOUR)]
+    parts = [_link("base", "0 0 0 0 0 0", "0 0 0.25", disc, 6.0, BASE_IN_MODELS)]
     for number, length in enumerate(links, start=1):
         frame = f'<pose relative_to="joint_{number}"/>'
         pose = f"0 0 {_ARM_HEIGHT} 0 0 0" if number == 1 else ""
         shape = _box(length, _LINK_WIDTH, _LINK_HEIGHT)
-        link = _link(f"link_{number}", pose, f"{0.5 * length:.9g} 0 0", shape, 1.0, _LINK_COLOUR)
+        link = _link(f"link_{number}", pose, f"{0.5 * length:.9g} 0 0", shape, 1.0, LINK_IN_MODELS)
         parts.append(link if number == 1 else link.replace("<pose></pose>", frame, 1))
         parts.append(_joint(number, links[number - 2] if number > 1 else 0.0))
     tip = f"{links[-1]:.9g} 0 0 0 0 {pi!r}"

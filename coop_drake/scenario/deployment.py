@@ -4,8 +4,10 @@ This file holds the values alone. They are applied in one place, :mod:`coop_drak
 puts blocks between every controller and the plant; only ``mass_error`` acts elsewhere, where the controllers'
 model of the team is made (:mod:`coop_drake.diagram.knowledge`). A new departure is a field here, a block
 there, tests in ``tests/diagram/test_deployment.py``, a mild and a harsh case in
-``tests/closed_loop/test_deployment.py``, and a row of ``docs/how_to/deployment.md``. Fused blocks refuse
-every departure that ``coop_drake/diagram/fused.py`` does not list.
+``tests/closed_loop/test_deployment.py``, a row of ``docs/how_to/deployment.md``, wrong values for it in
+``tests/support/mutants/values.py``, and ``docs/reference/scenario.md``, which ``python -m docs.generate``
+writes. ``scenario/validation.py`` refuses measurements and messages that are set without a control rate.
+Fused blocks refuse every departure that ``coop_drake/diagram/fused.py`` does not list.
 """
 
 from dataclasses import dataclass, field

@@ -40,7 +40,7 @@ def _check_control_rate(scenario: Scenario) -> None:
         return
     for section in ("measurements", "messages"):
         for name, value in dataclasses.asdict(getattr(scenario.deployment, section)).items():
-            if value > 0.0:
+            if value != 0.0:
                 key = f"deployment.{section}.{name}"
                 raise ScenarioError(str(scenario.path), key, value, "0 without deployment.control_rate")
 

@@ -101,12 +101,12 @@ def drive_team(
     """Write what drives the team, and what the robots' blocks would show to the log.
 
     Args:
-        gains: With the next four a ``FusedCell``.
+        gains: This and the next four arguments are the fields of ``FusedCell``; see there.
         edges: Edges of the governed set.
         flat: The map.
         field: The velocity field.
         table: The axes of all robots.
-        places: With the next five a ``FusedTeam``.
+        places: This and the next five arguments are the fields of ``FusedTeam``; see there.
         first: First rows.
         chains: From bases to end effectors.
         base_chains: From the object to bases.
@@ -157,7 +157,8 @@ def report_readiness(
     """Write for each robot the index of the current cell and the margin of ``robot_ready``, shape (2 N,).
 
     Args:
-        table: With the next seven ``ReadyConditions``, the tables those of a ``FusedCell``.
+        table: This and the next seven arguments are the conditions ``ReadyConditions``; see there. The tables
+            are those of ``FusedCell``.
         next_table: The axes in the next cell.
         next_edges: Edges of the next cell.
         next_stiffness: K of the next cell.

@@ -50,10 +50,18 @@ class TreeJoint:
     """A joint seen from the object outwards: frame J is fixed on the parent, the child C moves against J.
 
     A revolute joint gives ``X_PC = X_PJ @ Rot(sign * q)``, a prismatic one ``X_PC = X_PJ @ Trans(axis * q)``.
-    A new kind of joint has to be added to ``tree/team_arrays.py`` (its pose), ``tree/levers.py`` and
-    ``ComponentTree.reach`` (how far it moves the team), ``geometry/sweep_kernels.py`` (``over_piece``) and
-    ``geometry/swept_tree.py`` (``SweptTree.under``), ``laws/planar_chain.py`` (velocities and forces), and
-    independently of all these to ``verification``.
+    A new kind of joint has to be added
+
+    - to its plant: ``plant/chain.py`` (``MOVABLE``, which refuses all other kinds), ``component_tree.py``,
+      ``planarity.py``, ``joint_survey.py``, ``fixing.py`` and ``planar_chain.py``, all in ``plant/``;
+    - to its geometry: ``unit`` below, ``ComponentTree.reach``, ``tree/team_arrays.py`` (its pose) and
+      ``tree/levers.py``; ``geometry/sweep_kernels.py`` and ``swept_tree.py`` (over-sweeps),
+      ``geometry/under_kernels.py`` and ``sweeps.py`` (under-sweeps);
+    - to the control laws: ``laws/robot_dynamics.py`` (velocities and forces);
+    - to the planner: ``answers/problem.py`` (room beyond limits), ``planning/cells/split_rules.py``
+      (``finest_widths``), ``planning/search/rescaling.py`` and ``diagnosis/team_changes.py``;
+    - independently of all these to ``solids.py``, ``outer_sweeps.py`` and ``inner_sweeps.py`` of
+      ``verification/``.
 
     Attributes:
         name: Scoped name, for example ``robot_0::elbow``.
@@ -109,8 +117,9 @@ class ComponentTree:
 
     Attributes:
         components: Parents before children.
-        sharing_joint: Pairs of body names that are never held apart: a movable joint connects them, or their
-            models filter them, as those of imported robots do with all their own links.
+        sharing_joint: Pairs of body names that are not checked for collision with each other: a movable joint
+            connects them, or their models exclude the pair, as models of imported robots do for all pairs
+            of their own links.
     """
 
     components: tuple[Component, ...]

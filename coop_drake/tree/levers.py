@@ -14,7 +14,10 @@ _LEAST_LEVER = 0.01
 
 
 def axis_levers(tree: ComponentTree) -> tuple[float, ...]:
-    """How far a unit of each axis (theta, q...) moves the furthest point it carries [m/rad or 1]."""
+    """Largest distance that any carried point moves per unit of each axis (theta, q...).
+
+    In m/rad for an angle; without a unit for a prismatic joint.
+    """
     reaches = [0.0] * len(tree.components)
     levers = [0.0] * (1 + len(tree.joints))
     for index in range(len(tree.components) - 1, -1, -1):

@@ -30,12 +30,12 @@ class Parameter:
     upper: float
 
     def value(self, fraction: float) -> float:
-        """Return the gain at a fraction of the logarithmic range, rounded to four digits."""
+        """Return lower^(1 - f) upper^f for a fraction f, rounded to four digits; f is clipped to [0, 1]."""
         inside = min(max(fraction, 0.0), 1.0)
         return float(f"{exp(log(self.lower) + inside * log(self.upper / self.lower)):.4g}")
 
     def fraction(self, value: float) -> float:
-        """Return the fraction of the logarithmic range at which a gain lies."""
+        """Return the fraction f with lower^(1 - f) upper^f = value."""
         return log(value / self.lower) / log(self.upper / self.lower)
 
 

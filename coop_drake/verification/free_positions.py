@@ -44,7 +44,9 @@ class FreePositions:
     def outside(
         self, cover: BaseGeometry, lower: FloatArray, upper: FloatArray, tolerance: float
     ) -> BaseGeometry:
-        """Positions outside a cover at which no body is known to meet a wall at all angles of a slice.
+        """Positions outside a cover that are not proved blocked by a wall.
+
+        A position is proved blocked if one body meets a wall there at every angle of the slice.
 
         Args:
             cover: Positions that are left out.

@@ -71,7 +71,7 @@ def _common_to_turns(
     """Points x that lie in a ring turned by any angle t of an interval.
 
     Each edge of the ring, whose outward normal has the bearing a, demands n(a + t) . x <= h for all t. The
-    left     side is largest where a + t is nearest to the bearing of x: this gives the maximum in closed
+    left side is largest where a + t is nearest to the bearing of x: this gives the maximum in closed
     form. As the set of such x is convex, a polygon lies in it if its vertices do. A vertex that does not is
     cut off along the half-plane that it violates most, deeper by the tolerance, so that few rounds are
     enough.

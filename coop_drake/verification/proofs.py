@@ -14,6 +14,9 @@ goal, neither can the team.
 4. Kind ``blocked goal`` (``check_blocked_goal``): slices cover all joint values that are allowed at
    the goal (``tiling.check_tiling``), and in each of them the team collides at the goal's position
    (``covers.check_blocked``).
+
+A change of what a proof holds also concerns ``answers/proof.py`` (its data), ``answers/proof_file.py`` (its
+file), ``planning/proofs/proof_making.py`` (which makes it) and ``docs/conventions.md`` (which describes it).
 """
 
 from __future__ import annotations

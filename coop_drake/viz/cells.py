@@ -26,7 +26,10 @@ _TARGET = 0.05
 
 
 def set_cells(meshcat: Meshcat, plan: Plan) -> None:
-    """Draw every cell, its goal region and its target; only those of the first cell are visible."""
+    """Draw every cell, its goal region and its target.
+
+    Only those of the first cell are visible at first; the animation switches them.
+    """
     for index, (cell, transition) in enumerate(zip(plan.cells, plan.transitions, strict=True)):
         of_cell, of_goal = cell_paths(index)
         _set_area(meshcat, of_cell, cell.tidied, 0.004, CELL_COLOUR)

@@ -37,8 +37,8 @@ def trail_points(positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         positions: Of the object at every frame, shape (F, 2) [m].
 
     Returns:
-        The points, shape (P, 2) [m], and the number of pieces between them that the object has passed at
-        every frame, shape (F,).
+        The points, shape (P, 2) [m], and how many segments between them the object has passed at every
+        frame, with fractions, shape (F,).
     """
     gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
     pieces = int(np.ceil(gone[-1] / STEP))

@@ -52,7 +52,7 @@ def _united(sections: Sequence[CrossSection]) -> CrossSection:
 
 
 class Projections:
-    """Projects sets of slices, which share most of their slices with one another, and keeps the parts."""
+    """Projects sets of slices, and caches the projection of subsets that several sets share."""
 
     def __init__(self) -> None:
         self._unions: dict[tuple[Kind, tuple[int, ...]], CrossSection] = {}

@@ -56,12 +56,12 @@ class SceneCoordinates:
         self.outline: FloatArray = shapely.get_coordinates(self._floor.convex_hull)
 
     def height(self, theta: float | FloatArray) -> FloatArray:
-        """Return the height over the floor of an angle on the turn drawn [units]."""
+        """Return the height above the floor at which angle theta is drawn [scene units]."""
         fraction = (np.asarray(theta) - THETA[0]) / (THETA[1] - THETA[0])
         return _TURN_BEGINS + (_TURN_ENDS - _TURN_BEGINS) * fraction
 
     def heights(self, theta: Interval, gap: float) -> tuple[float, float]:
-        """Return the heights between which an interval of theta is drawn [units].
+        """Return the heights between which an interval of theta is drawn [scene units].
 
         Args:
             theta: The interval [rad].

@@ -30,7 +30,7 @@ _STEP_FRACTION = 0.5
 
 
 class BoxArrays(NamedTuple):
-    """What boxes are tried with.
+    """The team and the joint limits as arrays, used to test whether a box is free.
 
     Attributes:
         team: The team.

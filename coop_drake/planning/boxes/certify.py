@@ -41,8 +41,8 @@ class PathBox:
 
     Attributes:
         intervals: Intervals of (theta, q...).
-        positions: Positions p_WL; on the straight lines between them the team is free for all angles of the
-            intervals, shape (k, 2) [m].
+        positions: Positions p_WL; the team is free at every point of the polyline through them, for all
+            angles in the intervals, shape (k, 2) [m].
     """
 
     intervals: Intervals

@@ -18,7 +18,7 @@ class FreeBox:
 
     Attributes:
         polygon: Positions p_WL, one connected component of the under-approximation at margin zero [m].
-        core: The same at the plan's margin, inside ``polygon``, one connected component [m].
+        core: The positions that keep the plan's margin, one connected component; a subset of ``polygon`` [m].
         lower: Lower ends of (theta, q...), expanded by the overlap, theta unwrapped, shape (1 + n,) [rad, m].
         upper: Upper ends, shape (1 + n,).
     """

@@ -96,6 +96,11 @@ class Region:
 class CellMaker:
     """Makes the cells of slices; positions of a component are cached by the intervals that move it.
 
+    Over-cells hold all free positions, so they need spaces that are too large (``FreeSpace.over``) and bodies
+    that are too small (``SweptTree.under``, covered at every configuration). Under-cells hold free positions
+    only, so they need spaces that are too small (``FreeSpace.under``) and bodies that are too large
+    (``SweptTree.over``).
+
     Args:
         swept: Sweeps of the team's pieces.
         pairs: Self-collision of the team.

@@ -3,10 +3,13 @@
 1. Slices: those of MIXED cells first. Only if the path has none, those of GUIDE cells.
 2. Axes: those wider than the resolution. In a MIXED cell where one component alone blocks the path in the
    middle of the slice, only the axes that move this component.
-3. Every such axis is halved on trial, but for those along which the team sweeps far less than along others.
+3. Every such axis is halved on trial, except the axes along which the team sweeps far less than along others.
 4. An axis whose halving disconnects the path wins; on a path with such slices, only these are halved.
 5. Otherwise an axis that may separate two bodies that touch wins; otherwise the axis that leaves the smallest
    area of over-cells; if these areas are equal, the axis along which the team sweeps furthest.
+
+Every ``Exploration`` uses this order: proofs of infeasibility, the clearance bound, the strategy ``cells``.
+The sampled search of ``portfolio`` and the strategy ``paper`` (``printed_algorithms.py``) do not.
 """
 
 from __future__ import annotations

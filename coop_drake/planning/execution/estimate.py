@@ -34,7 +34,7 @@ def speed_per_clearance(gains: TransitionGains) -> float:
 
     At a steady speed v behind the governor (14)-(16) the object lags by zeta v / K, so that
     E = v^2 (1 + zeta^2 / K) / 2, and v = K_G sqrt(Delta E / K) gives
-    v / d = sqrt(K / (2 K / K_G^2 + 1 + zeta^2 / K)).
+    v / d = sqrt(K / (2 K / K_G^2 + 1 + zeta^2 / K)). A change of ``laws/governor.py`` changes this form.
 
     Args:
         gains: Gains of the transition.

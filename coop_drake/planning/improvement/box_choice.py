@@ -64,8 +64,8 @@ class Waypoints(NamedTuple):
 def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
     """Find the sequence of boxes along waypoints that is crossed in the shortest time.
 
-    Each box holds some consecutive waypoints, padded by one of a few widths. By dynamic programming, every
-    waypoint is reached by the fastest sequence for each width of the next box, and the state is kept.
+    Each box holds some consecutive waypoints, padded by one of a few widths. By dynamic programming, for
+    every waypoint and every width of the next box, the fastest sequence and its final state are stored.
 
     Args:
         waypoints: The waypoints.

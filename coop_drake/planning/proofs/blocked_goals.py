@@ -19,7 +19,8 @@ BUDGET = 128
 def blocked_goal(problem: PlanningProblem) -> tuple[BlockedGoalProof | None, int]:
     """Prove by under-sweeps that the team is in collision at its goal pose, whatever its free joints are.
 
-    The object is tested first, then each robot alone, then the team: a collision of some is one of the team.
+    The object is tested first, then each robot alone, then the team: if some of the bodies collide, so
+    does the team.
 
     Args:
         problem: The question, whose margin is zero.

@@ -29,7 +29,9 @@ INSIDE = 1.0 - 1e-9
 
 
 def disc_refuted(problem: PlanningProblem) -> DiscProof | None:
-    """Look for a disc of the team whose centre lies in different parts of the floor at start and goal.
+    """Look for a disc inside one body whose centre cannot get from its start to its goal.
+
+    That is so if start and goal lie in different connected parts of the positions at which the disc fits.
 
     Args:
         problem: The question, whose margin is zero.

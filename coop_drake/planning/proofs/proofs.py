@@ -1,4 +1,4 @@
-"""Explorations of the whole question and of its relaxations, in turns, until one of them answers."""
+"""Tries to prove infeasibility by exploring the question and its relaxations in turns."""
 
 from __future__ import annotations
 
@@ -44,7 +44,9 @@ class Refutation:
 
 
 class Proofs:
-    """Explorations of one question at margin zero; the same work gives the same answer.
+    """Tries to prove infeasibility by exploring the question and its relaxations in turns, at margin zero.
+
+    It is deterministic: the same amount of work gives the same answer.
 
     The inscribed disc is tested first. Then the whole question is explored in turns with those relaxations to
     two robots at most for which sampling finds no path. A refutation of any of them refutes the question.

@@ -48,7 +48,9 @@ def margins(first: float) -> Iterator[float]:
 
 
 def shrunk(workspace: Polygon, margin: float) -> MultiPolygon:
-    """Workspace without its points nearer to a wall than the margin; an octagon about the disc is used.
+    """Shrink the workspace by the margin.
+
+    The disc is replaced by an octagon around it, so slightly too much is removed.
 
     Raises:
         GeometryError: If geometry fails.

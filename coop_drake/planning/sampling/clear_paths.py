@@ -59,7 +59,7 @@ def best_candidate(
         problem: The question.
         hierarchy: Its subsystems.
         known: A free path, theta unwrapped, shape (m, 3 + n) [m, rad].
-        gap: Distance that pairs of bodies keep [m].
+        gap: Smallest distance between bodies of the team [m].
     """
     sampler = Sampler(hierarchy, marginal_workspace(problem, SAMPLED_CLEARANCE), gap, SEED)
     sampled = (sampler.path(SAMPLES, CHOICES) for _ in range(CANDIDATES))
@@ -74,7 +74,7 @@ def moved_from_obstacles(problem: PlanningProblem, path: FloatArray, gap: float)
     Args:
         problem: The question.
         path: A free path, theta unwrapped, shape (m, 3 + n) [m, rad].
-        gap: Distance that pairs of bodies keep [m].
+        gap: Smallest distance between bodies of the team [m].
     """
     most = problem.settings.margin / min(MARGIN_FRACTIONS)
     path = smoothed(problem, path, LEAST_CLEARANCE, 0.0, gap, moves=WIDE_MOVES, price=WIDE_PRICE)
@@ -90,7 +90,7 @@ def centred_in_narrow_passages(problem: PlanningProblem, path: FloatArray, gap: 
     Args:
         problem: The question.
         path: A free path, theta unwrapped, shape (m, 3 + n) [m, rad].
-        gap: Distance that pairs of bodies keep [m].
+        gap: Smallest distance between bodies of the team [m].
     """
     clearance = path_clearance(problem, path, NARROW)
     for _ in range(NARROW_REPEATS if 0.0 < clearance < NARROW else 0):

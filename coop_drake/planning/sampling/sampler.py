@@ -53,7 +53,7 @@ class GuidePath:
     Attributes:
         path: Configurations, shape (m, 3 + k).
         joints: For each of its joints the index of that joint in the whole q.
-        has_theta: Whether its theta is to be followed; that of a disc is not.
+        has_theta: Whether its theta is to be followed; False for a disc, whose angle has no meaning.
     """
 
     path: FloatArray

@@ -33,7 +33,7 @@ def search_by_cells(
 
     Args:
         problem: The question. Its strategy is ``cells``, which also tries margins once there is a channel at
-            margin zero, or ``paper``, which knows no margin.
+            margin zero, or ``paper``, which always uses margin zero.
         progress: Called with a phase and the fraction of the slices that are made.
         watch: Called with the events of explorations.
 

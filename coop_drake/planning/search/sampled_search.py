@@ -70,7 +70,7 @@ class BoxSequence:
 class SampledSearch:
     """Finds a box sequence at margin zero first, then looks for a larger margin near it.
 
-    What it finds is proved by the boxes, whatever was sampled. That it finds nothing proves nothing.
+    What it finds is proved by the boxes, whatever was sampled. If it finds nothing, that is no proof.
 
     Args:
         problem: The question.
