@@ -193,8 +193,8 @@ def test_a_live_run_is_looked_at_and_says_where_without_waiting_for_anybody(
 ):
     looking = []
 
-    def simulated(*_, onlooker, **__):
-        looking.append(onlooker)
+    def simulated(*_, observer, **__):
+        looking.append(observer)
         raise PlanError("far enough")
 
     monkeypatch.setattr(simulation, "simulate", simulated)

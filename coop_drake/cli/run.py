@@ -86,9 +86,9 @@ def carry_out(
         blocks: Blocks of every robot, or one block for the team.
     """
     maps = map_cells(task, plan, reporter, fresh=fresh_maps)
-    onlooker = _open_live_view(task, plan, reporter) if live else None
+    observer = _open_live_view(task, plan, reporter) if live else None
     with FigureProcesses() as figures:  # They import matplotlib while this process simulates.
-        log = _simulate(task, plan, maps, folder, reporter, blocks, onlooker)
+        log = _simulate(task, plan, maps, folder, reporter, blocks, observer)
         _draw(task, plan, log, folder, reporter, figures)
     reporter.table(task.name, summary_rows(reporter.facts))
     reporter.say(
@@ -108,14 +108,14 @@ def _simulate(
     folder: ResultFolder,
     reporter: Reporter,
     blocks: Blocks,
-    onlooker: Callable[..., None] | None,
+    observer: Callable[..., None] | None,
 ) -> SimulationLog:
     """Run the closed loop, note the facts, and write the log and the maps' certificates."""
     from coop_drake.memory import peak_memory_mb
     from coop_drake.simulation import simulate
 
     with reporter.stage("simulating", "simulation") as progress:
-        log = simulate(task.scenario, plan, maps, blocks=blocks, progress=progress, onlooker=onlooker)
+        log = simulate(task.scenario, plan, maps, blocks=blocks, progress=progress, observer=observer)
     reporter.facts.update(simulation_facts(plan, log), peak_memory_mb=peak_memory_mb())
     folder.make()
     folder.forget_simulation()

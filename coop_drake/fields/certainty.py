@@ -40,8 +40,8 @@ def direction_error(harmonic_map: HarmonicMap, points: FloatArray) -> FloatArray
         that the direction is not known at all.
     """
     p = as_points(points)
-    room = np.asarray(shapely.distance(harmonic_map.region.boundary, shapely.points(p)))
-    return _bound(harmonic_map, p, room)
+    distance = np.asarray(shapely.distance(harmonic_map.region.boundary, shapely.points(p)))
+    return _bound(harmonic_map, p, distance)
 
 
 def check_certainty(harmonic_map: HarmonicMap) -> None:
@@ -61,11 +61,11 @@ def check_certainty(harmonic_map: HarmonicMap) -> None:
     # At the goal there is no direction: its leaf is judged beside it.
     at_goal = shapely.distance(harmonic_map.goal, shapely.points(centres)) < _LEAST_DISTANCE * sizes
     centres[at_goal] += _ASIDE * sizes[at_goal, None]
-    room = shapely.distance(harmonic_map.region.boundary, shapely.points(centres))
-    unknown = _bound(harmonic_map, centres, np.maximum(room, _LEAST_DISTANCE * sizes)) > _UNCERTAIN
+    distance = shapely.distance(harmonic_map.region.boundary, shapely.points(centres))
+    unknown = _bound(harmonic_map, centres, np.maximum(distance, _LEAST_DISTANCE * sizes)) > _UNCERTAIN
     part = float((sizes * sizes)[unknown].sum() / (sizes * sizes).sum())
     if part > _MOST:
-        x, y = centres[np.argmax(np.where(unknown, room, -1.0))]
+        x, y = centres[np.argmax(np.where(unknown, distance, -1.0))]
         raise FieldError(
             f"the direction of the field is not known in {100.0 * part:.2g} % of the region, for example at "
             f"({x:.6g}, {y:.6g}) m: there the Jacobian's determinant is below the map's error; cut the "
@@ -73,13 +73,13 @@ def check_certainty(harmonic_map: HarmonicMap) -> None:
         )
 
 
-def _bound(harmonic_map: HarmonicMap, points: FloatArray, room: FloatArray) -> FloatArray:
+def _bound(harmonic_map: HarmonicMap, points: FloatArray, distance: FloatArray) -> FloatArray:
     """The bound of `direction_error` for given distances from the boundary, shape (n,) [m]."""
     T, J = harmonic_map(points)
     line = harmonic_map.goal_image - T
     x = J[:, 1, 1] * line[:, 0] - J[:, 0, 1] * line[:, 1]
     y = J[:, 0, 0] * line[:, 1] - J[:, 1, 0] * line[:, 0]
     error = harmonic_map.certificate.error_bound
-    of_J, of_line = 4.0 * error / (pi * np.maximum(room, 1e-300)), 2.0 * error
+    of_J, of_line = 4.0 * error / (pi * np.maximum(distance, 1e-300)), 2.0 * error
     lost = of_J * (np.hypot(*line.T) + of_line) + np.linalg.norm(J, axis=(1, 2)) * of_line
     return np.asarray(lost / np.maximum(np.hypot(x, y), 1e-300))

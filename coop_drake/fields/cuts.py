@@ -62,7 +62,7 @@ def _what_stays_open(
 
     target = goal if isinstance(goal, Point) else pole_of(goal)
     passage = PassageFinder(domain).find(start.coords[0], target.coords[0])
-    return GeometryCollection([passage.path, goal]), passage.neck
+    return GeometryCollection([passage.path, goal]), passage.clearance
 
 
 def _certify(domain: Polygon, cell: Polygon, goal: Point | Polygon, kept: GeometryCollection) -> None:

@@ -60,10 +60,10 @@ def medial_graph(polygon: Polygon, distance: BoundaryDistance) -> tuple[Graph, F
     """
     samples, successor = _samples_of(polygon)
     nodes, pairs, walls = _voronoi(samples)
-    room = distance.batch(nodes)
-    # Between two consecutive samples the Voronoi edge leaves through the wall: it leads nowhere.
+    node_clearance = distance.batch(nodes)
+    # The Voronoi edge between two consecutive samples crosses the boundary.
     through = (successor[walls[:, 0]] == walls[:, 1]) | (successor[walls[:, 1]] == walls[:, 0])
-    kept = ~through & (room[pairs] > 0.0).all(axis=1)
+    kept = ~through & (node_clearance[pairs] > 0.0).all(axis=1)
     pairs, walls = pairs[kept], walls[kept]
     first, second = nodes[pairs[:, 0]], nodes[pairs[:, 1]]
     length = np.linalg.norm(second - first, axis=1)
@@ -71,9 +71,9 @@ def medial_graph(polygon: Polygon, distance: BoundaryDistance) -> tuple[Graph, F
     middle = 0.5 * (samples[walls[:, 0]] + samples[walls[:, 1]])
     along = ((middle - first) * (second - first)).sum(axis=1) / np.maximum(length**2, 1e-30)
     gate = first + np.clip(along, 0.0, 1.0)[:, None] * (second - first)
-    clearance = np.minimum(room[pairs].min(axis=1), distance.batch(gate))
+    clearance = np.minimum(node_clearance[pairs].min(axis=1), distance.batch(gate))
     inside = clearance > 0.0
-    return Graph(nodes, pairs[inside], clearance[inside], length[inside]), room
+    return Graph(nodes, pairs[inside], clearance[inside], length[inside]), node_clearance
 
 
 def widest_path(graph: Graph, start: int, end: int) -> IndexArray | None:
@@ -97,11 +97,11 @@ def widest_path(graph: Graph, start: int, end: int) -> IndexArray | None:
     if chain is None:
         return None
     rows = {frozenset(pair): k for k, pair in enumerate(graph.pairs.tolist())}
-    neck = min(
+    widest = min(
         graph.clearance[rows[frozenset(pair)]]
         for pair in zip(chain[:-1].tolist(), chain[1:].tolist(), strict=True)
     )
-    wide = graph.clearance >= neck
+    wide = graph.clearance >= widest
     weights = _matrix(graph.pairs[wide], graph.length[wide] + 1e-9, count)
     _, shortest = dijkstra(weights, directed=False, indices=np.array(start), return_predecessors=True)
     return _trace(shortest, start, end)

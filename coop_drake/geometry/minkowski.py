@@ -49,11 +49,11 @@ class FreeSpace:
         self._points = np.ascontiguousarray(starts, dtype=float)
         self._first = np.cumsum([0, *map(len, self.rings)])
         areas = [_area(ring) for ring in self.rings]
-        rooms = [
+        extents = [
             np.ptp(ring, axis=0) if area > 0.0 else (np.inf, np.inf)
             for ring, area in zip(self.rings, areas, strict=True)
         ]
-        self._rooms = np.array(rooms, dtype=float).reshape(-1, 2)
+        self._extents = np.array(extents, dtype=float).reshape(-1, 2)
         self._most_area = sum(areas) + SAFE_SIDE * float(np.hypot(*(ends - starts).T).sum())
 
     @classmethod
@@ -78,11 +78,11 @@ class FreeSpace:
             found = None
         if found is not None and self._plausible(found, footprint[0]):
             return found
-        return self._stand_in(footprint) if self._over else CrossSection()
+        return self._fallback(footprint) if self._over else CrossSection()
 
     def _clipped(self, footprint: FloatArray) -> CrossSection:
         convex = np.ascontiguousarray(footprint, dtype=float)
-        drawn, first = fitting_cycles(self._points, self._first, self._rooms, convex)
+        drawn, first = fitting_cycles(self._points, self._first, self._extents, convex)
         places = first.tolist()
         cycles = [drawn[a:b] for a, b in pairwise(places) if a < b]
         return CrossSection(cycles, FillRule.Positive)
@@ -96,8 +96,8 @@ class FreeSpace:
         beyond = max(lower[0] - x_min, lower[1] - y_min, x_max - upper[0], y_max - upper[1])
         return bool(beyond <= SAFE_SIDE and 0.0 <= found.area() <= self._most_area)
 
-    def _stand_in(self, footprint: FloatArray) -> CrossSection:
-        """The difference as another library sees it, or a box that holds every position there can be."""
+    def _fallback(self, footprint: FloatArray) -> CrossSection:
+        """The difference by another library, or a box that holds every possible position."""
         rings = second_opinion(self.rings, self.edges.reshape(-1, 2, 2), footprint)
         return CrossSection(rings, FillRule.Positive)
 

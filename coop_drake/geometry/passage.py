@@ -28,12 +28,12 @@ class Passage:
 
     Attributes:
         path: From the one point to the other [m].
-        neck: Smallest distance of the path to the boundary, exact for this path [m].
+        clearance: Smallest distance of the path to the boundary, exact for this path [m].
         narrowest: Point of the path where that is, shape (2,) [m].
     """
 
     path: LineString
-    neck: float
+    clearance: float
     narrowest: FloatArray
 
     @property
@@ -69,38 +69,42 @@ class PassageFinder:
             GeometryError: If an end lies outside, or no passage joins them.
         """
         ends = np.array([start, end], dtype=float)
-        room = min(self._distance(ends[0]), self._distance(ends[1]))
-        if room <= 0.0:
+        widest = min(self._distance(ends[0]), self._distance(ends[1]))
+        if widest <= 0.0:
             raise GeometryError(
                 f"the ends {_text(ends[0])} and {_text(ends[1])} of a passage must lie inside"
             )
         straight = self._measure(ends)
-        if straight.neck >= room:
+        if straight.clearance >= widest:
             return straight
         graph = self._linked(ends)
         chain = widest_path(graph, len(graph.nodes) - 2, len(graph.nodes) - 1)
         best = straight
         if chain is not None:
-            best = max(straight, self._measure(self._shorten(graph.nodes[chain])), key=lambda way: way.neck)
-        if best.neck <= 0.0:
+            best = max(
+                straight,
+                self._measure(self._shorten(graph.nodes[chain])),
+                key=lambda passage: passage.clearance,
+            )
+        if best.clearance <= 0.0:
             raise GeometryError(f"no passage joins {_text(ends[0])} and {_text(ends[1])}")
         return best
 
     def _linked(self, ends: FloatArray) -> Graph:
         """The medial graph with the ends as its last two nodes."""
-        medial, room = self._medial
+        medial, clearance_there = self._medial
         graph = replace(medial, nodes=np.vstack([medial.nodes, ends]))
         for k, end in enumerate(ends):
             away = np.linalg.norm(medial.nodes - end, axis=1)
-            away[room <= 0.0] = np.inf
+            away[clearance_there <= 0.0] = np.inf
             near = np.argsort(away, kind="stable")[:LINKS]
-            nodes = np.union1d(near[np.isfinite(away[near])], np.flatnonzero(away <= room))
+            nodes = np.union1d(near[np.isfinite(away[near])], np.flatnonzero(away <= clearance_there))
             clearance = np.array([self._distance.along(end, graph.nodes[node]) for node in nodes])
             seen = clearance > 0.0
             graph = replace(
                 graph,
                 pairs=np.vstack(
-                    [graph.pairs, np.stack([nodes, np.full_like(nodes, len(room) + k)], axis=1)[seen]]
+                    [graph.pairs, np.stack([nodes, np.full_like(nodes, len(medial.nodes) + k)], axis=1)[seen]]
                 ),
                 clearance=np.append(graph.clearance, clearance[seen]),
                 length=np.append(graph.length, away[nodes][seen]),
@@ -109,22 +113,24 @@ class PassageFinder:
 
     def _shorten(self, points: FloatArray) -> FloatArray:
         """Leave out points as long as the straight way keeps the clearance of the whole path."""
-        neck = min(self._distance.along(a, b) for a, b in pairwise(points))
+        clearance = min(self._distance.along(a, b) for a, b in pairwise(points))
         kept, here = [0], 0
         while here < len(points) - 1:
             there = here + 1
-            while there + 1 < len(points) and self._distance.along(points[here], points[there + 1]) >= neck:
+            while (
+                there + 1 < len(points) and self._distance.along(points[here], points[there + 1]) >= clearance
+            ):
                 there += 1
             kept.append(there)
             here = there
         return points[kept]
 
     def _measure(self, points: FloatArray) -> Passage:
-        necks = [self._distance.along(a, b) for a, b in pairwise(points)]
-        worst = int(np.argmin(necks))
+        clearances = [self._distance.along(a, b) for a, b in pairwise(points)]
+        worst = int(np.argmin(clearances))
         segment = LineString(points[worst : worst + 2])
         narrowest = shapely.get_coordinates(shapely.shortest_line(segment, self._polygon.boundary))[0]
-        return Passage(LineString(points), float(necks[worst]), narrowest)
+        return Passage(LineString(points), float(clearances[worst]), narrowest)
 
 
 def pole(polygon: Polygon, tolerance: float = 1e-3) -> tuple[FloatArray, float]:

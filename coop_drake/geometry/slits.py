@@ -20,33 +20,36 @@ WIDTH = 0.04
 """Greatest width of a slit [m]: thin walls would make the map's boundary nearly coincide with itself."""
 
 WIDTH_PER_LENGTH = 0.2
-"""Nor is a slit wider than this share of its length [-]."""
+"""Greatest width of a slit over its length [-]."""
 
 NEAR = 1.0
-"""How far the end of a slit may be moved to square it, over its length [-]."""
+"""Greatest distance by which an end of a slit is moved so that it meets its ring at a right angle, over the
+slit's length [-]."""
 
 SQUARED_ENDS = (0, 1, 0, 1)
-"""Ends that stay where they are while the other one is moved, in turn."""
+"""Ends of a slit that stay in place, one after the other, while the other end is moved."""
 
 BREAKS = 12
-"""How often the reach of a slit into a wall is halved so that it does not come out on the other side."""
+"""How often the depth of a slit inside a wall is halved so that it does not pass through a thin wall."""
 
 
-def cut_holes(polygon: Polygon, path: BaseGeometry, room: float) -> Polygon:
-    """Join every hole to the outer ring, directly or by way of other holes, where nobody needs to pass.
+def cut_holes(polygon: Polygon, path: BaseGeometry, clearance: float) -> Polygon:
+    """Join every hole to the outer ring, directly or through other holes, by slits off the path.
 
     See `slits_of`. A slit is a straight strip a few centimetres wide.
 
     Args:
         polygon: The region [m].
         path: What must stay open, inside the polygon: a passage that ends at the goal, the goal, or both [m].
-        room: Distance from the path within which a slit does harm [m].
+        clearance: Slits are kept this far from the path where possible [m].
 
     Returns:
         What is left around the path; the polygon itself if it has no hole. A hole that no straight
         slit can reach without crossing the path stays.
     """
-    strips = [_strip(slit, polygon, float(path.distance(slit))) for slit in slits_of(polygon, path, room)]
+    strips = [
+        _strip(slit, polygon, float(path.distance(slit))) for slit in slits_of(polygon, path, clearance)
+    ]
     cut = polygon.difference(shapely.union_all(strips))
     return component_at(cut, path.representative_point())
 
@@ -57,32 +60,32 @@ def component_at(shape: BaseGeometry, point: Point) -> Polygon:
     return parts[0] if parts else Polygon()
 
 
-def slits_of(polygon: Polygon, path: BaseGeometry, room: float) -> list[LineString]:
-    """Straight ways between rings that make a region simply connected, where the ways to the path part.
+def slits_of(polygon: Polygon, path: BaseGeometry, clearance: float) -> list[LineString]:
+    """Straight segments between rings that make a region simply connected and lengthen no way to the path.
 
     On a triangulation whose vertices all lie on rings, the quickest ways from everywhere to the path cross
-    some of the diagonals; the others join the rings in a tree, for a spanning tree of the triangles and one
-    of the rings share no diagonal. So no start has a longer way than before. Diagonals within ``room`` of the
-    path are replaced by others where there are any; those that cross it are never taken.
+    some of the diagonals. The other diagonals join the rings in a tree, for a spanning tree of the triangles
+    and one of the rings share no diagonal, so no way becomes longer. Diagonals nearer to the path than
+    ``clearance`` are replaced by others where possible; those that cross it are never taken.
 
     Args:
         polygon: The region [m].
         path: What must stay open, as for `cut_holes` [m].
-        room: Distance from the path within which a slit does harm; half the width below which a passage slows
-            down [m].
+        clearance: Slits are kept this far from the path where possible; half the width below which a passage
+            slows down [m].
     """
     if not polygon.interiors:
         return []
     mesh = triangulate(polygon)
-    arrival, entrance = _quickest_ways(mesh, path, room)
+    arrival, entrance = _quickest_ways(mesh, path, clearance)
     lines = np.asarray(shapely.linestrings(mesh.vertices[mesh.diagonals]))
     away = np.asarray(shapely.distance(lines, path))
     crossed = np.zeros(len(away), dtype=np.bool_)
     crossed[entrance[entrance >= 0]] = True
     latest = arrival[mesh.neighbours].max(axis=1)
     length = np.asarray(shapely.length(lines))
-    # The way that is lost least comes first: among crossed diagonals the one farthest upstream.
-    order = np.lexsort((length, np.where(crossed, -latest, 0.0), crossed, away < room))
+    # Diagonals that no quickest way crosses come first, then those crossed earliest on the way to the path.
+    order = np.lexsort((length, np.where(crossed, -latest, 0.0), crossed, away < clearance))
     group = np.arange(1 + len(polygon.interiors))
     chosen = []
     for k in order:
@@ -96,7 +99,7 @@ def slits_of(polygon: Polygon, path: BaseGeometry, room: float) -> list[LineStri
 def _squared(
     polygon: Polygon, path: BaseGeometry, lines: list[LineString], rings: IndexArray
 ) -> list[LineString]:
-    """Move one end of each slit to where it meets its ring squarely, if that is near and in nobody's way."""
+    """Move one end of each slit to where it meets its ring at a right angle, where that is near and free."""
     walls = [polygon.exterior, *polygon.interiors]
     shapely.prepare(polygon)
     for k, line in enumerate(lines):
@@ -115,13 +118,13 @@ def _squared(
     return lines
 
 
-def _quickest_ways(mesh: Triangles, path: BaseGeometry, room: float) -> tuple[FloatArray, IndexArray]:
+def _quickest_ways(mesh: Triangles, path: BaseGeometry, clearance: float) -> tuple[FloatArray, IndexArray]:
     """When each triangle reaches the path's end, and through which diagonal it is left (-1 on the path)."""
     centres = mesh.vertices[mesh.corners].mean(axis=1)
     ends = mesh.vertices[mesh.diagonals]
     middles, widths = ends.mean(axis=1), np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     walked = np.linalg.norm(centres[mesh.neighbours] - middles[:, None], axis=2).sum(axis=1)
-    cost = walked * (1.0 + 2.0 * room / widths)
+    cost = walked * (1.0 + 2.0 * clearance / widths)
     around: list[list[tuple[int, int]]] = [[] for _ in centres]
     for k, (a, b) in enumerate(mesh.neighbours.tolist()):
         around[a].append((b, k))

@@ -13,7 +13,7 @@ _NEEDLE = 1e-12
 
 @compiled
 def fitting_cycles(
-    points: FloatArray, first: IntArray, rooms: FloatArray, convex: FloatArray
+    points: FloatArray, first: IntArray, extents: FloatArray, convex: FloatArray
 ) -> tuple[FloatArray, IntArray]:
     """Trace every ring with the footprint's vertex that lies furthest out: the reduced convolution with -F.
 
@@ -25,8 +25,8 @@ def fitting_cycles(
         points: Vertices of all rings, outer ones counter-clockwise, holes clockwise, none twice in a row,
             shape (E, 2) [m].
         first: Where each ring begins, shape (R + 1,).
-        rooms: Widths in x and y of what a ring encloses, shape (R, 2): a ring with less room than F needs is
-            left out [m].
+        extents: Widths in x and y of what a ring encloses, shape (R, 2); a ring no wider and no higher than F
+            is left out [m].
         convex: Convex ring F, counter-clockwise, shape (n, 2) [m].
 
     Returns:
@@ -40,7 +40,7 @@ def fitting_cycles(
         size = 0
         for r in range(len(first) - 1):
             before = first[r + 1] - 1
-            small = rooms[r, 0] <= width and rooms[r, 1] <= height
+            small = extents[r, 0] <= width and extents[r, 1] <= height
             for i in range(first[r], first[r] if small else first[r + 1]):
                 after = i + 1 if i + 1 < first[r + 1] else first[r]
                 k, last = furthest[before], furthest[i]

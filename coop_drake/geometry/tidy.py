@@ -28,36 +28,37 @@ SLACK = 1e-7
 DEEPEST_CUT = 0.02
 """Simplification never cuts deeper than this [m]."""
 
-CUT_PER_NECK = 0.2
-"""Nor deeper than this share of the neck [-]."""
+CUT_PER_CLEARANCE = 0.2
+"""Simplification never cuts deeper than this fraction of the passage's clearance, either [-]."""
 
-NECK_KEPT = 0.8
-"""Share of the neck that a tidied cell must keep, or a gentler tidying is tried [-]."""
+CLEARANCE_KEPT = 0.8
+"""Fraction of the passage's clearance that a tidied cell must keep; else a weaker tidying is tried [-]."""
 
 MITRE_LIMIT = 1.9
-"""Corners sharper than about 63 degrees are cut off; below 2, so that opposite corners keep a neck open."""
+"""Longest mitre over the radius [-]: corners sharper than about 63 degrees are cut off. Below 2, so that a
+passage between two opposite corners stays open."""
 
 CORRIDOR = 2.0
 """Bays farther from the passage than this many clearances are left out where that saves vertices [-]."""
 
 STRENGTHS = (1.0, 0.5, 0.2, 0.0)
-"""Shares of the full opening and simplification, tried in this order."""
+"""Fractions of the full opening and simplification, tried in this order [-]."""
 
 
 @dataclass(frozen=True)
 class _Route:
-    """The way through a cell that tidying must keep."""
+    """The path through a cell that tidying must keep, and its clearance [m]."""
 
     points: tuple[Point, ...]
     path: LineString
-    neck: float
+    clearance: float
 
 
 def tidy_cell(safe: Polygon, points: Sequence[FloatArray]) -> Polygon:
-    """Make a map-worthy cell Q of a safe region S: Q = opening(S, b/2) within S, cut open, simplified inward.
+    """Make a cell Q that can be mapped of a safe region S: opening(S, b/2) within S, cut open, simplified.
 
-    The neck b is the clearance of the widest passage through the given points. Where the full treatment would
-    lose a point or a fifth of the neck, gentler ones are tried; the last one only cuts the holes open.
+    b is the clearance of the widest passage through the given points. Where full tidying would lose a point
+    or a fifth of b, weaker ones are tried; the last one only joins the holes to the outer ring.
 
     Args:
         safe: S, with holes or without [m].
@@ -71,17 +72,17 @@ def tidy_cell(safe: Polygon, points: Sequence[FloatArray]) -> Polygon:
     """
     region = component_at(safe.buffer(-GUARD, join_style="mitre"), Point(points[0]))
     if region.is_empty:
-        raise GeometryError(f"the safe region leaves no room at {Point(points[0]).wkt}")
+        raise GeometryError(f"the safe region holds no path through {Point(points[0]).wkt}")
     route = _route(region, points)
     opened = region
     for _ in region.interiors:
         if not opened.interiors:
             break
-        opened = cut_holes(opened, route.path, route.neck) or region
+        opened = cut_holes(opened, route.path, route.clearance) or region
     for strength in STRENGTHS:
         cell = _tidied(opened, route, strength)
         for candidate in (_without_bays(cell, route), cell):
-            if candidate is not None and _serves(candidate, safe, points, NECK_KEPT * route.neck):
+            if candidate is not None and _serves(candidate, safe, points, CLEARANCE_KEPT * route.clearance):
                 return candidate
     return opened
 
@@ -98,17 +99,21 @@ def _without_bays(cell: Polygon, route: _Route) -> Polygon | None:
 
 def _route(region: Polygon, points: Sequence[FloatArray]) -> _Route:
     finder = PassageFinder(region)
-    ways = [finder.find(start, end) for start, end in pairwise(points)] if len(points) > 1 else []
-    if not ways:
+    passages = [finder.find(start, end) for start, end in pairwise(points)] if len(points) > 1 else []
+    if not passages:
         here = Point(points[0])
         return _Route((here,), LineString([here, here]), BoundaryDistance(region)(points[0]))
-    coordinates = [point for way in ways for point in way.path.coords]
-    return _Route(tuple(Point(p) for p in points), LineString(coordinates), min(way.neck for way in ways))
+    coordinates = [point for passage in passages for point in passage.path.coords]
+    return _Route(
+        tuple(Point(p) for p in points),
+        LineString(coordinates),
+        min(passage.clearance for passage in passages),
+    )
 
 
 def _tidied(region: Polygon, route: _Route, strength: float) -> Polygon:
     """Opening, then simplification, both with mitred corners so that straight walls stay as they are."""
-    radius = 0.5 * strength * route.neck
+    radius = 0.5 * strength * route.clearance
     shape = region
     if radius > 0.0:
         eroded = region.buffer(-radius, join_style="mitre", mitre_limit=MITRE_LIMIT)
@@ -121,15 +126,15 @@ def _tidied(region: Polygon, route: _Route, strength: float) -> Polygon:
 
 
 def _simplified(shape: Polygon, route: _Route, strength: float) -> Polygon:
-    depth = strength * min(DEEPEST_CUT, CUT_PER_NECK * route.neck)
+    depth = strength * min(DEEPEST_CUT, CUT_PER_CLEARANCE * route.clearance)
     return simplify_inward(shape, max(depth, SLACK), SLACK) if not shape.is_empty else shape
 
 
-def _serves(cell: Polygon, safe: Polygon, points: Sequence[FloatArray], neck: float) -> bool:
+def _serves(cell: Polygon, safe: Polygon, points: Sequence[FloatArray], clearance: float) -> bool:
     """Whether a cell lies inside the safe region and still joins all points widely enough."""
     if cell.is_empty or not cell.is_valid or not safe.covers(cell):
         return False
     if not all(cell.contains(Point(point)) for point in points):
         return False
     finder = PassageFinder(cell)
-    return all(finder.find(start, end).neck >= neck for start, end in pairwise(points))
+    return all(finder.find(start, end).clearance >= clearance for start, end in pairwise(points))

@@ -66,14 +66,14 @@ def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray:
         lower, upper = -np.inf, np.inf
         for j in range(count):
             sine = x[i] * y[j] - y[i] * x[j]
-            room = h[j] - h[i] * (x[i] * x[j] + y[i] * y[j])
+            left = h[j] - h[i] * (x[i] * x[j] + y[i] * y[j])
             if abs(sine) < _PARALLEL:
-                if room < -_PARALLEL:
+                if left < -_PARALLEL:
                     upper = -np.inf
             elif sine > 0.0:
-                upper = min(upper, room / sine)
+                upper = min(upper, left / sine)
             else:
-                lower = max(lower, room / sine)
+                lower = max(lower, left / sine)
         if upper - lower > _SHORTEST:
             vertices[size, 0], vertices[size, 1] = h[i] * x[i] - upper * y[i], h[i] * y[i] + upper * x[i]
             size += 1
@@ -163,11 +163,11 @@ def common_disc(centres: FloatArray, radius: float, largest_turn: float) -> Floa
         reach = np.inf
         for i in range(len(centres)):
             dx, dy = x - centres[i, 0], y - centres[i, 1]
-            room = radius * radius - dx * dx - dy * dy
-            if room <= 0.0:
+            beyond = radius * radius - dx * dx - dy * dy
+            if beyond <= 0.0:
                 return np.empty((0, 2))
             along = u * dx + v * dy
-            reach = min(reach, sqrt(along * along + room) - along)
+            reach = min(reach, sqrt(along * along + beyond) - along)
         reach *= 1.0 - 1e-9
         ring[k, 0], ring[k, 1] = x + reach * u, y + reach * v
     return ring

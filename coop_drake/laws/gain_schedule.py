@@ -19,7 +19,7 @@ class Schedule(NamedTuple):
     """The rule by which gains follow the cell; in that of fixed gains, lower and upper bounds are equal.
 
     Attributes:
-        wall_stiffness: K times the neck's width [m/s^2].
+        wall_stiffness: K times the path's clearance b [m/s^2].
         min_stiffness: Smallest K [1/s^2].
         max_stiffness: Largest K [1/s^2].
         damping_factor: zeta over sqrt(K) [-].
@@ -88,19 +88,19 @@ def schedule_of(gain_set: GainSet) -> Schedule:
 
 
 @compiled
-def scheduled_governor(schedule: Schedule, neck: float) -> tuple[float, float, float]:
+def scheduled_governor(schedule: Schedule, clearance: float) -> tuple[float, float, float]:
     """Return K, zeta and K_G of a transition: K = clamp(``wall_stiffness`` / b), the largest for b = 0.
 
     Args:
         schedule: The rule.
-        neck: b, largest clearance that a path to the target can keep inside the cell [m].
+        clearance: b, largest clearance that a path to the target can keep inside the cell [m].
 
     Returns:
         K [1/s^2], zeta = ``damping_factor`` sqrt(K) [1/s] and K_G = ``governor_factor`` sqrt(K) [-].
     """
     stiffness = schedule.max_stiffness
-    if neck * stiffness > schedule.wall_stiffness:
-        stiffness = max(schedule.wall_stiffness / neck, schedule.min_stiffness)
+    if clearance * stiffness > schedule.wall_stiffness:
+        stiffness = max(schedule.wall_stiffness / clearance, schedule.min_stiffness)
     root = sqrt(stiffness)
     return stiffness, schedule.damping_factor * root, schedule.governor_factor * root
 
@@ -155,7 +155,7 @@ def scheduled_axis(
 def transition_gains(
     gain_set: GainSet,
     *,
-    neck: float,
+    clearance: float,
     slice_lower: FloatArray,
     slice_upper: FloatArray,
     goal_lower: FloatArray,
@@ -166,7 +166,7 @@ def transition_gains(
 
     Args:
         gain_set: Fixed gains, or the rule by which gains follow the cell.
-        neck: b, largest clearance that a path to the target can keep inside the cell [m].
+        clearance: b, largest clearance that a path to the target can keep inside the cell [m].
         slice_lower: Lower ends of the slice's axes (theta, q...), shape (m,) [rad or m].
         slice_upper: Upper ends, above the lower ones, shape (m,).
         goal_lower: Lower ends of the goal intervals, inside the slice, shape (m,).
@@ -183,7 +183,7 @@ def transition_gains(
     """
     _check_intervals(slice_lower, slice_upper, goal_lower, goal_upper)
     schedule = schedule_of(gain_set)
-    stiffness, damping, governor_gain = scheduled_governor(schedule, float(neck))
+    stiffness, damping, governor_gain = scheduled_governor(schedule, float(clearance))
     if isinstance(gain_set, FixedGains):  # as given, not by way of the root of K
         damping, governor_gain = float(gain_set.damping), float(gain_set.governor_gain)
     axes = np.transpose([slice_lower, slice_upper, goal_lower, goal_upper, resting]).astype(float)

@@ -108,7 +108,7 @@ class ScheduledGains:
     """Rules by which gains follow the cell: K grows where it is narrow, lambda where funnels shrink little.
 
     Attributes:
-        wall_stiffness: K times the neck's width, K = clamp(wall_stiffness / b) [m/s^2].
+        wall_stiffness: K times the path's clearance b, K = clamp(wall_stiffness / b) [m/s^2].
         min_stiffness: Smallest K [1/s^2].
         max_stiffness: Largest K [1/s^2].
         damping_factor: zeta over sqrt(K) [-].

@@ -32,7 +32,7 @@ def simulate(
     blocks: Blocks = "named",
     replacements: Replacements | None = None,
     progress: Progress | None = None,
-    onlooker: Callable[[Sample], None] | None = None,
+    observer: Callable[[Sample], None] | None = None,
 ) -> SimulationLog:
     """Run the closed loop from the plan's start until the object rests at the goal, or the run fails.
 
@@ -49,7 +49,7 @@ def simulate(
         replacements: Blocks of a user's own in every robot's controller, by the name of the block that they
             replace, such as ``axis_ppc``; with named blocks only.
         progress: Called with the stage and the fraction done, if given.
-        onlooker: Called with every accepted step, for example a live view; it changes nothing about the run.
+        observer: Called with every accepted step, for example a live view; it changes nothing about the run.
 
     Raises:
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
@@ -57,7 +57,7 @@ def simulate(
     """
     loop = build_closed_loop(scenario, plan, maps, blocks=blocks, replacements=replacements)
     try:
-        return _simulated(loop, scenario, progress, onlooker)
+        return _simulated(loop, scenario, progress, observer)
     finally:
         loop.release()
         del loop
@@ -70,7 +70,7 @@ def _simulated(
     loop: ClosedLoop,
     scenario: Scenario,
     progress: Progress | None,
-    onlooker: Callable[[Sample], None] | None,
+    observer: Callable[[Sample], None] | None,
 ) -> SimulationLog:
     plan = loop.plan
     clearance = TeamClearance(scenario.workspace.polygon, read_component_tree(loop.team.as_tree))
@@ -81,7 +81,7 @@ def _simulated(
         scenario.goal.tolerances.position,
         root,
         progress,
-        onlooker,
+        observer,
     )
     simulator = Simulator(loop.diagram, root)
     configure_simulator(simulator, scenario)

@@ -25,7 +25,7 @@ class Watch:
         position_tolerance: How close to the goal counts as arrived [m].
         root: Context of the whole diagram in the simulator.
         progress: Called with the stage and the fraction done, if given.
-        onlooker: Called with every accepted step, if given.
+        observer: Called with every accepted step, if given.
     """
 
     def __init__(
@@ -35,13 +35,13 @@ class Watch:
         position_tolerance: float,
         root: Context,
         progress: Callable[[str, float], None] | None,
-        onlooker: Callable[[Sample], None] | None = None,
+        observer: Callable[[Sample], None] | None = None,
     ) -> None:
         self.recorder = Recorder()
         self.reached = False
         self.violation = ""
         self._loop, self._invariants = loop, invariants
-        self._progress, self._onlooker = progress, onlooker
+        self._progress, self._observer = progress, observer
         self._telemetry = Telemetry(loop, root)
         self._tolerance = position_tolerance
         self._last: Sample | None = None
@@ -58,8 +58,8 @@ class Watch:
         self.recorder.add(sample, margins)
         self._last = sample
         self._report(sample)
-        if self._onlooker is not None:
-            self._onlooker(sample)
+        if self._observer is not None:
+            self._observer(sample)
         if margins.violation:
             self.violation = margins.violation
         elif sample.arrived:

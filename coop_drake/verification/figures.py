@@ -20,8 +20,8 @@ __all__ = ["check_figures"]
 RELATIVE = 1e-9
 """Relative difference of figures that are computed twice, in another order of operations [-]."""
 
-NECK_FRACTION = 1e-3
-"""Fraction of a neck by which eroding with polygons for arcs may be wrong; a bound for 32 chords [-]."""
+ERODING_FRACTION = 1e-3
+"""Error of eroding with 32 chords for a quarter circle, a bound, as a fraction of the clearance [-]."""
 
 SAME_PLACE = 1e-9
 """Paths shorter than this do not move the position, only angles [m]."""
@@ -52,7 +52,7 @@ def check_figures(plan: Plan, gain_sets: Mapping[str, GainSet]) -> tuple[Check, 
         _check_length(entry, transition, where)
         gains = transition_gains(
             gain_sets[plan.gain_set],
-            neck=transition.neck,
+            clearance=transition.neck,
             slice_lower=plan.cells[k].lower,
             slice_upper=plan.cells[k].upper,
             goal_lower=transition.goal_lower,
@@ -73,7 +73,7 @@ def check_figures(plan: Plan, gain_sets: Mapping[str, GainSet]) -> tuple[Check, 
 
 def _check_neck(cell: Polygon, entry: FloatArray, transition: Transition, where: str) -> None:
     """The cell, eroded by the neck, must hold entry and target in one connected part."""
-    eroded = cell.buffer(-transition.neck * (1.0 - NECK_FRACTION), quad_segs=32)
+    eroded = cell.buffer(-transition.neck * (1.0 - ERODING_FRACTION), quad_segs=32)
     ends = Point(entry), Point(transition.target)
     if not any(all(part.covers(end) for end in ends) for part in shapely.get_parts(eroded)):
         raise RefusalError(f"{where}.neck", f"no path keeps {transition.neck} m of clearance")

@@ -134,11 +134,11 @@ def test_robots_move_the_object_together_at_any_accuracy():
     assert len(coarse.times) < len(fine.times)
 
 
-def test_an_onlooker_sees_every_step_and_changes_nothing():
+def test_an_observer_sees_every_step_and_changes_nothing():
     scenario, plan = small_problem("base")
     scenario = replace(scenario, simulator=replace(scenario.simulator, max_time=0.1))
     seen = []
-    watched = simulate(scenario, plan, small_maps(), onlooker=lambda sample: seen.append(sample.time))
+    watched = simulate(scenario, plan, small_maps(), observer=lambda sample: seen.append(sample.time))
     alone = simulate(scenario, plan, small_maps())
     assert seen == watched.times.tolist()
     assert np.array_equal(watched.object_pose, alone.object_pose)

@@ -49,14 +49,14 @@ def test_nothing_but_strips_is_lost_and_the_widest_passage_stays(floor_with_ends
         assert floor.buffer(1e-9).covers(cell)
         assert cell.contains(goal)
         assert floor.difference(cell).buffer(-0.06).is_empty
-    assert cell.boundary.distance(passage.path) >= 0.4 * passage.neck
+    assert cell.boundary.distance(passage.path) >= 0.4 * passage.clearance
 
 
 def test_slits_keep_clear_of_the_widest_passage():
     room = HALL.difference(CRATE)
     passage = PassageFinder(room).find([0.5, 3.2], [5.5, 3.2])
     cell = cut_open(room, Point(5.5, 3.2), Point(0.5, 3.2))
-    assert cell.boundary.distance(passage.path) == pytest.approx(passage.neck)
+    assert cell.boundary.distance(passage.path) == pytest.approx(passage.clearance)
     assert room.difference(cell).bounds[3] < 1.6
 
 

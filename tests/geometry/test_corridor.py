@@ -31,5 +31,5 @@ def test_the_passage_keeps_its_clearance(floor_with_ends):
     corridor = corridor_around(floor, passage.path, 2.0)
     assert floor.buffer(1e-9).covers(corridor)
     assert corridor.contains(Point(end))
-    assert corridor.exterior.distance(passage.path) >= 0.99 * passage.neck
+    assert corridor.exterior.distance(passage.path) >= 0.99 * passage.clearance
     assert BoundaryDistance(corridor)(start) == pytest.approx(BoundaryDistance(floor)(start), rel=1e-9)

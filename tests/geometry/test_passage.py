@@ -1,4 +1,4 @@
-"""Widest passages: known necks, and what must hold on any floor."""
+"""Widest passages: known clearances, and what must hold on any floor."""
 
 import numpy as np
 import pytest
@@ -21,40 +21,40 @@ def rooms_joined_by(*gaps):
 
 
 @pytest.mark.parametrize("width", [0.8, 0.1, 0.02, 0.002])
-def test_neck_of_an_aisle_is_half_its_width(width):
+def test_clearance_of_an_aisle_is_half_its_width(width):
     passage = PassageFinder(rooms_joined_by((1.0, 1.0 + width))).find((0.5, 0.5), (4.5, 0.5))
-    assert passage.neck == pytest.approx(0.5 * width, rel=0.03)
+    assert passage.clearance == pytest.approx(0.5 * width, rel=0.03)
     assert 1.99 <= passage.narrowest[0] <= 3.01
 
 
 def test_the_wider_of_two_aisles_is_taken_though_it_is_longer():
     passage = PassageFinder(rooms_joined_by((0.4, 0.6), (1.5, 1.9))).find((0.5, 0.5), (4.5, 0.5))
-    assert passage.neck == pytest.approx(0.2, rel=0.02)
+    assert passage.clearance == pytest.approx(0.2, rel=0.02)
     assert passage.length > 4.3
 
 
 def test_a_clear_straight_way_is_taken_as_it_is():
     passage = PassageFinder(box(0, 0, 4, 2)).find((1.0, 1.0), (3.0, 0.5))
     assert passage.path.equals(LineString([(1.0, 1.0), (3.0, 0.5)]))
-    assert passage.neck == pytest.approx(0.5)
+    assert passage.clearance == pytest.approx(0.5)
 
 
 def test_a_passage_from_a_point_to_itself_has_no_length():
     passage = PassageFinder(box(0, 0, 4, 2)).find((1.0, 0.7), (1.0, 0.7))
     assert passage.length == 0.0
-    assert passage.neck == pytest.approx(0.7)
+    assert passage.clearance == pytest.approx(0.7)
 
 
 @given(floors_with_ends())
 @settings(max_examples=60, deadline=None)
-def test_a_passage_keeps_its_neck_and_is_no_wider_than_its_ends(floor_with_ends):
+def test_a_passage_keeps_its_clearance_and_is_no_wider_than_its_ends(floor_with_ends):
     floor, (start, end) = floor_with_ends
     passage = PassageFinder(floor).find(start, end)
     distance = BoundaryDistance(floor)
     assert floor.contains(passage.path)
-    assert floor.boundary.distance(passage.path) == pytest.approx(passage.neck, abs=1e-12)
-    assert passage.neck <= min(distance(start), distance(end)) + 1e-12
-    assert distance(passage.narrowest) == pytest.approx(passage.neck, abs=1e-9)
+    assert floor.boundary.distance(passage.path) == pytest.approx(passage.clearance, abs=1e-12)
+    assert passage.clearance <= min(distance(start), distance(end)) + 1e-12
+    assert distance(passage.narrowest) == pytest.approx(passage.clearance, abs=1e-9)
     assert passage.path.coords[0] == tuple(start)
     assert passage.path.coords[-1] == tuple(end)
 
@@ -64,7 +64,7 @@ def test_a_passage_keeps_its_neck_and_is_no_wider_than_its_ends(floor_with_ends)
 def test_no_passage_is_much_wider_than_the_one_found(floor_with_ends):
     floor, (start, end) = floor_with_ends
     passage = PassageFinder(floor).find(start, end)
-    eroded = floor.buffer(-1.1 * passage.neck - 0.002)
+    eroded = floor.buffer(-1.1 * passage.clearance - 0.002)
     parts = [part for part in getattr(eroded, "geoms", [eroded]) if not part.is_empty]
     reach = 1e-6
     holds = [{k for k, part in enumerate(parts) if part.distance(Point(p)) < reach} for p in (start, end)]

@@ -51,11 +51,11 @@ def test_a_room_without_holes_stays_as_it_is():
 def test_no_hole_is_left_and_the_passage_stays_inside(floor_with_ends):
     floor, (start, end) = floor_with_ends
     passage = PassageFinder(floor).find(start, end)
-    cut = cut_holes(floor, passage.path, passage.neck)
+    cut = cut_holes(floor, passage.path, passage.clearance)
     assert cut.is_valid
     assert not cut.interiors
     assert floor.buffer(1e-9).covers(cut)
     assert cut.contains(Point(start))
     assert cut.contains(Point(end))
     assert BoundaryDistance(cut).along(start, start) > 0.0
-    assert cut.boundary.distance(passage.path) >= 0.4 * passage.neck
+    assert cut.boundary.distance(passage.path) >= 0.4 * passage.clearance

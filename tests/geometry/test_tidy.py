@@ -18,7 +18,7 @@ def edge_lengths(polygon):
     return np.linalg.norm(np.diff(shapely.get_coordinates(polygon.exterior), axis=0), axis=1)
 
 
-def test_cusps_slivers_idle_vertices_and_pillars_go_and_the_neck_stays():
+def test_cusps_slivers_idle_vertices_and_pillars_go_and_the_clearance_stays():
     safe = untidy_cell()
     tidied = tidy_cell(safe, ENDS)
     assert not tidied.interiors
@@ -26,8 +26,8 @@ def test_cusps_slivers_idle_vertices_and_pillars_go_and_the_neck_stays():
     assert edge_lengths(tidied).min() > 0.005
     assert np.degrees(sharpest_angle(safe)) < 5.0
     assert np.degrees(sharpest_angle(tidied)) > 45.0
-    neck = PassageFinder(safe).find(*ENDS).neck
-    assert PassageFinder(tidied).find(*ENDS).neck >= 0.8 * neck
+    clearance = PassageFinder(safe).find(*ENDS).clearance
+    assert PassageFinder(tidied).find(*ENDS).clearance >= 0.8 * clearance
 
 
 @given(floors_with_ends())
@@ -40,7 +40,7 @@ def test_a_tidy_cell_is_inside_whole_and_joins_the_ends(floor_with_ends):
     assert not tidied.interiors
     for end in ends:
         assert BoundaryDistance(tidied)(end) > 0.0
-    assert PassageFinder(tidied).find(*ends).neck >= 0.4 * PassageFinder(safe).find(*ends).neck
+    assert PassageFinder(tidied).find(*ends).clearance >= 0.4 * PassageFinder(safe).find(*ends).clearance
 
 
 @given(floors_with_ends())
@@ -57,7 +57,7 @@ def test_a_clean_convex_room_is_kept_but_for_the_guard():
 
 
 def test_a_point_outside_the_safe_region_is_refused():
-    with pytest.raises(GeometryError, match="leaves no room"):
+    with pytest.raises(GeometryError, match="holds no path"):
         tidy_cell(box(0, 0, 1, 1), [np.array([2.0, 2.0])])
 
 

@@ -9,17 +9,21 @@ GOAL = {"goal_lower": np.array([0.8, -1.0]), "goal_upper": np.array([1.0, 1.0])}
 RESTING = np.array([0.4, 0.5])
 
 
-def schedule(gain_set, *, neck=0.2, **changes):
-    return transition_gains(gain_set, neck=neck, **({**SLICE, **GOAL, "resting": RESTING} | changes))
+def schedule(gain_set, *, clearance=0.2, **changes):
+    return transition_gains(
+        gain_set, clearance=clearance, **({**SLICE, **GOAL, "resting": RESTING} | changes)
+    )
 
 
 @pytest.mark.parametrize(
-    ("neck", "stiffness"),
+    ("clearance", "stiffness"),
     [(1.0, 50.0), (0.4, 50.0), (0.2, 100.0), (0.05, 400.0), (0.01, 400.0), (0.0, 400.0)],
 )
-def test_stiffness_follows_the_neck_between_its_bounds(neck, stiffness):
-    gains = schedule(ScheduledGains(), neck=neck)
-    assert scheduled_governor(schedule_of(ScheduledGains()), neck)[0] == pytest.approx(stiffness, rel=1e-14)
+def test_stiffness_follows_the_clearance_between_its_bounds(clearance, stiffness):
+    gains = schedule(ScheduledGains(), clearance=clearance)
+    assert scheduled_governor(schedule_of(ScheduledGains()), clearance)[0] == pytest.approx(
+        stiffness, rel=1e-14
+    )
     assert gains.stiffness == pytest.approx(stiffness, rel=1e-14)
     assert gains.damping == pytest.approx(np.sqrt(stiffness))
     assert gains.governor_gain == pytest.approx(0.8 * np.sqrt(stiffness))
@@ -64,7 +68,7 @@ def test_the_energy_bound_lies_above_the_energy_at_rest():
 def test_fixed_gains_do_not_look_at_the_cell():
     wide, narrow = (
         schedule(FixedGains(joint_decay_rate=3.0)),
-        schedule(FixedGains(joint_decay_rate=3.0), neck=1e-6),
+        schedule(FixedGains(joint_decay_rate=3.0), clearance=1e-6),
     )
     for gains in (wide, narrow):
         assert (gains.stiffness, gains.damping, gains.governor_gain) == (50.0, 5.0, 5.0)

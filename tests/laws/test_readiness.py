@@ -17,7 +17,7 @@ NEXT_INTERVALS = {
 
 
 def table_of(intervals, resting):
-    gains = transition_gains(ScheduledGains(), neck=0.2, resting=np.array(resting), **intervals)
+    gains = transition_gains(ScheduledGains(), clearance=0.2, resting=np.array(resting), **intervals)
     return axis_table(Funnel(**intervals, decay_rate=gains.decay_rate, shape=gains.funnel), gains), gains
 
 

@@ -168,7 +168,7 @@ def test_e43_the_wanted_rate_leaves_minus_k1_z1_and_not_its_square():
 
 def test_gains_of_the_schedule_bound_the_log_term_for_every_row_of_table_1():
     for transition in table_transitions(CORRECTED):
-        gains = transition_gains(ScheduledGains(), neck=0.1, **transition)
+        gains = transition_gains(ScheduledGains(), clearance=0.1, **transition)
         x, lower, upper = transition["resting"], transition["slice_lower"], transition["slice_upper"]
         pull = (upper - lower) / ((x - lower) * (upper - x)) * np.abs(np.log((x - lower) / (upper - x)))
         assert np.all(gains.log_gain * pull <= 20.0 * (1.0 + 1e-12))

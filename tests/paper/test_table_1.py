@@ -80,7 +80,7 @@ def test_one_bound_on_the_energy_for_all_transitions_would_stop_at_the_worst():
     gain_set = ScheduledGains()
     at_rest = []
     for transition in table_transitions(CORRECTED)[1:]:
-        gains = transition_gains(gain_set, neck=0.2, **transition)
+        gains = transition_gains(gain_set, clearance=0.2, **transition)
         at_rest.append(
             (gains.energy_bound - gain_set.energy_allowance * gains.log_gain) / gain_set.energy_factor
         )

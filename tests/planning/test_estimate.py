@@ -28,8 +28,8 @@ def test_speed_in_a_long_aisle_is_that_of_a_governed_point(gain_set):
     aisle = box(0.0, -half_width, 30.0, half_width)
     lower, upper = np.array([-1.0]), np.array([1.0])
     gains = transition_gains(
-        gain_set, neck=half_width, slice_lower=lower, slice_upper=upper, goal_lower=lower, goal_upper=upper,
-        resting=np.zeros(1),
+        gain_set, clearance=half_width, slice_lower=lower, slice_upper=upper,
+        goal_lower=lower, goal_upper=upper, resting=np.zeros(1),
     )  # fmt: skip
     run = run_governor(
         BoundaryDistance(aisle), lambda point: np.array([1.0, 0.0]), position=np.array([2.0, 0.0]),

@@ -107,8 +107,8 @@ def test_a_long_aisle_is_crossed_at_the_governors_speed():
         state, places, room, lower, upper, np.array([lower, upper]), np.zeros(1), schedule, 0.0, 60.0
     )
     gains = transition_gains(
-        ScheduledGains(), neck=0.2, slice_lower=lower, slice_upper=upper, goal_lower=lower, goal_upper=upper,
-        resting=np.zeros(1),
+        ScheduledGains(), clearance=0.2, slice_lower=lower, slice_upper=upper,
+        goal_lower=lower, goal_upper=upper, resting=np.zeros(1),
     )  # fmt: skip
     assert seconds == pytest.approx(10.0 / (speed_per_clearance(gains) * 0.2), rel=0.1)
     assert 9.8 < state[2] <= 10.0

@@ -32,7 +32,7 @@ def play(transitions, gain_set, *, start, step=1e-3, time_limit=30.0, gated=True
         gated: Whether the energy gate of the next funnel must open too.
         neck: Passed to the schedule, of no influence on the axes.
     """
-    gains = [transition_gains(gain_set, neck=neck, **t) for t in transitions]
+    gains = [transition_gains(gain_set, clearance=neck, **t) for t in transitions]
     funnels = [
         Funnel(t["slice_lower"], t["slice_upper"], t["goal_lower"], t["goal_upper"], g.decay_rate, g.funnel)
         for t, g in zip(transitions, gains, strict=True)

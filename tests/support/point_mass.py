@@ -55,7 +55,7 @@ def build_fields(plan, *, tolerance=1e-4):
 
 
 def straight_fields(plan):
-    """Stand-ins for convex cells: straight to the target, slowing down within a third of the neck."""
+    """Fields for convex cells: straight to the target, slower within a third of the path's clearance."""
 
     def field(transition):
         radius = transition.neck / 3.0

@@ -125,7 +125,7 @@ def _transition(
     neck = min(cell.safe.exterior.distance(Point(p)) for p in (position, target))
     gains = transition_gains(
         gain_set,
-        neck=neck,
+        clearance=neck,
         slice_lower=cell.lower,
         slice_upper=cell.upper,
         goal_lower=lower,

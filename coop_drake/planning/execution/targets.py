@@ -69,7 +69,7 @@ def _crossing_times(box: FreeBox, entries: Sequence[FloatArray], exits: Sequence
             passage = finder.find(entry, exit_)
         except GeometryError:
             return float("inf")
-        return transition_time(passage.length, passage.neck)
+        return transition_time(passage.length, passage.clearance)
 
     return np.array([[time(entry, exit_) for exit_ in exits] for entry in entries])
 

@@ -140,8 +140,8 @@ def _route(
     wanted = (
         narrowest if len(cells) > 1 else min(narrowest, GOAL_REGION_FRACTION * problem.position_tolerance)
     )
-    if inradius < wanted or route.passage.neck < narrowest:
-        seconds = travel_time(route.passage.length, route.passage.neck)
+    if inradius < wanted or route.passage.clearance < narrowest:
+        seconds = travel_time(route.passage.length, route.passage.clearance)
         raise StallError(_stall(problem, index, route, seconds))
     return route
 
@@ -165,11 +165,11 @@ def _transition(
         goal_lower=goals[0],
         goal_upper=goals[1],
         inradius=route.inradius,
-        neck=route.passage.neck,
+        neck=route.passage.clearance,
         length=route.passage.length,
         estimated_time=0.0,
         only_angles=bool(route.passage.length <= SAME_PLACE),
-        gains=_gains(gain_set, cell, route.passage.neck, goals, resting),
+        gains=_gains(gain_set, cell, route.passage.clearance, goals, resting),
     )
 
 
@@ -178,7 +178,7 @@ def _stall(problem: PlanningProblem, index: int, route: _TransitionGeometry, sec
     x, y = passage.narrowest
     narrowest = NARROWEST * usual_unit(problem.tree)
     return (
-        f"cell {index}: the object's passage through ({x:.3f}, {y:.3f}) is {2e3 * passage.neck:.1f} mm "
+        f"cell {index}: the object's passage through ({x:.3f}, {y:.3f}) is {2e3 * passage.clearance:.1f} mm "
         f"wide and {passage.length:.2f} m long, about {seconds:.0f} s, and its target "
         f"({route.target[0]:.3f}, {route.target[1]:.3f}) has {1e3 * route.inradius:.1f} mm around it; "
         f"expected at least {2e3 * narrowest:g} mm and {1e3 * narrowest:g} mm, and at most "
@@ -194,10 +194,12 @@ def _cell(box: FreeBox, entry: FloatArray, target: FloatArray, index: int) -> Ce
     return Cell(box.lower, box.upper, box.polygon, box.core, tidied)
 
 
-def _gains(gain_set: GainSet, cell: Cell, neck: float, goal: Bounds, resting: FloatArray) -> TransitionGains:
+def _gains(
+    gain_set: GainSet, cell: Cell, clearance: float, goal: Bounds, resting: FloatArray
+) -> TransitionGains:
     return transition_gains(
         gain_set,
-        neck=neck,
+        clearance=clearance,
         slice_lower=cell.lower,
         slice_upper=cell.upper,
         goal_lower=goal[0],
