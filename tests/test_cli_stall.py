@@ -65,4 +65,8 @@ def test_reports_that_never_arrive_are_named(planned, tmp_path):
     deployment = {"control_rate": 100.0, "messages": {"loss": 1.0}}
     deaf = write_scenario(tmp_path / "deaf.scenario.yaml", goal=goal, deployment=deployment)
     result = invoke("simulate", deaf, "--plan", path, "--out", tmp_path, "--json")
-    assert_stalled(result, tmp_path, "it waits until the cell planner hears that every robot is ready")
+    assert_stalled(
+        result,
+        tmp_path,
+        "it waits until the cell planner receives the robots' reports",
+    )

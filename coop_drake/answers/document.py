@@ -131,7 +131,7 @@ def _mapping(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     names = [name for name, _ in pairs]
     for name in mapping if len(mapping) < len(pairs) else ():
         if names.count(name) > 1:
-            raise DataError(name, mapping[name], "every key once; this one stands twice in one mapping")
+            raise DataError(name, mapping[name], "each key at most once; a mapping has this one twice")
     return mapping
 
 

@@ -53,5 +53,5 @@ def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> E
     picture = ResultFolder.of(task.name, out).path / "diagram.svg"
     with reporter.stage("drawing"):
         save_figure(block_diagram_figure(loop, robot), picture)
-    reporter.say(f"The picture is {escape(str(picture))}")
+    reporter.say(f"The picture is in {escape(str(picture))}")
     return ExitCode.DONE

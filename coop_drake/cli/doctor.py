@@ -58,7 +58,7 @@ class Finding:
 
 def doctor_command(
     machine: Machine = False,
-    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show what is wrong only.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Show only what is wrong.")] = False,
 ) -> None:
     """Check the installation: versions, Drake, Meshcat, fonts, compiled parts, memory, caches."""
     with reporting(machine=machine, quiet=quiet) as reporter:

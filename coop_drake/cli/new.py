@@ -36,30 +36,36 @@ _QUESTIONS: tuple[tuple[str, str, Any], ...] = (
 
 def new_command(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of scenario and folder.")],
-    robots: Annotated[int | None, typer.Option("--robots", metavar="N", help="Two to four; 2.")] = None,
+    robots: Annotated[
+        int | None, typer.Option("--robots", metavar="N", help="Number of robots, 2 to 4; default 2.")
+    ] = None,
     arm: Annotated[
         str | None,
         typer.Option(
             "--arm",
             metavar="L1,L2,…",
-            help="Links from base to end effector in metres, joints between them; 0.35,0.4.",
+            help="Lengths of the arm's links from base to end effector in metres, with a joint between each "
+            "two; default 0.35,0.4.",
         ),
     ] = None,
     base_radius: Annotated[
-        float | None, typer.Option("--base-radius", metavar="M", help="Radius of a base in metres; 0.25.")
+        float | None,
+        typer.Option("--base-radius", metavar="M", help="Radius of a base in metres; default 0.25."),
     ] = None,
     length: Annotated[
-        float | None, typer.Option("--length", metavar="M", help="Length of the object in metres; 0.8.")
+        float | None,
+        typer.Option("--length", metavar="M", help="Length of the object in metres; default 0.8."),
     ] = None,
     width: Annotated[
-        float | None, typer.Option("--width", metavar="M", help="Width of the object in metres; 0.5.")
+        float | None, typer.Option("--width", metavar="M", help="Width of the object in metres; default 0.5.")
     ] = None,
     door: Annotated[
         float | None,
         typer.Option(
             "--door",
             metavar="M",
-            help="Width of the door between two rooms in metres; wide by default.",
+            help="Width of the door between two rooms in metres; default: the team's width and 0.2 m on each "
+            "side.",
         ),
     ] = None,
     floor_plan: Annotated[

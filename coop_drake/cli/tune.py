@@ -32,7 +32,7 @@ def tune_command(
             "-l",
             metavar="LIMIT",
             help="What must be kept: time<=16, clearance>=0.1, or time<=1.1x for 1.1 times the value before. "
-            "time<=1x by default.",
+            "Default: time<=1x (not slower than before).",
         ),
     ] = None,
     gains: GainsName = None,

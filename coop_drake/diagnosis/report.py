@@ -42,7 +42,7 @@ def _passage_sentences(findings: PassageFindings) -> list[str]:
         back = f"Moving every wall back by up to {widening.most:.3f} m was {known} enough."
         return [back, *_open_floor_sentences(findings.open_floor)]
     if not count:
-        refuted = f", by {widening.refuted:.3f} m proved too little" if widening.refuted else ""
+        refuted = f"; by {widening.refuted:.3f} m was proved too little" if widening.refuted else ""
         return [f"Moving every wall back by {widening.found:.3f} m was found enough{refuted}."]
     sentences = [
         f"Passage {number} blocks: {_where(passage)}. {_missing(passage)}."
@@ -58,10 +58,10 @@ def _open_floor_sentences(floor: OpenFloor | None) -> list[str]:
         return []
     if floor.answer is Answer.FOUND:
         return ["Without any walls there is a path: the walls must move back by more than was tried."]
-    known = "exists, proved" if floor.answer is Answer.INFEASIBLE else "was found"
-    sentences = [f"Even without walls no path {known}: the bodies may be in each other's way."]
-    return sentences + [
-        f"If {first} and {second} could overlap, there would be one." for first, second in floor.pairs
+    proved = floor.answer is Answer.INFEASIBLE
+    known = "It is proved that there is no path" if proved else "No path was found"
+    return [f"{known} even without walls: the bodies may be in each other's way."] + [
+        f"A path exists if {first} and {second} are allowed to overlap." for first, second in floor.pairs
     ]
 
 
@@ -78,7 +78,7 @@ def _missing(passage: BlockingPassage) -> str:
         return f"{enough}, {2.0 * passage.refuted:.3f} m more was proved too little"
     if passage.refuted is None:
         return f"{enough}; no amount was proved too little"
-    return f"{enough}; as it is it was proved too narrow"
+    return f"{enough}; its present width is proved too narrow"
 
 
 def _goal_sentences(goal: BlockedPose) -> list[str]:
@@ -96,7 +96,7 @@ def _goal_sentences(goal: BlockedPose) -> list[str]:
 
 
 def rows_of(diagnosis: Diagnosis) -> list[Row]:
-    """Label and value of every row of the closing table."""
+    """Label and value of every row of the table of findings, which the command `why` shows."""
     rows = [("answer", diagnosis.answer.value)]
     if diagnosis.margin is not None:
         rows.append(("margin kept", f"{diagnosis.margin:.3f} m"))
@@ -130,8 +130,8 @@ def _relaxation(relaxation: Relaxation) -> str:
     if bracket.found is not None:
         too_little = f" ({amount(bracket.refuted)} is proved too little)" if bracket.refuted else ""
         return f"{amount(bracket.found)} is enough{too_little}"
-    known = "proved" if relaxation.never_enough else "nothing found"
-    return f"not enough alone ({known} up to {amount(bracket.most)})"
+    known = "proved" if relaxation.never_enough else "no path found"
+    return f"not enough by itself ({known} even at {amount(bracket.most)})"
 
 
 def facts_of(diagnosis: Diagnosis) -> dict[str, Any]:

@@ -204,6 +204,6 @@ def _check(scenario: Scenario, knowledge: Sequence[RobotKnowledge]) -> None:
         raise ScenarioError(
             str(scenario.path),
             *refused,
-            "for fused blocks an ideal plant without springs, and of a deployment control_rate, mass_error "
-            "and messages alone; named blocks do everything",
+            "an ideal plant without springs, of deployment only control_rate, mass_error, messages and seed: "
+            "fused blocks support only these; use `--blocks named` for the rest",
         )

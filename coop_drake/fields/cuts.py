@@ -11,6 +11,9 @@ from coop_drake.geometry.slits import cut_holes
 
 __all__ = ["cut_open"]
 
+_REMEDY = "move the goal or the start, or map the domain with its holes"
+"""What a user can do where a domain cannot be cut open."""
+
 _ROUNDING = 1e-9
 """Distance, per length of the boundary, by which rounding may put the result outside the domain [-]."""
 
@@ -72,15 +75,15 @@ def _certify(domain: Polygon, cell: Polygon, goal: Point | Polygon, kept: Geomet
         FieldError: If it does not.
     """
     if cell.is_empty or not cell.is_valid or not domain.buffer(_ROUNDING * domain.length).covers(cell):
-        raise FieldError("the slits leave no valid cell around the goal")
+        raise FieldError(f"the slits leave no valid cell around the goal; {_REMEDY}")
     lines = [part for part in shapely.get_parts(kept) if isinstance(part, LineString)]
     if not all(cell.contains(line) for line in lines):
-        raise FieldError("the slits cross the widest passage to the goal")
+        raise FieldError(f"the slits cross the widest passage to the goal; {_REMEDY}")
     filled = Polygon(goal.exterior) if isinstance(goal, Polygon) else goal
     for hole in cell.interiors:
         if not filled.covers(hole):
             x, y = hole.centroid.coords[0]
             raise FieldError(
                 f"the hole around ({x:.6g}, {y:.6g}) m cannot be joined to the outer ring by straight slits "
-                "that leave the passage to the goal open"
+                f"that leave the passage to the goal open; {_REMEDY}"
             )

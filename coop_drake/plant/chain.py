@@ -75,7 +75,10 @@ def _check_tree(scenario: Scenario, robot: RobotAssembly, plant: MultibodyPlant,
         if int(child.index()) in seen:
             name = scoped(plant, child)
             raise refusal(
-                scenario, robot, scoped(plant, joint), f"one joint towards {name}; loops have no tree"
+                scenario,
+                robot,
+                scoped(plant, joint),
+                f"exactly one joint that leads to {name}; closed loops are not supported",
             )
         seen.add(int(child.index()))
 

@@ -154,9 +154,7 @@ class _TreeReader:
         X_CB = X_CW @ body.EvalPoseInWorld(self.context)
         geometries = self.plant.GetCollisionGeometriesForBody(body)
         if not geometries and self.plant.GetVisualGeometriesForBody(body):
-            raise self._refusal(
-                body, "bodies with collision geometry (this one can be seen, but not collide)"
-            )
+            raise self._refusal(body, "bodies with collision geometry (this one has visual geometry only)")
         shapes = []
         for geometry in geometries:
             try:

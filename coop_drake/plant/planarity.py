@@ -105,10 +105,12 @@ def check_masses(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant, 
         ScenarioError: The mass matrix is singular, the object has no mass, or a file adds constraints.
     """
     if plant.num_constraints() > 0:
-        raise refusal(scenario, None, "constraints in the models", "joints that move on their own")
+        raise refusal(
+            scenario, None, "constraints in the models", "joints that are not coupled to one another"
+        )
     mass_matrix = plant.CalcMassMatrix(context)
     if not np.isfinite(mass_matrix).all():
-        raise refusal(scenario, None, "an endless inertia", "masses and lengths that can be computed with")
+        raise refusal(scenario, None, "an infinite or undefined inertia", "finite masses and lengths")
     values = np.linalg.eigvalsh(mass_matrix)
     if values[0] <= 1e-12 * values[-1]:
         raise refusal(

@@ -179,7 +179,9 @@ class _Reader:
         name = bases[0] if bases else models[0]
         if len(bases) != 1:
             raise self._refuse(
-                self.models[name], list(models), "welds that lead from one base model outwards, parent first"
+                self.models[name],
+                list(models),
+                "welds that form a tree from one base model; each parent is listed before its child",
             )
         grasps = [weld for _, weld, parent, child in welds if parent == object_model and child in models]
         if len(grasps) != 1:

@@ -93,7 +93,7 @@ class _Collection:
         """Count an entry, and refuse a key that the mapping has already: PyYAML would keep the last."""
         if self._keys is not None and self._entries % 2 == 0 and isinstance(event, yaml.ScalarEvent):
             if event.value in self._keys and event.value != "<<":
-                raise DataError(_place(event.start_mark), event.value, "every key once")
+                raise DataError(_place(event.start_mark), event.value, "each key at most once")
             self._keys.add(event.value)
         self._entries += 1
         self.size += size
@@ -121,10 +121,10 @@ def _check_events(events: Iterator[yaml.Event]) -> None:
         elif isinstance(event, yaml.AliasEvent) and event.anchor in anchors:
             repeated = anchors[event.anchor]
             if not repeated.closed:
-                raise DataError(repeated.place, "endless nesting", "nothing that holds itself")
+                raise DataError(repeated.place, "a circular reference", "data that does not contain itself")
             size, height = repeated.size, repeated.height
         if len(around) + height > _DEEPEST:
-            allowed = f"at most {_DEEPEST} lists and mappings in each other"
-            raise DataError(_place(event.start_mark), "endless nesting", allowed)
+            allowed = f"at most {_DEEPEST} lists and mappings inside one another"
+            raise DataError(_place(event.start_mark), "too deep nesting", allowed)
         if around and not isinstance(event, yaml.CollectionStartEvent):
             around[-1].add(event, size, height)

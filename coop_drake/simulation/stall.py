@@ -42,7 +42,7 @@ def blocking_margin(plan: Plan, sample: Sample, position_tolerance: float) -> st
     last = sample.cell == len(plan.cells) - 1
     margins = _arrival(plan, sample, position_tolerance) if last else _readiness(plan, sample)
     if min(margins.values()) >= 0.0:
-        return "the cell planner hears that every robot is ready"
+        return "the cell planner receives the robots' reports; all robots are ready"
     name = min(margins, key=lambda key: margins[key])
     return f"{name} (margin {margins[name]:.3g})"
 

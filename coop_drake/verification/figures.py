@@ -82,7 +82,11 @@ def _check_neck(cell: Polygon, entry: FloatArray, transition: Transition, where:
 def _check_length(entry: FloatArray, transition: Transition, where: str) -> None:
     straight = float(np.hypot(*(transition.target - entry)))
     if transition.length < straight * (1.0 - RELATIVE):
-        raise RefusalError(f"{where}.length", f"{transition.length} m is less than the {straight} m between")
+        raise RefusalError(
+            f"{where}.length",
+            f"{transition.length} m is less than the straight distance of {straight} m between start and "
+            "target of the transition",
+        )
     if transition.only_angles != (transition.length <= SAME_PLACE):
         raise RefusalError(f"{where}.only_angles", f"{transition.only_angles} over {transition.length} m")
 

@@ -52,7 +52,8 @@ def check_handovers(plan: Plan) -> tuple[Check, Check, Check]:
             if (shared <= 0.0).any():
                 raise RefusalError(
                     f"cells[{k}], cells[{k + 1}]",
-                    f"do not overlap on axis {int(np.argmin(shared))}: {shared.min()} are shared",
+                    f"do not overlap on axis {int(np.argmin(shared))}: "
+                    f"the gap is {abs(shared.min())} (rad or m)",
                 )
             widths.append(float(shared.min()))
             areas.append(_overlap(here.core, onwards.core, f"cells[{k}].core, cells[{k + 1}].core"))
@@ -107,7 +108,8 @@ def _require_intervals(transition: Transition, cell: Cell, where: str, what: str
     _require_held(transition.goal_upper, cell.lower, cell.upper, f"{where}.goal_upper", what)
     if not (transition.goal_lower < transition.goal_upper).all():
         axis = int(np.argmin(transition.goal_upper - transition.goal_lower))
-        raise RefusalError(f"{where}.goal_upper[{axis}]", "is not above the lower end")
+        lower, upper = transition.goal_lower[axis], transition.goal_upper[axis]
+        raise RefusalError(f"{where}.goal_upper[{axis}]", f"{upper} is not above the lower end {lower}")
 
 
 def _require_held(values: FloatArray, lower: FloatArray, upper: FloatArray, where: str, what: str) -> None:

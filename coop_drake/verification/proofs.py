@@ -133,7 +133,7 @@ def _check_robots(proof: SlicesProof | BlockedGoalProof, problem: PlanningProble
     robots = list(proof.robots)
     known = sorted({joint.robot for joint in problem.tree.joints})
     if any(robot not in known for robot in robots) or sorted(set(robots)) != robots:
-        raise RefusalError("robots", f"{robots} are not some of {known}, ascending")
+        raise RefusalError("robots", f"{robots} must be a subset of {known}, in ascending order")
     axes = [0, *[1 + joint.index for joint in problem.tree.joints if joint.robot in robots]]
     return Check("the robots that are kept are the team's", len(robots) + 1), axes
 

@@ -41,11 +41,11 @@ HARSH = {
     "model error": (Deployment(mass_error=-0.98), "distance of object angle to its funnel is -"),
     "lost reports": (
         Deployment(control_rate=RATE, messages=Messages(loss=1.0)),
-        "waits until the cell planner hears that every robot is ready",
+        "waits until the cell planner receives the robots' reports",
     ),
     "late reports": (
         Deployment(control_rate=RATE, messages=Messages(delay=5.0)),
-        "waits until the cell planner hears that every robot is ready",
+        "waits until the cell planner receives the robots' reports",
     ),
 }
 

@@ -183,7 +183,7 @@ def test_slices_that_do_not_overlap_are_refused():
     after = replace(
         channel.boxes[1], lower=channel.boxes[1].lower + shift, upper=channel.boxes[1].upper + shift
     )
-    with pytest.raises(PlanError, match="cell 0: axis 1 has no interval"):
+    with pytest.raises(PlanError, match="cell 0: on axis 1 it shares no interval"):
         plan_of(problem, replace(channel, boxes=(channel.boxes[0], after, channel.boxes[2])))
 
 

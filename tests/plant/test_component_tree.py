@@ -185,7 +185,7 @@ def test_bodies_without_any_geometry_are_left_out(tmp_path):
             "<sphere><radius>0.1</radius></sphere></geometry></visual></link>"
             "<joint name='t' type='fixed'><parent>base</parent><child>flag</child></joint>",
             "robot_0::flag",
-            "bodies with collision geometry (this one can be seen, but not collide)",
+            "bodies with collision geometry (this one has visual geometry only)",
         ),
         (
             "<link name='wall'><pose>0 0 0.4 0 0 0</pose><collision name='v'><geometry><plane><normal>0 0 1"

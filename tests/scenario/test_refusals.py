@@ -267,8 +267,8 @@ def test_wrong_file_is_refused_with_key_value_and_what_is_allowed(name, tmp_path
         ("? [1, 2]\n: {}\n", "line 1, column 3", "found unhashable key"),
         ("workspace: !!int floor\n", "the file", "invalid literal for int"),
         ("workspace: 2026-13-41\n", "the file", "month must be in 1..12"),
-        ("workspace: &floor {outer: *floor}\n", "line 1, column 12", "endless nesting"),
-        ("workspace: " + 2000 * "[" + 2000 * "]", "line 1, column 61", "endless nesting"),
+        ("workspace: &floor {outer: *floor}\n", "line 1, column 12", "a circular reference"),
+        ("workspace: " + 2000 * "[" + 2000 * "]", "line 1, column 61", "too deep nesting"),
     ],
 )
 def test_text_that_does_not_parse_is_refused_with_its_line(text, place, problem, tmp_path):

@@ -178,7 +178,7 @@ def without_label(part, problem):
 @pytest.mark.parametrize(
     ("kind", "way", "value", "message"),
     [
-        (SlicesProof, ("robots",), [3], r"robots: \[3\] are not some of \[0\]"),
+        (SlicesProof, ("robots",), [3], r"robots: \[3\] must be a subset of \[0\]"),
         (SlicesProof, ("robots",), [0], r"slices\[0\]: has 1 axes; the kept bodies have 2"),
         (SlicesProof, ("robots",), [0.5], r"robots\[0\]: 0.5 is not allowed; expected a whole number"),
         (SlicesProof, ("kind",), "guess", r"kind: 'guess' is not allowed"),
@@ -201,7 +201,7 @@ def without_label(part, problem):
             r"reached: None is not allowed; expected true or false",
         ),
         (BlockedGoalProof, ("slices", 0, "upper", 0), 0.2, r"slices: are about theta in \[0.1, 0.2\]"),
-        (BlockedGoalProof, ("robots",), [0, 0], r"robots: \[0, 0\] are not some of"),
+        (BlockedGoalProof, ("robots",), [0, 0], r"robots: \[0, 0\] must be a subset of"),
     ],
 )
 def test_refusals_under_a_new_digest_say_what_and_where(documents, tmp_path, kind, way, value, message):

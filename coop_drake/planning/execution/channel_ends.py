@@ -51,8 +51,10 @@ def goal_intervals(problem: PlanningProblem, channel: Channel, index: int) -> Bo
         lower, upper = np.maximum(lower, goals[0]), np.minimum(upper, goals[1])
     if not (lower < upper).all():
         axis = int(np.argmin(lower < upper))
+        other = "the next cell" if index + 1 < len(channel.boxes) else "the goal"
         raise PlanError(
-            f"cell {index}: axis {axis} has no interval to leave in: [{lower[axis]}, {upper[axis]}]"
+            f"cell {index}: on axis {axis} it shares no interval with {other}: the larger lower end "
+            f"{lower[axis]} is not below the smaller upper end {upper[axis]}"
         )
     return lower, upper
 

@@ -49,7 +49,7 @@ def choose_targets(channel: Channel, start: FloatArray, goal: FloatArray) -> tup
     for index, box in enumerate(channel.boxes):
         costs = times[:, None] + _crossing_times(box, layers[index], layers[index + 1])
         if not np.isfinite(costs).any():
-            raise PlanError(f"cell {index}: no passage joins where it is entered to where it is left")
+            raise PlanError(f"cell {index}: its entrance and its exit are not connected inside it")
         choices.append(np.argmin(costs, axis=0))
         times = costs.min(axis=0)
     chosen = [0]
