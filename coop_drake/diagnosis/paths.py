@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-import shapely
-from shapely import Polygon
-
 from coop_drake.answers import PlanningProblem
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.passage import pole
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning import Channel
@@ -56,7 +54,6 @@ def widest_path(problem: PlanningProblem, channel: Channel) -> FloatArray:
     """
     targets = []
     for one, other in pairwise(channel.boxes):
-        shared = shapely.get_parts(shapely.intersection(one.polygon, other.polygon))
-        areas = [part for part in shared if isinstance(part, Polygon)]
-        targets.append(max((pole(area) for area in areas), key=lambda found: found[1])[0])
+        poles = map(pole, parts_of(one.polygon.intersection(other.polygon)))
+        targets.append(max(poles, key=lambda found: found[1])[0])
     return path_through(problem, channel, [*targets, problem.goal_pose[:2]])

@@ -7,14 +7,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.patches import Circle
-from shapely import Point, Polygon
-from shapely.geometry.base import BaseGeometry
+from shapely import Point
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.findings import Diagnosis
 from coop_drake.diagnosis.passages import BlockingPassage
 from coop_drake.drawing import draw_polygon, draw_workspace, new_figure, team_footprints
 from coop_drake.drawing.colours import AT_FAULT, BLUE, GREY, INK, NOT_AT_FAULT, OUTSIDE, PAPER, WALL
+from coop_drake.geometry.parts import parts_of
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["diagnosis_figure"]
@@ -125,17 +125,11 @@ def _enlarged(ax: Axes, problem: PlanningProblem, z: FloatArray, bodies: frozens
         draw_polygon(ax, footprint.shape, facecolor=fill, edgecolor="none", alpha=0.65, zorder=3)
         draw_polygon(ax, footprint.shape, facecolor="none", edgecolor=edge, linewidth=1.0, zorder=4)
         outside = footprint.shape.difference(problem.workspace)
-        for part in _areas(outside):
+        for part in parts_of(outside):
             draw_polygon(ax, part, facecolor=OUTSIDE, edgecolor=OUTSIDE, linewidth=1.5, zorder=5)
     reach = max(_reach(problem, z), 0.5) + BORDER
     ax.set_xlim(z[0] - reach, z[0] + reach)
     ax.set_ylim(z[1] - reach, z[1] + reach)
-
-
-def _areas(shape: BaseGeometry) -> list[Polygon]:
-    return [
-        part for part in getattr(shape, "geoms", [shape]) if isinstance(part, Polygon) and not part.is_empty
-    ]
 
 
 def _reach(problem: PlanningProblem, z: FloatArray) -> float:

@@ -10,6 +10,7 @@ from scipy.spatial import QhullError, Voronoi
 from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.geometry.parts import parts_of
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["WidenedFloor"]
@@ -74,8 +75,7 @@ class WidenedFloor:
 
     def _joined(self, shape: BaseGeometry) -> Polygon:
         """The part that holds the start, without superfluous corners."""
-        parts = [part for part in shapely.get_parts(shape) if isinstance(part, Polygon)]
-        best = max(parts, key=lambda part: (part.contains(self._inside), part.area))
+        best = max(parts_of(shape), key=lambda part: (part.contains(self._inside), part.area))
         tidy = best.simplify(TINY)
         return tidy if isinstance(tidy, Polygon) and tidy.is_valid else best
 

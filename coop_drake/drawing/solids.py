@@ -10,8 +10,8 @@ import numpy as np
 from manifold3d import CrossSection
 from numpy.typing import NDArray
 from shapely import Polygon, constrained_delaunay_triangles
-from shapely.geometry.base import BaseGeometry
 
+from coop_drake.geometry.parts import parts_of
 from coop_drake.tree.pose import FloatArray
 
 __all__ = [
@@ -19,7 +19,6 @@ __all__ = [
     "extruded_section",
     "flat_mesh",
     "joined",
-    "parts_of",
     "ribbon_mesh",
     "ring_lines",
     "slab_mesh",
@@ -42,12 +41,6 @@ class TriangleMesh:
 
     vertices: FloatArray
     faces: NDArray[np.int32]
-
-
-def parts_of(shape: BaseGeometry) -> list[Polygon]:
-    """Return the polygons a shape consists of; lines and points are dropped."""
-    parts = getattr(shape, "geoms", [shape])
-    return [part for part in parts if isinstance(part, Polygon) and not part.is_empty]
 
 
 def wall_polygons(workspace: Polygon, thickness: float) -> list[Polygon]:

@@ -17,6 +17,7 @@ from coop_drake.drawing import (
 )
 from coop_drake.drawing.colours import FLOOR, INK, LIGHT_GREY, VERMILLION
 from coop_drake.floor_plans.plan import FloorPlan
+from coop_drake.geometry.parts import parts_of
 
 __all__ = ["save_picture"]
 
@@ -45,7 +46,9 @@ def save_picture(plan: FloorPlan, path: Path, title: str, inside: tuple[float, f
         axes = figure.add_subplot()
         draw_workspace(axes, plan.polygon)
         if taken.area > 1e-9:
-            draw_polygon(axes, _areas(taken), facecolor=VERMILLION, edgecolor="none", zorder=2)
+            draw_polygon(
+                axes, shapely.MultiPolygon(parts_of(taken)), facecolor=VERMILLION, edgecolor="none", zorder=2
+            )
         for ring in (plan.drawn.exterior, *plan.drawn.interiors):
             axes.plot(*shapely.get_coordinates(ring).T, color=LIGHT_GREY, linewidth=0.6, zorder=3)
         if inside is not None:
@@ -56,11 +59,6 @@ def save_picture(plan: FloorPlan, path: Path, title: str, inside: tuple[float, f
             patches.append(Patch(color=VERMILLION, label=f"taken by walls: {taken.area:.3g} m²"))
         legend_above(axes, patches)
         save_figure(figure, path)
-
-
-def _areas(shape: shapely.Geometry) -> shapely.MultiPolygon:
-    parts = [part for part in shapely.get_parts(shape) if part.geom_type == "Polygon"]
-    return shapely.MultiPolygon(parts)
 
 
 def _caption(plan: FloorPlan) -> str:

@@ -10,7 +10,7 @@ from shapely import LineString, Point, Polygon
 
 from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import BoundaryDistance, signed_distance
-from coop_drake.geometry.slits import component_at
+from coop_drake.geometry.parts import component_at
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["corridor_around"]

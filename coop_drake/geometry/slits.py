@@ -11,10 +11,11 @@ from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
+from coop_drake.geometry.parts import component_at
 from coop_drake.geometry.triangles import IndexArray, Triangles, triangulate
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["WIDTH", "component_at", "cut_holes", "slits_of"]
+__all__ = ["WIDTH", "cut_holes", "slits_of"]
 
 WIDTH = 0.04
 """Greatest width of a slit [m]: thin walls would make the map's boundary nearly coincide with itself."""
@@ -52,12 +53,6 @@ def cut_holes(polygon: Polygon, path: BaseGeometry, clearance: float) -> Polygon
     ]
     cut = polygon.difference(shapely.union_all(strips))
     return component_at(cut, path.representative_point())
-
-
-def component_at(shape: BaseGeometry, point: Point) -> Polygon:
-    """The polygon among the parts of a shape that holds a point, an empty one if none does."""
-    parts = [part for part in shapely.get_parts(shape) if isinstance(part, Polygon) and part.contains(point)]
-    return parts[0] if parts else Polygon()
 
 
 def slits_of(polygon: Polygon, path: BaseGeometry, clearance: float) -> list[LineString]:

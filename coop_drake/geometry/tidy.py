@@ -12,9 +12,10 @@ from shapely import LineString, Point, Polygon
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.corridor import corridor_around
+from coop_drake.geometry.parts import component_at
 from coop_drake.geometry.passage import PassageFinder
 from coop_drake.geometry.simplify import simplify_inward
-from coop_drake.geometry.slits import component_at, cut_holes
+from coop_drake.geometry.slits import cut_holes
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["tidy_cell"]

@@ -8,7 +8,8 @@ from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.plan import Plan
 from coop_drake.drawing.colours import BLUE, GREEN, OBJECT
-from coop_drake.drawing.solids import flat_mesh, parts_of
+from coop_drake.drawing.solids import flat_mesh
+from coop_drake.geometry.parts import parts_of
 from coop_drake.viz.paint import rgba, set_mesh
 
 __all__ = ["CELL_COLOUR", "GOAL_COLOUR", "GOAL_POSE_COLOUR", "cell_paths", "set_cells", "set_goal"]

@@ -10,7 +10,8 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.answers.plan import Plan
 from coop_drake.drawing.colours import INK
 from coop_drake.drawing.footprints import team_footprints
-from coop_drake.drawing.solids import flat_mesh, parts_of
+from coop_drake.drawing.solids import flat_mesh
+from coop_drake.geometry.parts import parts_of
 from coop_drake.plant import read_component_tree
 from coop_drake.scenario import Scenario
 from coop_drake.tree.pose import FloatArray

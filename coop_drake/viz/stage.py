@@ -15,11 +15,11 @@ from coop_drake.drawing.solids import (
     TriangleMesh,
     flat_mesh,
     joined,
-    parts_of,
     ring_lines,
     slab_mesh,
     wall_polygons,
 )
+from coop_drake.geometry.parts import parts_of
 from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.paint import rgba, set_mesh
 

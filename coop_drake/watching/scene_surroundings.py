@@ -15,7 +15,8 @@ from shapely import Polygon
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.drawing.colours import FLOOR_IN_SPACE, INK, WALL
 from coop_drake.drawing.footprints import team_footprints
-from coop_drake.drawing.solids import TriangleMesh, joined, parts_of, slab_mesh, tube_mesh, wall_polygons
+from coop_drake.drawing.solids import TriangleMesh, joined, slab_mesh, tube_mesh, wall_polygons
+from coop_drake.geometry.parts import parts_of
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.scene_coordinates import SceneCoordinates
 from coop_drake.watching.theta_layers import THETA, on_turn

@@ -12,6 +12,7 @@ from shapely import MultiPolygon, Polygon
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
+from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.swept_tree import Interval, Intervals, SweptTree
 from coop_drake.planning.boxes.certify import PathBox
 from coop_drake.planning.boxes.channel import Channel, FreeBox
@@ -100,8 +101,7 @@ def nearby(floor: Polygon | MultiPolygon, positions: FloatArray, reach: float) -
         reach: Distance of the team's furthest point from p_WL [m].
     """
     lower, upper = positions.min(axis=0) - reach - EXTRA_FLOOR, positions.max(axis=0) + reach + EXTRA_FLOOR
-    parts = shapely.get_parts(floor.intersection(shapely.box(*lower, *upper)))
-    return MultiPolygon([part for part in parts if isinstance(part, Polygon)])
+    return MultiPolygon(parts_of(floor.intersection(shapely.box(*lower, *upper))))
 
 
 def _joined(regions: Sequence[Region], box: PathBox) -> Region | None:

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-import shapely
 from shapely import Polygon
 
 from coop_drake.errors import GeometryError, PlanError
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.passage import PassageFinder, pole
 from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.travel_time import transition_time
@@ -110,8 +110,7 @@ def _adopt(
 
 def _parts(first: FreeBox, second: FreeBox, index: int) -> list[Polygon]:
     """Parts of the overlap of two cores, those with the largest inscribed disc first."""
-    overlap = first.core.intersection(second.core)
-    parts = [part for part in shapely.get_parts(overlap) if isinstance(part, Polygon) and part.area > 0.0]
+    parts = [part for part in parts_of(first.core.intersection(second.core)) if part.area > 0.0]
     if not parts:
         raise PlanError(f"cells {index} and {index + 1}: their cores do not overlap")
     return sorted(parts, key=lambda part: -pole(part)[1])[:LARGEST_PARTS]

@@ -14,8 +14,8 @@ from coop_drake.answers.plan import Cell, Plan, Transition
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, StallError
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.parts import component_at
 from coop_drake.geometry.passage import Passage, PassageFinder
-from coop_drake.geometry.slits import component_at
 from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.laws import GainSet, TransitionGains, transition_gains
 from coop_drake.planning.boxes.channel import Channel, FreeBox

@@ -21,6 +21,7 @@ from coop_drake.answers.proof import (
     SlicesProof,
 )
 from coop_drake.geometry.minkowski import to_polygon
+from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.slices import Slices
@@ -139,7 +140,7 @@ def _grown(regions: Sequence[Region], growth: float) -> list[Polygon]:
     """Connected parts of some regions grown by a length, in a fixed order."""
     polygons = [shapely.make_valid(to_polygon(region.section)) for region in regions]
     grown = shapely.union_all([polygon.buffer(growth, join_style="mitre") for polygon in polygons])
-    parts = [part for part in shapely.get_parts(grown) if isinstance(part, Polygon) and part.area > 0.0]
+    parts = [part for part in parts_of(grown) if part.area > 0.0]
     return sorted(parts, key=lambda part: (part.bounds, part.area))
 
 

@@ -15,6 +15,7 @@ from coop_drake.errors import GeometryError
 from coop_drake.geometry import safeguards
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.minkowski import FreeSpace, polygon_rings, to_polygon
+from coop_drake.geometry.parts import parts_of
 from coop_drake.tree.component_tree import Component, ComponentTree
 from coop_drake.tree.pose import FloatArray
 
@@ -80,7 +81,7 @@ def marginal_workspace(problem: PlanningProblem, margin: float) -> MultiPolygon:
     for footprint, clearance in _close_ends(problem, margin):
         own = shrunk(problem.workspace, END_FRACTION * clearance)
         patch = own.intersection(footprint.buffer(PATCH_FACTOR * margin, quad_segs=2))
-        result = _areas(shapely.union(result, patch))
+        result = MultiPolygon(parts_of(shapely.union(result, patch)))
     return result
 
 
@@ -114,11 +115,6 @@ def _ends(problem: PlanningProblem) -> list[tuple[FloatArray, int | None]]:
     free = any(value is None for value in problem.goal_joints)
     goal = np.array([*problem.goal_pose, *joints])
     return [(problem.start, None), (goal, 1 if free else None)]
-
-
-def _areas(shape: BaseGeometry) -> MultiPolygon:
-    parts = [part for part in shapely.get_parts(shape) if isinstance(part, Polygon)]
-    return MultiPolygon(parts)
 
 
 def exact_footprint(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.answers.problem import PlanningProblem
+from coop_drake.geometry.parts import parts_of
 from coop_drake.planning.sampling.collision_kernels import is_free
 from coop_drake.planning.sampling.elastic_band_kernels import improve
 from coop_drake.planning.sampling.obstacle_grid import grid_for_team
@@ -153,7 +154,7 @@ def are_free(problem: PlanningProblem, path: FloatArray) -> NDArray[np.bool_]:
 def widened_floor(workspace: Polygon, amount: float) -> MultiPolygon:
     """Workspace with all walls moved back by an amount [m]; walls thinner than twice as much disappear."""
     grown = workspace.buffer(amount, join_style="mitre", mitre_limit=MITRE_LIMIT)
-    return MultiPolygon([part for part in getattr(grown, "geoms", [grown]) if isinstance(part, Polygon)])
+    return MultiPolygon(parts_of(grown))
 
 
 def repaired(problem: PlanningProblem, path: FloatArray, growth: float) -> FloatArray | None:
