@@ -21,7 +21,7 @@ Row = tuple[str, str]
 
 
 def sentences_of(diagnosis: Diagnosis) -> list[str]:
-    """The findings in sentences; what is proved and what was merely found are told apart."""
+    """The findings in sentences; they say what is proved and what was merely found."""
     if diagnosis.answer is Answer.FOUND:
         return [f"Feasible: a channel was found that keeps {diagnosis.margin:.3f} m from the walls."]
     known = "Infeasible, proved" if diagnosis.answer is Answer.INFEASIBLE else "Undecided"

@@ -1,7 +1,4 @@
-"""Worker processes for trials: runs are simulated in parallel, and memory that Diagrams leak is freed.
-
-Drake does not free a Diagram that contains blocks written in Python.
-"""
+"""Worker processes for trials: runs are simulated in parallel."""
 
 from __future__ import annotations
 

@@ -52,19 +52,11 @@ class Region:
         return self.area / perimeter
 
     def holds(self, point: FloatArray) -> bool:
-        """Whether the point lies inside (even-odd rule over all rings)."""
-        x, y = float(point[0]), float(point[1])
-        inside = False
-        for ring in self.rings:
-            tail = following(ring)
-            spans = (ring[:, 1] > y) != (tail[:, 1] > y)
-            a, b = ring[spans], tail[spans]
-            crossings = a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / (b[:, 1] - a[:, 1]) > x
-            inside ^= bool(crossings.sum() % 2)
-        return inside
+        """Whether a point, shape (2,) [m], lies inside."""
+        return bool(self.depths(point[None])[0] > 0.0)
 
     def depths(self, points: FloatArray) -> FloatArray:
-        """Signed distances from the boundary, positive inside; shape (k, 2) to (k,) [m]."""
+        """Signed distances from the boundary, positive inside (even-odd rule); shape (k, 2) to (k,) [m]."""
         nearest = np.full(len(points), np.inf)
         inside = np.zeros(len(points), dtype=bool)
         x, y = points[:, :1], points[:, 1:]
