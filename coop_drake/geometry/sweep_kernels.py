@@ -12,7 +12,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.geometry.convex import SLACK
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays
+from coop_drake.tree.team_arrays import TeamArrays, moved
 
 _TURN = 2.0 * pi
 
@@ -289,8 +289,7 @@ def over_piece(
         x, y, angle = team.joints[link, 0], team.joints[link, 1], team.joints[link, 2]
         c, s = cos(angle), sin(angle)
         for i in range(len(ring)):
-            u, v = ring[i, 0], ring[i, 1]
-            ring[i, 0], ring[i, 1] = x + c * u - s * v, y + s * u + c * v
+            ring[i, 0], ring[i, 1] = moved(x, y, c, s, ring[i, 0], ring[i, 1])
         link, stages = team.links[link, 0], stages - 1
     if rounded and team.radii[piece] > 0.0:
         ring = grown(ring, team.radii[piece], disc_turn(0.5 * widest))

@@ -61,11 +61,6 @@ class SweptTree:
         self._over: dict[tuple[object, ...], FloatArray] = {}
         self._under: dict[tuple[object, ...], FloatArray | None] = {}
 
-    def forget(self) -> None:
-        """Drop all cached sweeps."""
-        self._over.clear()
-        self._under.clear()
-
     def over(self, index: int, intervals: Intervals, stages: int | None = None) -> FloatArray:
         """Polygon that encloses a piece at every configuration of a slice, the object's origin at p_WL = 0.
 

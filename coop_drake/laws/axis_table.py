@@ -31,8 +31,9 @@ LAW_COLUMNS = 10
 where it is not, kappa [rad^2/s^2 or m^2/s^2], k1 [1/s], k2 [1/s], and the largest V with which the cell may
 be entered."""
 
-GOAL_LOWER, GOAL_UPPER, LOG_GAIN, ENERGY_BOUND = 2, 3, 6, 9
-"""Some of these columns by name."""
+SLICE_LOWER, SLICE_UPPER, GOAL_LOWER, GOAL_UPPER, DECAY_RATE = range(5)
+SMOOTH, LOG_GAIN, POSITION_GAIN, RATE_GAIN, ENERGY_BOUND = range(5, LAW_COLUMNS)
+"""The columns by name, in this order."""
 
 
 def axis_table(funnel: Funnel, gains: TransitionGains) -> FloatArray:
@@ -72,15 +73,19 @@ def write_row(
         gains: k1 and k2 [1/s].
         smooth: Whether the funnel is smooth.
     """
-    row[0], row[1], row[GOAL_LOWER], row[GOAL_UPPER] = intervals
-    row[4], row[LOG_GAIN], row[ENERGY_BOUND] = scheduled
-    row[5], row[7], row[8] = 1.0 if smooth else 0.0, gains[0], gains[1]
+    row[SLICE_LOWER], row[SLICE_UPPER], row[GOAL_LOWER], row[GOAL_UPPER] = intervals
+    row[DECAY_RATE], row[LOG_GAIN], row[ENERGY_BOUND] = scheduled
+    row[POSITION_GAIN], row[RATE_GAIN] = gains
+    row[SMOOTH] = 1.0 if smooth else 0.0
 
 
 @compiled
 def bounds_of(row: FloatArray, time: float) -> tuple[float, float, float, float, float, float]:
     """Return ``axis_bounds`` of one axis from its row, ``time`` [s] after the cell was entered."""
-    return axis_bounds(time, row[0], row[1], row[2], row[3], row[4], row[5] != 0.0)
+    return axis_bounds(
+        time, row[SLICE_LOWER], row[SLICE_UPPER], row[GOAL_LOWER], row[GOAL_UPPER], row[DECAY_RATE],
+        row[SMOOTH] != 0.0,
+    )  # fmt: skip
 
 
 @compiled
@@ -93,7 +98,7 @@ def track_row(row: FloatArray, time: float, position: float, rate: float) -> tup
         position: x [rad or m].
         rate: x' [rad/s or m/s].
     """
-    return track_axis(position, rate, bounds_of(row, time), row[LOG_GAIN], row[7], row[8])
+    return track_axis(position, rate, bounds_of(row, time), row[LOG_GAIN], row[POSITION_GAIN], row[RATE_GAIN])
 
 
 @compiled

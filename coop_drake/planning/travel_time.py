@@ -13,17 +13,17 @@ SPEED_PER_CLEARANCE = 3.0
 """Speed over clearance with the paper's gains, for choices made before gains are known [1/s]."""
 
 
-def travel_time(length: float, neck: float, speed: float = SPEED_PER_CLEARANCE) -> float:
-    """Return the time that the object needs for a path whose clearance is the neck everywhere [s].
+def travel_time(length: float, clearance: float, speed: float = SPEED_PER_CLEARANCE) -> float:
+    """Return the time that the object needs for a path with the same clearance everywhere [s].
 
     Args:
         length: L, length of the path to the target [m].
-        neck: b, clearance that the path keeps [m].
+        clearance: b, clearance that the path keeps [m].
         speed: Speed over clearance [1/s].
     """
-    return length / (speed * neck) if neck > 0.0 else inf
+    return length / (speed * clearance) if clearance > 0.0 else inf
 
 
-def transition_time(length: float, neck: float, speed: float = SPEED_PER_CLEARANCE) -> float:
+def transition_time(length: float, clearance: float, speed: float = SPEED_PER_CLEARANCE) -> float:
     """Return an approximate time of one transition, ``SETTLING_TIME`` more than its travel [s]."""
-    return SETTLING_TIME + travel_time(length, neck, speed)
+    return SETTLING_TIME + travel_time(length, clearance, speed)

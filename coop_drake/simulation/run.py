@@ -61,8 +61,9 @@ def simulate(
     finally:
         loop.release()
         del loop
-        # Diagrams and their systems hold each other, and Python does not see how large they are: it would
-        # let many runs' plants pile up. They are young; to look through all that is old would take longer.
+        # Diagrams and their systems refer to each other in cycles, and Python does not see their size: else
+        # the plants of many runs would fill the memory. They are new objects, so a collection of the two
+        # younger generations frees them and takes less time than a full one.
         gc.collect(1)
 
 
@@ -114,8 +115,8 @@ def configure_simulator(simulator: Simulator, scenario: Scenario) -> None:
     settings = scenario.simulator
     scheme = settings.integration_scheme
     if scheme == "runge_kutta5" and scenario.deployment.period is not None:
-        # Nothing holds back a team whose efforts are held: where they are absurd, rates grow to a power from
-        # one stage of a trial step to the next, and what is infinite after seven would end the process.
+        # Efforts that are held do not react within a step: where they are absurdly large, rates grow with
+        # every stage of a trial step, and an infinite state after seven stages would end the process.
         scheme = "bogacki_shampine3"
     # Schemes without an error estimate take the longest step always; Drake ignores the accuracy for them.
     config = SimulatorConfig(
@@ -129,7 +130,7 @@ def configure_simulator(simulator: Simulator, scenario: Scenario) -> None:
 
 def _advance(simulator: Simulator, watch: Watch, max_time: float) -> None:
     try:
-        # Trial steps of a run that is lost overflow; that it is lost is for the watch to tell.
+        # Trial steps of a run that fails may overflow; the watch reports the failure.
         with np.errstate(over="ignore", invalid="ignore"):
             simulator.AdvanceTo(max_time)
     except RuntimeError as error:

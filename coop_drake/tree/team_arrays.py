@@ -13,7 +13,7 @@ from coop_drake.tree.pose import FloatArray, IntArray
 if TYPE_CHECKING:
     from coop_drake.tree.component_tree import ComponentTree, ConvexShape, TreeJoint
 
-__all__ = ["TeamArrays", "place", "team_arrays"]
+__all__ = ["TeamArrays", "moved", "place", "team_arrays"]
 
 
 class TeamArrays(NamedTuple):
@@ -42,6 +42,12 @@ class TeamArrays(NamedTuple):
 
 
 @compiled
+def moved(x: float, y: float, c: float, s: float, u: float, v: float) -> tuple[float, float]:
+    """Return the point (u, v) of a frame at (x, y), turned by the angle with cosine c and sine s [m]."""
+    return x + c * u - s * v, y + s * u + c * v
+
+
+@compiled
 def place(team: TeamArrays, z: FloatArray) -> FloatArray:
     """Compute the pose ``X_WC`` of every component, eq. (3).
 
@@ -61,8 +67,7 @@ def place(team: TeamArrays, z: FloatArray) -> FloatArray:
             x, y, angle = z[0], z[1], z[2]
         else:
             jx, jy = team.joints[c, 0], team.joints[c, 1]
-            x = poses[p, 0] + poses[p, 2] * jx - poses[p, 3] * jy
-            y = poses[p, 1] + poses[p, 3] * jx + poses[p, 2] * jy
+            x, y = moved(poses[p, 0], poses[p, 1], poses[p, 2], poses[p, 3], jx, jy)
             angle = poses[p, 4] + team.joints[c, 2]
             q = z[team.links[c, 1]]
             if team.links[c, 2] == 1:

@@ -28,7 +28,7 @@ SAME_PLACE = 1e-9
 
 
 def check_figures(plan: Plan, gain_sets: Mapping[str, GainSet]) -> tuple[Check, Check, Check]:
-    """Compute inradius and gains of every transition again; test its neck and its length.
+    """Compute inradius and gains of every transition again; test its clearance and its length.
 
     The estimated time comes of a simulation and does not matter for safety: it is the only figure that
     nothing but the digest of the file protects.
@@ -72,7 +72,7 @@ def check_figures(plan: Plan, gain_sets: Mapping[str, GainSet]) -> tuple[Check, 
 
 
 def _check_neck(cell: Polygon, entry: FloatArray, transition: Transition, where: str) -> None:
-    """The cell, eroded by the neck, must hold entry and target in one connected part."""
+    """The cell, eroded by the stated clearance, must hold entry and target in one connected part."""
     eroded = cell.buffer(-transition.neck * (1.0 - ERODING_FRACTION), quad_segs=32)
     ends = Point(entry), Point(transition.target)
     if not any(all(part.covers(end) for end in ends) for part in shapely.get_parts(eroded)):
