@@ -82,7 +82,7 @@ def read_map(path: Path, settings: FloorPlanSettings) -> OccupancyMap:
     resolution = _number(document, "resolution", file) * scale
     if not 0.0 < resolution <= 10.0:
         raise FloorPlanError(
-            file, "resolution", f"cells of {resolution:g} m cannot be meant", "give metres per cell"
+            file, "resolution", f"cells of {resolution:g} m are not allowed", "give metres per cell"
         )
     origin = document.get("origin")
     if not (isinstance(origin, list) and len(origin) == 3 and all(_is_number(value) for value in origin)):

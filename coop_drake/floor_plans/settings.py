@@ -92,8 +92,8 @@ class FloorPlanSettings:
         unit = UNITS[self.unit] if self.unit is not None else unit_of_file
         if unit is None:
             raise FloorPlanError(
-                file, "unit", "the file does not say what its unit is", f"say it: one of {', '.join(UNITS)}"
+                file, "unit", "the file does not say what its unit is", f"name it: one of {', '.join(UNITS)}"
             )
         if not 0.0 < unit < inf:
-            raise FloorPlanError(file, "unit", f"a unit of {unit:g} m cannot be meant", "name the unit")
+            raise FloorPlanError(file, "unit", f"a unit of {unit:g} m is not allowed", "name the unit")
         return unit * self.scale

@@ -1,4 +1,4 @@
-"""Scenarios whose numbers cannot be meant: each key with values outside what its documentation allows."""
+"""Scenarios with numbers that are not allowed: each key with values outside what its documentation allows."""
 
 from __future__ import annotations
 
