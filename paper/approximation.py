@@ -68,7 +68,7 @@ def two_components(tree: ComponentTree) -> ComponentTree:
     carried = tuple(body for body in tree.components[0].bodies if body.robot in (None, robot))
     joint = replace(moved.joint, index=0)
     return ComponentTree(
-        (replace(tree.components[0], bodies=carried), replace(moved, joint=joint)), tree.sharing_joint
+        (replace(tree.components[0], bodies=carried), replace(moved, joint=joint)), tree.unchecked_pairs
     )
 
 

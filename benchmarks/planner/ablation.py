@@ -20,7 +20,7 @@ from coop_drake.answers import PlanningProblem
 from coop_drake.planning import find_channel
 from coop_drake.planning.boxes.channel import Channel
 from coop_drake.planning.cells.exploration import Verdict
-from coop_drake.planning.proofs.proofs import Proofs, explorer
+from coop_drake.planning.proofs.proof_search import Proofs, explorer
 
 __all__ = ["VARIANTS", "Answered", "ablation_rows", "ablation_tasks", "answer"]
 

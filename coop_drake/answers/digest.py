@@ -55,7 +55,7 @@ def _rounded(value: Any) -> Any:
 def _tree(tree: ComponentTree) -> dict[str, Any]:
     return {
         "components": [_component(component) for component in tree.components],
-        "sharing_joint": sorted(sorted(pair) for pair in tree.sharing_joint),
+        "sharing_joint": sorted(sorted(pair) for pair in tree.unchecked_pairs),
     }
 
 

@@ -18,8 +18,8 @@ class MixedCell:
         lower: Lower ends of the nominal intervals, shape (1 + m,) [rad, m].
         upper: Upper ends, shape (1 + m,).
         polygon: Positions p_WL outside which nothing is free [m].
-        share: The widest of its intervals as a fraction of that axis.
-        hinted: Whether its middle configuration is free.
+        width_fraction: Width of its widest interval divided by the range of that axis [-].
+        middle_is_free: Whether its middle configuration is free.
         finest: Whether every interval is below the resolution, so that it will not be halved any more.
     """
 
@@ -27,6 +27,6 @@ class MixedCell:
     lower: FloatArray
     upper: FloatArray
     polygon: Polygon
-    share: float
-    hinted: bool
+    width_fraction: float
+    middle_is_free: bool
     finest: bool

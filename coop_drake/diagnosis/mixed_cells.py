@@ -21,7 +21,7 @@ def mixed_sentences(cells: Sequence[MixedCell]) -> list[str]:
     """
     sentences = [
         f"{len(cells)} cells on the last channel were proved neither free nor blocked; "
-        f"the widest spans {100.0 * cells[0].share:.2g} % of an axis."
+        f"the widest spans {100.0 * cells[0].width_fraction:.2g} % of an axis."
     ]
     for cell in cells[:SHOWN]:
         x_min, y_min, x_max, y_max = cell.polygon.bounds
@@ -50,6 +50,6 @@ def mixed_facts(cell: MixedCell) -> dict[str, Any]:
         "bounds": [float(value) for value in cell.polygon.bounds],
         "lower": [float(value) for value in cell.lower],
         "upper": [float(value) for value in cell.upper],
-        "share_of_axis": cell.share,
+        "share_of_axis": cell.width_fraction,
         "below_resolution": cell.finest,
     }

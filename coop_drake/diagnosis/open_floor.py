@@ -42,7 +42,7 @@ def on_open_floor(problem: PlanningProblem, planner: BudgetedPlanner) -> OpenFlo
     tree, pairs = problem.tree, []
     for (i, j), (k, m) in tree.collision_pairs[:PAIRS]:
         pair = tree.components[i].bodies[j].name, tree.components[k].bodies[m].name
-        lenient = replace(bare, tree=replace(tree, sharing_joint=tree.sharing_joint | {pair}))
+        lenient = replace(bare, tree=replace(tree, unchecked_pairs=tree.unchecked_pairs | {pair}))
         if planner.ask(lenient, "letting bodies overlap").answer is Answer.FOUND:
             pairs.append(pair)
     return OpenFloor(answer, tuple(pairs))

@@ -66,7 +66,7 @@ def shrunk_bodies(tree: ComponentTree, names: Collection[str], factor: float) ->
         )
         for component in tree.components
     )
-    return ComponentTree(components, tree.sharing_joint)
+    return ComponentTree(components, tree.unchecked_pairs)
 
 
 def shrink_into_themselves(tree: ComponentTree, names: Collection[str]) -> bool:
@@ -86,7 +86,7 @@ def widened_joints(tree: ComponentTree, amount: float) -> ComponentTree:
         component if component.joint is None else replace(component, joint=_widened(component.joint, amount))
         for component in tree.components
     )
-    return ComponentTree(components, tree.sharing_joint)
+    return ComponentTree(components, tree.unchecked_pairs)
 
 
 def _widened(joint: TreeJoint, amount: float) -> TreeJoint:

@@ -48,7 +48,7 @@ class ClosedLoop:
     plan: Plan
 
     @property
-    def laws(self) -> tuple[Diagram, ...]:
+    def bare_controllers(self) -> tuple[Diagram, ...]:
         """The controllers alone, without the sensors, actuators and radio of a deployment."""
         return tuple(deployed.controller for deployed in self.deployed) or self.controllers
 

@@ -173,7 +173,7 @@ def _named_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
     states = [ports.add(loop.station.diagram, f"robot_{robot.index}_state") for robot in robots]
     efforts = [ports.add(controller, "robot_effort") for controller in loop.controllers]
     logged = [name for name in TELEMETRY if name != "object_state"]
-    of = {name: [ports.add(law, name) for law in loop.laws] for name in ("ready", *logged)}
+    of = {name: [ports.add(law, name) for law in loop.bare_controllers] for name in ("ready", *logged)}
     # Every robot has bounds for the angle; they are equal, and the first robot's are taken.
     bounds = [np.split(funnels, 2) for funnels in of["funnels"]]
     return _Places(

@@ -117,13 +117,13 @@ class ComponentTree:
 
     Attributes:
         components: Parents before children.
-        sharing_joint: Pairs of body names that are not checked for collision with each other: a movable joint
-            connects them, or their models exclude the pair, as models of imported robots do for all pairs
-            of their own links.
+        unchecked_pairs: Pairs of body names that are not checked for collision with each other: a movable
+            joint connects them, or their models exclude the pair, as models of imported robots do for all
+            pairs of their own links.
     """
 
     components: tuple[Component, ...]
-    sharing_joint: frozenset[tuple[str, str]]
+    unchecked_pairs: frozenset[tuple[str, str]]
 
     @cached_property
     def joints(self) -> tuple[TreeJoint, ...]:
@@ -152,7 +152,7 @@ class ComponentTree:
     def collision_pairs(self) -> tuple[tuple[tuple[int, int], tuple[int, int]], ...]:
         """Pairs ``((component, body), (component, body))`` that must never overlap.
 
-        Bodies of one component never move against each other; those of ``sharing_joint`` may overlap.
+        Bodies of one component never move against each other; those of ``unchecked_pairs`` may overlap.
         """
         entries = [
             (i, j, body.name) for i, c in enumerate(self.components) for j, body in enumerate(c.bodies)
@@ -162,8 +162,8 @@ class ComponentTree:
             for n, (i, j, first) in enumerate(entries)
             for k, m, second in entries[n + 1 :]
             if i != k
-            and (first, second) not in self.sharing_joint
-            and (second, first) not in self.sharing_joint
+            and (first, second) not in self.unchecked_pairs
+            and (second, first) not in self.unchecked_pairs
         )
 
     @cached_property

@@ -59,11 +59,13 @@ def block_diagram_figure(loop: ClosedLoop, robot: int = 0) -> Figure:
     Raises:
         IndexError: The team has no such robot.
     """
-    if not 0 <= robot < len(loop.laws):
-        raise IndexError(f"robot {robot} is not in the team of {len(loop.laws)}")
+    if not 0 <= robot < len(loop.bare_controllers):
+        raise IndexError(f"robot {robot} is not in the team of {len(loop.bare_controllers)}")
     flows = (
         signal_flow(loop.diagram, "Closed loop: between robots only ready reports cross"),
-        signal_flow(loop.laws[robot], f"Controller of robot {robot}", telemetry=frozenset(TELEMETRY)),
+        signal_flow(
+            loop.bare_controllers[robot], f"Controller of robot {robot}", telemetry=frozenset(TELEMETRY)
+        ),
     )
     places = [_places(flow) for flow in flows]
     extents = [_extent(found) for found in places]

@@ -26,7 +26,7 @@ def parts(diagram):
 def test_an_ideal_team_has_nothing_round_its_controllers():
     loop = loop_of(seed=3)
     assert loop.deployed == ()
-    assert loop.laws == loop.controllers
+    assert loop.bare_controllers == loop.controllers
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_a_sampled_team_keeps_its_governors_between_samples():
     loop = loop_of(control_rate=200.0)
     root = loop.create_context()
     assert root.num_continuous_states() == 2 * (3 + len(loop.team.joints))
-    for law in loop.laws:
+    for law in loop.bare_controllers:
         governor = law.GetOutputPort("governor_position").Eval(law.GetMyContextFromRoot(root))
         np.testing.assert_array_equal(governor, loop.plan.start[:2])
 
@@ -70,7 +70,7 @@ def test_a_sampled_team_keeps_its_governors_between_samples():
 def test_before_the_start_everything_stood_still():
     loop = loop_of(control_rate=200.0, measurements=Measurements(delay=0.02))
     root = loop.create_context()
-    for law in loop.laws:
+    for law in loop.bare_controllers:
         state = law.GetOutputPort("object_state").Eval(law.GetMyContextFromRoot(root))
         np.testing.assert_allclose(state, [*loop.plan.start[:3], 0.0, 0.0, 0.0], atol=1e-12)
 
@@ -82,7 +82,8 @@ def test_every_robot_has_noise_of_its_own_and_a_seed_decides_it():
         simulator.AdvanceTo(0.05)
         root = simulator.get_context()
         return [
-            law.GetInputPort("object_pose").Eval(law.GetMyContextFromRoot(root)).tolist() for law in loop.laws
+            law.GetInputPort("object_pose").Eval(law.GetMyContextFromRoot(root)).tolist()
+            for law in loop.bare_controllers
         ]
 
     first = measured(1)
@@ -108,7 +109,7 @@ def test_actuators_give_no_more_than_their_limits():
     loop = loop_of(actuators=ActuatorLimits(base_force=0.5, base_torque=0.25, joint_effort=0.125))
     simulator = Simulator(loop.diagram, loop.create_context())
     simulator.AdvanceTo(0.2)
-    for controller, law in zip(loop.controllers, loop.laws, strict=True):
+    for controller, law in zip(loop.controllers, loop.bare_controllers, strict=True):
         given, wanted = (
             part.GetOutputPort("robot_effort").Eval(part.GetMyContextFromRoot(simulator.get_context()))
             for part in (controller, law)
@@ -133,7 +134,10 @@ def test_robots_that_overestimate_masses_push_harder():
         loop = loop_of(mass_error=error)
         root = loop.create_context()
         efforts.append(
-            [law.GetOutputPort("robot_effort").Eval(law.GetMyContextFromRoot(root)) for law in loop.laws]
+            [
+                law.GetOutputPort("robot_effort").Eval(law.GetMyContextFromRoot(root))
+                for law in loop.bare_controllers
+            ]
         )
     np.testing.assert_allclose(efforts[1], 1.5 * np.array(efforts[0]), rtol=1e-9, atol=1e-9)
     assert np.abs(efforts[0]).max() > 0.1

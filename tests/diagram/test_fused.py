@@ -56,7 +56,7 @@ class Side:
     def governors(self):
         if self.loop.fused:
             return [self.loop.fused.governor]
-        return [law.GetSubsystemByName("governor_state") for law in self.loop.laws]
+        return [law.GetSubsystemByName("governor_state") for law in self.loop.bare_controllers]
 
     def derivatives(self):
         self.loop.diagram.EvalTimeDerivatives(self.root)

@@ -35,7 +35,7 @@ def test_undecided_says_what_remained_mixed(strategy: str) -> None:
     assert isinstance(answer, NoChannel)
     assert not answer.proved
     assert answer.mixed
-    assert answer.mixed[0].share == max(cell.share for cell in answer.mixed)
+    assert answer.mixed[0].width_fraction == max(cell.width_fraction for cell in answer.mixed)
 
 
 def test_cells_alone_refute_in_the_full_space() -> None:

@@ -7,7 +7,7 @@ import pytest
 from coop_drake.planning.boxes.boxes import explored_channel
 from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.planning.cells.exploration import Verdict
-from coop_drake.planning.proofs.proofs import explorer
+from coop_drake.planning.proofs.proof_search import explorer
 from coop_drake.planning.questions.relaxation import relaxed
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case

@@ -12,7 +12,7 @@ from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.proofs.blocked_goals import blocked_goal
 from coop_drake.planning.proofs.clearance_bound import clearance_bound
 from coop_drake.planning.proofs.inscribed_disc import disc_refuted
-from coop_drake.planning.proofs.proofs import Proofs, explorer
+from coop_drake.planning.proofs.proof_search import Proofs, explorer
 from coop_drake.planning.questions.relaxation import inscribed_disc, relaxed
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose

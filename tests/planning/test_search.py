@@ -76,7 +76,7 @@ def test_a_spent_budget_is_no_proof() -> None:
     channel, _ = find_channel(problem)
     assert isinstance(channel, NoChannel)
     assert not channel.proved
-    assert 0.0 < channel.mixed[0].share <= 1.0
+    assert 0.0 < channel.mixed[0].width_fraction <= 1.0
 
 
 def test_same_question_same_answer() -> None:

@@ -155,7 +155,7 @@ def test_collision_filter_groups_exempt_pairs(tmp_path):
     )
     plain, _one = team_of(shipped("base"))
     filtered, _two = team_of(load_scenario(write_edited(tmp_path, ("object: object", group))))
-    lost = read_component_tree(filtered).sharing_joint - read_component_tree(plain).sharing_joint
+    lost = read_component_tree(filtered).unchecked_pairs - read_component_tree(plain).unchecked_pairs
     assert {frozenset(pair) for pair in lost} == {frozenset(("robot_0::base", "robot_0::link_2"))}
 
 

@@ -70,7 +70,7 @@ class Loop:
         integrators = (
             [loop.fused.governor]
             if loop.fused
-            else [law.GetSubsystemByName("governor_state") for law in loop.laws]
+            else [law.GetSubsystemByName("governor_state") for law in loop.bare_controllers]
         )
         for integrator in integrators:
             state = integrator.GetMyMutableContextFromRoot(root)

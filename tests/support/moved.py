@@ -43,7 +43,7 @@ class Similarity:
         return replace(
             problem,
             workspace=affine_transform(problem.workspace, matrix),
-            tree=ComponentTree(components, problem.tree.sharing_joint),
+            tree=ComponentTree(components, problem.tree.unchecked_pairs),
             start=self._configuration(problem, problem.start),
             goal_pose=self._configuration(problem, problem.goal_pose),
             goal_joints=tuple(

@@ -16,7 +16,7 @@ from coop_drake.answers.proof_file import load_proof, save_proof
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning import find_channel
 from coop_drake.planning.proofs.proof_making import slices_proof
-from coop_drake.planning.proofs.proofs import explorer
+from coop_drake.planning.proofs.proof_search import explorer
 from coop_drake.planning.questions.relaxation import relaxed
 from coop_drake.verification import verify_file, verify_proof
 from tests.support.certificates import (

@@ -15,7 +15,7 @@ def loop():
 
 @pytest.fixture(scope="module")
 def controller(loop):
-    return signal_flow(loop.laws[1], "controller", telemetry=frozenset(TELEMETRY))
+    return signal_flow(loop.bare_controllers[1], "controller", telemetry=frozenset(TELEMETRY))
 
 
 def test_every_block_and_every_connection_of_the_loop_is_there(loop):

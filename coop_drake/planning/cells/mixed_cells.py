@@ -34,4 +34,4 @@ def mixed_cells(
         done = bool((upper - lower <= np.array(finest)).all())
         polygon = to_polygon(cell.region.section)
         cells.append(MixedCell(robots, lower, upper, polygon, fraction, cell.kind is Kind.GUIDE, done))
-    return tuple(sorted(cells, key=lambda cell: -cell.share))
+    return tuple(sorted(cells, key=lambda cell: -cell.width_fraction))

@@ -45,7 +45,7 @@ class Waypoints(NamedTuple):
         pads: Paddings of a box to choose from, shape (p,) [rad or m].
         goals: Lower and upper ends of the last goal intervals, shape (2, m) [rad, m].
         schedule: The rules by which gains are chosen.
-        least: Clearance that every waypoint must keep [m].
+        least_clearance: Clearance that every waypoint must keep [m].
         tolerance: Tolerance of the goal's position [m].
     """
 
@@ -56,7 +56,7 @@ class Waypoints(NamedTuple):
     pads: FloatArray
     goals: FloatArray
     schedule: Schedule
-    least: float
+    least_clearance: float
     tolerance: float
 
 
@@ -101,7 +101,7 @@ def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
                 clearances = clearances_in_box(
                     waypoints.boxes, waypoints.grid, lower, upper, waypoints.path, i, j, LARGEST_CLEARANCE
                 )
-                if len(clearances) == 0 or smallest(clearances) < waypoints.least:
+                if len(clearances) == 0 or smallest(clearances) < waypoints.least_clearance:
                     break
                 _reach(waypoints, i, p, j, lower, upper, clearances, best, states, before)
     return best[n - 1, 0], _box_rows(before)

@@ -51,11 +51,11 @@ LEAST_CLEARANCE = 1e-4
 
 
 @compiled
-def _clearance_at(places: FloatArray, clearances: FloatArray, s: float) -> float:
+def _clearance_at(arc_lengths: FloatArray, clearances: FloatArray, s: float) -> float:
     """Return the clearance between two waypoints [m]."""
-    for k in range(len(places) - 1):
-        if s <= places[k + 1]:
-            fraction = max(s - places[k], 0.0) / max(places[k + 1] - places[k], 1e-12)
+    for k in range(len(arc_lengths) - 1):
+        if s <= arc_lengths[k + 1]:
+            fraction = max(s - arc_lengths[k], 0.0) / max(arc_lengths[k + 1] - arc_lengths[k], 1e-12)
             return float(clearances[k] + fraction * (clearances[k + 1] - clearances[k]))
     return float(clearances[-1])
 
@@ -64,7 +64,7 @@ def _clearance_at(places: FloatArray, clearances: FloatArray, s: float) -> float
 def _advance_position(
     state: FloatArray,
     h: float,
-    places: FloatArray,
+    arc_lengths: FloatArray,
     clearances: FloatArray,
     gains: tuple[float, float, float],
     smoothing: float,
@@ -72,9 +72,9 @@ def _advance_position(
     """Take one step of (s, s', s_G) at constant speed of p_G, which changes slowly against the step."""
     s, v, g = state[0], state[1], state[2]
     stiffness, damping, gain = gains
-    d = _clearance_at(places, clearances, g)
+    d = _clearance_at(arc_lengths, clearances, g)
     margin = energy_margin(tracking_energy(s - g, 0.0, v, 0.0, stiffness), d, stiffness)
-    field = FIELD_SPEED * min(1.0, max(places[-1] - g, 0.0) / slowdown_radius(FIELD_SPEED, gain))
+    field = FIELD_SPEED * min(1.0, max(arc_lengths[-1] - g, 0.0) / slowdown_radius(FIELD_SPEED, gain))
     speed, _ = governor_velocity(field, 0.0, margin, stiffness, gain, smoothing)
     middle = g + 0.5 * h * speed
     a1 = governed_acceleration(s, v, g, stiffness, damping)
@@ -150,50 +150,50 @@ def smallest(values: FloatArray) -> float:
 @compiled
 def cross_box(
     state: FloatArray,
-    places: FloatArray,
+    arc_lengths: FloatArray,
     clearances: FloatArray,
     lower: FloatArray,
     upper: FloatArray,
-    goals: FloatArray,
-    resting: FloatArray,
+    goal_intervals: FloatArray,
+    axis_rest: FloatArray,
     schedule: Schedule,
     tolerance: float,
-    limit: float,
+    time_limit: float,
 ) -> float:
     """Simulate the motion through one box.
 
     Args:
         state: (s, s', s_G, axes, axis rates), shape (3 + 2 m,); changed in place [m, m/s, rad].
-        places: Where the waypoints lie along the whole path, the last one the target, shape (k,) [m].
+        arc_lengths: Lengths of the path up to its waypoints, the last one the target, shape (k,) [m].
         clearances: Clearance at the waypoints, shape (k,) [m].
         lower: Lower ends of the slice, shape (m,).
         upper: Upper ends of the slice, shape (m,).
-        goals: Lower and upper ends of the goal intervals, shape (2, m).
-        resting: Where the axes were aimed at before, shape (m,).
+        goal_intervals: Lower and upper ends of the goal intervals, shape (2, m).
+        axis_rest: Where the axes were aimed at before, shape (m,).
         schedule: The rule that gives the gains.
         tolerance: Of the goal's position in the last box, otherwise 0 [m].
-        limit: Longest time [s].
+        time_limit: Longest time [s].
 
     Returns:
-        Time that passed [s]; infinite beyond the limit.
+        Time that passed [s]; infinite beyond the time limit.
     """
     m = len(lower)
     gains = scheduled_governor(schedule, max(smallest(clearances), LEAST_CLEARANCE))
     table = np.empty((m, LAW_COLUMNS))
     for a in range(m):
-        ends = lower[a], upper[a], goals[0, a], goals[1, a]
-        scheduled = scheduled_axis(schedule, a > 0, ends[0], ends[1], ends[2], ends[3], resting[a])
+        ends = lower[a], upper[a], goal_intervals[0, a], goal_intervals[1, a]
+        scheduled = scheduled_axis(schedule, a > 0, ends[0], ends[1], ends[2], ends[3], axis_rest[a])
         gains_of_axes = schedule.position_gain, schedule.rate_gain
         write_row(table[a], ends, scheduled, gains_of_axes, schedule.smooth)
     time = 0.0
-    while time <= limit:
+    while time <= time_limit:
         if tolerance > 0.0:
-            if _arrived(state, places[-1], table, tolerance):
+            if _arrived(state, arc_lengths[-1], table, tolerance):
                 return time
-        elif _may_leave(state, places[-1], clearances[-1], gains[0], table, schedule.energy_allowance):
+        elif _may_leave(state, arc_lengths[-1], clearances[-1], gains[0], table, schedule.energy_allowance):
             return time
         for _ in range(2):
-            _advance_position(state, 0.5 * PERIOD, places, clearances, gains, schedule.smoothing)
+            _advance_position(state, 0.5 * PERIOD, arc_lengths, clearances, gains, schedule.smoothing)
         for a in range(m):
             _advance_axis(state, 3 + a, m, time, table[a])
         time += PERIOD

@@ -89,25 +89,27 @@ def cover_path(
     goals = np.array(final_intervals(problem, angle))
     smallest = LEAST_CLEARANCE * usual_unit(problem.tree)
     # At a small margin some levels are equal; each is tried once.
-    for least, pads in dict.fromkeys((max(fraction * margin, smallest), pads) for fraction, pads in LEVELS):
-        points = _waypoints(boxes, grid, path, least, pads[0])
+    for least_clearance, pads in dict.fromkeys(
+        (max(fraction * margin, smallest), pads) for fraction, pads in LEVELS
+    ):
+        points = _waypoints(boxes, grid, path, least_clearance, pads[0])
         if points is None:
             continue
         places = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
         waypoints = Waypoints(
-            boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), least,
+            boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), least_clearance,
             problem.position_tolerance,
         )  # fmt: skip
-        found = _fastest_boxes(waypoints, Regions(problem, swept, pairs, CORE_FRACTION * least))
+        found = _fastest_boxes(waypoints, Regions(problem, swept, pairs, CORE_FRACTION * least_clearance))
         if found is not None:
             free, ends = found
             targets = (*(points[j, :2] for j in ends[:-1]), problem.goal_pose[:2])
-            return PathCovering(Channel(tuple(free), CORE_FRACTION * least, angle), targets)
+            return PathCovering(Channel(tuple(free), CORE_FRACTION * least_clearance, angle), targets)
     return None
 
 
 def _waypoints(
-    boxes: BoxArrays, grid: ObstacleGrid, path: FloatArray, least: float, pad: float
+    boxes: BoxArrays, grid: ObstacleGrid, path: FloatArray, least_clearance: float, pad: float
 ) -> FloatArray | None:
     """Waypoints along a path, so close that one box holds each of them with the next, shape (n, 3 + m).
 
@@ -123,7 +125,7 @@ def _waypoints(
     def between(first: float, last: float, halvings: int) -> list[FloatArray] | None:
         """Waypoints after the first place, the last one at the last place."""
         pair = np.stack([configuration(first), configuration(last)])
-        furthest = longest_box(boxes, grid, pair, 0, 1, pad, least, 0.0)[1]
+        furthest = longest_box(boxes, grid, pair, 0, 1, pad, least_clearance, 0.0)[1]
         if furthest == 1:
             return [pair[1]]
         if halvings == 0:

@@ -38,7 +38,7 @@ def relaxed(problem: PlanningProblem, robots: Collection[int]) -> tuple[Planning
     components = tuple(_renumbered(tree.components[index], kept, joints) for index in kept)
     question = replace(
         problem,
-        tree=ComponentTree(components, tree.sharing_joint),
+        tree=ComponentTree(components, tree.unchecked_pairs),
         start=np.concatenate((problem.start[:3], problem.start[3:][joints])),
         goal_joints=tuple(problem.goal_joints[index] for index in joints),
     )

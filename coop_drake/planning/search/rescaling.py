@@ -53,7 +53,7 @@ class Rescaling:
         return replace(
             problem,
             workspace=_scaled(problem.workspace, scale),
-            tree=ComponentTree(components, tree.sharing_joint),
+            tree=ComponentTree(components, tree.unchecked_pairs),
             start=problem.start * units,
             goal_pose=problem.goal_pose * units[:3],
             goal_joints=tuple(None if goal is None else float(goal * unit) for goal, unit in goals),

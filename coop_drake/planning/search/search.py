@@ -25,7 +25,7 @@ from coop_drake.planning.cells.events import Watch
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.proofs.blocked_goals import blocked_goal
 from coop_drake.planning.proofs.clearance_bound import clearance_bound
-from coop_drake.planning.proofs.proofs import Proofs
+from coop_drake.planning.proofs.proof_search import Proofs
 from coop_drake.planning.questions.question_checks import check_question, goal_beyond_limits
 from coop_drake.planning.search.cell_search import search_by_cells
 from coop_drake.planning.search.rescaling import Rescaling
