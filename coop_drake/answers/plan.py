@@ -79,7 +79,7 @@ class Plan:
         goal_pose: (x, y, theta), theta unwrapped along the plan, shape (3,).
         goal_joints: Goal of each joint, None where free.
         cells: From the start's cell to the goal's.
-        transitions: As many as cells.
+        transitions: One for each cell, in the same order.
     """
 
     problem: str = ""

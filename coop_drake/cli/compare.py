@@ -84,7 +84,7 @@ def _compare(scenario: Path, gains: str | None, out: Path | None, reporter: Repo
     reporter.facts.update(compared)
     rows = [(label, *(_text(facts[key], form) for facts in measures)) for label, key, form in _ROWS]
     reporter.table(task.name, rows, [heading for _, heading in _PLANTS])
-    reporter.say(f"The same as JSON is in {escape(str(folder.path / 'compare.json'))}")
+    reporter.say(f"These figures are also in the JSON file {escape(str(folder.path / 'compare.json'))}")
     for (_, heading), facts in zip(_PLANTS, measures, strict=True):
         if facts["violation"]:
             reporter.complain(f"{heading}: {facts['violation']}")

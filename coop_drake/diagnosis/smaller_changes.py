@@ -18,7 +18,8 @@ from coop_drake.tree.pose import FloatArray
 __all__ = ["clear_elsewhere", "least_change"]
 
 FRACTIONS = (0.1, 0.25, 0.5)
-"""Where between the amount that a path needs and the one that is known to be enough a proof is tried [-]."""
+"""A proof is tried at these fractions of the way from the amount that a path needs to the amount that is
+known to be enough [-]."""
 
 ROUNDS = 4
 """Paths that are moved and proved one after another [-]."""

@@ -1,4 +1,4 @@
-"""The same team with smaller bodies or with joints that turn further."""
+"""Builds changed copies of a team: with smaller bodies, or with wider joint limits."""
 
 from __future__ import annotations
 

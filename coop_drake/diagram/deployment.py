@@ -35,7 +35,7 @@ class DeployedController:
     """A controller behind its sensors, actuators and radio.
 
     Attributes:
-        diagram: The same ports as the controller inside.
+        diagram: The whole; it has the same ports as the controller inside.
         controller: The controller inside.
         noises: Sources of noise.
         delays: For each measured port the block that delays it.

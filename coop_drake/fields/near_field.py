@@ -79,10 +79,11 @@ def panel_ends(
         place: Which regular panel, or which panel of a ring, counted over the incoming and then the outgoing
             leg.
         level: The ring, 0 the outermost.
-        x: The point [m].
-        y: The point [m].
-        rx: The point seen from the vertex [m]; more precise than the difference where it was moved.
-        ry: The same in y.
+        x: First coordinate of the point [m].
+        y: Second coordinate of the point [m].
+        rx: First coordinate of the point seen from the vertex [m]; more precise than the difference where the
+            point was moved.
+        ry: Second coordinate of the point seen from the vertex [m].
     """
     if k < 0:
         p = row(m, PANELS, place, 4)

@@ -19,10 +19,10 @@ class BodyPair:
 
     Attributes:
         first: Pieces of the first body, indices into ``SweptTree.pieces``.
-        second: Pieces of the second.
-        first_stages: Joints between the first body and the component that both hang from.
-        second_stages: The same for the second.
-        axes: Axes of the slice that move one against the other; theta is never among them.
+        second: Pieces of the second body.
+        first_stages: Number of joints between the first body and the nearest component that carries both.
+        second_stages: Number of joints between the second body and that component.
+        axes: Axes of the slice that move one body against the other; theta is never among them.
     """
 
     first: tuple[int, ...]

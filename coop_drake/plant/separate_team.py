@@ -155,7 +155,7 @@ def _grasp(
 def _in_plant(
     robot: RobotModel, base: RigidBody, joints: tuple[Joint, ...], grasp: ConstrainedGrasp
 ) -> RobotModel:
-    """The same robot in a plant of its own."""
+    """Return the model of a robot as it stands in a plant of its own."""
     return replace(
         robot,
         model_instance=base.model_instance(),

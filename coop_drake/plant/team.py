@@ -46,7 +46,7 @@ class ObjectInertia:
     p_LLcm: FloatArray  # noqa: N815
 
     def scaled(self, factor: float) -> ObjectInertia:
-        """The same with mass and inertia multiplied by a factor."""
+        """Return this inertia with mass and rotational inertia multiplied by a factor."""
         return ObjectInertia(factor * self.mass, factor * self.inertia_about_com, self.p_LLcm)
 
 

@@ -84,7 +84,7 @@ def _of_kind(kind: Any) -> Schema:
 
 
 def _of_union(kind: Any) -> Schema:
-    """One of several classes, which a tag tells apart where the file is parsed; or null or one type."""
+    """Schema of a choice: several classes, which a tag distinguishes in the file, or one type or null."""
     choices = []
     for tag, cls in classes_by_tag(kind).items():
         choice = _of_class(cls)
@@ -98,7 +98,7 @@ def _of_union(kind: Any) -> Schema:
 
 
 def _of_drake(kind: Any) -> Schema:
-    """One of Drake's classes; what is neither a text nor a list of texts in it is left to Drake."""
+    """Schema of a class of Drake; only texts and lists of texts are described; Drake checks the rest."""
     fields = getattr(kind, "__fields__", None)
     if not fields or kind.__name__ == "Transform":
         return {"type": "object"} if fields else {}

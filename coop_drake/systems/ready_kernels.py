@@ -20,9 +20,9 @@ class ReadyConditions(NamedTuple):
 
     Attributes:
         table: The axes (theta, own joints) in this cell, shape (1 + n, ``LAW_COLUMNS``).
-        next_table: The same in the next cell; in the last cell not read, as the next two.
-        next_edges: Edges of the next cell, shape (edges, 4) [m].
-        next_stiffness: K of the next cell [1/s^2].
+        next_table: The axes in the next cell; not read in the last cell.
+        next_edges: Edges of the next cell, shape (edges, 4) [m]; not read in the last cell.
+        next_stiffness: K of the next cell [1/s^2]; not read in the last cell.
         inradius: R of the transition [m].
         goal: Goal position of the object, shape (2,) [m].
         tolerance: Largest distance to it that counts as arrived [m].

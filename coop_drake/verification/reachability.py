@@ -42,7 +42,7 @@ def check_reachability(
     Args:
         slices: A tiling with its cells.
         start: (theta, kept joints...) of the start.
-        goal: The same of the goal, None where a joint is free.
+        goal: (theta, kept joints...) of the goal, None where a joint is free.
         problem: The problem.
 
     Raises:

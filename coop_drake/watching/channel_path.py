@@ -47,7 +47,7 @@ def path_through(channel: Sequence[ChannelCell], start: FloatArray, goal: FloatA
     Args:
         channel: Cells whose regions meet one after the other.
         start: (x, y, theta, q...), shape (2 + axes,) [m, rad].
-        goal: The same at the goal; NaN for joints that are free.
+        goal: (x, y, theta, q...) at the goal; NaN for joints that are free.
     """
     pieces: list[PathPiece] = []
     polygons = [_simplified(to_polygon(cell.region.section)) for cell in channel]

@@ -21,11 +21,11 @@ _SLACK = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Components:
-    """Over-cells by whether some sequence of meeting over-cells joins them to the start.
+    """Over-cells, divided by whether a sequence of meeting over-cells joins them to the start.
 
     Attributes:
-        reached: Slice and region of those that are joined.
-        others: Slice and region of those that are not.
+        reached: Slice and region of every over-cell that is joined to the start.
+        others: Slice and region of every over-cell that is not.
     """
 
     reached: tuple[tuple[Leaf, Region], ...]

@@ -36,7 +36,7 @@ class Box:
     Attributes:
         intervals: Expanded intervals of (theta, q...).
         full: Positions that are free at no margin.
-        core: Those of them that keep the margin.
+        core: Positions that are free at the plan's margin; a subset of ``full``.
     """
 
     intervals: Intervals

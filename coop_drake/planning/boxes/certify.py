@@ -20,7 +20,7 @@ LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.
 widest comes first, because wide boxes are crossed faster."""
 
 SMALLEST_LEVELS = (*LEVELS, (0.0003, 0.0001))
-"""The same with a level for passages of a millimetre."""
+"""``LEVELS`` and a further level, for passages of a millimetre [rad or m, m]."""
 
 SPACING = 0.02
 """Distance between samples of a path in any scaled axis [m]: a box ends at a sample."""

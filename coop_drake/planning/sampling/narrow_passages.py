@@ -42,7 +42,7 @@ MOVES = 2_000
 """Changes of a path that are tried at a time."""
 
 WINDOW = 40
-"""Samples to both sides of the narrowest one that later changes are confined to: two metres of path."""
+"""Later changes are confined to this many samples on each side of the narrowest one: two metres of path."""
 
 HALVINGS = 10
 """Bisections of an amount: the result is exact to a thousandth of the amount."""
