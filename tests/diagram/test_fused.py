@@ -161,5 +161,5 @@ def test_a_sampled_fused_run_is_the_sampled_named_one():
 )
 def test_what_only_named_blocks_do_is_refused(deployment):
     scenario, plan = small_problem("base")
-    with pytest.raises(ScenarioError, match=r"deployment: .* for fused blocks an ideal plant"):
+    with pytest.raises(ScenarioError, match=r"deployment: .* fused blocks support only these"):
         build_closed_loop(replace(scenario, deployment=deployment), plan, small_maps(), blocks="fused")
