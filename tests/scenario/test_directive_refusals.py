@@ -4,7 +4,7 @@ import pytest
 
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario import load_scenario
-from tests.support.edited_scenario import write_edited
+from tests.support.edited_scenario import check_refusal, write_edited
 
 WELD = "{parent: object::grasp_0, child: robot_0::gripper}"
 MODEL = "{name: robot_0, file: package://coop_drake_models/long_blue.sdf}"
@@ -144,16 +144,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", sorted(CASES))
 def test_wrong_file_is_refused_with_key_value_and_what_is_allowed(name, tmp_path):
-    pair, key, value, allowed = CASES[name]
-    path = write_edited(tmp_path, pair)
-    with pytest.raises(ScenarioError) as caught:
-        load_scenario(path)
-    assert caught.value.file == str(path)
-    assert caught.value.key == key
-    if value is not ...:
-        assert caught.value.value == value
-    assert allowed in caught.value.allowed
-    assert str(caught.value).startswith(f"{path}: {key}: ")
+    check_refusal(tmp_path, *CASES[name])
 
 
 def test_one_robot_is_not_enough(tmp_path):

@@ -4,7 +4,7 @@ import pytest
 
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario import load_scenario
-from tests.support.edited_scenario import write_edited
+from tests.support.edited_scenario import check_refusal
 
 START = "object: {x: 0.9, y: 2, theta: 1.57}"
 OUTER = "[0, 0], [1.8, 0], [1.8, 3.6]"
@@ -244,16 +244,7 @@ CASES = {
 
 @pytest.mark.parametrize("name", sorted(CASES))
 def test_wrong_file_is_refused_with_key_value_and_what_is_allowed(name, tmp_path):
-    pair, key, value, allowed = CASES[name]
-    path = write_edited(tmp_path, pair)
-    with pytest.raises(ScenarioError) as caught:
-        load_scenario(path)
-    assert caught.value.file == str(path)
-    assert caught.value.key == key
-    if value is not ...:
-        assert caught.value.value == value
-    assert allowed in caught.value.allowed
-    assert str(caught.value).startswith(f"{path}: {key}: ")
+    check_refusal(tmp_path, *CASES[name])
 
 
 @pytest.mark.parametrize(

@@ -2,8 +2,10 @@
 
 from pathlib import Path
 
+import pytest
 from pydrake.systems.framework import DiagramBuilder
 
+from coop_drake.errors import ScenarioError
 from coop_drake.plant import TeamPlant, build_team_plant
 from coop_drake.scenario import Scenario, load_scenario
 
@@ -50,3 +52,16 @@ def team_of(scenario: Scenario) -> tuple[TeamPlant, DiagramBuilder]:
     """The team's plant; keep the builder as long as it is used."""
     builder = DiagramBuilder()
     return build_team_plant(scenario, builder), builder
+
+
+def check_refusal(folder: Path, pair: tuple[str, str], key: str, value: object, allowed: str) -> None:
+    """Check that an edited scenario is refused with file, key, value (`...` for any) and what is allowed."""
+    path = write_edited(folder, pair)
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(path)
+    assert caught.value.file == str(path)
+    assert caught.value.key == key
+    if value is not ...:
+        assert caught.value.value == value
+    assert allowed in caught.value.allowed
+    assert str(caught.value).startswith(f"{path}: {key}: ")
