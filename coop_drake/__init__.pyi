@@ -5,6 +5,7 @@ from .answers import (
     PlannerSettings,
     PlanningProblem,
     PlanningResult,
+    SimulationLog,
     Undecided,
     load_plan,
     save_plan,
@@ -19,7 +20,7 @@ from .floor_plans import FloorPlanSettings, read_floor_plan
 from .laws import FixedGains, GainSet, ScheduledGains
 from .plant import planning_problem
 from .scenario import Scenario, dump_scenario, load_scenario
-from .simulation import SimulationLog, build_maps, communication, simulate
+from .simulation import build_maps, communication, simulate
 from .viz import (
     LiveView,
     angle_figure,

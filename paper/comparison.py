@@ -9,9 +9,10 @@ from typing import ClassVar
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.scenario import Scenario
-from coop_drake.simulation import SimulationLog, build_maps, simulate
+from coop_drake.simulation import build_maps, simulate
 from coop_drake.tuning import CRITERIA
 from paper.corridor import corridor_plan, corridor_scenario
 from paper.runs import GAIN_SETS, part_of

@@ -6,12 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from coop_drake.answers import Found, Plan, PlanningProblem
+from coop_drake.answers.log import SimulationLog
 from coop_drake.errors import PlanError
 from coop_drake.fields import MapStore
 from coop_drake.planning import reschedule
 from coop_drake.planning.planner import plan
 from coop_drake.scenario import Scenario
-from coop_drake.simulation import SimulationLog, build_maps, simulate
+from coop_drake.simulation import build_maps, simulate
 
 __all__ = ["GAIN_SETS", "Run", "part_of", "reproduce_runs"]
 

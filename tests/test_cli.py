@@ -14,10 +14,10 @@ from typer.testing import CliRunner
 
 from coop_drake import simulation
 from coop_drake.answers import load_plan
+from coop_drake.answers.log import SimulationLog
 from coop_drake.cli import app, run
 from coop_drake.cli.reporter import Reporter
 from coop_drake.errors import PlanError
-from coop_drake.simulation import SimulationLog
 from coop_drake.viz import LiveView
 from tests.support.scenarios import MODELS, ROOM, write_scenario
 

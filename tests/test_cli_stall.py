@@ -10,8 +10,9 @@ import pytest
 from typer.testing import CliRunner
 
 from coop_drake.answers import load_plan, save_plan
+from coop_drake.answers.log import SimulationLog
 from coop_drake.cli import app, run
-from coop_drake.simulation import SimulationLog, stall
+from coop_drake.simulation import stall
 from tests.support.scenarios import write_scenario
 
 

@@ -17,6 +17,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers import load_plan, save_plan
 from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.proof_file import save_proof
 from coop_drake.cli import simulate, verify
 from coop_drake.cli.task import Task, read_task
@@ -26,7 +27,6 @@ from coop_drake.planning import find_channel
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.scenario import dump_scenario, load_scenario
 from coop_drake.scenario.document import parse
-from coop_drake.simulation import SimulationLog
 from coop_drake.verification import verify_file
 from tests.support.cases import case
 from tests.support.certificates import GAINS, bent_corridor

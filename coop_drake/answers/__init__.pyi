@@ -1,4 +1,5 @@
 from .cell_table import table_1
+from .log import SimulationLog
 from .plan import Cell, Found, Infeasible, Plan, PlanningResult, Transition, Undecided
 from .plan_file import load_plan, save_plan
 from .problem import PlannerSettings, PlanningProblem
@@ -13,6 +14,7 @@ __all__ = [
     "PlanningProblem",
     "PlanningResult",
     "SearchReport",
+    "SimulationLog",
     "Transition",
     "Undecided",
     "load_plan",

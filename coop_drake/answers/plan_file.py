@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
+from coop_drake.answers.digest import content_digest
 from coop_drake.answers.document import Document, write_document
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_checks import check_plan
 from coop_drake.typed_data import to_plain
 
-__all__ = ["FORMAT", "load_plan", "read_plan", "save_plan"]
+__all__ = ["FORMAT", "load_plan", "plan_digest", "read_plan", "save_plan"]
 
 FORMAT = "coop_drake plan"
 """What the document says it is."""
@@ -30,8 +32,16 @@ def save_plan(plan: Plan, path: Path | str) -> Path:
     Returns:
         The path written.
     """
-    content = {"format": FORMAT, "version": VERSION, **to_plain(plan, Plan)}
-    return write_document(path, content, rows=("cells", "transitions"))
+    return write_document(path, _content(plan), rows=("cells", "transitions"))
+
+
+def plan_digest(plan: Plan) -> str:
+    """Return the digest that ``save_plan`` writes into a plan's file."""
+    return content_digest(_content(plan))
+
+
+def _content(plan: Plan) -> dict[str, Any]:
+    return {"format": FORMAT, "version": VERSION, **to_plain(plan, Plan)}
 
 
 def load_plan(path: Path | str) -> Plan:

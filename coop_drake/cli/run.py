@@ -30,9 +30,9 @@ from coop_drake.viz.figure_processes import FigureProcesses
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
+    from coop_drake.answers.log import SimulationLog
     from coop_drake.diagram import Blocks
     from coop_drake.fields import HarmonicMap
-    from coop_drake.simulation import SimulationLog
 
 __all__ = ["carry_out", "run_command"]
 

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan, PlanningResult
+    from coop_drake.answers.log import SimulationLog
     from coop_drake.fields import HarmonicMap
-    from coop_drake.simulation import SimulationLog
 
 __all__ = ["answer_of", "map_facts", "plan_facts", "planning_facts", "simulation_facts", "summary_rows"]
 

@@ -1,6 +1,5 @@
 from .clearance import Clearance, TeamClearance
 from .invariants import ACCELERATION_TOLERANCE, WRENCH_TOLERANCE, Invariants, Margins
-from .log import SimulationLog
 from .maps import build_maps, certificate_rows
 from .message_statistics import MessageStatistics, communication
 from .run import configure_simulator, simulate
@@ -14,7 +13,6 @@ __all__ = [
     "Margins",
     "MessageStatistics",
     "Sample",
-    "SimulationLog",
     "TeamClearance",
     "build_maps",
     "certificate_rows",

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.simulation.invariants import Margins
-from coop_drake.simulation.log import FloatArray, SimulationLog
 from coop_drake.simulation.telemetry import Sample
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Recorder"]
 
@@ -21,16 +24,11 @@ class Recorder:
         """Add one step."""
         self._rows.append((sample, margins))
 
-    def to_log(
-        self, *, reached: bool, violation: str, joint_names: tuple[str, ...], robot_names: tuple[str, ...]
-    ) -> SimulationLog:
+    def to_log(self, **ends: Any) -> SimulationLog:
         """Return the log of all steps.
 
         Args:
-            reached: Whether the object came to rest at the goal.
-            violation: Why the run ended early, empty if it did not.
-            joint_names: Names of the joints' columns.
-            robot_names: Names of the robots' rows.
+            ends: The log's fields from ``reached`` on, which are the same for all steps.
         """
         z, rates = self._samples("z"), self._samples("rates")
         return SimulationLog(
@@ -61,10 +59,7 @@ class Recorder:
             slice_margin=self._margins("slice_margin"),
             acceleration_error=self._margins("acceleration_error"),
             wrench_error=self._margins("wrench_error"),
-            reached=reached,
-            violation=violation,
-            joint_names=joint_names,
-            robot_names=robot_names,
+            **ends,
         )
 
     def _samples(self, name: str) -> FloatArray:

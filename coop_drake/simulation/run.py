@@ -8,16 +8,18 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
+from coop_drake.answers.plan_file import plan_digest
 from coop_drake.diagram import Blocks, ClosedLoop, Replacements, build_closed_loop
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import read_component_tree
 from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
+from coop_drake.scenario.digest import scenario_digest
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.invariants import Invariants
 from coop_drake.simulation.joint_limits import joint_limits_kept_by_funnels
-from coop_drake.simulation.log import SimulationLog
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.simulation.watch import Watch
 
@@ -96,6 +98,8 @@ def _simulated(
         violation=watch.violation,
         joint_names=plan.joint_names,
         robot_names=tuple(robot.name for robot in loop.team.robots),
+        plan_digest=plan_digest(plan),
+        scenario_digest=scenario_digest(scenario),
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.simulation import SimulationLog
+from coop_drake.answers.log import SimulationLog
 
 __all__ = ["CRITERIA", "Criterion"]
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from coop_drake.answers import Found, Plan, PlanningProblem
+from coop_drake.answers.log import SimulationLog
 from coop_drake.diagram import Blocks, build_closed_loop
 from coop_drake.errors import ScenarioError
 from coop_drake.fields import HarmonicMap
@@ -13,7 +14,7 @@ from coop_drake.laws import GainSet
 from coop_drake.planning import reschedule
 from coop_drake.planning.planner import plan
 from coop_drake.scenario import Scenario
-from coop_drake.simulation import SimulationLog, build_maps, simulate
+from coop_drake.simulation import build_maps, simulate
 from coop_drake.tuning.criteria import CRITERIA
 
 __all__ = ["GainTrial", "RunOutcome", "TrialRunner", "fastest_blocks", "outcome_of"]

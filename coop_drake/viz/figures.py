@@ -9,9 +9,9 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from shapely import Polygon
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.drawing.canvas import house_style, save_figure
-from coop_drake.simulation import SimulationLog
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.viz import floor_figures, time_figures
 

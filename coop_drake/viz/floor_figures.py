@@ -12,12 +12,12 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from shapely import Polygon
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.drawing.canvas import legend_above, new_figure
 from coop_drake.drawing.colours import INK, SKY, VERMILLION
 from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace, frame_of, team_legend
-from coop_drake.simulation import SimulationLog
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 

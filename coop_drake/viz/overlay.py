@@ -9,12 +9,12 @@ import numpy as np
 from pydrake.geometry import Rgba
 from shapely import Polygon, box
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.drawing.colours import GREY
 from coop_drake.drawing.player import player_style
 from coop_drake.errors import CoopDrakeError
 from coop_drake.scenario import Scenario
-from coop_drake.simulation import SimulationLog
 from coop_drake.templates import rendered
 from coop_drake.viz.arrows import LONGEST
 from coop_drake.viz.cells import CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.files import write_atomically
 from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
-from coop_drake.simulation import SimulationLog
 from coop_drake.viz.overlay import page_content, with_overlay
 from coop_drake.viz.replay import animation_of
 from coop_drake.viz.scene import TransportScene

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 from pydrake.geometry import MeshcatAnimation
 from pydrake.math import RigidTransform
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.progress import Progress
-from coop_drake.simulation import SimulationLog
 from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.animation_tracks import Tracks
 from coop_drake.viz.arrows import ABOVE, arrow_path, arrow_sizes

@@ -6,9 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.drawing.canvas import new_figure
 from coop_drake.drawing.colours import GREY
-from coop_drake.simulation import SimulationLog
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["break_at_switches", "time_axes"]

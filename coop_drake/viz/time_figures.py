@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.drawing.canvas import legend_above
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, OBJECT, ORANGE, SKY, robot_colour
-from coop_drake.simulation import SimulationLog
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.time_axes import break_at_switches, time_axes

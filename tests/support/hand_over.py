@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from shapely import Point
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
-from coop_drake.simulation import SimulationLog
 
 
 def assert_certified(plan: Plan, log: SimulationLog) -> None:

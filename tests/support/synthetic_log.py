@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from shapely import Point, Polygon
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Cell, Plan, Transition
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.laws.gains import TransitionGains
-from coop_drake.simulation import SimulationLog
 
 SECONDS = 12.0
 WAY = np.array([[0.9, 2.0], [0.9, 5.8], [3.4, 5.8], [5.0, 4.4], [5.0, 8.0]])

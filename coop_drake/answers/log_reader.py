@@ -42,11 +42,14 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "ready_margins": ("T", "N"),
     "reached": (),
     "violation": (),
+    "plan_digest": (),
+    "scenario_digest": (),
     "joint_names": ("n",),
     "robot_names": ("N",),
 }
 """Shapes of the arrays as in the docstring of the log; every other array has shape (T,)."""
-_KINDS = {"reached": "b", "violation": "U", "joint_names": "U", "robot_names": "U"}
+_TEXTS = ("violation", "joint_names", "robot_names", "plan_digest", "scenario_digest")
+_KINDS = {"reached": "b", **dict.fromkeys(_TEXTS, "U")}
 """Kinds of the arrays that do not hold numbers, as numpy names them."""
 
 

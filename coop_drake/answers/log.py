@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coop_drake.answers.log_reader import read_arrays
 from coop_drake.files import write_atomically
-from coop_drake.simulation.log_reader import read_arrays
+from coop_drake.tree.pose import FloatArray, IntArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
+__all__ = ["SimulationLog"]
 
 
 @dataclass(frozen=True)
@@ -57,6 +56,8 @@ class SimulationLog:
         violation: Which invariant broke, when and by how much; empty if none did.
         joint_names: Names of the joints' columns.
         robot_names: Names of the robots' rows.
+        plan_digest: ``plan_digest`` of the plan that was followed.
+        scenario_digest: ``scenario_digest`` of the scenario that was simulated.
     """
 
     times: FloatArray
@@ -90,6 +91,8 @@ class SimulationLog:
     violation: str
     joint_names: tuple[str, ...]
     robot_names: tuple[str, ...]
+    plan_digest: str = ""
+    scenario_digest: str = ""
 
     def save(self, path: Path | str) -> None:
         """Write the log as a compressed ``.npz`` file; an interrupted write leaves no file behind.
@@ -115,7 +118,7 @@ class SimulationLog:
             **{
                 **values,
                 "reached": bool(values["reached"]),
-                "violation": str(values["violation"]),
+                **{name: str(values[name]) for name in ("violation", "plan_digest", "scenario_digest")},
                 "joint_names": tuple(str(name) for name in values["joint_names"]),
                 "robot_names": tuple(str(name) for name in values["robot_names"]),
             }

@@ -3,9 +3,10 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from coop_drake.answers.log import SimulationLog
 from coop_drake.errors import PlanError
-from coop_drake.simulation import SimulationLog
 
+DIGESTS = ("plan_digest", "scenario_digest")
 ROWS, ROBOTS, JOINTS = 5, 2, 3
 SHAPES = {
     "times": (), "cell_index": (), "transition_start": (), "object_pose": (3,), "object_twist": (3,),
@@ -30,6 +31,8 @@ def log():
         violation="",
         joint_names=("a::one", "a::two", "b::one"),
         robot_names=("a", "b"),
+        plan_digest="1f",
+        scenario_digest="2e",
     )
 
 
@@ -42,6 +45,7 @@ def test_a_log_survives_its_file_bit_by_bit(log, tmp_path):
     assert (again.reached, again.violation) == (True, "")
     assert again.joint_names == log.joint_names
     assert again.robot_names == log.robot_names
+    assert (again.plan_digest, again.scenario_digest) == ("1f", "2e")
 
 
 def test_a_violation_survives_its_file(log, tmp_path):
@@ -54,7 +58,7 @@ def test_a_violation_survives_its_file(log, tmp_path):
 
 def test_every_array_has_a_documented_shape(log):
     names = {field.name for field in fields(SimulationLog)}
-    assert names == set(SHAPES) | {"reached", "violation", "joint_names", "robot_names"}
+    assert names == set(SHAPES) | {"reached", "violation", "joint_names", "robot_names", *DIGESTS}
 
 
 def test_an_interrupted_write_leaves_the_old_file(log, tmp_path, monkeypatch):
