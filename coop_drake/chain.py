@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from coop_drake.scenario import Scenario
     from coop_drake.verification import Verified
 
-__all__ = ["plan", "show", "verify", "why"]
-
 _SCHEDULED = "scheduled"
 """Name of the gain set of a problem that comes without a scenario."""
 

@@ -16,8 +16,6 @@ from numba import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
 
-__all__ = ["compiled", "kernel_stamp"]
-
 F = TypeVar("F", bound=Callable[..., object])
 
 _REASSOCIATED = {"contract", "reassoc"}

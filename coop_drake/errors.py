@@ -2,20 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = [
-    "CoopDrakeError",
-    "FieldError",
-    "FloorPlanError",
-    "GeometryError",
-    "PlanError",
-    "RefusalError",
-    "ScenarioError",
-    "StallError",
-    "TuningError",
-    "UnmappableError",
-    "shortened",
-]
-
 _LONGEST_VALUE = 200
 """Characters of a value that a message shows; a whole section of a file would fill the screen."""
 

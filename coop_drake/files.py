@@ -8,8 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
-__all__ = ["write_atomically"]
-
 
 def write_atomically(path: Path | str, content: bytes | Callable[[IO[bytes]], object]) -> Path:
     """Write a file as a whole: neither a crash nor Ctrl-C leaves a part of it.

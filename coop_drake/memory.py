@@ -6,8 +6,6 @@ import resource
 import sys
 from pathlib import Path
 
-__all__ = ["peak_memory_mb"]
-
 _STATUS = Path("/proc/self/status")
 _UNIT = 1e-6 if sys.platform == "darwin" else 1.024e-3
 """Unit of ``ru_maxrss`` [MB]: macOS counts bytes, Linux kibibytes."""

@@ -4,7 +4,5 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-__all__ = ["Progress"]
-
 Progress = Callable[[str, float], None]
 """Called with the name of a phase and the fraction of it that is done, 0 to 1."""

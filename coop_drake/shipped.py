@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["SHIPPED", "scenario_file", "shipped_scenarios"]
-
 _PACKAGE = Path(__file__).resolve().parent
 _SUFFIX = ".scenario.yaml"
 

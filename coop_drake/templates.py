@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["rendered"]
-
 
 def rendered(package: str, name: str, **content: Any) -> str:
     """Fill a Jinja template; values in HTML are escaped unless the template says otherwise.

@@ -18,10 +18,6 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["EXACT", "LARGEST", "Codec", "DataError", "FieldType", "Limits", "NotNegative", "Number"]
-__all__ += ["Positive", "Vector", "below", "check_fields", "classes_by_tag", "convert", "convert_class"]
-__all__ += ["field_types", "to_plain"]
-
 T = TypeVar("T")
 
 LARGEST = 1e6

@@ -12,8 +12,6 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import PlanError
 
-__all__ = ["check_plan_belongs"]
-
 _SAME_GOAL = 1e-9
 """Difference of goals that rounding explains: an unwrapped angle may be turned by whole turns [m, rad]."""
 

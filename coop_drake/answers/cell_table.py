@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from coop_drake.answers.plan import Plan
 
-__all__ = ["table_1"]
-
 
 def table_1(plan: Plan) -> str:
     """Return the intervals of theta and of every joint, cell by cell, as a Markdown table.

@@ -12,8 +12,6 @@ import shapely
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape, TreeJoint
 
-__all__ = ["content_digest", "problem_digest"]
-
 DECIMALS = 9
 """Decimals of a problem's numbers that its digest sees [m, rad]: last bits differ between libraries."""
 

@@ -15,8 +15,6 @@ from coop_drake.errors import PlanError, shortened
 from coop_drake.files import write_atomically
 from coop_drake.typed_data import DataError, convert, convert_class
 
-__all__ = ["Document", "write_document"]
-
 Content = TypeVar("Content")
 
 DIGITS = 300

@@ -8,8 +8,6 @@ from shapely import Point, Polygon
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import PlanError
 
-__all__ = ["check_plan"]
-
 ROUNDING = 1e-9
 """Regions and intervals that share a boundary may differ by so much [m, rad]."""
 

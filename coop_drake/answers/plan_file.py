@@ -11,8 +11,6 @@ from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_checks import check_plan
 from coop_drake.typed_data import to_plain
 
-__all__ = ["FORMAT", "load_plan", "plan_digest", "read_plan", "save_plan"]
-
 FORMAT = "coop_drake plan"
 """What the document says it is."""
 

@@ -11,8 +11,6 @@ from typing import Annotated
 from coop_drake.answers.region import Region
 from coop_drake.typed_data import EXACT, Limits, Positive, Vector
 
-__all__ = ["BlockedGoalProof", "DiscProof", "InfeasibilityProof", "OverCell", "OverSlice", "SlicesProof"]
-
 Index = Annotated[int, Limits(at_least=0), EXACT]
 
 

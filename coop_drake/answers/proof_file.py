@@ -11,8 +11,6 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import BlockedGoalProof, DiscProof, InfeasibilityProof, SlicesProof
 from coop_drake.typed_data import to_plain
 
-__all__ = ["FORMAT", "SavedProof", "load_proof", "read_proof", "save_proof"]
-
 FORMAT = "coop_drake proof of infeasibility"
 """What the document says it is."""
 

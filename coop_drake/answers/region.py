@@ -11,8 +11,6 @@ from shapely import Polygon
 from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import Codec, DataError, Number, convert, convert_class
 
-__all__ = ["Region"]
-
 
 def _read_ring(value: object, key: str) -> FloatArray:
     """Read the corners of a ring, shape (n, 2) [m]."""

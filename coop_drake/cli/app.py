@@ -42,8 +42,6 @@ from coop_drake.cli.warm import warm_command
 from coop_drake.cli.watch import watch_command
 from coop_drake.cli.why import why_command
 
-__all__ = ["app", "main"]
-
 _PANELS: dict[str, dict[str, Callable[..., None]]] = {
     "Carrying objects": {
         "run": run_command,

@@ -11,8 +11,6 @@ from coop_drake.cli.clone import root_of_clone
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.guard import reporting
 
-__all__ = ["bench_command"]
-
 
 def bench_command(context: typer.Context) -> None:
     """Measure speed and accuracy: alone it lists what there is, `bench all` measures everything.

@@ -7,8 +7,6 @@ from pathlib import Path
 import coop_drake
 from coop_drake.errors import CoopDrakeError
 
-__all__ = ["root_of_clone"]
-
 
 def root_of_clone(package: str) -> Path:
     """Return the folder of the clone that coop_drake runs from.

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from coop_drake.answers import Plan
     from coop_drake.fields import HarmonicMap
 
-__all__ = ["compare_command"]
-
 _PLANTS: tuple[tuple[Literal["joints", "constraints"], str], ...] = (
     ("joints", "one tree, grasps rigid"),
     ("constraints", "a tree each, grasps constraints"),

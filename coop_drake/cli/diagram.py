@@ -17,8 +17,6 @@ from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import read_task
 
-__all__ = ["diagram_command"]
-
 
 def diagram_command(
     scenario: ScenarioPath,

@@ -19,8 +19,6 @@ from coop_drake.cli.guard import reporting
 from coop_drake.cli.maps import map_cache
 from coop_drake.cli.options import Machine
 
-__all__ = ["Finding", "doctor_command", "examine"]
-
 _LEAST_MEMORY = 1.0
 """Memory that a run needs, with a reserve: it peaks at about 0.6 [GB]."""
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = ["EXAMPLES", "epilog"]
-
 _BASE = "models/base.scenario.yaml"
 
 EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from coop_drake.floor_plans import FloorPlan
     from coop_drake.floor_plans.settings import Unit
 
-__all__ = ["floor_plan_command"]
-
 _PICTURES = (".png", ".svg")
 _SECTIONS = (".yaml", ".yml")
 

@@ -35,8 +35,6 @@ from coop_drake.tuning import (
 from coop_drake.tuning.search import load_optimizer
 from coop_drake.viz.tuning_figure import write_tuning_figure
 
-__all__ = ["Request", "tune"]
-
 _PATIENCE = 2.0
 """A trial is ended when it takes this many times as long as before, or as a limit allows [-]."""
 

@@ -11,8 +11,6 @@ from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.reporter import Reporter
 from coop_drake.errors import CoopDrakeError, FieldError, FloorPlanError, ScenarioError, StallError
 
-__all__ = ["reporting"]
-
 _EXTRAS = {
     "collada": "robots",
     "defusedxml": "robots",

@@ -10,8 +10,6 @@ from platformdirs import user_cache_path
 
 import coop_drake
 
-__all__ = ["keep_kernels_somewhere"]
-
 _NUMBA = "NUMBA_CACHE_DIR"
 
 

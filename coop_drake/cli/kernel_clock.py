@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from time import perf_counter, thread_time
 from typing import Any
 
-__all__ = ["KernelClock", "kernel_clock"]
-
 
 @dataclass
 class KernelClock:

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
     from coop_drake.answers import Plan
     from coop_drake.fields import HarmonicMap, MapStore
 
-__all__ = ["map_cache", "map_cells", "maps_command", "write_certificates"]
-
 _FOLDER_VARIABLE = "COOP_DRAKE_CACHE"
 """Environment variable that names another folder for the cache."""
 

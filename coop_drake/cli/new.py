@@ -19,8 +19,6 @@ from coop_drake.cli.reporter import Reporter
 if TYPE_CHECKING:
     from coop_drake.scenario.starter import Starter
 
-__all__ = ["new_command"]
-
 _QUESTIONS: tuple[tuple[str, str, Any], ...] = (
     ("robots", "How many robots", 2),
     (

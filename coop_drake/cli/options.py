@@ -9,20 +9,6 @@ import typer
 
 from coop_drake.shipped import scenario_file, shipped_scenarios
 
-__all__ = [
-    "BlocksName",
-    "FreshMaps",
-    "GainsName",
-    "Live",
-    "Machine",
-    "PictureFolder",
-    "Quiet",
-    "ResultsFolder",
-    "ScenarioPath",
-    "complete_gains",
-    "complete_scenario",
-]
-
 _ENDING = ".scenario.yaml"
 _SHIPPED_GAINS = ("scheduled", "table_2")
 

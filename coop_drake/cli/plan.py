@@ -18,8 +18,6 @@ from coop_drake.cli.task import Task, read_task
 if TYPE_CHECKING:
     from coop_drake.answers import Infeasible, PlanningResult, Undecided
 
-__all__ = ["plan_command", "report_no_plan", "search", "search_and_write"]
-
 
 def plan_command(
     scenario: ScenarioPath,

@@ -19,8 +19,6 @@ from rich.table import Table
 from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.kernel_clock import kernel_clock
 
-__all__ = ["ProgressCallback", "Reporter"]
-
 ProgressCallback = Callable[[str, float], None]
 
 _SMALLEST_STEP = 0.002

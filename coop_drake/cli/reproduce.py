@@ -14,8 +14,6 @@ from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Machine, Quiet
 from coop_drake.cli.reporter import Reporter
 
-__all__ = ["reproduce_command"]
-
 
 def reproduce_command(
     scenario: Annotated[

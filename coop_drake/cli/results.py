@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["ResultFolder"]
-
 _PLANNING = ("plan.json", "certificate.json", "table_1.md")
 _DIAGNOSIS = ("why.png", "why.svg")
 _SIMULATION = ("maps.json", "log.npz", "transport.html", "fig[01][0-9]_*.png", "summary.png")

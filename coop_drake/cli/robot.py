@@ -16,8 +16,6 @@ from coop_drake.cli.reporter import Reporter
 if TYPE_CHECKING:
     from coop_drake.plant.joint_survey import SurveyedJoint
 
-__all__ = ["robot_command"]
-
 
 def robot_command(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="A *.urdf or *.sdf file; run xacro before.")],

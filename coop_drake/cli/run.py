@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from coop_drake.diagram import Blocks
     from coop_drake.fields import HarmonicMap
 
-__all__ = ["carry_out", "run_command"]
-
 _WAIT_FOR_VIEWER = 30.0
 """How long a live run waits for somebody to open its address [s]; a person needs a few seconds."""
 

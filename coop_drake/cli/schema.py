@@ -12,8 +12,6 @@ from rich.markup import escape
 from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Quiet
 
-__all__ = ["schema_command"]
-
 
 def schema_command(
     out: Annotated[

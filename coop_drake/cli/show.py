@@ -15,8 +15,6 @@ from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.simulate import read_plan
 from coop_drake.cli.task import Task, read_task
 
-__all__ = ["show_command"]
-
 _PICTURES = (".png", ".svg")
 
 

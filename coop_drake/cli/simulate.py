@@ -18,8 +18,6 @@ from coop_drake.cli.task import Task, read_task
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
 
-__all__ = ["read_plan", "simulate_command"]
-
 
 def simulate_command(
     scenario: ScenarioPath,

@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from coop_drake.answers.log import SimulationLog
     from coop_drake.fields import HarmonicMap
 
-__all__ = ["answer_of", "map_facts", "plan_facts", "planning_facts", "simulation_facts", "summary_rows"]
-
 _ROWS: tuple[tuple[str, str, str], ...] = (
     ("answer", "answer", "{}"),
     ("cells", "cells", "{}"),

@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from coop_drake.answers import PlanningProblem
     from coop_drake.scenario import Scenario
 
-__all__ = ["Task", "read_task"]
-
 
 @dataclass(frozen=True)
 class Task:

@@ -10,8 +10,6 @@ import typer
 from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath
 
-__all__ = ["tune_command"]
-
 
 def tune_command(
     scenario: ScenarioPath,

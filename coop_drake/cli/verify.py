@@ -19,8 +19,6 @@ from coop_drake.errors import RefusalError
 if TYPE_CHECKING:
     from coop_drake.verification import Check
 
-__all__ = ["verify_command"]
-
 
 def verify_command(
     certificate: Annotated[

@@ -14,8 +14,6 @@ from coop_drake.cli.options import Quiet, ScenarioPath
 from coop_drake.cli.reporter import ProgressCallback
 from coop_drake.cli.task import Task, read_task
 
-__all__ = ["warm_command"]
-
 _SIDE_BY_SIDE = ("coop_drake.planning.warm_up", "coop_drake.fields.warm_up")
 """Modules that compile kernels when they are run; they share none."""
 

@@ -19,8 +19,6 @@ from coop_drake.cli.task import read_task
 if TYPE_CHECKING:
     from coop_drake.answers import PlanningProblem
 
-__all__ = ["watch_command"]
-
 _FEWEST, _MOST = 2, 500
 """Numbers of keyframes that make a moving picture and still fit into a page that browsers open [-]."""
 _OURS = ("think_[0-9][0-9][0-9][0-9].png", "think.png", "think.gif", "think.html")

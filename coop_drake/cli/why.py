@@ -13,8 +13,6 @@ from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import Task, read_task
 
-__all__ = ["why_command"]
-
 _EXIT_CODES = {
     "found": ExitCode.DONE,
     "infeasible": ExitCode.INFEASIBLE,

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 from coop_drake.diagnosis.variants import Answer, Outcome
 
-__all__ = ["Amounts", "Bracket", "bracketed"]
-
 
 @dataclass(frozen=True)
 class Bracket:

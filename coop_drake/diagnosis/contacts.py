@@ -14,8 +14,6 @@ from coop_drake.drawing import BodyFootprint, team_footprints
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Contact", "Overlap", "contacts", "deepest", "overlaps"]
-
 NEGLIGIBLE = 1e-4
 """Less deep than this is no collision: arcs are polygons here [m]."""
 

@@ -19,8 +19,6 @@ from coop_drake.diagnosis.widened_floor import WidenedFloor
 from coop_drake.planning import Channel, find_channel
 from coop_drake.progress import Progress
 
-__all__ = ["diagnose", "find_passages"]
-
 SLICES = 120
 """Budget of every variant [slices]: most have their answer within some dozens."""
 

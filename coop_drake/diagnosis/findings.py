@@ -13,8 +13,6 @@ from coop_drake.diagnosis.relaxations import Relaxation
 from coop_drake.diagnosis.variants import Answer
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BlockedPose", "Diagnosis", "PassageFindings"]
-
 
 @dataclass(frozen=True)
 class PassageFindings:

@@ -12,8 +12,6 @@ from shapely.geometry.polygon import orient
 from coop_drake.geometry.boundary import edges_of
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Gap", "narrowest_gap"]
-
 FACING = 0.3
 """Cosine of the largest angle between a wall's normal and the direction to the wall that it faces [-]."""
 

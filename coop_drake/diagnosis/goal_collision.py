@@ -16,8 +16,6 @@ from coop_drake.diagnosis.widened_floor import WidenedFloor
 from coop_drake.planning.proofs.blocked_goals import blocked_goal
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["blocked_pose"]
-
 TRIED = 256
 """Values of the free joints that are tried, spread evenly over their limits [-]."""
 

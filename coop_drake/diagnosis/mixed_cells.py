@@ -7,8 +7,6 @@ from typing import Any
 
 from coop_drake.answers.mixed_cell import MixedCell
 
-__all__ = ["mixed_facts", "mixed_sentences"]
-
 SHOWN = 3
 """Cells that are described, the widest first [-]."""
 

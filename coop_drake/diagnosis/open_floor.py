@@ -9,8 +9,6 @@ from shapely import box
 from coop_drake.answers import PlanningProblem
 from coop_drake.diagnosis.variants import Answer, BudgetedPlanner
 
-__all__ = ["OpenFloor", "on_open_floor"]
-
 BEYOND = 2.0
 """The open floor extends beyond the workspace by so many times the team's reach: it can turn anywhere [-]."""
 

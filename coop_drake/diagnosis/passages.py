@@ -11,8 +11,6 @@ from coop_drake.diagnosis.variants import Answer, BudgetedPlanner
 from coop_drake.diagnosis.widened_floor import WidenedFloor
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BlockingPassage", "UniformWidening", "blocking_passages"]
-
 MOST = 4
 """Passages that are widened together at most [-]."""
 

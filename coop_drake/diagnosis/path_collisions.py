@@ -16,8 +16,6 @@ from coop_drake.geometry.swept_tree import Interval
 from coop_drake.planning.questions.margins import exact_footprint
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BodyAtFault", "CollidingStretch", "colliding_stretches"]
-
 NOTICED = 0.05
 """Collisions less deep than this fraction of the deepest one on the path are left out [-]."""
 

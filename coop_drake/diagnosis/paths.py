@@ -17,8 +17,6 @@ from coop_drake.planning.questions.margins import exact_footprint, marginal_work
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["is_free", "widest_path"]
-
 
 def is_free(problem: PlanningProblem, path: FloatArray) -> tuple[bool, int]:
     """Try to prove a path free at margin zero, by covering it with free boxes.

@@ -17,8 +17,6 @@ from coop_drake.drawing.colours import AT_FAULT, BLUE, GREY, INK, NOT_AT_FAULT, 
 from coop_drake.geometry.parts import parts_of
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["diagnosis_figure"]
-
 MOST_PLACES = 3
 """Places that are shown enlarged at most: more would be too small to read [-]."""
 

@@ -20,8 +20,6 @@ from coop_drake.diagnosis.team_changes import (
 from coop_drake.diagnosis.variants import BudgetedPlanner, Outcome
 from coop_drake.tree.component_tree import ComponentTree
 
-__all__ = ["Relaxation", "TeamChange", "changes", "try_changes"]
-
 MOST_SHRINKAGE, SHRINKAGE_RESOLUTION = 0.7, 0.02
 """Bodies are made smaller by up to this fraction of their size, looked for this closely [-]."""
 

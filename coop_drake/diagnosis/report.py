@@ -15,8 +15,6 @@ from coop_drake.diagnosis.relaxations import Relaxation
 from coop_drake.diagnosis.variants import Answer
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["facts_of", "rows_of", "sentences_of"]
-
 Row = tuple[str, str]
 
 

@@ -15,8 +15,6 @@ from coop_drake.planning.sampling.narrow_passages import (
 )
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["clear_elsewhere", "least_change"]
-
 FRACTIONS = (0.1, 0.25, 0.5)
 """A proof is tried at these fractions of the way from the amount that a path needs to the amount that is
 known to be enough [-]."""

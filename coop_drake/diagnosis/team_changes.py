@@ -15,14 +15,6 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.tree.component_tree import Body, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import FloatArray
 
-__all__ = [
-    "base_bodies",
-    "object_bodies",
-    "shrink_into_themselves",
-    "shrunk_bodies",
-    "widened_joints",
-]
-
 SLIDE_PER_RADIAN = 0.25
 """Widening of a prismatic joint for every radian of a revolute one: the length of a short link [m/rad]."""
 

@@ -17,8 +17,6 @@ from coop_drake.progress import Progress
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Answer", "BudgetedPlanner", "Outcome"]
-
 STEP = 0.05
 """Distance of consecutive configurations of the paths that are looked at [m]."""
 

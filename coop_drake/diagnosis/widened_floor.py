@@ -13,8 +13,6 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.geometry.parts import parts_of
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["WidenedFloor"]
-
 SAMPLES, FINEST = 6_000, 0.01
 """Walls are sampled at this many points, but no closer than this [-, m]."""
 
@@ -143,5 +141,4 @@ class WidenedFloor:
         boundary = self._workspace.boundary
         spacing = max(FINEST, boundary.length / SAMPLES)
         points = shapely.get_coordinates(shapely.segmentize(boundary, spacing))
-        samples: FloatArray = np.unique(np.round(points, 9), axis=0)
-        return samples
+        return np.unique(np.round(points, 9), axis=0)

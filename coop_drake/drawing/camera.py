@@ -10,8 +10,6 @@ from shapely import Polygon
 
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["camera_pose"]
-
 _ASPECT = 4 / 3  # Browser windows are seldom narrower than this.
 
 

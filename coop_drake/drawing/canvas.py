@@ -16,8 +16,6 @@ from matplotlib.patches import Patch
 from coop_drake.drawing.colours import GREY
 from coop_drake.files import write_atomically
 
-__all__ = ["house_style", "legend_above", "new_figure", "save_figure"]
-
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.grid": True,

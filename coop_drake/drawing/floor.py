@@ -19,8 +19,6 @@ from coop_drake.drawing.footprints import team_footprints
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["draw_polygon", "draw_team", "draw_workspace", "frame_of", "outline_of", "team_legend"]
-
 _RIM = 0.3
 """Width of the wall drawn around the floor [m]."""
 

@@ -11,8 +11,6 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BodyFootprint", "team_footprints"]
-
 
 @dataclass(frozen=True)
 class BodyFootprint:

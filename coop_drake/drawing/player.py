@@ -5,8 +5,6 @@ from __future__ import annotations
 from coop_drake.drawing import colours
 from coop_drake.templates import rendered
 
-__all__ = ["player_style"]
-
 
 def player_style() -> str:
     """Return the style sheet, in the colours of all pictures."""

@@ -14,18 +14,6 @@ from shapely import Polygon, constrained_delaunay_triangles
 from coop_drake.geometry.parts import parts_of
 from coop_drake.tree.pose import FloatArray
 
-__all__ = [
-    "TriangleMesh",
-    "extruded_section",
-    "flat_mesh",
-    "joined",
-    "ribbon_mesh",
-    "ring_lines",
-    "slab_mesh",
-    "tube_mesh",
-    "wall_polygons",
-]
-
 _TUBE_CORNERS = 6
 """Corners of a tube's cross-section: it looks round where it is a few pixels wide."""
 

@@ -12,8 +12,6 @@ from coop_drake.fields.goals import check_domain
 from coop_drake.geometry.boundary import edges_of
 from coop_drake.geometry.simplify import vertex_angles
 
-__all__ = ["blunted"]
-
 ComplexArray = NDArray[np.complex128]
 
 _DEPTH = 0.01

@@ -10,8 +10,6 @@ from coop_drake.fields.harmonic_map import HarmonicMap
 from coop_drake.fields.outline import IntArray, Outline, outline_of
 from coop_drake.fields.quadrature import FloatArray
 
-__all__ = ["BoundarySamples", "sample_boundary"]
-
 
 @dataclass(frozen=True)
 class BoundarySamples:

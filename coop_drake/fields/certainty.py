@@ -12,8 +12,6 @@ from coop_drake.fields.harmonic_map import HarmonicMap
 from coop_drake.fields.points import as_points
 from coop_drake.fields.quadrature import FloatArray
 
-__all__ = ["check_certainty", "direction_error"]
-
 _UNCERTAIN = 0.1
 """Sine of the error above which a direction counts as unknown: six degrees [-]."""
 _MOST = 0.01

@@ -13,8 +13,6 @@ from coop_drake.fields.outline import ComplexArray, IntArray, Outline
 from coop_drake.fields.panels import Panels
 from coop_drake.fields.quadrature import FloatArray
 
-__all__ = ["Fault", "MapCertificate", "certify", "find_fault"]
-
 #: Chebyshev points [-]: denser than the nodes of a panel, and different from them.
 _ON_PANEL = np.sort(np.cos(np.pi * (np.arange(23) + 0.5) / 23))
 _ON_RING = np.cos(np.pi * (np.arange(5) + 0.5) / 5)

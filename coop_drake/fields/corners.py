@@ -16,8 +16,6 @@ import numpy as np
 
 from coop_drake.fields.quadrature import FloatArray, gauss_nodes, interpolation
 
-__all__ = ["CornerOperator", "corner_operator", "leg_panels"]
-
 _BROAD = 4.0 * pi / 9.0  # gap between the legs from which one panel resolves the other leg at every scale
 _DOUBLINGS = 7  # 2^7 dyadic levels: what the next would add is below rounding for every angle
 
@@ -113,8 +111,7 @@ def _prolongation(breaks: FloatArray, nodes: int, points: FloatArray) -> FloatAr
 def _wedge_kernel(angle: float, target: FloatArray, source: FloatArray, weight: FloatArray) -> FloatArray:
     """Twice the double layer of one leg on the other, at distances from the corner, times the weights."""
     s, t = target[:, None], source[None, :]
-    kernel: FloatArray = (s * sin(angle) / pi) / (s * s + t * t - 2.0 * cos(angle) * s * t) * weight
-    return kernel
+    return (s * sin(angle) / pi) / (s * s + t * t - 2.0 * cos(angle) * s * t) * weight
 
 
 def _fixed_point(Z: FloatArray, U: FloatArray, V: FloatArray, X: FloatArray) -> FloatArray:
@@ -125,5 +122,4 @@ def _fixed_point(Z: FloatArray, U: FloatArray, V: FloatArray, X: FloatArray) -> 
         DV = np.linalg.solve(identity - X @ Z, np.concatenate((V, X @ U), axis=-1))
         D_V, D_XU = DV[..., :n], DV[..., n:]
         Z, U, V, X = Z + U @ Z @ D_V, U @ (U + Z @ D_XU), V @ D_V, X + V @ D_XU
-    R: FloatArray = Z + U @ Z @ np.linalg.solve(identity - X @ Z, V)
-    return R
+    return Z + U @ Z @ np.linalg.solve(identity - X @ Z, V)

@@ -9,8 +9,6 @@ from coop_drake.errors import FieldError
 from coop_drake.fields.goals import check_question, pole_of
 from coop_drake.geometry.slits import cut_holes
 
-__all__ = ["cut_open"]
-
 _REMEDY = "move the goal or the start, or map the domain with its holes"
 """What a user can do where a domain cannot be cut open."""
 

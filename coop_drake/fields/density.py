@@ -28,8 +28,6 @@ from coop_drake.fields.panels import Panels
 from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.skeletons import Cluster, solve_clusters
 
-__all__ = ["Density", "solve_density"]
-
 
 @dataclass(frozen=True)
 class Density:

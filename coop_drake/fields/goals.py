@@ -12,8 +12,6 @@ from coop_drake.errors import FieldError
 from coop_drake.fields.quadrature import FloatArray
 from coop_drake.geometry.simplify import sharpest_angle, simplify_inward
 
-__all__ = ["check_domain", "check_question", "goal_edges", "pole_of", "region_to_map"]
-
 _ON = 1e-9
 """An edge closer to the goal's boundary than this fraction of the domain's diameter lies on it [-]."""
 _SLIVER = 1e-9

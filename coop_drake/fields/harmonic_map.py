@@ -14,8 +14,6 @@ from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.solving import Solution, solve
 from coop_drake.fields.tolerance import TOLERANCE
 
-__all__ = ["HarmonicMap", "Solution"]
-
 
 class HarmonicMap:
     """T = (u, v), both harmonic, from a polygonal domain F to the unit disk.

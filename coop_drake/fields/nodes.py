@@ -11,8 +11,6 @@ from coop_drake.fields.outline import ComplexArray, IntArray, Outline
 from coop_drake.fields.panels import Panels
 from coop_drake.fields.quadrature import FloatArray, gauss_nodes
 
-__all__ = ["Nodes", "place_nodes"]
-
 
 @dataclass(frozen=True)
 class Nodes:

@@ -13,8 +13,6 @@ from coop_drake.errors import FieldError, UnmappableError
 from coop_drake.fields.goals import goal_edges
 from coop_drake.fields.quadrature import FloatArray
 
-__all__ = ["Outline", "outline_of"]
-
 ComplexArray = NDArray[np.complex128]
 IntArray = NDArray[np.int64]
 

@@ -14,8 +14,6 @@ from coop_drake.fields.panels import Panels
 from coop_drake.fields.quadrature import FloatArray, legendre_transform
 from coop_drake.fields.refinement import refine
 
-__all__ = ["pack_layers"]
-
 _MARGIN = 1.0 + 1e-9
 """Size of the quadtree's square per size of the domain, so that rounding leaves no vertex outside [-]."""
 

@@ -20,8 +20,6 @@ from coop_drake.fields.boundary import BoundarySamples, sample_boundary
 from coop_drake.fields.harmonic_map import HarmonicMap
 from coop_drake.fields.quadrature import FloatArray
 
-__all__ = ["grid_figure", "residual_figure", "streamline_figure"]
-
 _SIDE = 4.2  # height of a panel [in]
 _FINE = 400  # points on a grid line across the region
 _RIM = 0.06  # room round a region, of its size

@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike
 from coop_drake.errors import FieldError
 from coop_drake.fields.quadrature import FloatArray
 
-__all__ = ["as_points"]
-
 
 def as_points(points: ArrayLike) -> FloatArray:
     """Points as an array of floats, shape (..., 2) [m].

@@ -8,8 +8,6 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-__all__ = ["FloatArray", "gauss_nodes", "interpolation", "legendre_transform"]
-
 FloatArray = NDArray[np.float64]
 
 
@@ -25,11 +23,9 @@ def legendre_transform(count: int) -> FloatArray:
     """Matrix (count, count) from values at the Gauss nodes to Legendre coefficients, lowest degree first."""
     nodes, weights = gauss_nodes(count)
     degrees = np.arange(count)
-    matrix: FloatArray = (degrees[:, None] + 0.5) * legendre.legvander(nodes, count - 1).T * weights
-    return matrix
+    return (degrees[:, None] + 0.5) * legendre.legvander(nodes, count - 1).T * weights
 
 
 def interpolation(count: int, points: FloatArray) -> FloatArray:
     """Matrix (n, count) from values at the Gauss nodes to the interpolant's values at ``points`` (n,)."""
-    matrix: FloatArray = legendre.legvander(points, count - 1) @ legendre_transform(count)
-    return matrix
+    return legendre.legvander(points, count - 1) @ legendre_transform(count)

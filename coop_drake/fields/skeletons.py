@@ -30,8 +30,6 @@ from coop_drake.fields.double_layer import DoubleLayer, block, mark_near
 from coop_drake.fields.outline import IntArray
 from coop_drake.fields.quadrature import FloatArray
 
-__all__ = ["Cluster", "solve_clusters"]
-
 DENSE = 1_500
 """Unknowns up to which one dense system is as fast; below it nothing is compressed."""
 _LEAF = 160

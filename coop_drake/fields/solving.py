@@ -18,8 +18,6 @@ from coop_drake.fields.packing import pack_layers
 from coop_drake.fields.panels import Panels, lay_panels
 from coop_drake.fields.quadrature import FloatArray
 
-__all__ = ["Solution", "solve"]
-
 _GAIN = 4.0
 """Factor by which the error falls with every further node on a panel, approximately [-]."""
 _PROGRESS = 0.7
@@ -112,8 +110,7 @@ def _is_promising(attempt: Attempt, last: Attempt, excess: float) -> bool:
 
 def _angles(outline: Outline) -> FloatArray:
     """Angles of the corners [rad], rounded to 1e-12 so that equal corners share one operator in the cache."""
-    angles: FloatArray = np.round(outline.corner_angles, 12)
-    return angles
+    return np.round(outline.corner_angles, 12)
 
 
 def _unknowns(outline: Outline, panels: Panels, attempt: Attempt) -> int:

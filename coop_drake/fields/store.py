@@ -24,8 +24,6 @@ from coop_drake.fields.harmonic_map import HarmonicMap
 from coop_drake.fields.solving import Solution
 from coop_drake.files import write_atomically
 
-__all__ = ["MapStore"]
-
 _SUFFIX = ".map.npz"
 _DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
 

@@ -12,8 +12,6 @@ from coop_drake.fields.points import as_points
 from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.velocity_field import VelocityField
 
-__all__ = ["Streamlines", "trace_streamlines"]
-
 _TURN = 0.2
 """Largest turn of the direction within a step [rad]."""
 _LONGEST = 0.05

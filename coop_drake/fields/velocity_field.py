@@ -16,8 +16,6 @@ from coop_drake.fields.points import as_points
 from coop_drake.fields.quadrature import FloatArray
 from coop_drake.geometry.boundary import edges_of
 
-__all__ = ["VelocityField"]
-
 
 class VelocityField:
     """The velocity along the pulled-back straight line to the goal's image, eq. (13).

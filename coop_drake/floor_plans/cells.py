@@ -12,8 +12,6 @@ from coop_drake.floor_plans.map_file import BoolGrid, OccupancyMap
 from coop_drake.floor_plans.rooms import Inside, Room
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["room_of_map"]
-
 
 def room_of_map(
     cells: OccupancyMap,
@@ -84,8 +82,7 @@ def _component(
 def _opened(room: BoolGrid, radius: float) -> BoolGrid:
     """The cells of the room that discs inside the room cover (an opening); so walls only grow."""
     centres = ndimage.distance_transform_edt(room) > radius
-    covered: BoolGrid = (ndimage.distance_transform_edt(~centres) <= radius) & room
-    return covered
+    return (ndimage.distance_transform_edt(~centres) <= radius) & room
 
 
 def _without_checkers(room: BoolGrid) -> BoolGrid:

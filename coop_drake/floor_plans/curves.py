@@ -9,8 +9,6 @@ import numpy as np
 
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["flatten"]
-
 _ARC_ERROR = 3e-4
 """Error of a cubic that stands for a quarter of a circle: 2.8e-4 of the radius, as a fraction of its size
 [-]."""
@@ -64,5 +62,4 @@ def _at(control: FloatArray, t: FloatArray) -> FloatArray:
     while layer.shape[1] > 1:
         layer = layer[:, :-1] + t[:, None, None] * (layer[:, 1:] - layer[:, :-1])
     layer[-1, 0] = control[-1]
-    points: FloatArray = layer[:, 0]
-    return points
+    return layer[:, 0]

@@ -22,8 +22,6 @@ from coop_drake.floor_plans.shape_file import read_geojson, read_wkt
 from coop_drake.floor_plans.svg_file import read_svg
 from coop_drake.floor_plans.walls import Drawing
 
-__all__ = ["READERS", "SUFFIXES"]
-
 READERS: Mapping[str, Callable[[Path, FloorPlanSettings], Drawing | OccupancyMap]] = {
     ".svg": read_svg,
     ".dxf": read_dxf,

@@ -9,8 +9,6 @@ from shapely.geometry.base import BaseGeometry
 
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["bridges", "loose_ends"]
-
 
 def loose_ends(noded: BaseGeometry) -> FloatArray:
     """Points at which exactly one line ends and no other passes, in order, shape (n, 2) [m].

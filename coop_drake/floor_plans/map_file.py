@@ -16,8 +16,6 @@ from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans.settings import FloorPlanSettings
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BoolGrid", "OccupancyMap", "read_map"]
-
 BoolGrid = NDArray[np.bool_]
 
 _MODES = ("trinary", "scale", "raw")

@@ -19,8 +19,6 @@ from coop_drake.drawing.colours import FLOOR, INK, LIGHT_GREY, VERMILLION
 from coop_drake.floor_plans.plan import FloorPlan
 from coop_drake.geometry.parts import parts_of
 
-__all__ = ["save_picture"]
-
 _WIDTH = 8.0
 """Width of the figure [in]."""
 _TALLEST = 9.0

@@ -17,8 +17,6 @@ from coop_drake.floor_plans.rooms import Inside, Room, chosen_room, room_of
 from coop_drake.floor_plans.settings import FloorPlanSettings
 from coop_drake.floor_plans.walls import Drawing
 
-__all__ = ["FloorPlan", "excess", "read_floor_plan"]
-
 _LARGEST_FILE = 200_000_000
 """Larger files would fill the memory while they are read [bytes]."""
 _MANY_DRAWN, _MANY_TRACED = 4_000, 300

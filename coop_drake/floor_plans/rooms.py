@@ -15,8 +15,6 @@ from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans.gaps import bridges, loose_ends
 from coop_drake.floor_plans.walls import Drawing, Wall
 
-__all__ = ["Inside", "Room", "chosen_room", "room_of"]
-
 _LARGEST = 1000.0
 _SMALLEST = 0.1
 """Floors wider or narrower than this are refused, since the unit is probably wrong [m]."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 import shapely
 from shapely import Polygon
 
-__all__ = ["workspace_section"]
-
 _DECIMALS = 9
 """Decimals of a metre that are written."""
 _WIDTH = 100

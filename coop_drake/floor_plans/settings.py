@@ -9,8 +9,6 @@ from typing import Annotated, Literal
 from coop_drake.errors import FloorPlanError
 from coop_drake.typed_data import DataError, Limits, check_fields
 
-__all__ = ["UNITS", "FloorPlanSettings", "Scale", "Tolerance", "Unit"]
-
 Unit = Literal["mm", "cm", "dm", "m", "km", "in", "ft", "yd"]
 UNITS: dict[Unit, float] = {
     "mm": 1e-3,

@@ -16,8 +16,6 @@ from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans.settings import FloorPlanSettings
 from coop_drake.floor_plans.walls import Drawing, Wall, refuse_many
 
-__all__ = ["read_geojson", "read_wkt"]
-
 _KINDS = (
     "Point",
     "MultiPoint",

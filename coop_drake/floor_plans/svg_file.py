@@ -20,8 +20,6 @@ from coop_drake.floor_plans.walls import Drawing, Wall, refuse_many
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-__all__ = ["read_svg"]
-
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _PATH_DATA = re.compile(rf"\s*[Mm](?:[MmZzLlHhVvCcSsQqTtAa]|{_NUMBER}|[\s,])*")
 _TRANSFORMS = re.compile(

@@ -17,8 +17,6 @@ from coop_drake.tree.pose import FloatArray
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-__all__ = ["SVG", "SvgPage", "length", "read_svg_page"]
-
 SVG = "{http://www.w3.org/2000/svg}"
 """Namespace of SVG elements."""
 

@@ -9,8 +9,6 @@ import numpy as np
 from coop_drake.errors import FloorPlanError
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Drawing", "Wall", "refuse_many"]
-
 _MOST_POINTS = 400_000
 """Points of a drawing from which finding its rooms would take hours."""
 

@@ -19,8 +19,6 @@ from coop_drake.tree.pose import FloatArray
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-__all__ = ["Graph", "medial_graph", "widest_path"]
-
 SHORTEST_SAMPLE = 2e-3
 """The boundary is sampled no finer than this [m]; narrower passages are still measured exactly."""
 

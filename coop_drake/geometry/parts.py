@@ -6,8 +6,6 @@ import shapely
 from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
-__all__ = ["component_at", "parts_of"]
-
 
 def parts_of(shape: BaseGeometry) -> list[Polygon]:
     """The polygons that a shape consists of; lines, points and empty polygons are dropped."""

@@ -16,8 +16,6 @@ from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.medial import Graph, medial_graph, widest_path
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Passage", "PassageFinder", "pole"]
-
 LINKS = 24
 """An end is linked to this many nearest nodes of the medial graph, besides those whose disc holds it."""
 

@@ -11,11 +11,10 @@ from shapely import LineString, Point, Polygon
 from shapely.geometry.base import BaseGeometry
 from shapely.ops import substring
 
+from coop_drake.geometry.edge_pieces import IndexArray
 from coop_drake.geometry.parts import component_at
-from coop_drake.geometry.triangles import IndexArray, Triangles, triangulate
+from coop_drake.geometry.triangles import Triangles, triangulate
 from coop_drake.tree.pose import FloatArray
-
-__all__ = ["WIDTH", "cut_holes", "slits_of"]
 
 WIDTH = 0.04
 """Greatest width of a slit [m]: thin walls would make the map's boundary nearly coincide with itself."""

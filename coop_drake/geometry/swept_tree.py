@@ -94,14 +94,12 @@ class SweptTree:
     @staticmethod
     def _turn(piece: Piece, intervals: Intervals, stages: int) -> float:
         widths = [intervals[axis][1] - intervals[axis][0] for axis in piece.axes[:stages]]
-        turn: float = disc_turn(0.5 * max(widths, default=0.0))
-        return turn
+        return disc_turn(0.5 * max(widths, default=0.0))
 
     def _swept(self, index: int, intervals: Intervals, count: int, *, rounded: bool) -> FloatArray:
         bounds = np.array(intervals)
         lower, upper = bounds[:, 0].copy(), bounds[:, 1].copy()
-        swept: FloatArray = over_piece(self.arrays, index, lower, upper, count, rounded)
-        return swept
+        return over_piece(self.arrays, index, lower, upper, count, rounded)
 
     def _under_stage(self, index: int, intervals: Intervals, count: int) -> FloatArray | None:
         piece = self.pieces[index]

@@ -18,8 +18,6 @@ from coop_drake.geometry.simplify import simplify_inward
 from coop_drake.geometry.slits import cut_holes
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["tidy_cell"]
-
 GUARD = 1e-6
 """A tidy cell keeps this distance from the safe region's boundary, so that rounding never leaves it [m]."""
 

@@ -12,8 +12,6 @@ from coop_drake.geometry.boundary import edges_of
 from coop_drake.geometry.edge_pieces import IndexArray, cut_edges
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["IndexArray", "Triangles", "triangulate"]
-
 PIECES_PER_GAP = 1.0
 """Least number of pieces on a stretch of a ring as long as its distance to the opposite wall [-]."""
 

@@ -13,8 +13,6 @@ from pydrake.systems.framework import Context
 
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["ConstrainedGrasp", "ConstrainedGrasps"]
-
 
 @dataclass(frozen=True)
 class ConstrainedGrasp:
@@ -49,8 +47,7 @@ class ConstrainedGrasp:
         """Vector from Bk to Ek in W, shape (2,) [m]."""
         p_WE = self.gripper_frame.CalcPoseInWorld(context).translation()
         p_WB = self.base_joint.child_body().EvalPoseInWorld(context).translation()
-        lever: FloatArray = (p_WE - p_WB)[:2]
-        return lever
+        return (p_WE - p_WB)[:2]
 
 
 class ConstrainedGrasps:

@@ -107,5 +107,4 @@ def _tangent_corners(angles: FloatArray, support: FloatArray) -> FloatArray:
     across = (following - support * cos(step)) / sin(step)
     normals = np.column_stack([np.cos(angles), np.sin(angles)])
     tangents = np.column_stack([-np.sin(angles), np.cos(angles)])
-    corners: FloatArray = support[:, None] * normals + across[:, None] * tangents
-    return corners
+    return support[:, None] * normals + across[:, None] * tangents

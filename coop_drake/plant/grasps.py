@@ -15,8 +15,6 @@ from coop_drake.plant.parsing import joints_of
 from coop_drake.scenario import RobotAssembly
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Grasps", "WeldedGrasps"]
-
 
 class Grasps(Protocol):
     """The grasps of all robots, in the scenario's order."""

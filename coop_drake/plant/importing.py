@@ -17,8 +17,6 @@ from coop_drake.tree.pose import FloatArray
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-__all__ = ["ImportedRobot", "import_robot"]
-
 _DRAKE = "http://drake.mit.edu"
 _UNREAD = ("calibration", "safety_controller", "verbose")
 _DROPPED = (

@@ -17,8 +17,6 @@ from coop_drake.plant.chain import limits_of
 from coop_drake.plant.parsing import joints_of
 from coop_drake.plant.planarity import TILT, axis_in_world, is_upright
 
-__all__ = ["SurveyedJoint", "survey_joints"]
-
 
 @dataclass(frozen=True)
 class SurveyedJoint:

@@ -12,8 +12,6 @@ from math import isfinite, isnan
 from pathlib import Path
 from xml.parsers import expat
 
-__all__ = ["fault_of"]
-
 _ROOTS = {".sdf": "sdf", ".urdf": "robot"}
 _DEEPEST = 100
 """Elements inside each other that are allowed; models have about ten, and Drake's readers recurse."""

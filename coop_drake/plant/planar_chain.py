@@ -31,8 +31,6 @@ from coop_drake.plant.robot import RobotPlant
 from coop_drake.plant.team import RobotModel, TeamPlant
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BaseChain", "base_chain", "robot_chain"]
-
 
 @dataclass(frozen=True)
 class BaseChain:
@@ -134,8 +132,7 @@ def _at_zero(plant: MultibodyPlant, context: Context) -> Context:
 
 
 def _origin(context: Context, frame: Frame) -> FloatArray:
-    origin: FloatArray = frame.CalcPoseInWorld(context).translation()[:2]
-    return origin
+    return frame.CalcPoseInWorld(context).translation()[:2]
 
 
 def _joint(context: Context, joint: Joint) -> tuple[float, float, float, float, float]:

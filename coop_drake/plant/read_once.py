@@ -17,8 +17,6 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.scenario import Scenario
 
-__all__ = ["add_copy", "read_once"]
-
 P = ParamSpec("P")
 T = TypeVar("T")
 

@@ -20,8 +20,6 @@ from coop_drake.plant.team import RobotModel, TeamPlant, build_team_plant
 from coop_drake.scenario import Assembly, Scenario
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["SeparateTeam", "build_separate_team"]
-
 
 @dataclass(frozen=True)
 class SeparateTeam(TeamPlant):

@@ -10,8 +10,6 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.tree.component_tree import Body, ConvexShape
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["enclosed_in_fewer", "without_covered"]
-
 _FEW = 16
 """Footprints with at most this many corners are not simplified."""
 
@@ -38,8 +36,7 @@ def enclosed_in_fewer(points: FloatArray) -> FloatArray:
     outer = Polygon(hole).convex_hull
     if not outer.buffer(1e-9).covers(inner):
         return points
-    corners: FloatArray = shapely.get_coordinates(shapely.orient_polygons(outer))[:-1]
-    return corners
+    return shapely.get_coordinates(shapely.orient_polygons(outer))[:-1]
 
 
 def without_covered(bodies: tuple[Body, ...], may_overlap: frozenset[tuple[str, str]]) -> tuple[Body, ...]:

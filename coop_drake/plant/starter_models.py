@@ -7,8 +7,6 @@ from math import pi
 
 from coop_drake.drawing.colours import BASE_IN_MODELS, LINK_IN_MODELS, OBJECT_IN_MODELS
 
-__all__ = ["object_model", "robot_model"]
-
 _LINK_WIDTH = 0.1
 _LINK_HEIGHT = 0.08
 """Width and height of a link, as in the shipped models [m]."""

@@ -10,8 +10,6 @@ from coop_drake.scenario.model import Gains, Scenario
 from coop_drake.scenario.reading import read_file
 from coop_drake.typed_data import to_plain
 
-__all__ = ["dump_gains", "with_gains"]
-
 
 def with_gains(scenario: Scenario, choice: str | None) -> Scenario:
     """Return the scenario with a gain set selected.

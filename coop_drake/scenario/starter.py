@@ -8,8 +8,6 @@ from dataclasses import dataclass
 
 from coop_drake.errors import ScenarioError
 
-__all__ = ["Starter", "starter_text"]
-
 _CLEARANCE = 0.5
 """Distance between the walls of a room and the team in its middle [m]; the team can turn there."""
 

@@ -7,8 +7,6 @@ import numpy as np
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["axis_levers", "configuration_scale"]
-
 _LEAST_LEVER = 0.01
 """A joint that moves no solid body counts this much in distances [m per unit]: it still has to be moved."""
 

@@ -8,8 +8,6 @@ import numpy as np
 
 from coop_drake.tree.component_tree import ComponentTree
 
-__all__ = ["usual_unit"]
-
 _USUAL_SIZE = 0.25
 """Mean radius of a usual team's convex pieces [m]; steps and resolutions of the search are meant for it."""
 

@@ -9,8 +9,6 @@ import numpy as np
 
 from coop_drake.answers.log import SimulationLog
 
-__all__ = ["CRITERIA", "Criterion"]
-
 
 @dataclass(frozen=True)
 class Criterion:

@@ -11,8 +11,6 @@ from coop_drake.errors import TuningError
 from coop_drake.tuning.criteria import CRITERIA
 from coop_drake.tuning.trial import RunOutcome
 
-__all__ = ["Limit", "Objective", "read_weights"]
-
 _LIMITS_BROKEN = 1e3
 """Smallest score of a run that breaks a limit; runs that keep all limits stay below [-]."""
 

@@ -12,8 +12,6 @@ import numpy as np
 from coop_drake.errors import TuningError
 from coop_drake.laws.gains import FixedGains, FloatArray, GainSet
 
-__all__ = ["Parameter", "to_fractions", "tunable_parameters", "with_fractions"]
-
 
 @dataclass(frozen=True)
 class Parameter:

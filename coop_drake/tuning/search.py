@@ -20,8 +20,6 @@ from coop_drake.tuning.objective import Objective
 from coop_drake.tuning.parameters import Parameter, to_fractions, with_fractions
 from coop_drake.tuning.trial import GainTrial
 
-__all__ = ["Search", "load_optimizer", "search"]
-
 _FIRST_STEP = 0.15
 """Standard deviation of the first generation, as a fraction of every gain's logarithmic range [-]."""
 

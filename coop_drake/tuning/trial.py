@@ -17,8 +17,6 @@ from coop_drake.scenario import Scenario
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.tuning.criteria import CRITERIA
 
-__all__ = ["GainTrial", "RunOutcome", "TrialRunner", "fastest_blocks", "outcome_of"]
-
 
 @dataclass(frozen=True)
 class RunOutcome:

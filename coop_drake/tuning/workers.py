@@ -15,8 +15,6 @@ from coop_drake.laws import GainSet
 from coop_drake.scenario import load_scenario
 from coop_drake.tuning.trial import GainTrial, TrialRunner, fastest_blocks
 
-__all__ = ["Workers"]
-
 _TRIALS_EACH = 100
 """Trials after which a process is replaced, so that memory does not grow."""
 

@@ -12,8 +12,6 @@ from coop_drake.laws import GainSet
 from coop_drake.scenario import dump_gains
 from coop_drake.tuning.search import Search
 
-__all__ = ["TUNED", "write_gains", "write_trials"]
-
 TUNED = "tuned"
 """Name of the gain set that tuning writes."""
 

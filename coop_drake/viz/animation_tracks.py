@@ -9,8 +9,6 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Tracks", "kept_frames"]
-
 _POSITION, _ANGLE, _SCALE = 3e-3, 5e-3, 0.03
 """Largest errors of positions [m], angles [rad] and scales [-]: a pixel or so."""
 

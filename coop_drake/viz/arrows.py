@@ -11,8 +11,6 @@ from pydrake.math import RigidTransform, RotationMatrix
 from coop_drake.plant import TeamPlant
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["ABOVE", "LONGEST", "arrow_path", "arrow_sizes", "force_of_a_metre", "set_arrows"]
-
 LONGEST = 1.2
 """Greatest length of an arrow [m]; stronger forces are drawn with it."""
 

@@ -27,8 +27,6 @@ from coop_drake.drawing.colours import (
 )
 from coop_drake.viz.signal_flow import INPUTS, OUTPUTS, DiagramBlock, Signal, SignalFlow, signal_flow
 
-__all__ = ["block_diagram_figure"]
-
 _ROW, _TITLE, _WIDTH, _GAP, _SPACE = 0.22, 0.42, 2.3, 0.9, 0.25
 """Heights of a port and of a title, width of a block, gaps between columns and between blocks [in]."""
 

@@ -12,8 +12,6 @@ from coop_drake.drawing.solids import flat_mesh
 from coop_drake.geometry.parts import parts_of
 from coop_drake.viz.paint import rgba, set_mesh
 
-__all__ = ["CELL_COLOUR", "GOAL_COLOUR", "GOAL_POSE_COLOUR", "cell_paths", "set_cells", "set_goal"]
-
 CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR = BLUE, GREEN, OBJECT
 
 _LINE = 0.03

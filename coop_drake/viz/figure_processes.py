@@ -9,8 +9,6 @@ import sys
 from types import TracebackType
 from typing import Any
 
-__all__ = ["FigureProcesses"]
-
 _MOST = 2
 """More processes draw no sooner: each imports matplotlib, which takes as long as four figures."""
 

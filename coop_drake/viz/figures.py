@@ -15,8 +15,6 @@ from coop_drake.drawing.canvas import house_style, save_figure
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.viz import floor_figures, time_figures
 
-__all__ = ["write_figures"]
-
 
 def write_figures(
     workspace: Polygon,

@@ -21,8 +21,6 @@ from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace, fr
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["overview_figure", "path_figure", "start_and_goal_figure"]
-
 _TALLEST, _LOWEST = 9.0, 3.0
 """Limits of a floor's height on the page [in]."""
 
@@ -133,8 +131,7 @@ def _at_goal(asked: PlanningProblem | Plan, free: FloatArray) -> FloatArray:
 def _joints_at_end(plan: Plan) -> FloatArray:
     """Return the middle of the last goal interval of every joint, shape (n,) [rad or m]."""
     last = plan.transitions[-1]
-    middle: FloatArray = 0.5 * (last.goal_lower + last.goal_upper)[1:]
-    return middle
+    return 0.5 * (last.goal_lower + last.goal_upper)[1:]
 
 
 def _draw_cells(ax: Axes, plan: Plan) -> None:

@@ -16,8 +16,6 @@ from coop_drake.viz.cells import cell_paths
 from coop_drake.viz.scene import TransportScene
 from coop_drake.viz.trail import STEP, set_trail
 
-__all__ = ["LiveView"]
-
 _FRAMES_PER_SECOND = 25.0
 """Steps shown per simulated second [1/s]: motion looks smooth."""
 

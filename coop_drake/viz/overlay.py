@@ -21,8 +21,6 @@ from coop_drake.viz.cells import CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR
 from coop_drake.viz.paint import hex_colour
 from coop_drake.viz.trail import TRAIL_COLOUR
 
-__all__ = ["page_content", "with_overlay"]
-
 _RATE = 10.0
 """Clearances shown per second [1/s]: digits that change faster cannot be read."""
 

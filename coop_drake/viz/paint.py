@@ -8,8 +8,6 @@ from pydrake.geometry import Meshcat, Rgba
 from coop_drake.drawing.colours import red_green_blue
 from coop_drake.drawing.solids import TriangleMesh
 
-__all__ = ["hex_colour", "rgba", "set_mesh"]
-
 
 def set_mesh(meshcat: Meshcat, path: str, mesh: TriangleMesh, colour: Rgba) -> None:
     """Put a triangle mesh at a path."""

@@ -16,8 +16,6 @@ from coop_drake.viz.replay import animation_of
 from coop_drake.viz.scene import TransportScene
 from coop_drake.viz.server import silent_meshcat
 
-__all__ = ["inline_frame", "recording_html", "write_recording"]
-
 _MOST_FRAMES = 4000
 """Largest number of frames; longer runs get fewer frames per second, so that the file stays small."""
 

@@ -16,8 +16,6 @@ from coop_drake.viz.cells import cell_paths
 from coop_drake.viz.scene import TransportScene
 from coop_drake.viz.trail import INDICES, set_trail, trail_points
 
-__all__ = ["animation_of"]
-
 _TRAIL = "/motion/trail"
 _ARROW_ANGLE = 0.06
 """Largest error of an arrow's direction [rad]: arrows turn fast where forces are small."""

@@ -21,8 +21,6 @@ from coop_drake.viz.paint import rgba
 from coop_drake.viz.stage import place_camera, set_stage
 from coop_drake.viz.team_view import TeamView
 
-__all__ = ["TransportScene"]
-
 _SHADOW_HEIGHT = 0.003
 """Height of the object's shadow [m]: above the grid, below the cells, which it would otherwise darken."""
 

@@ -6,8 +6,6 @@ import logging
 
 from pydrake.geometry import Meshcat, MeshcatParams
 
-__all__ = ["silent_meshcat"]
-
 
 def silent_meshcat(parameters: MeshcatParams | None = None) -> Meshcat:
     """Start a Meshcat server and log no address; ``web_url()`` returns it.

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import networkx as nx
 from pydrake.systems.framework import Diagram, InputPortIndex, OutputPortIndex, System
 
-__all__ = ["INPUTS", "OUTPUTS", "DiagramBlock", "Signal", "SignalFlow", "signal_flow"]
-
 INPUTS, OUTPUTS = "from outside", "to outside"
 """Names of the blocks that stand for a Diagram's own ports."""
 

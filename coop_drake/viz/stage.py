@@ -23,8 +23,6 @@ from coop_drake.geometry.parts import parts_of
 from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.paint import rgba, set_mesh
 
-__all__ = ["place_camera", "set_stage"]
-
 _WALL_OPACITY = 0.42
 """Opacity of walls, behind which robots are to be seen."""
 

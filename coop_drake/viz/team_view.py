@@ -23,8 +23,6 @@ from coop_drake.scenario import Scenario
 from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.paint import rgba, set_mesh
 
-__all__ = ["TeamView"]
-
 _SEE_THROUGH = 0.6
 """Opacity of the object, below which its cell is to be seen."""
 

@@ -11,8 +11,6 @@ from coop_drake.drawing.canvas import new_figure
 from coop_drake.drawing.colours import GREY
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["break_at_switches", "time_axes"]
-
 _WIDTH = 7.5
 """Width of a figure [in]: that of a page of text."""
 

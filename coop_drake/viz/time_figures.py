@@ -14,17 +14,6 @@ from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.time_axes import break_at_switches, time_axes
 
-__all__ = [
-    "angle_figure",
-    "angular_velocity_figure",
-    "force_figure",
-    "joints_figure",
-    "position_figure",
-    "summary_figure",
-    "torque_figure",
-    "velocity_figure",
-]
-
 _SINGLE = 2.7
 """Height of the panel of a figure that has only one [in]."""
 

@@ -10,8 +10,6 @@ from coop_drake.drawing.solids import ribbon_mesh
 from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.paint import rgba, set_mesh
 
-__all__ = ["INDICES", "STEP", "TRAIL_COLOUR", "set_trail", "trail_points"]
-
 TRAIL_COLOUR = INK
 
 STEP = 0.03

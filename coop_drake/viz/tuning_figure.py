@@ -14,8 +14,6 @@ from coop_drake.drawing.canvas import house_style, new_figure, save_figure
 from coop_drake.drawing.colours import BLUE, GREY, INK, VERMILLION
 from coop_drake.tuning import CRITERIA, Criterion, Search
 
-__all__ = ["tuning_figure", "write_tuning_figure"]
-
 
 def write_tuning_figure(found: Search, path: Path) -> Path:
     """Write the figure of a search as PNG."""

@@ -18,8 +18,6 @@ from coop_drake.watching.channel_path import PathPiece
 from coop_drake.watching.search_states import ChannelCell, Leaf
 from coop_drake.watching.theta_layers import THETA, on_turn
 
-__all__ = ["AnglePanel", "cut", "leaf_colour"]
-
 
 def cut(leaves: Iterable[Leaf], axis: int, point: FloatArray) -> list[Leaf]:
     """Return the leaves that a plane of theta and one joint meets; other joints have the point's values.

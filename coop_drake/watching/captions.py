@@ -7,8 +7,6 @@ from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.watching.recording import BOXES, SearchRecording
 from coop_drake.watching.search_states import SearchState
 
-__all__ = ["counters", "headline"]
-
 
 def headline(recording: SearchRecording, state: SearchState) -> str:
     """Return what happened since the keyframe before, or how the search ended."""

@@ -17,8 +17,6 @@ from coop_drake.planning.cells.slices import nearest_turn
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.search_states import ChannelCell
 
-__all__ = ["PathPiece", "path_through"]
-
 _INSET = 0.02
 """Distance by which crossings stay inside what two regions share, where that is wide enough [m]."""
 

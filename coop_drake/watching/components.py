@@ -13,8 +13,6 @@ from coop_drake.planning.cells.slices import holds, share_facet
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.search_states import Leaf
 
-__all__ = ["Components", "components_from_start"]
-
 _SLACK = 1e-6
 """Slack of the quick test for neighbours that goes before the exact one [rad, m]."""
 

@@ -17,8 +17,6 @@ from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.channel_path import PathPiece
 
-__all__ = ["DASHES", "draw_ends", "draw_path", "draw_section"]
-
 DASHES = (0.0, (1.4, 0.9))
 """Dashes of what is not proved, in widths of the line."""
 

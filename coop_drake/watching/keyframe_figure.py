@@ -23,8 +23,6 @@ from coop_drake.watching.recording import SearchRecording
 from coop_drake.watching.search_states import Leaf
 from coop_drake.watching.theta_layers import THETA
 
-__all__ = ["keyframe_figure"]
-
 _SIZE = (12.8, 7.2)
 """Width and height of the figure [in]: 1280 by 720 pixels."""
 

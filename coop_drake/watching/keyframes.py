@@ -15,8 +15,6 @@ from coop_drake.watching.projections import Projection, Projections
 from coop_drake.watching.recording import SearchRecording
 from coop_drake.watching.search_states import SearchState, search_states
 
-__all__ = ["Keyframe", "keyframes"]
-
 
 @dataclass(frozen=True, eq=False)
 class Keyframe:

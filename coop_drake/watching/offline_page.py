@@ -14,8 +14,6 @@ from meshcat.visualizer import ViewerWindow, Visualizer
 from coop_drake.drawing.player import player_style
 from coop_drake.templates import rendered
 
-__all__ = ["OfflineWindow", "offline_visualizer"]
-
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
 
 

@@ -18,8 +18,6 @@ from coop_drake.watching.keyframe_figure import keyframe_figure
 from coop_drake.watching.keyframes import Keyframe
 from coop_drake.watching.recording import SearchRecording
 
-__all__ = ["on_sheet", "write_pictures"]
-
 _ON_SHEET, _SHEET_COLUMNS = 6, 2
 """Number of pictures on the sheet, and of its columns."""
 

@@ -11,8 +11,6 @@ from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.planning.cells.cells import Region
 from coop_drake.watching.search_states import Leaf
 
-__all__ = ["Projection", "Projections", "union"]
-
 _OUTLINE_TOLERANCE = 0.005
 """Distance by which outlines may move when they are simplified for drawing [m]: less than a pixel."""
 

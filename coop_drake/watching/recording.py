@@ -30,8 +30,6 @@ from coop_drake.planning.search.search import find_channel
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BOXES", "SearchRecording", "Strategy", "record_search"]
-
 BOXES = "boxes along a sampled path"
 """The question of the events that add the boxes of a channel one by one."""
 

@@ -28,8 +28,6 @@ from coop_drake.watching.scene_coordinates import SceneCoordinates
 from coop_drake.watching.scene_surroundings import Surface, put_mesh, put_surroundings, scene_labels
 from coop_drake.watching.theta_layers import THETA, layers, on_turn
 
-__all__ = ["scene_page", "write_scene"]
-
 _RATE = 4
 """Keyframes per second [1/s]: each can be looked at."""
 

@@ -14,8 +14,6 @@ from coop_drake.geometry.swept_tree import Interval
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.theta_layers import THETA
 
-__all__ = ["SceneCoordinates"]
-
 _EXTENT = 10.0
 """Larger side of the floor [units]; the viewer's camera sees no further than a hundred."""
 

@@ -21,8 +21,6 @@ from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.scene_coordinates import SceneCoordinates
 from coop_drake.watching.theta_layers import THETA, on_turn
 
-__all__ = ["Surface", "put_mesh", "put_surroundings", "scene_labels"]
-
 _TICKS = ((0.0, "θ = 0"), (pi / 2, "π/2"), (pi, "π"), (3 * pi / 2, "3π/2"))
 """Marks on the scale of theta: angle [rad] and text."""
 

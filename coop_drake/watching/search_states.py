@@ -22,8 +22,6 @@ from coop_drake.planning.cells.events import (
     SliceSplit,
 )
 
-__all__ = ["ChannelCell", "Leaf", "SearchState", "search_states"]
-
 
 @dataclass(frozen=True, eq=False)
 class Leaf:

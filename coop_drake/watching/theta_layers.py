@@ -10,8 +10,6 @@ from typing import TypeVar
 from coop_drake.geometry.swept_tree import Interval
 from coop_drake.planning.cells.slices import nearest_turn
 
-__all__ = ["THETA", "layers", "on_turn"]
-
 THETA: Interval = (-pi / 4, 7 * pi / 4)
 """The turn of theta that is drawn [rad]; coarse slices begin and end there."""
 
