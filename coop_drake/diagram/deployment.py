@@ -10,6 +10,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPo
 from pydrake.systems.primitives import (
     Adder,
     DiscreteTimeDelay,
+    FirstOrderLowPassFilter,
     Gain,
     LinearSystem,
     RandomSource,
@@ -28,6 +29,10 @@ __all__ = ["DeployedController", "build_radio", "deploy"]
 _STRONGEST = 1e5
 """Limit of every effort where the scenario gives none [N, N m]. A controller outside its funnel may ask for
 any effort; without a limit the plant's state would overflow, which ends the process instead of the run."""
+
+_KILO = 1e3
+"""Unit of the lagging efforts [N, N m]. The integrator's error control compares states of all units with one
+number; efforts in newtons would ask for a thousandth of a newton, and for very short steps."""
 
 
 @dataclass(frozen=True)
@@ -66,9 +71,9 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int) -> DeployedC
     """Add an effort limit to a robot's controller, and the noise, delays, hold and radio of a deployment.
 
     In the order of the signals: ``robot_state`` and ``object_pose`` get noise, then a delay; ``robot_effort``
-    is held for a period, then limited; ``ready`` goes through a :class:`MessageChannel`, or a hold where
-    nothing is lost or late. The limit is always there: that of the actuators, or where none is given, one so
-    high that only a diverging run reaches it.
+    is held for a period, then limited, then lags; ``ready`` goes through a :class:`MessageChannel`, or a
+    hold where nothing is lost or late. The limit is always there: that of the actuators, or where none is
+    given, one so high that only a diverging run reaches it.
 
     Args:
         controller: From :func:`build_robot_controller`, with the same period.
@@ -128,7 +133,9 @@ class _Wrapping:
         entry, period = controller.GetInputPort(name), self._deployment.period
         size = entry.size()
         if period is not None and self._deployment.measurements.delay > 0.0:
-            steps = whole_periods(self._deployment.measurements.delay, period)
+            # Controllers compute at the instant at which the delay takes its next sample, and before it does:
+            # one period of the measurements' age is already this.
+            steps = whole_periods(self._deployment.measurements.delay, period) - 1
             delay = self._builder.AddNamedSystem(f"{name}_delay", DiscreteTimeDelay(period, steps, size))
             self._builder.Connect(delay.get_output_port(), entry)
             self.delays[name], entry = delay, delay.get_input_port()
@@ -156,7 +163,22 @@ class _Wrapping:
         limits = _limits(self._deployment, joints)
         saturation = self._builder.AddNamedSystem("actuator_limits", Saturation(-limits, limits))
         self._builder.Connect(effort, saturation.get_input_port())
-        return saturation.get_output_port()
+        return self._lag(saturation.get_output_port())
+
+    def _lag(self, effort: OutputPort) -> OutputPort:
+        """Return what actuators give that follow their commands with a lag."""
+        if (lag := self._deployment.actuators.lag) == 0.0:
+            return effort
+        chain = (
+            ("effort_in_kilonewtons", Gain(1.0 / _KILO, effort.size())),
+            ("actuator_lag", FirstOrderLowPassFilter(lag, effort.size())),
+            ("lagged_effort", Gain(_KILO, effort.size())),
+        )
+        for name, block in chain:
+            self._builder.AddNamedSystem(name, block)
+            self._builder.Connect(effort, block.get_input_port())
+            effort = block.get_output_port()
+        return effort
 
     def send(self, ready: OutputPort, robot: int) -> OutputPort:
         """Return the reports of a robot as the cell planner receives them."""

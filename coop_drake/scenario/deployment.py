@@ -18,6 +18,9 @@ from coop_drake.typed_data import Limits, NotNegative, Positive
 Delay = Annotated[float, Limits(at_least=0.0, at_most=10.0)]
 """A delay [s]; the loop is lost after fractions of a second, so that a longer one is a typing error."""
 
+Lag = Annotated[float, Limits(at_least=0.0, at_most=10.0)]
+"""A time constant [s]; limited as a delay is."""
+
 Probability = Annotated[float, Limits(at_least=0.0, at_most=1.0)]
 
 ControlRate = Annotated[float, Limits(at_least=1.0, at_most=1e4)]
@@ -46,17 +49,20 @@ class Measurements:
 
 @dataclass(frozen=True)
 class ActuatorLimits:
-    """Largest efforts of the actuators; null for no limit.
+    """Largest efforts of the actuators, null for no limit, and how quickly they follow their commands.
 
     Attributes:
         base_force: Largest force of every base along each axis of W [N].
         base_torque: Largest torque of every base [N m].
         joint_effort: Largest effort of every joint [N m or N].
+        lag: Time constant with which every effort follows its command, as a first-order low pass [s]; 0 for
+            actuators that follow at once.
     """
 
     base_force: Positive | None = None
     base_torque: Positive | None = None
     joint_effort: Positive | None = None
+    lag: Lag = 0.0
 
 
 @dataclass(frozen=True)

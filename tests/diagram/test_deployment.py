@@ -48,6 +48,10 @@ def test_an_ideal_team_has_nothing_round_its_controllers():
             {"control_rate": 200.0, "measurements": Measurements(delay=0.01)},
             {"effort_hold", "radio", "object_pose_delay", "robot_state_delay"},
         ),
+        (
+            {"actuators": ActuatorLimits(lag=0.01)},
+            {"effort_in_kilonewtons", "actuator_lag", "lagged_effort"},
+        ),
     ],
 )
 def test_only_what_is_switched_on_is_there_beside_a_limit(deployment, more):
@@ -126,6 +130,50 @@ def test_where_no_limit_is_given_the_limit_lets_every_effort_pass_but_those_of_a
     for asked, given in ((5e4, 5e4), (1e9, 1e5), (-np.inf, -1e5)):
         limit.get_input_port().FixValue(context, np.full(4, asked))
         np.testing.assert_array_equal(limit.get_output_port().Eval(context), np.full(4, given))
+
+
+def test_actuators_follow_their_commands_with_a_lag():
+    """In continuous time: the rate of what is given is what is still missing, over the time constant."""
+    loop, lag = loop_of(actuators=ActuatorLimits(lag=0.02)), 0.02
+    simulator = Simulator(loop.diagram, loop.create_context())
+    given = []
+    for time in (0.0, 0.1, 0.1 + 1e-5):
+        simulator.AdvanceTo(time)
+        root = simulator.get_context()
+        given.append(
+            [
+                part.GetOutputPort("robot_effort").Eval(part.GetMyContextFromRoot(root))
+                for part in loop.controllers
+            ]
+        )
+        wanted = [
+            law.GetOutputPort("robot_effort").Eval(law.GetMyContextFromRoot(root))
+            for law in loop.bare_controllers
+        ]
+    given = np.array(given)
+    np.testing.assert_array_equal(given[0], 0.0)
+    expected = (np.array(wanted) - given[2]) / lag
+    np.testing.assert_allclose((given[2] - given[1]) / 1e-5, expected, rtol=1e-2, atol=0.1)
+    assert np.abs(expected).max() > 10.0
+
+
+@pytest.mark.parametrize("periods", [1, 2, 4])
+def test_a_controller_gets_measurements_of_the_age_that_is_stated(periods):
+    """At the instant at which it computes its effort, which is held from then on."""
+    loop = loop_of(control_rate=100.0, measurements=Measurements(delay=0.01 * periods))
+    simulator, true, known = Simulator(loop.diagram, loop.create_context()), [], []
+    law = loop.bare_controllers[0]
+    for k in range(12):
+        simulator.AdvanceTo(0.01 * k)  # the updates of this instant are still to come
+        root = simulator.get_context()
+        true.append(
+            loop.station.diagram.GetOutputPort("object_pose").Eval(
+                loop.station.diagram.GetMyContextFromRoot(root)
+            )
+        )
+        known.append(law.GetInputPort("object_pose").Eval(law.GetMyContextFromRoot(root)))
+    np.testing.assert_array_equal(known[periods:], true[:-periods])
+    assert np.abs(np.subtract(true[-1], true[-2])).max() > 1e-9
 
 
 def test_robots_that_overestimate_masses_push_harder():

@@ -55,6 +55,7 @@ _NOT_NEGATIVE = [
     "deployment.messages.loss",
     "deployment.messages.repeat",
     "deployment.messages.delay",
+    "deployment.actuators.lag",
 ]
 _BEYOND = {
     "planner.slice_overlap": (1.5, "slices overlap by a part of their width"),
@@ -69,6 +70,7 @@ _BEYOND = {
     "deployment.actuators.base_force": (0.0, "nothing would move"),
     "deployment.actuators.base_torque": (-5.0, "limits are magnitudes"),
     "deployment.actuators.joint_effort": (0.0, "nothing would move"),
+    "deployment.actuators.lag": (60.0, "a motor does not take minutes"),
     "planner.strategy": ("astar", "no strategy has this name"),
     "simulator.integration_scheme": ("runge_kutta7", "no integrator has this name"),
     "gains.selected": ("table_3", "no gain set has this name"),
