@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import shapely
-from shapely import Polygon
+from shapely import Polygon, box
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
-from coop_drake.verification.free_positions import FreePositions
+from coop_drake.verification.free_positions import BEYOND, FreePositions
 from coop_drake.verification.halving import first_failure
 
-__all__ = ["check_blocked", "check_cover", "uncovered"]
+__all__ = ["check_blocked", "check_cover", "check_near_floor", "uncovered"]
 
 TOLERANCES = (3e-4, 3e-5, 3e-6, 2e-7)
 """How much an inner sweep may leave out, tried in this order: coarse ones are quick and often enough [m]."""
@@ -83,6 +84,23 @@ def check_blocked(
         return f"the team may be free at ({place[0]}, {place[1]})"
 
     _require(failure, free, lower, upper, where)
+
+
+def check_near_floor(cells: Sequence[Polygon], problem: PlanningProblem, where: str) -> None:
+    """Refuse cells that reach far beyond the floor: numbers of any size would spoil the rounding of covers.
+
+    Args:
+        cells: The cells.
+        problem: The problem.
+        where: Name of the slice, for the message.
+
+    Raises:
+        RefusalError: Names the slice and the cell.
+    """
+    near = box(*problem.workspace.bounds).buffer(2.0 * (problem.tree.reach + BEYOND), join_style="mitre")
+    for k, cell in enumerate(cells):
+        if not near.covers(cell):
+            raise RefusalError(where, f"cell {k} reaches to {cell.bounds}, far beyond the floor")
 
 
 def uncovered(outside: Callable[[float], BaseGeometry]) -> tuple[BaseGeometry, float]:

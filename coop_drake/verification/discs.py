@@ -13,13 +13,13 @@ from coop_drake.errors import RefusalError
 from coop_drake.tree.component_tree import ConvexShape
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
-from coop_drake.verification.covers import uncovered
+from coop_drake.verification.covers import check_near_floor, uncovered
 from coop_drake.verification.floor_edges import floor_edges
 from coop_drake.verification.free_positions import fitting_positions, without_slivers
 from coop_drake.verification.inner_sweeps import inscribed_circle
 from coop_drake.verification.outer_sweeps import outer_sweep
 from coop_drake.verification.problem_match import goal_box
-from coop_drake.verification.reachability import check_labels
+from coop_drake.verification.reachability import TOUCHING, check_labels
 from coop_drake.verification.solids import Solid, component_stages
 
 __all__ = ["check_disc"]
@@ -48,6 +48,7 @@ def check_disc(proof: DiscProof, problem: PlanningProblem) -> tuple[Check, ...]:
     clearance = _check_inside(proof, problem)
     edges = floor_edges(problem.workspace)
     cells = [cell.polygon for cell in proof.cells]
+    check_near_floor(cells, problem, "cells")
     cover = shapely.union_all(cells)
 
     def outside(tolerance: float) -> BaseGeometry:
@@ -62,8 +63,12 @@ def check_disc(proof: DiscProof, problem: PlanningProblem) -> tuple[Check, ...]:
     start = _places(proof, problem, problem.start[2:], problem.start[2:], problem.start[:2])
     goal = _places(proof, problem, *goal_box(problem), problem.goal_pose[:2])
     names = [f"cells[{k}]" for k in range(len(cells))]
-    pairs = np.array([(i, j) for j in range(len(cells)) for i in range(j) if cells[i].intersects(cells[j])])
-    at_start, at_goal = ({k for k, cell in enumerate(cells) if cell.intersects(end)} for end in (start, goal))
+    pairs = np.array(
+        [(i, j) for j in range(len(cells)) for i in range(j) if cells[i].dwithin(cells[j], TOUCHING)]
+    )
+    at_start, at_goal = (
+        {k for k, cell in enumerate(cells) if cell.dwithin(end, TOUCHING)} for end in (start, goal)
+    )
     labels = [cell.reached for cell in proof.cells]
     where = f"({centre[0]:.4f}, {centre[1]:.4f})"
     return (

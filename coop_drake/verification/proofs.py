@@ -29,7 +29,7 @@ from coop_drake.errors import RefusalError
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check, Verified
-from coop_drake.verification.covers import check_blocked, check_cover
+from coop_drake.verification.covers import check_blocked, check_cover, check_near_floor
 from coop_drake.verification.discs import check_disc
 from coop_drake.verification.free_positions import FreePositions
 from coop_drake.verification.problem_match import goal_box, same_angle
@@ -92,6 +92,7 @@ def check_slices(
     for k, part in enumerate(proof.slices):
         ends = _in_all(lower[k], axes, problem), _in_all(upper[k], axes, problem)
         polygons = [cell.polygon for cell in part.cells]
+        check_near_floor(polygons, problem, f"slices[{k}]")
         finest = min(finest, check_cover(free, *ends, polygons, f"slices[{k}]"))
         if progress is not None:
             progress("checking slices", (k + 1) / len(lower))

@@ -22,10 +22,13 @@ from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.tiling import facet_pairs
 
-__all__ = ["check_labels", "check_reachability"]
+__all__ = ["TOUCHING", "check_labels", "check_reachability"]
 
 HELD = 1e-9
 """A slice whose interval misses an angle by no more than this holds it all the same [rad, m]."""
+
+TOUCHING = 1e-6
+"""Cells nearer to each other than this touch: covers are computed with rounding, a gap may hide in it [m]."""
 
 
 def check_reachability(
@@ -57,12 +60,12 @@ def check_reachability(
     labels = [cell.reached for part in slices for cell in part.cells]
     own = np.stack((np.arange(len(slices)),) * 2, axis=1)
     pairs = _cell_pairs(np.concatenate((own, facet_pairs(lower, upper))), slices, first)
-    touching = pairs[shapely.intersects(polygons[pairs[:, 0]], polygons[pairs[:, 1]])]
+    touching = pairs[shapely.dwithin(polygons[pairs[:, 0]], polygons[pairs[:, 1]], TOUCHING)]
     at_start, at_goal = (
         {
             i
             for i, k in enumerate(owners)
-            if _holds(lower[k], upper[k], angles) and polygons[i].intersects(Point(pose[:2]))
+            if _holds(lower[k], upper[k], angles) and polygons[i].dwithin(Point(pose[:2]), TOUCHING)
         }
         for angles, pose in ((start, problem.start), (goal, problem.goal_pose))
     )

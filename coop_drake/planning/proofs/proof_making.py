@@ -36,6 +36,9 @@ GROWTHS = (1e-3, 1e-4, 1e-5, 0.0, -5e-7)
 faster the check. The last one takes back half of the tolerance by which the planner grows cells, for cells
 that merely touch."""
 
+TOUCHING = 1e-6
+"""Cells nearer to each other than this count as touching, as they do for the verifier [m]."""
+
 
 def slices_proof(
     question: PlanningProblem, robots: Sequence[int], slices: Slices, regions: Mapping[int, Sequence[Region]]
@@ -63,7 +66,7 @@ def slices_proof(
         labels = _reached(cells, joined, starts, Point(question.start[:2]))
         goal = Point(question.goal_pose[:2])
         if any(
-            label and cell.intersects(goal)
+            label and cell.dwithin(goal, TOUCHING)
             for leaf in goals
             for cell, label in zip(cells[leaf], labels[leaf], strict=True)
         ):
@@ -101,8 +104,8 @@ def disc_proof(
 
     def separated(growth: float) -> list[OverCell] | None:
         cells = _grown(regions, growth)
-        labels = [cell.intersects(Point(start)) for cell in cells]
-        if any(label and cell.intersects(goals) for cell, label in zip(cells, labels, strict=True)):
+        labels = [cell.dwithin(Point(start), TOUCHING) for cell in cells]
+        if any(label and cell.dwithin(goals, TOUCHING) for cell, label in zip(cells, labels, strict=True)):
             return None
         return list(map(OverCell, labels, cells))
 
@@ -166,10 +169,10 @@ def _reached(
         dtype=np.int64,
     ).reshape(-1, 2)
     polygons = np.array([cells[leaf][i] for leaf, i in flat], dtype=object)
-    touching = pairs[shapely.intersects(polygons[pairs[:, 0]], polygons[pairs[:, 1]])]
+    touching = pairs[shapely.dwithin(polygons[pairs[:, 0]], polygons[pairs[:, 1]], TOUCHING)]
     graph: nx.Graph[int] = nx.Graph()
     graph.add_edges_from(touching.tolist())
-    first = [k for k, (leaf, _) in enumerate(flat) if leaf in starts and polygons[k].intersects(start)]
+    first = [k for k, (leaf, _) in enumerate(flat) if leaf in starts and polygons[k].dwithin(start, TOUCHING)]
     graph.add_nodes_from(first)
     reached: set[int] = set().union(*(nx.node_connected_component(graph, k) for k in first))
     return {leaf: [place[leaf, i] in reached for i in range(len(cells[leaf]))] for leaf in cells}
