@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapely import box
 
-from coop_drake.answers.plan import Found
+from coop_drake.answers.plan import Found, Undecided
 from coop_drake.answers.problem import LIMIT_ROOM, PlanningProblem
 from coop_drake.errors import PlanError
 from coop_drake.laws import ScheduledGains
@@ -17,7 +17,7 @@ from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJ
 from coop_drake.tree.pose import PlanarPose
 from coop_drake.verification import verify_plan, verify_proof
 from tests.planning.test_search import rod_problem
-from tests.support.cases import rectangle
+from tests.support.cases import case, rectangle
 from tests.support.moved import Similarity
 
 
@@ -125,6 +125,22 @@ def test_the_margin_grows_and_shrinks_with_the_scene(kind, scale: float) -> None
         channel, _ = find_channel(replace(moved, settings=settings))
         assert isinstance(channel, Channel)
         assert 0.5 * found.margin < channel.margin / scale < 2.0 * found.margin
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1000.0])
+def test_a_transport_is_planned_and_verified_in_any_unit(scale: float) -> None:
+    problem = Similarity(scale=scale).question(case("base"))
+    found = plan(problem, ScheduledGains(), gain_set_name="scheduled")
+    assert isinstance(found, Found)
+    verify_plan(found.plan, problem, {"scheduled": ScheduledGains()})
+
+
+def test_a_stall_in_another_unit_says_so() -> None:
+    problem = Similarity(scale=64.0).question(reaching(0.3, (-0.5, 0.5)))
+    hurried = replace(problem.settings, max_transition_time=1.0)
+    answer = plan(replace(problem, settings=hurried), ScheduledGains(), gain_set_name="scheduled")
+    assert isinstance(answer, Undecided)
+    assert answer.reason.endswith("at most 1 s (these lengths are to be multiplied by 64)")
 
 
 @pytest.mark.parametrize("scale", [0.1, 1000.0])

@@ -25,13 +25,12 @@ from coop_drake.planning.execution.targets import choose_targets
 from coop_drake.planning.travel_time import travel_time
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.usual_unit import usual_unit
 
-__all__ = ["make_plan", "reschedule"]
+__all__ = ["make_plan", "reschedule", "with_gains"]
 
 NARROWEST = 1e-3
-"""Necks and goal regions with less clearance are refused, because the governor would need minutes there [m];
-for teams of another size it is scaled."""
+"""Necks and goal regions with less clearance are refused, because the governor would need minutes there [m].
+"""
 
 GOAL_REGION_FRACTION = 0.9
 """The region of the goal need not be wider than this fraction of the position tolerance [-]."""
@@ -98,7 +97,12 @@ def make_plan(
 
 
 def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
-    """A plan with the gains of another gain set.
+    """A plan with the gains of another gain set, and with times estimated anew; see ``with_gains``."""
+    return timed(with_gains(plan, gain_set, name))
+
+
+def with_gains(plan: Plan, gain_set: GainSet, name: str) -> Plan:
+    """A plan with the gains of another gain set; its estimated times are kept.
 
     Args:
         plan: The plan.
@@ -112,7 +116,7 @@ def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
         gains = _gains(gain_set, cell, transition.neck, goals, resting)
         transitions.append(replace(transition, gains=gains))
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
-    return timed(replace(plan, transitions=tuple(transitions), gain_set=name))
+    return replace(plan, transitions=tuple(transitions), gain_set=name)
 
 
 @dataclass(frozen=True)
@@ -136,11 +140,10 @@ def _route(
         region = component_at(_disc(target, problem.position_tolerance).intersection(here), Point(target))
     inradius = 0.0 if region.is_empty else BoundaryDistance(region)(target)
     route = _TransitionGeometry(target, region, inradius, PassageFinder(here).find(entry, target))
-    narrowest = NARROWEST * usual_unit(problem.tree)
-    wanted = (
-        narrowest if len(cells) > 1 else min(narrowest, GOAL_REGION_FRACTION * problem.position_tolerance)
-    )
-    if inradius < wanted or route.passage.clearance < narrowest:
+    wanted = NARROWEST
+    if len(cells) == 1:
+        wanted = min(NARROWEST, GOAL_REGION_FRACTION * problem.position_tolerance)
+    if inradius < wanted or route.passage.clearance < NARROWEST:
         seconds = travel_time(route.passage.length, route.passage.clearance)
         raise StallError(_stall(problem, index, route, seconds))
     return route
@@ -176,12 +179,11 @@ def _transition(
 def _stall(problem: PlanningProblem, index: int, route: _TransitionGeometry, seconds: float) -> str:
     passage = route.passage
     x, y = passage.narrowest
-    narrowest = NARROWEST * usual_unit(problem.tree)
     return (
         f"cell {index}: the object's passage through ({x:.3f}, {y:.3f}) is {2e3 * passage.clearance:.1f} mm "
         f"wide and {passage.length:.2f} m long, about {seconds:.0f} s, and its target "
         f"({route.target[0]:.3f}, {route.target[1]:.3f}) has {1e3 * route.inradius:.1f} mm around it; "
-        f"expected at least {2e3 * narrowest:g} mm and {1e3 * narrowest:g} mm, and at most "
+        f"expected at least {2e3 * NARROWEST:g} mm and {1e3 * NARROWEST:g} mm, and at most "
         f"{problem.settings.max_transition_time:.0f} s"
     )
 

@@ -24,7 +24,6 @@ from coop_drake.planning.improvement.box_choice import Waypoints, choose_boxes
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_inside
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.usual_unit import usual_unit
 
 __all__ = ["PathCovering", "cover_path"]
 
@@ -45,7 +44,7 @@ LEVELS = ((0.3, PADS), (0.1, NARROW_PADS))
 """Fractions of the margin that waypoints keep [-], and paddings; tried in this order until one works."""
 
 LEAST_CLEARANCE = 2e-3
-"""Waypoints keep at least this clearance [m]; for teams of another size it is scaled."""
+"""Waypoints keep at least this clearance [m]."""
 
 CORE_FRACTION = 0.9
 """Fraction of the waypoints' clearance that cores keep, so that waypoints lie inside them [-]."""
@@ -87,10 +86,9 @@ def cover_path(
     boxes, grid = box_arrays(swept, pairs), grid_inside(floor, problem.tree.reach)
     angle = float(path[-1, 2] + nearest_turn(float(problem.goal_pose[2] - path[-1, 2])))
     goals = np.array(final_intervals(problem, angle))
-    smallest = LEAST_CLEARANCE * usual_unit(problem.tree)
     # At a small margin some levels are equal; each is tried once.
     for least_clearance, pads in dict.fromkeys(
-        (max(fraction * margin, smallest), pads) for fraction, pads in LEVELS
+        (max(fraction * margin, LEAST_CLEARANCE), pads) for fraction, pads in LEVELS
     ):
         points = _waypoints(boxes, grid, path, least_clearance, pads[0])
         if points is None:

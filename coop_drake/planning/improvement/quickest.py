@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from shapely.errors import ShapelyError
 
+from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError
@@ -11,9 +14,11 @@ from coop_drake.laws import GainSet
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
 from coop_drake.planning.execution.channel_ends import check_ends, turned_to_start
 from coop_drake.planning.execution.channel_path import path_through
-from coop_drake.planning.execution.transitions import make_plan
+from coop_drake.planning.execution.transitions import make_plan, with_gains
 from coop_drake.planning.improvement.path_covering import cover_path
+from coop_drake.planning.search.rescaling import Rescaling
 from coop_drake.progress import Progress
+from coop_drake.tree.usual_unit import usual_unit
 
 __all__ = ["quickest_plan"]
 
@@ -27,6 +32,8 @@ def quickest_plan(
     progress: Progress | None = None,
 ) -> Plan:
     """Make a plan along the path of a search's result, with other boxes if these can be found.
+
+    Teams of an unusual size are planned in a unit of length in which their size is usual.
 
     With the paper's fixed gains narrow scenarios often have no faster boxes; the plan then uses the boxes
     that the search found.
@@ -43,6 +50,25 @@ def quickest_plan(
         PlanError: If the channel does not join the start to the goal.
         StallError: If a passage is too narrow or too slow to be executed; names it.
     """
+    unit = usual_unit(problem.tree)
+    if unit == 1.0:
+        return _quickest(problem, found, gain_set, gain_set_name, progress)
+    scale = Rescaling(problem, unit)
+    try:
+        made = _quickest(scale.question(), scale.usual(found), scale.gains(gain_set), gain_set_name, progress)
+    except (GeometryError, PlanError, StallError) as error:
+        raise StallError(f"{error} (these lengths are to be multiplied by {unit:g})") from error
+    plan = with_gains(scale.plan(made), gain_set, gain_set_name)
+    return replace(plan, problem=problem_digest(problem))
+
+
+def _quickest(
+    problem: PlanningProblem,
+    found: Channel | CoveredPath,
+    gain_set: GainSet,
+    gain_set_name: str,
+    progress: Progress | None,
+) -> Plan:
     if isinstance(found, Channel):
         found = turned_to_start(found, problem.start[2])
         check_ends(problem, found)

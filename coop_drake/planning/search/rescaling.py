@@ -10,6 +10,7 @@ import shapely
 from shapely import Polygon
 
 from coop_drake.answers.mixed_cell import MixedCell
+from coop_drake.answers.plan import Cell, Plan
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.answers.proof import (
     AngleBox,
@@ -20,6 +21,7 @@ from coop_drake.answers.proof import (
     OverSlice,
 )
 from coop_drake.geometry.swept_tree import Intervals
+from coop_drake.laws.gains import FixedGains, GainSet
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.events import ChannelSearched, Event, SeenCell, SliceAdded, Watch
@@ -66,18 +68,60 @@ class Rescaling:
         if isinstance(found, Channel):
             return self._channel(found)
         if isinstance(found, CoveredPath):
-            path = found.path * self._configuration_units()
-            channel = found.channel
-            return replace(
-                found, path=path, margin=self.unit * found.margin, channel=lambda: self._channel(channel())
-            )
+            return self._covered(found)
         proof = None if found.proof is None else self._proof(found.proof)
         return replace(found, mixed=tuple(map(self._mixed, found.mixed)), proof=proof)
+
+    def usual(self, found: Channel | CoveredPath) -> Channel | CoveredPath:
+        """A search's result in metres, expressed in the unit."""
+        there = Rescaling(self.question(), 1.0 / self.unit)
+        return there._channel(found) if isinstance(found, Channel) else there._covered(found)
+
+    def gains(self, gain_set: GainSet) -> GainSet:
+        """Gains for lengths in the unit; those of joints stay, as joints may turn or slide."""
+        smoothing = gain_set.smoothing / self.unit
+        if isinstance(gain_set, FixedGains):
+            return replace(gain_set, smoothing=smoothing)
+        return replace(gain_set, smoothing=smoothing, wall_stiffness=gain_set.wall_stiffness / self.unit)
+
+    def plan(self, made: Plan) -> Plan:
+        """A plan in the unit, expressed in metres, but for its gains and the digest of its problem."""
+        unit, axes = self.unit, self._axis_units(range(len(self.problem.tree.joints)))
+        cells = tuple(
+            Cell(c.lower * axes, c.upper * axes, *(_scaled(p, unit) for p in (c.safe, c.core, c.tidied)))
+            for c in made.cells
+        )
+        transitions = tuple(
+            replace(
+                step,
+                target=unit * step.target,
+                goal_lower=step.goal_lower * axes,
+                goal_upper=step.goal_upper * axes,
+                inradius=unit * step.inradius,
+                neck=unit * step.neck,
+                length=unit * step.length,
+                goal_region=_scaled(step.goal_region, unit),
+            )
+            for step in made.transitions
+        )
+        return replace(
+            made,
+            margin=unit * made.margin,
+            start=self.problem.start.copy(),
+            goal_pose=np.array([*self.problem.goal_pose[:2], made.goal_pose[2]]),
+            goal_joints=self.problem.goal_joints,
+            cells=cells,
+            transitions=transitions,
+        )
 
     def _mixed(self, cell: MixedCell) -> MixedCell:
         units = self._robot_units(cell.robots)
         polygon = _scaled(cell.polygon, self.unit)
         return replace(cell, lower=cell.lower * units, upper=cell.upper * units, polygon=polygon)
+
+    def _covered(self, found: CoveredPath) -> CoveredPath:
+        path, margin = found.path * self._configuration_units(), self.unit * found.margin
+        return replace(found, path=path, margin=margin, channel=lambda: self._channel(found.channel()))
 
     def _channel(self, found: Channel) -> Channel:
         units = self._axis_units(range(len(self.problem.tree.joints)))
