@@ -8,6 +8,18 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
+_FOLDER_VARIABLE = "COOP_DRAKE_CACHE"
+"""Environment variable that names another folder for what is kept from one command to the next."""
+
+
+def cache_folder(kind: str) -> Path:
+    """The folder for results of one kind in the user's cache, or in what ``COOP_DRAKE_CACHE`` names."""
+    if named := os.environ.get(_FOLDER_VARIABLE):
+        return Path(named) / kind
+    from platformdirs import user_cache_path
+
+    return user_cache_path("coop_drake") / kind
+
 
 def write_atomically(path: Path | str, content: bytes | Callable[[IO[bytes]], object]) -> Path:
     """Write a file as a whole: neither a crash nor Ctrl-C leaves a part of it.

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -17,13 +15,11 @@ from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import map_facts
 from coop_drake.cli.task import Task
 from coop_drake.errors import FieldError
+from coop_drake.files import cache_folder
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
     from coop_drake.fields import HarmonicMap, MapStore
-
-_FOLDER_VARIABLE = "COOP_DRAKE_CACHE"
-"""Environment variable that names another folder for the cache."""
 
 
 def maps_command(
@@ -43,12 +39,9 @@ def maps_command(
 
 def map_cache() -> MapStore:
     """The maps in the folder that the system has for a user's caches, or that ``COOP_DRAKE_CACHE`` names."""
-    from platformdirs import user_cache_path
-
     from coop_drake.fields import MapStore
 
-    named = os.environ.get(_FOLDER_VARIABLE)
-    return MapStore((Path(named) if named else user_cache_path("coop_drake")) / "maps")
+    return MapStore(cache_folder("maps"))
 
 
 def map_cells(task: Task, plan: Plan, reporter: Reporter, *, fresh: bool = False) -> tuple[HarmonicMap, ...]:

@@ -142,9 +142,10 @@ def _section(floor_plan: Path, unit: str | None, layers: list[str] | None, folde
 
 def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -> ExitCode:
     """Write the files beside their place, read them as a user would, and only then move them there."""
-    from coop_drake.cli.task import read_task
     from coop_drake.errors import ScenarioError
+    from coop_drake.plant import planning_problem
     from coop_drake.plant.starter_models import object_model, robot_model
+    from coop_drake.scenario import load_scenario
     from coop_drake.scenario.starter import starter_text
 
     files = {
@@ -161,7 +162,7 @@ def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -
             (Path(draft) / name).write_text(text, encoding="utf-8")
         try:
             with reporter.stage("checking"):
-                read_task(Path(draft) / f"{starter.name}.scenario.yaml", None)
+                planning_problem(load_scenario(Path(draft) / f"{starter.name}.scenario.yaml"))
         except ScenarioError as error:  # The draft is gone when the message is read.
             file = error.file.replace(str(Path(draft)), str(folder))
             raise ScenarioError(file, error.key, error.value, error.allowed) from error

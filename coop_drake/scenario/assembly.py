@@ -1,13 +1,14 @@
 """Finds the object, the robots and the grasps in the model directives of a scenario."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from pydrake.common.schema import Transform
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import AddWeld, ModelDirective, PackageMap
 
 from coop_drake.errors import ScenarioError
-from coop_drake.scenario.directives import flat
+from coop_drake.scenario.directives import checked_directives, flat
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.packages import package_map
 
@@ -42,6 +43,7 @@ class Assembly:
         object_model: Name of the object's model.
         robots: The robots in the order of their base models in the directives.
         owners: For each directive the models that it adds or connects.
+        nested: Files with directives that other directives name.
     """
 
     packages: PackageMap
@@ -50,6 +52,7 @@ class Assembly:
     object_model: str
     robots: tuple[RobotAssembly, ...]
     owners: tuple[frozenset[str], ...]
+    nested: tuple[Path, ...]
 
     def of_robot(self, index: int) -> tuple[int, ...]:
         """Indices of the directives that add one robot alone, without its grasp."""
@@ -74,7 +77,11 @@ class _Reader:
         self.scenario = scenario
         self.file = str(scenario.path)
         self.packages = package_map(scenario.path)
-        entries = list(flat(scenario.directives, scenario.path, self.packages, self.file, "directives"))
+        directives = checked_directives(self.file, scenario.directives)
+        self.nested: list[Path] = []
+        entries = list(
+            flat(directives, (scenario.path,), self.packages, self.file, "directives", self.nested)
+        )
         self.keys = tuple(key for key, _ in entries)
         self.directives = tuple(directive for _, directive in entries)
         self.models: dict[str, str] = {}
@@ -140,6 +147,7 @@ class _Reader:
             object_model,
             self._in_order(robots),
             self._all_owners(),
+            tuple(self.nested),
         )
 
     def _turn_grasps(self, object_model: str) -> None:

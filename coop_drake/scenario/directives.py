@@ -11,9 +11,10 @@ from pydrake.common.schema import Transform
 from pydrake.multibody.parsing import AddModel, AddWeld, ModelDirective, PackageMap
 
 from coop_drake.errors import ScenarioError
-from coop_drake.scenario.drake_types import Directive
+from coop_drake.scenario.directive import Directive, DirectiveEntry
 from coop_drake.scenario.packages import resolve
 from coop_drake.scenario.reading import read_file
+from coop_drake.typed_data import DataError
 
 REQUIRED = {
     "add_model": ("name", "file"),
@@ -37,7 +38,22 @@ class DirectivesFile:
     directives: tuple[Directive, ...]
 
 
-def check_directive(file: str, key: str, directive: ModelDirective) -> None:
+def checked_directives(file: str, entries: tuple[DirectiveEntry, ...]) -> tuple[ModelDirective, ...]:
+    """Return the directives of a file as Drake's type.
+
+    Raises:
+        ScenarioError: Naming the key of what Drake cannot read, or would end the process on.
+    """
+    try:
+        directives = tuple(entry.drake for entry in entries)
+    except DataError as error:
+        raise ScenarioError(file, error.key, error.value, error.allowed) from error
+    for entry, directive in zip(entries, directives, strict=True):
+        _check(file, entry.key, directive)
+    return directives
+
+
+def _check(file: str, key: str, directive: ModelDirective) -> None:
     """Refuse a directive on which Drake would end the process, or whose values would have no effect.
 
     Raises:
@@ -92,26 +108,26 @@ def _check_transform(file: str, key: str, transform: Transform) -> None:
 
 
 def flat(
-    directives: tuple[ModelDirective, ...], path: Path, packages: PackageMap, file: str, key: str
+    directives: tuple[ModelDirective, ...],
+    trail: tuple[Path, ...],
+    packages: PackageMap,
+    file: str,
+    key: str,
+    nested: list[Path],
 ) -> Iterator[tuple[str, ModelDirective]]:
     """Yield ``(key, directive)``, with nested files opened and file addresses resolved.
 
     Args:
         directives: Checked directives.
-        path: The file that holds them; relative paths are relative to its folder.
+        trail: The file that holds them, last, after those that lead to it; paths are relative to its folder.
         packages: Folders of the packages that ``package://`` addresses name.
         file: The scenario file, for messages.
         key: Key of the directives in the scenario file.
+        nested: Receives the files that are opened.
 
     Raises:
         ScenarioError: A file is missing, is wrong, or includes itself.
     """
-    yield from _flat(directives, (path,), packages, file, key)
-
-
-def _flat(
-    directives: tuple[ModelDirective, ...], trail: tuple[Path, ...], packages: PackageMap, file: str, key: str
-) -> Iterator[tuple[str, ModelDirective]]:
     for index, directive in enumerate(directives):
         here = f"{key}[{index}]"
         if directive.add_model:
@@ -121,12 +137,11 @@ def _flat(
         elif directive.add_directives:
             name = directive.add_directives.file
             nested_key = f"{here}.add_directives.file"
-            nested = Path(resolve(name, trail[-1], packages, file, nested_key).removeprefix("file://"))
-            if nested in trail:
+            opened = Path(resolve(name, trail[-1], packages, file, nested_key).removeprefix("file://"))
+            if opened in trail:
                 raise ScenarioError(file, nested_key, name, "a file that does not include itself")
-            inner = read_file(DirectivesFile, nested).directives
-            for place, entry in enumerate(inner):
-                check_directive(str(nested), f"directives[{place}]", entry)
-            yield from _flat(inner, (*trail, nested), packages, file, f"{here}.add_directives")
+            nested.append(opened)
+            inner = checked_directives(str(opened), read_file(DirectivesFile, opened).directives)
+            yield from flat(inner, (*trail, opened), packages, file, f"{here}.add_directives", nested)
         else:
             yield here, directive

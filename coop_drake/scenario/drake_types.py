@@ -29,9 +29,6 @@ def write_directive(directive: parsing.ModelDirective) -> object:
     return parse(yaml_dump_typed(directive))
 
 
-Directive = Annotated[parsing.ModelDirective, Codec(read_directive, write_directive)]
-
-
 def _read(value: object, kind: Any, key: str) -> Any:
     """Read a value of one of Drake's types."""
     origin, arguments = get_origin(kind), get_args(kind)

@@ -7,6 +7,9 @@ import re
 from types import UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
+from pydrake.multibody.parsing import ModelDirective
+
+from coop_drake.scenario.directive import DirectiveEntry
 from coop_drake.scenario.directives import REQUIRED
 from coop_drake.scenario.model import Scenario
 from coop_drake.typed_data import LARGEST, Limits, classes_by_tag, field_types
@@ -80,6 +83,8 @@ def _of_kind(kind: Any) -> Schema:
         return {"type": "array", "items": _of_kind(arguments[0]), **ends}
     if origin in (Union, UnionType):
         return _of_union(kind)
+    if kind is DirectiveEntry:
+        return _of_drake(ModelDirective)
     return _of_drake(kind) if not dataclasses.is_dataclass(kind) else _of_class(kind)
 
 

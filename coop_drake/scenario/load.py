@@ -1,5 +1,7 @@
 """Loads scenario files and writes them."""
 
+from __future__ import annotations
+
 import dataclasses
 from pathlib import Path
 
@@ -7,7 +9,6 @@ from coop_drake.errors import ScenarioError
 from coop_drake.scenario.floor import with_floor
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.reading import read_file, write_text
-from coop_drake.scenario.validation import validate
 from coop_drake.shipped import scenario_file, shipped_scenarios
 
 
@@ -25,6 +26,22 @@ def load_scenario(path: Path | str) -> Scenario:
         ScenarioError: With file, key, value and what is allowed there.
         FloorPlanError: The workspace names a floor plan that cannot be read.
     """
+    from coop_drake.scenario.validation import validate
+
+    scenario = read_scenario(path)
+    validate(scenario)
+    return scenario
+
+
+def read_scenario(path: Path | str) -> Scenario:
+    """Read a scenario file as :func:`load_scenario` does, without the checks that relate several values.
+
+    Drake is not imported unless the workspace is a floor plan in another file.
+
+    Raises:
+        ScenarioError: The file cannot be read, or a single value in it is not allowed.
+        FloorPlanError: The workspace names a floor plan that cannot be read.
+    """
     file = scenario_file(path)
     if file.is_dir():
         files = "a file, or a folder with just one *.scenario.yaml"
@@ -34,9 +51,7 @@ def load_scenario(path: Path | str) -> Scenario:
         raise ScenarioError(
             str(path), "the file", "no such file", f"a readable file, or a shipped scenario: {known}"
         )
-    scenario = with_floor(dataclasses.replace(read_file(Scenario, file), path=file))
-    validate(scenario)
-    return scenario
+    return with_floor(dataclasses.replace(read_file(Scenario, file), path=file))
 
 
 def dump_scenario(scenario: Scenario) -> str:

@@ -11,7 +11,7 @@ from coop_drake.fields.tolerance import TOLERANCE
 from coop_drake.floor_plans.settings import Scale, Tolerance, Unit
 from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains
 from coop_drake.scenario.deployment import Deployment
-from coop_drake.scenario.drake_types import Directive
+from coop_drake.scenario.directive import Directive
 from coop_drake.tree.pose import PlanarPose
 from coop_drake.typed_data import Limits, Positive
 

@@ -1,11 +1,15 @@
 """Finds model files: in packages around the scenario file, or by paths relative to it."""
 
-from pathlib import Path
+from __future__ import annotations
 
-from pydrake.multibody.parsing import PackageMap
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from coop_drake.errors import ScenarioError
 from coop_drake.shipped import SHIPPED
+
+if TYPE_CHECKING:
+    from pydrake.multibody.parsing import PackageMap
 
 
 def package_map(scenario_path: Path) -> PackageMap:
@@ -20,17 +24,23 @@ def package_map(scenario_path: Path) -> PackageMap:
     Raises:
         ScenarioError: A package.xml does not name its package.
     """
+    from pydrake.multibody.parsing import PackageMap
+
     packages = PackageMap()
-    folders = scenario_path.resolve().parents
-    for file in reversed([folder / "package.xml" for folder in (*folders, SHIPPED)]):
+    for file in reversed(package_files(scenario_path)):
         if file.is_file():
             _add(packages, file)
     return packages
 
 
+def package_files(scenario_path: Path) -> list[Path]:
+    """Where a package.xml is looked for, the nearest place first; most of these files do not exist."""
+    return [folder / "package.xml" for folder in (*scenario_path.resolve().parents, SHIPPED)]
+
+
 def _add(packages: PackageMap, file: Path) -> None:
     """Add a package, and remove another one of its name."""
-    single = PackageMap.MakeEmpty()
+    single = type(packages).MakeEmpty()
     try:
         single.AddPackageXml(file)
     except RuntimeError as error:

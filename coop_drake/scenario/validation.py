@@ -4,7 +4,6 @@ import dataclasses
 
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.assembly import assemble
-from coop_drake.scenario.directives import check_directive
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.rings import check_workspace
 
@@ -23,8 +22,6 @@ def validate(scenario: Scenario) -> None:
     if scenario.gains.selected not in scenario.gains.sets:
         known = ", ".join(sorted(scenario.gains.sets))
         raise ScenarioError(file, "gains.selected", scenario.gains.selected, f"a gain set, one of {known}")
-    for index, directive in enumerate(scenario.directives):
-        check_directive(file, f"directives[{index}]", directive)
     _check_control_rate(scenario)
     robots = [robot.name for robot in assemble(scenario).robots]
     for section in ("fixed_joints", "load_shares"):

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from coop_drake.scenario import Scenario
+from coop_drake.scenario.directive import DirectiveEntry
 from tests.support.mutants.mutant import Mutant, Place, at, block, dotted, flow, put, renamed, without
 
 _NUMBERS = {
@@ -100,7 +101,7 @@ def _places(value: Any, kind: Any, path: Place) -> Iterator[tuple[Place, Any]]:
     if origin in (typing.Union, types.UnionType) and isinstance(value, dict):
         tag = value["_tag"].removeprefix("!")
         kind = next(a for a in arguments if a.__name__ == tag)
-    if dataclasses.is_dataclass(kind):
+    if dataclasses.is_dataclass(kind) and kind is not DirectiveEntry:
         yield path, kind
         hints = typing.get_type_hints(kind)
         for name in value:

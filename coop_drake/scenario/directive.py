@@ -1,0 +1,45 @@
+"""A model directive as it stands in a file; Drake's type is made of it when it is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Annotated
+
+from coop_drake.typed_data import Codec
+
+if TYPE_CHECKING:
+    from pydrake.multibody.parsing import ModelDirective
+
+
+@dataclass(frozen=True)
+class DirectiveEntry:
+    """One entry of a list of model directives. To hold it does not import Drake, to read it does.
+
+    Attributes:
+        data: Plain data of the YAML file.
+        key: Where it stands in the file.
+    """
+
+    data: object
+    key: str
+
+    @cached_property
+    def drake(self) -> ModelDirective:
+        """The directive as Drake's type.
+
+        Raises:
+            DataError: The first departure of the data from that type.
+        """
+        from coop_drake.scenario.drake_types import read_directive
+
+        return read_directive(self.data, self.key)
+
+
+def _write(entry: DirectiveEntry) -> object:
+    from coop_drake.scenario.drake_types import write_directive
+
+    return write_directive(entry.drake)
+
+
+Directive = Annotated[DirectiveEntry, Codec(DirectiveEntry, _write)]
