@@ -1,4 +1,4 @@
-from .axis_table import axis_table
+from .axis_table import axis_table, funnel_acceleration
 from .funnels import Funnel, FunnelBounds, funnel_bounds
 from .gain_schedule import transition_gains
 from .gains import FixedGains, GainSet, ScheduledGains, TransitionGains
@@ -10,7 +10,7 @@ from .governor import (
     tracking_energy,
 )
 from .load_sharing import acceleration_at, object_twist, total_wrench, wrench_share
-from .ppc import funnel_acceleration, prescribed_acceleration, prescribed_energy
+from .ppc import prescribed_acceleration, prescribed_energy
 from .readiness import clearance_margin, interval_margin
 
 __all__ = [

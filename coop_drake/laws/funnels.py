@@ -11,7 +11,11 @@ from numpy.typing import NDArray
 from coop_drake.compiled import compiled
 from coop_drake.laws.gains import FloatArray, FunnelShape
 
-__all__ = ["Funnel", "FunnelBounds", "axis_bounds", "decay_factor", "funnel_bounds"]
+__all__ = ["CLOSING", "Funnel", "FunnelBounds", "axis_bounds", "decay_factor", "funnel_bounds"]
+
+CLOSING = 5.0
+"""lambda times the time T_f after which a quintic funnel is closed [-]: e^-5 is below a hundredth, so
+that the exponential funnel of the same lambda is closed for all purposes then, too."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,7 @@ class Funnel:
         goal_lower: Lower bounds in the limit, shape (m,) [rad or m].
         goal_upper: Upper bounds in the limit, shape (m,) [rad or m].
         decay_rate: lambda, shape (m,) [1/s].
-        shape: ``exponential``, e^(-lambda t) as printed, or ``smooth``, (1 + lambda t) e^(-lambda t).
+        shape: ``exponential``, e^(-lambda t) as printed, or ``quintic``, see ``decay_factor``.
     """
 
     slice_lower: FloatArray
@@ -32,7 +36,7 @@ class Funnel:
     goal_lower: FloatArray
     goal_upper: FloatArray
     decay_rate: FloatArray
-    shape: FunnelShape = "smooth"
+    shape: FunnelShape = "quintic"
 
     def select(self, axes: NDArray[np.intp]) -> Funnel:
         """Return the funnels of some axes only, for instance those that one robot controls."""
@@ -58,23 +62,29 @@ class FunnelBounds(NamedTuple):
 
 
 @compiled
-def decay_factor(time: float, decay_rate: float, smooth: bool) -> tuple[float, float, float]:
+def decay_factor(time: float, decay_rate: float, quintic: bool) -> tuple[float, float, float]:
     """Return f(t) of a funnel, which decays from 1 to 0, with its first and second derivative.
 
-    f(t) = (1 + lambda t) e^(-lambda t) where the funnel is smooth, otherwise e^(-lambda t) as printed.
+    f(t) = e^(-lambda t) as printed; or where the funnel is quintic f = 1 - 10 u^3 + 15 u^4 - 6 u^5 with
+    u = t / T_f, T_f = 5 / lambda, and 0 after T_f. Value, rate and acceleration of the quintic are continuous
+    at 0 and at T_f: bounds that rest begin to move, and come to rest, without a step of the law.
 
     Args:
         time: t >= 0 since the transition began [s].
         decay_rate: lambda [1/s].
-        smooth: Which of the two shapes.
+        quintic: Which of the two shapes.
     """
-    exponential = np.exp(-decay_rate * time)
-    if not smooth:
+    if not quintic:
+        exponential = np.exp(-decay_rate * time)
         return exponential, -decay_rate * exponential, decay_rate * decay_rate * exponential
+    u, rate = decay_rate * time / CLOSING, decay_rate / CLOSING
+    if u >= 1.0:
+        return 0.0, 0.0, 0.0
+    left = 1.0 - u
     return (
-        (1.0 + decay_rate * time) * exponential,
-        -decay_rate * decay_rate * time * exponential,
-        decay_rate * decay_rate * (decay_rate * time - 1.0) * exponential,
+        left * left * left * (1.0 + 3.0 * u + 6.0 * u * u),
+        -30.0 * rate * u * u * left * left,
+        -60.0 * rate * rate * u * left * (1.0 - 2.0 * u),
     )
 
 
@@ -86,7 +96,7 @@ def axis_bounds(
     goal_lower: float,
     goal_upper: float,
     decay_rate: float,
-    smooth: bool,
+    quintic: bool,
 ) -> tuple[float, float, float, float, float, float]:
     """Return the bounds of one axis, (17) and (39) with errata E17a and E39, and their derivatives.
 
@@ -100,12 +110,12 @@ def axis_bounds(
         goal_lower: rho_G of the lower bound [rad or m].
         goal_upper: rho_G of the upper bound [rad or m].
         decay_rate: lambda [1/s].
-        smooth: Whether f is that of the smooth funnel, see ``decay_factor``.
+        quintic: Whether f is that of the quintic funnel, see ``decay_factor``.
 
     Returns:
         Lower and upper bound [rad or m], their rates [per s] and their accelerations [per s^2].
     """
-    value, first, second = decay_factor(time, decay_rate, smooth)
+    value, first, second = decay_factor(time, decay_rate, quintic)
     below, above = slice_lower - goal_lower, slice_upper - goal_upper
     return (
         goal_lower + below * value,
@@ -120,9 +130,9 @@ def axis_bounds(
 def funnel_bounds(funnel: Funnel, time: float) -> FunnelBounds:
     """Return ``axis_bounds`` of every axis of a funnel, ``time`` [s] after the transition began."""
     intervals = (funnel.slice_lower, funnel.slice_upper, funnel.goal_lower, funnel.goal_upper)
-    smooth = funnel.shape == "smooth"
+    quintic = funnel.shape == "quintic"
     rows = [
-        axis_bounds(float(time), slice_lower, slice_upper, goal_lower, goal_upper, rate, smooth)
+        axis_bounds(float(time), slice_lower, slice_upper, goal_lower, goal_upper, rate, quintic)
         for slice_lower, slice_upper, goal_lower, goal_upper, rate in zip(
             *intervals, funnel.decay_rate, strict=True
         )

@@ -8,11 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.funnels import axis_bounds
-from coop_drake.laws.gains import FixedGains, FloatArray, GainSet, TransitionGains
-from coop_drake.laws.ppc import SATURATION, track_axis
+from coop_drake.laws.funnels import CLOSING, axis_bounds
+from coop_drake.laws.gains import FixedGains, FloatArray, GainSet, ScheduledGains, TransitionGains
+from coop_drake.laws.ppc import ramped_gain, track_axis
 
 __all__ = ["Schedule", "schedule_of", "scheduled_axis", "scheduled_governor", "transition_gains"]
+
+PEAK = 10.0 / sqrt(3.0) / CLOSING**2
+"""Largest acceleration of a quintic bound over lambda^2 times the distance that it moves [-]: 10 / sqrt(3) is
+the largest second derivative of the quintic over u."""
 
 
 class Schedule(NamedTuple):
@@ -25,18 +29,23 @@ class Schedule(NamedTuple):
         damping_factor: zeta over sqrt(K) [-].
         governor_factor: K_G over sqrt(K) [s].
         smoothing: c of the governor's root [m].
-        smooth: Whether funnels are smooth.
-        funnel_acceleration: Acceleration of a funnel bound aimed at [rad/s^2 or m/s^2].
+        quintic: Whether funnels are quintic.
+        funnel_acceleration: Largest acceleration of a funnel bound [rad/s^2 or m/s^2].
         min_angle_rate: Smallest lambda of the object's angle [1/s].
         max_angle_rate: Largest lambda of the object's angle [1/s].
         min_joint_rate: Smallest lambda of a joint [1/s].
         max_joint_rate: Largest lambda of a joint [1/s].
         max_log_gain: Largest kappa [rad^2/s^2 or m^2/s^2].
+        log_stiffness: Largest stiffness 16 kappa / w^2 of the log term in the middle of the goal interval, of
+            width w [1/s^2].
         log_acceleration: Largest kappa |a s| when a transition is entered at rest [rad/s^2 or m/s^2].
         position_gain: k1 [1/s].
         rate_gain: k2 [1/s].
+        ramp_rate: mu [1/s].
+        saturation: Smallest distance to a funnel bound, over the funnel's width [-].
         energy_factor: A transition is entered below this multiple of the energy at rest ...
-        energy_allowance: ... plus this multiple of kappa.
+        energy_allowance: ... plus this multiple of kappa ...
+        entry_energy: ... plus this energy.
     """
 
     wall_stiffness: float
@@ -45,46 +54,68 @@ class Schedule(NamedTuple):
     damping_factor: float
     governor_factor: float
     smoothing: float
-    smooth: bool
+    quintic: bool
     funnel_acceleration: float
     min_angle_rate: float
     max_angle_rate: float
     min_joint_rate: float
     max_joint_rate: float
     max_log_gain: float
+    log_stiffness: float
     log_acceleration: float
     position_gain: float
     rate_gain: float
+    ramp_rate: float
+    saturation: float
     energy_factor: float
     energy_allowance: float
+    entry_energy: float
 
 
 def schedule_of(gain_set: GainSet) -> Schedule:
     """Return the rule of a gain set."""
-    if isinstance(gain_set, FixedGains):
-        root = sqrt(gain_set.stiffness)
-        stiffness = 0.0, gain_set.stiffness, gain_set.stiffness
-        factors = gain_set.damping / root, gain_set.governor_gain / root
-        rates = (*[gain_set.angle_decay_rate] * 2, *[gain_set.joint_decay_rate] * 2)
-        acceleration, log_gains = 0.0, (gain_set.log_gain, inf)
-    else:
-        stiffness = gain_set.wall_stiffness, gain_set.min_stiffness, gain_set.max_stiffness
-        factors = gain_set.damping_factor, gain_set.governor_factor
-        rates = (gain_set.min_decay_rate, gain_set.max_decay_rate) * 2
-        acceleration = gain_set.funnel_acceleration
-        log_gains = gain_set.max_log_gain, gain_set.log_acceleration
-    numbers = (*stiffness, *factors, gain_set.smoothing, acceleration, *rates, *log_gains)
-    return Schedule._make(
-        (
-            *map(float, numbers[:6]),
-            gain_set.funnel == "smooth",
-            *map(float, numbers[6:]),
-            float(gain_set.position_gain),
-            float(gain_set.rate_gain),
-            float(gain_set.energy_factor),
-            float(gain_set.energy_allowance),
-        )
-    )
+    return _fixed(gain_set) if isinstance(gain_set, FixedGains) else _by_age(gain_set)
+
+
+def _fixed(gains: FixedGains) -> Schedule:
+    root, stiffness = sqrt(gains.stiffness), float(gains.stiffness)
+    angle, joint = float(gains.angle_decay_rate), float(gains.joint_decay_rate)
+    return Schedule(
+        wall_stiffness=0.0, min_stiffness=stiffness, max_stiffness=stiffness,
+        damping_factor=gains.damping / root, governor_factor=gains.governor_gain / root,
+        smoothing=float(gains.smoothing), quintic=gains.funnel == "quintic", funnel_acceleration=0.0,
+        min_angle_rate=angle, max_angle_rate=angle, min_joint_rate=joint, max_joint_rate=joint,
+        max_log_gain=float(gains.log_gain), log_stiffness=inf, log_acceleration=inf,
+        position_gain=float(gains.position_gain), rate_gain=float(gains.rate_gain),
+        ramp_rate=float(gains.ramp_rate), saturation=float(gains.saturation),
+        energy_factor=float(gains.energy_factor), energy_allowance=float(gains.energy_allowance),
+        entry_energy=0.0,
+    )  # fmt: skip
+
+
+def _by_age(gains: ScheduledGains) -> Schedule:
+    """Return the rule for the age tau of commands: k2 = phase / tau, and K at most (phase / tau)^2.
+
+    A rate loop with gain k2 crosses over at k2, where the age takes the phase k2 tau; the loop of the
+    position, of stiffness K, crosses over near sqrt(K) or above and has the damping zeta.
+    """
+    fastest = gains.age_phase / gains.age
+    rate_gain = min(fastest, float(gains.max_rate_gain))
+    stiffness = min(float(gains.max_stiffness), fastest * fastest)
+    slowest, quickest = float(gains.min_decay_rate), gains.decay_fraction * rate_gain
+    rates = min(slowest, quickest), quickest
+    return Schedule(
+        wall_stiffness=float(gains.wall_stiffness), min_stiffness=min(float(gains.min_stiffness), stiffness),
+        max_stiffness=stiffness, damping_factor=float(gains.damping_factor),
+        governor_factor=float(gains.governor_factor), smoothing=float(gains.smoothing), quintic=True,
+        funnel_acceleration=float(gains.funnel_acceleration), min_angle_rate=rates[0],
+        max_angle_rate=rates[1], min_joint_rate=rates[0], max_joint_rate=rates[1],
+        max_log_gain=float(gains.max_log_gain), log_stiffness=gains.log_fraction * rate_gain * rate_gain,
+        log_acceleration=float(gains.log_acceleration), position_gain=gains.position_fraction * rate_gain,
+        rate_gain=rate_gain, ramp_rate=gains.ramp_fraction * rate_gain, saturation=float(gains.saturation),
+        energy_factor=float(gains.energy_factor), energy_allowance=float(gains.energy_allowance),
+        entry_energy=0.5 * gains.entry_rate * gains.entry_rate,
+    )  # fmt: skip
 
 
 @compiled
@@ -117,11 +148,12 @@ def scheduled_axis(
 ) -> tuple[float, float, float]:
     """Return lambda, kappa and the energy bound of one axis.
 
-    lambda = clamp(sqrt(``funnel_acceleration`` / shrink)), shrink being the distance that the faster bound
-    moves: a smooth bound starts with the acceleration lambda^2 times its shrink. kappa is the largest gain,
-    up to ``max_log_gain``, with which the log term kappa |a s| at rest stays below ``log_acceleration``; a
-    and s are those of ``track_axis`` in ``ppc.py``.
-    The bound on V is ``energy_factor`` times the energy at rest, plus ``energy_allowance`` times kappa.
+    lambda = clamp(sqrt(``funnel_acceleration`` / (``PEAK`` shrink))), shrink being the distance that the
+    faster bound moves: the largest acceleration of a quintic bound is ``PEAK`` lambda^2 shrink. kappa is the
+    largest gain, up to ``max_log_gain``, with which the log term kappa |a s| at rest stays below
+    ``log_acceleration`` and its stiffness in the middle of the goal interval below ``log_stiffness``; a and s
+    are those of ``track_axis`` in ``ppc.py``. The bound on V is ``energy_factor`` times the energy at rest,
+    plus ``energy_allowance`` times kappa, plus ``entry_energy``.
 
     Args:
         schedule: The rule.
@@ -139,17 +171,21 @@ def scheduled_axis(
     if is_joint:
         slowest, fastest = schedule.min_joint_rate, schedule.max_joint_rate
     shrink, rate = max(goal_lower - slice_lower, slice_upper - goal_upper), fastest
-    if shrink * fastest * fastest > schedule.funnel_acceleration:
-        rate = max(sqrt(schedule.funnel_acceleration / shrink), slowest)
-    width = slice_upper - slice_lower
-    inside = min(max(resting, slice_lower + SATURATION * width), slice_upper - SATURATION * width)
+    if PEAK * shrink * fastest * fastest > schedule.funnel_acceleration:
+        rate = max(sqrt(schedule.funnel_acceleration / (PEAK * shrink)), slowest)
+    width, goal_width = slice_upper - slice_lower, goal_upper - goal_lower
+    near = schedule.saturation * width
+    inside = min(max(resting, slice_lower + near), slice_upper - near)
     dl, du = inside - slice_lower, slice_upper - inside
-    pull, log_gain = abs(log(dl / du)) * (dl + du) / (dl * du), schedule.max_log_gain
+    pull = abs(log(dl / du)) * (dl + du) / (dl * du)
+    log_gain = min(schedule.max_log_gain, schedule.log_stiffness * goal_width * goal_width / 16.0)
     if pull * log_gain > schedule.log_acceleration:
         log_gain = schedule.log_acceleration / pull
-    bounds = axis_bounds(0.0, slice_lower, slice_upper, goal_lower, goal_upper, rate, schedule.smooth)
-    at_rest = track_axis(inside, 0.0, bounds, log_gain, schedule.position_gain, 0.0)[1]
-    return rate, log_gain, schedule.energy_factor * at_rest + schedule.energy_allowance * log_gain
+    bounds = axis_bounds(0.0, slice_lower, slice_upper, goal_lower, goal_upper, rate, schedule.quintic)
+    k1, k1_dot = ramped_gain(0.0, schedule.position_gain, schedule.ramp_rate)
+    at_rest = track_axis(inside, 0.0, bounds, (log_gain, k1, k1_dot, 0.0, schedule.saturation))[1]
+    allowance = schedule.energy_allowance * log_gain + schedule.entry_energy
+    return rate, log_gain, schedule.energy_factor * at_rest + allowance
 
 
 def transition_gains(
@@ -192,12 +228,14 @@ def transition_gains(
         stiffness=stiffness,
         damping=damping,
         governor_gain=governor_gain,
-        smoothing=gain_set.smoothing,
-        funnel=gain_set.funnel,
+        smoothing=schedule.smoothing,
+        funnel="quintic" if schedule.quintic else "exponential",
         decay_rate=rows[:, 0].copy(),
         log_gain=rows[:, 1].copy(),
-        position_gain=gain_set.position_gain,
-        rate_gain=gain_set.rate_gain,
+        position_gain=schedule.position_gain,
+        rate_gain=schedule.rate_gain,
+        ramp_rate=schedule.ramp_rate,
+        saturation=schedule.saturation,
         energy_bound=rows[:, 2].copy(),
     )
 

@@ -9,7 +9,14 @@ from numpy.typing import NDArray
 from coop_drake.typed_data import EXACT, DataError, Limits, NotNegative, Positive, Vector, check_fields
 
 FloatArray = NDArray[np.float64]
-FunnelShape = Literal["exponential", "smooth"]
+FunnelShape = Literal["exponential", "quintic"]
+
+IDEAL_AGE = 0.0125
+"""Smallest age for which gains are scheduled [s]. An ideal team could take larger gains: on the shipped
+scenarios they make the transport no quicker, and its forces larger."""
+
+Saturation = Annotated[float, Limits(above=0.0, below=0.5)]
+"""A distance to a funnel bound over the funnel's width; the middle is at one half [-]."""
 
 EnergyFactor = Annotated[float, Limits(at_least=1.0)]
 """A multiple of the energy at rest; below 1 no transition could begin [-]."""
@@ -30,11 +37,15 @@ class TransitionGains:
         damping: zeta of (14) [1/s].
         governor_gain: K_G of (14) [-].
         smoothing: c of the smoothed square root sqrt(x + c^2) - c; 0 gives the printed root [m].
-        funnel: ``exponential`` as printed in (17), or ``smooth`` (C1 at the switch).
+        funnel: ``exponential`` as printed in (17), or ``quintic`` (C2 at both ends, closed after 5/lambda).
         decay_rate: lambda of (17), (39), shape (1 + n,) [1/s].
         log_gain: kappa, gain of the log term of (18), shape (1 + n,) [rad^2/s^2 or m^2/s^2].
-        position_gain: k1 of (18)-(20) [1/s].
+        position_gain: k1 of (18)-(20), in the limit where it is ramped in [1/s].
         rate_gain: k2 of (18) [1/s].
+        ramp_rate: mu of ``ramped_gain``, the rate at which k1 is ramped in; 0 for k1 at once, as
+            printed [1/s].
+        saturation: Smallest distance to a funnel bound with which the law computes, over the funnel's width
+            [-]; see ``track_axis``.
         energy_bound: Largest PPC energy V accepted when this transition is entered, shape (1 + n,).
     """
 
@@ -47,6 +58,8 @@ class TransitionGains:
     log_gain: AxisGains
     position_gain: Gain
     rate_gain: Gain
+    ramp_rate: Annotated[NotNegative, EXACT]
+    saturation: Annotated[Saturation, EXACT]
     energy_bound: AxisGains
 
     @property
@@ -76,12 +89,15 @@ class FixedGains:
         damping: zeta [1/s].
         governor_gain: K_G [-].
         smoothing: c of the governor's root; 0 is the printed root [m].
-        funnel: ``exponential`` or ``smooth``.
+        funnel: ``exponential`` or ``quintic``.
         angle_decay_rate: lambda of the object's angle [1/s].
         joint_decay_rate: lambda of every joint [1/s].
         log_gain: kappa [rad^2/s^2 or m^2/s^2].
         position_gain: k1 [1/s].
         rate_gain: k2 [1/s].
+        ramp_rate: mu, the rate at which k1 is ramped in; 0 for k1 at once [1/s].
+        saturation: Smallest distance to a funnel bound with which the law computes, over the width [-]. By
+            default so small that it only bounds the trial steps of an integrator.
         energy_factor: A transition is entered below this multiple of the energy at rest ...
         energy_allowance: ... plus this multiple of kappa.
     """
@@ -96,6 +112,8 @@ class FixedGains:
     log_gain: Positive = 1.0
     position_gain: Positive = 1.0
     rate_gain: Positive = 1.0
+    ramp_rate: NotNegative = 0.0
+    saturation: Saturation = 1e-7
     energy_factor: EnergyFactor = 1.2
     energy_allowance: Positive = 0.5
 
@@ -105,50 +123,79 @@ class FixedGains:
 
 @dataclass(frozen=True)
 class ScheduledGains:
-    """Rules by which gains follow the cell: K grows where it is narrow, lambda where funnels shrink little.
+    """Rules by which gains follow the cell, and the age of the measurements on which efforts rest.
+
+    An effort answers to a measurement that is as old as the delay, and is held for a control period: on
+    average its age is tau = delay + period / 2. Rate gains are bounded by a fraction of 1 / tau, and all
+    others by the rate gain k2.
 
     Attributes:
+        command_age: tau [s]; null for that of the scenario's ``deployment``, or for 12.5 ms if that is
+            less.
+        age_phase: k2 times tau, the phase by which the age turns the rate loop [rad].
+        max_rate_gain: Largest k2 [1/s].
+        position_fraction: k1 over k2 [-].
+        ramp_fraction: mu over k2, the rate at which k1 is ramped in [-].
         wall_stiffness: K times the path's clearance b, K = clamp(wall_stiffness / b) [m/s^2].
-        min_stiffness: Smallest K [1/s^2].
-        max_stiffness: Largest K [1/s^2].
+        min_stiffness: Smallest K [1/s^2], unless the age allows less.
+        max_stiffness: Largest K [1/s^2]; also at most (age_phase / tau)^2.
         damping_factor: zeta over sqrt(K) [-].
         governor_factor: K_G over sqrt(K) [s].
         smoothing: c of the governor's root [m].
-        funnel: ``smooth`` or ``exponential``.
-        funnel_acceleration: Wall acceleration aimed at, lambda = clamp(sqrt(. / shrink)) [rad/s^2 or m/s^2].
+        funnel_acceleration: Largest acceleration of a funnel bound, for which lambda is chosen [rad/s^2 or
+            m/s^2].
         min_decay_rate: Smallest lambda [1/s].
-        max_decay_rate: Largest lambda [1/s].
+        decay_fraction: Largest lambda over k2 [-].
         max_log_gain: Largest kappa [rad^2/s^2 or m^2/s^2].
+        log_fraction: Largest stiffness 16 kappa / w^2 of the log term in the middle of the goal interval, of
+            width w, over k2^2 [-].
         log_acceleration: Largest kappa |a s| when a transition is entered at rest [rad/s^2 or m/s^2].
-        position_gain: k1 [1/s].
-        rate_gain: k2 [1/s].
+        saturation: Smallest distance to a funnel bound with which the law computes, over the width [-].
         energy_factor: A transition is entered below this multiple of the energy at rest ...
-        energy_allowance: ... plus this multiple of kappa.
+        energy_allowance: ... plus this multiple of kappa ...
+        entry_rate: ... plus the energy v^2 / 2 of this rate v [rad/s or m/s].
     """
 
+    command_age: Positive | None = None
+    age_phase: Positive = 0.35
+    max_rate_gain: Positive = 60.0
+    position_fraction: Positive = 0.4
+    ramp_fraction: Positive = 0.3
     wall_stiffness: Positive = 20.0
     min_stiffness: Positive = 50.0
-    max_stiffness: Positive = 400.0
-    damping_factor: Positive = 1.0
-    governor_factor: Positive = 0.8
+    max_stiffness: Positive = 150.0
+    damping_factor: Positive = 1.4
+    governor_factor: Positive = 1.2
     smoothing: NotNegative = 0.001
-    funnel: FunnelShape = "smooth"
-    funnel_acceleration: Positive = 20.0
-    min_decay_rate: Positive = 2.0
-    max_decay_rate: Positive = 8.0
+    funnel_acceleration: Positive = 12.0
+    min_decay_rate: Positive = 1.5
+    decay_fraction: Positive = 0.5
     max_log_gain: Positive = 0.1
-    log_acceleration: Positive = 20.0
-    position_gain: Positive = 1.0
-    rate_gain: Positive = 8.0
+    log_fraction: Positive = 0.3
+    log_acceleration: Positive = 5.0
+    saturation: Saturation = 0.02
     energy_factor: EnergyFactor = 1.2
     energy_allowance: Positive = 0.5
+    entry_rate: Positive = 0.02
 
     def __post_init__(self) -> None:
         check_fields(self)
-        for low, high in (("min_stiffness", "max_stiffness"), ("min_decay_rate", "max_decay_rate")):
-            least, largest = getattr(self, low), getattr(self, high)
-            if least > largest:
-                raise DataError(low, least, f"at most {high}, {largest:g}")
+        if self.min_stiffness > self.max_stiffness:
+            allowed = f"at most max_stiffness, {self.max_stiffness:g}"
+            raise DataError("min_stiffness", self.min_stiffness, allowed)
+
+    @property
+    def age(self) -> float:
+        """The age for which gains are scheduled [s]."""
+        return IDEAL_AGE if self.command_age is None else self.command_age
+
+    def for_age(self, age: float) -> "ScheduledGains":
+        """Return the rules for a team whose efforts rest on measurements of an age [s].
+
+        A ``command_age`` that is given stays.
+        """
+        given = self.command_age is not None
+        return self if given or age <= IDEAL_AGE else replace(self, command_age=age)
 
 
 GainSet = FixedGains | ScheduledGains

@@ -5,21 +5,38 @@ from __future__ import annotations
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.funnels import Funnel, FunnelBounds, funnel_bounds
+from coop_drake.laws.funnels import FunnelBounds
 from coop_drake.laws.gains import FloatArray
 
 __all__ = [
     "SATURATION",
-    "funnel_acceleration",
     "prescribed_acceleration",
     "prescribed_energy",
+    "ramped_gain",
     "track_axis",
 ]
 
 SATURATION = 1e-7
-"""Smallest distance to a funnel bound that the law computes with, over the funnel's width [-]. An axis that
-is nearer, or outside, counts as this far inside. Trial steps of an integrator may end there: the law must
-then point back inside and must not grow with the distance, or the next trial step would overflow."""
+"""Smallest distance to a funnel bound that the law as printed computes with, over the funnel's width [-].
+Trial steps of an integrator may end nearer or outside: the law must then point back inside and must not grow
+with the distance, or the next trial step would overflow."""
+
+
+@compiled
+def ramped_gain(time: float, gain: float, ramp_rate: float) -> tuple[float, float]:
+    """Return k1(t) = k1 (1 - (1 + mu t) e^(-mu t)) and its derivative [1/s, 1/s^2].
+
+    Both begin at zero, so that an axis that enters a cell at rest is not thrown towards the funnel's middle.
+
+    Args:
+        time: t >= 0 since the cell was entered [s].
+        gain: k1, the value in the limit [1/s].
+        ramp_rate: mu [1/s]; for 0 the gain is k1 from the beginning.
+    """
+    if ramp_rate == 0.0:
+        return gain, 0.0
+    left = np.exp(-ramp_rate * time)
+    return gain * (1.0 - (1.0 + ramp_rate * time) * left), gain * ramp_rate * ramp_rate * time * left
 
 
 @compiled
@@ -27,9 +44,7 @@ def track_axis(
     position: float,
     rate: float,
     bounds: tuple[float, float, float, float, float, float],
-    log_gain: float,
-    position_gain: float,
-    rate_gain: float,
+    gains: tuple[float, float, float, float, float],
 ) -> tuple[float, float]:
     """Return the acceleration x'' that keeps one axis in its funnel, and its energy V.
 
@@ -40,37 +55,40 @@ def track_axis(
         x'' = -k2 (x' - v) + v' - kappa a s
 
     and the energy V = kappa s^2 / 2 + (x' - v)^2 / 2 of (41) and (48) decays with
-    V' = -kappa k1 s^2 - k2 (x' - v)^2. The distances dl and du saturate, see ``SATURATION``.
+    V' = -kappa k1 s^2 - k2 (x' - v)^2, also while k1 changes, because v' holds its rate k1'. The distances dl
+    and du saturate: an axis that is nearer to a bound than a share of the width, or outside, counts as this
+    far inside. Where they do, V is no longer sure to decay, and the law stays bounded.
 
     Args:
         position: x [rad or m].
         rate: x' [rad/s or m/s].
         bounds: rho_l, rho_u, their rates and their accelerations, as ``axis_bounds`` returns them.
-        log_gain: kappa [rad^2/s^2 or m^2/s^2].
-        position_gain: k1 [1/s].
-        rate_gain: k2 [1/s].
+        gains: kappa [rad^2/s^2 or m^2/s^2], k1 now [1/s], k1' now [1/s^2], k2 [1/s], and the smallest
+            distance to a bound over the funnel's width [-].
 
     Returns:
         x'' [rad/s^2 or m/s^2] and V [rad^2/s^2 or m^2/s^2].
     """
     lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration = bounds
+    log_gain, k1, k1_dot, k2, saturation = gains
     w, w_dot = upper - lower, upper_rate - lower_rate
-    near, far = SATURATION * w, (1.0 - SATURATION) * w
+    near, far = saturation * w, (1.0 - saturation) * w
     dl = min(max(position - lower, near), far)
     du = min(max(upper - position, near), far)
     dl_dot, du_dot = rate - lower_rate, upper_rate - rate
     s, s_dot = np.log(dl / du), dl_dot / dl - du_dot / du
     a = w / (dl * du)
-    v = (lower_rate * du + upper_rate * dl - position_gain * s * dl * du) / w
+    v = (lower_rate * du + upper_rate * dl - k1 * s * dl * du) / w
     v_dot = (
         lower_acceleration * du
         + lower_rate * du_dot
         + upper_acceleration * dl
         + upper_rate * dl_dot
-        - position_gain * (s_dot * dl * du + s * (dl_dot * du + dl * du_dot))
+        - k1 * (s_dot * dl * du + s * (dl_dot * du + dl * du_dot))
+        - k1_dot * s * dl * du
         - v * w_dot
     ) / w
-    acceleration = -rate_gain * (rate - v) + v_dot - log_gain * a * s
+    acceleration = -k2 * (rate - v) + v_dot - log_gain * a * s
     return acceleration, 0.5 * log_gain * s * s + 0.5 * (rate - v) * (rate - v)
 
 
@@ -82,6 +100,8 @@ def prescribed_acceleration(
     log_gain: FloatArray,
     position_gain: float,
     rate_gain: float,
+    position_gain_rate: float = 0.0,
+    saturation: float = SATURATION,
 ) -> FloatArray:
     """Return the acceleration of ``track_axis`` for every axis, shape (m,).
 
@@ -90,10 +110,13 @@ def prescribed_acceleration(
         rate: x' of every axis, shape (m,).
         bounds: Funnel bounds now.
         log_gain: kappa of every axis, shape (m,) [rad^2/s^2 or m^2/s^2].
-        position_gain: k1 [1/s].
+        position_gain: k1 now [1/s].
         rate_gain: k2 [1/s].
+        position_gain_rate: k1' now [1/s^2].
+        saturation: Smallest distance to a bound, over the width [-].
     """
-    return _track(position, rate, bounds, log_gain, position_gain, rate_gain)[:, 0]
+    gains = position_gain, position_gain_rate, rate_gain, saturation
+    return _track(position, rate, bounds, log_gain, gains)[:, 0]
 
 
 def prescribed_energy(
@@ -105,22 +128,7 @@ def prescribed_energy(
     position_gain: float,
 ) -> FloatArray:
     """Return the energy V of ``track_axis`` for every axis, shape (m,); arguments as above."""
-    return _track(position, rate, bounds, log_gain, position_gain, 0.0)[:, 1]
-
-
-def funnel_acceleration(
-    position: FloatArray,
-    rate: FloatArray,
-    funnel: Funnel,
-    time: float,
-    *,
-    log_gain: FloatArray,
-    position_gain: float,
-    rate_gain: float,
-) -> FloatArray:
-    """Return ``prescribed_acceleration`` within ``funnel_bounds(funnel, time)``."""
-    bounds = funnel_bounds(funnel, time)
-    return _track(position, rate, bounds, log_gain, position_gain, rate_gain)[:, 0]
+    return _track(position, rate, bounds, log_gain, (position_gain, 0.0, 0.0, SATURATION))[:, 1]
 
 
 def _track(
@@ -128,13 +136,13 @@ def _track(
     rate: FloatArray,
     bounds: FunnelBounds,
     log_gain: FloatArray,
-    position_gain: float,
-    rate_gain: float,
+    gains: tuple[float, float, float, float],
 ) -> FloatArray:
     """Return acceleration and energy of every axis, shape (m, 2)."""
+    others = tuple(float(gain) for gain in gains)
     return np.array(
         [
-            track_axis(x, v, axis, kappa, float(position_gain), float(rate_gain))
+            track_axis(x, v, axis, (kappa, *others))
             for x, v, axis, kappa in zip(position, rate, zip(*bounds, strict=True), log_gain, strict=True)
         ]
     )

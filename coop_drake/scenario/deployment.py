@@ -11,6 +11,7 @@ Fused blocks refuse every departure that ``coop_drake/diagram/fused.py`` does no
 """
 
 from dataclasses import dataclass, field
+from math import ceil
 from typing import Annotated
 
 from coop_drake.typed_data import Limits, NotNegative, Positive
@@ -105,6 +106,16 @@ class Deployment:
     def ideal(self) -> bool:
         """Whether nothing is switched on, so that the equations of the control law hold exactly."""
         return self == Deployment(seed=self.seed)
+
+    @property
+    def command_age(self) -> float:
+        """Mean age of the measurements on which an effort rests: their delay and half a period [s].
+
+        A delay is rounded up to whole periods, see ``whole_periods`` of the systems.
+        """
+        if self.period is None:
+            return 0.0
+        return (ceil(self.measurements.delay / self.period - 1e-9) + 0.5) * self.period
 
     @property
     def period(self) -> float | None:

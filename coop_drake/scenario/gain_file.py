@@ -23,15 +23,15 @@ def with_gains(scenario: Scenario, choice: str | None) -> Scenario:
     """
     if choice is None:
         return scenario
-    if choice in scenario.gain_sets:
+    if choice in scenario.gains.sets:
         return replace(scenario, gains=replace(scenario.gains, selected=choice))
     if not Path(choice).is_file():
-        allowed = f"one of {', '.join(sorted(scenario.gain_sets))}, or a file with a gain set"
+        allowed = f"one of {', '.join(sorted(scenario.gains.sets))}, or a file with a gain set"
         raise ScenarioError(str(scenario.path), "--gains", choice, allowed)
     read: Gains = read_file(Gains, Path(choice))
     if read.selected not in read.sets:
         raise ScenarioError(choice, "selected", read.selected, "one of " + ", ".join(sorted(read.sets)))
-    return replace(scenario, gains=replace(read, sets={**scenario.gain_sets, **read.sets}))
+    return replace(scenario, gains=replace(read, sets={**scenario.gains.sets, **read.sets}))
 
 
 def dump_gains(name: str, gain_set: GainSet) -> str:

@@ -269,8 +269,12 @@ class Scenario:
 
     @property
     def gain_sets(self) -> dict[str, GainSet]:
-        """The gain sets by name."""
-        return self.gains.sets
+        """The gain sets by name; rules without a ``command_age`` of their own get that of ``deployment``."""
+        age = self.deployment.command_age
+        return {
+            name: gains.for_age(age) if isinstance(gains, ScheduledGains) else gains
+            for name, gains in self.gains.sets.items()
+        }
 
     @property
     def selected_gains(self) -> str:

@@ -40,20 +40,23 @@ class Parameter:
 # The ranges hold an order of magnitude or two around the defaults. Ranges of a smallest and of a largest gain
 # meet and do not overlap, so that every combination is a valid gain set.
 _SCHEDULED = (
+    Parameter("age_phase", 0.1, 0.8),
+    Parameter("position_fraction", 0.1, 1.0),
+    Parameter("ramp_fraction", 0.1, 1.0),
     Parameter("wall_stiffness", 2.0, 100.0),
-    Parameter("min_stiffness", 10.0, 150.0),
-    Parameter("max_stiffness", 150.0, 1500.0),
-    Parameter("damping_factor", 0.4, 3.0),
-    Parameter("governor_factor", 0.2, 3.0),
+    Parameter("min_stiffness", 10.0, 80.0),
+    Parameter("max_stiffness", 80.0, 800.0),
+    Parameter("damping_factor", 0.7, 3.0),
+    Parameter("governor_factor", 0.3, 3.0),
     Parameter("funnel_acceleration", 2.0, 60.0),
     Parameter("min_decay_rate", 0.7, 4.0),
-    Parameter("max_decay_rate", 4.0, 16.0),
+    Parameter("decay_fraction", 0.2, 1.0),
     Parameter("max_log_gain", 0.01, 1.0),
-    Parameter("log_acceleration", 2.0, 60.0),
-    Parameter("position_gain", 0.3, 4.0),
-    Parameter("rate_gain", 2.0, 30.0),
+    Parameter("log_fraction", 0.05, 1.0),
+    Parameter("log_acceleration", 1.0, 60.0),
     Parameter("energy_factor", 1.05, 3.0),
     Parameter("energy_allowance", 0.05, 3.0),
+    Parameter("entry_rate", 0.005, 0.1),
 )
 _FIXED = (
     Parameter("stiffness", 10.0, 400.0),

@@ -154,7 +154,7 @@ FAR = {"outer": [[90, 90], [91, 90], [91, 91]], "holes": []}
         ),
         (
             put("loose", "transitions", 0, "gains", "funnel"),
-            r"transitions\[0\].gains.funnel: 'loose' .* one of exponential, smooth",
+            r"transitions\[0\].gains.funnel: 'loose' .* one of exponential, quintic",
         ),
         (
             put([1, 1, -1], "transitions", 0, "gains", "decay_rate"),

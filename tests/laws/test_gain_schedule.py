@@ -17,7 +17,7 @@ def schedule(gain_set, *, clearance=0.2, **changes):
 
 @pytest.mark.parametrize(
     ("clearance", "stiffness"),
-    [(1.0, 50.0), (0.4, 50.0), (0.2, 100.0), (0.05, 400.0), (0.01, 400.0), (0.0, 400.0)],
+    [(1.0, 50.0), (0.4, 50.0), (0.2, 100.0), (0.05, 150.0), (0.01, 150.0), (0.0, 150.0)],
 )
 def test_stiffness_follows_the_clearance_between_its_bounds(clearance, stiffness):
     gains = schedule(ScheduledGains(), clearance=clearance)
@@ -25,8 +25,20 @@ def test_stiffness_follows_the_clearance_between_its_bounds(clearance, stiffness
         stiffness, rel=1e-14
     )
     assert gains.stiffness == pytest.approx(stiffness, rel=1e-14)
-    assert gains.damping == pytest.approx(np.sqrt(stiffness))
-    assert gains.governor_gain == pytest.approx(0.8 * np.sqrt(stiffness))
+    assert gains.damping == pytest.approx(1.4 * np.sqrt(stiffness))
+    assert gains.governor_gain == pytest.approx(1.2 * np.sqrt(stiffness))
+
+
+@pytest.mark.parametrize("age", [0.005, 0.0125, 0.03, 0.2])
+def test_gains_follow_the_age_of_what_a_command_rests_on(age):
+    """k2 is 0.35 over the age, all others are fractions of it, and K is at most the square of 0.35 / age."""
+    gains = schedule(ScheduledGains(command_age=age), clearance=0.01, resting=np.array([0.5, 0.0]))
+    k2 = min(60.0, 0.35 / age)
+    assert gains.rate_gain == pytest.approx(k2)
+    assert (gains.position_gain, gains.ramp_rate) == pytest.approx((0.4 * k2, 0.3 * k2))
+    assert gains.stiffness == pytest.approx(min(150.0, (0.35 / age) ** 2))
+    assert gains.log_gain[0] == pytest.approx(min(0.1, 0.3 * (0.2 * k2) ** 2 / 16.0))
+    assert np.all(gains.decay_rate <= 0.5 * k2 * (1.0 + 1e-12))
 
 
 def test_walls_that_close_far_close_slowly():
@@ -38,11 +50,15 @@ def test_walls_that_close_far_close_slowly():
         goal_upper=np.array([10.0, 2.0, 2.0, 2.0]),
         resting=np.array([5.0, 1.0, 1.0, 1.0]),
     )
-    assert gains.decay_rate == pytest.approx([2.0, 5.0, np.sqrt(20.0 / 1.9), 8.0])
+    # The largest acceleration of a bound is 10 / (25 sqrt(3)) lambda^2 shrink; without shrink it is k2 / 2.
+    aimed = np.sqrt(12.0 * 2.5 * np.sqrt(3.0) / np.array([9.0, 0.8, 1.9]))
+    assert gains.decay_rate == pytest.approx([*aimed, 14.0])
+    slow = schedule(ScheduledGains(funnel_acceleration=0.1))
+    assert slow.decay_rate[0] == 1.5
 
 
 def test_the_log_term_at_rest_stays_below_its_acceleration():
-    lower, upper, rest = np.zeros(3), np.ones(3), np.array([0.5, 0.01, 1.0 - 1e-4])
+    lower, upper, rest = np.zeros(3), np.ones(3), np.array([0.5, 0.03, 1.0 - 0.02])
     goal_upper = np.array([1.0, 1.0, 1.0])
     gains = schedule(
         ScheduledGains(),
@@ -54,13 +70,20 @@ def test_the_log_term_at_rest_stays_below_its_acceleration():
     )
     pull = np.abs(np.log(rest / (1.0 - rest))) / (rest * (1.0 - rest))
     assert gains.log_gain[0] == 0.1
-    assert gains.log_gain[1:] * pull[1:] == pytest.approx(20.0)
+    assert gains.log_gain[1:] * pull[1:] == pytest.approx(5.0)
 
 
 def test_the_energy_bound_lies_above_the_energy_at_rest():
     s = np.log(0.4 / 0.6)
     gains = schedule(ScheduledGains())
-    # C1 walls stand still at first, so the wanted rate is that of the log term alone.
+    # Quintic walls stand still at first, and k1 begins at zero: the wanted rate is zero.
+    kappa = gains.log_gain[0]
+    assert gains.energy_bound[0] == pytest.approx(0.6 * kappa * s**2 + 0.5 * kappa + 0.5 * 0.02**2)
+
+
+def test_energies_of_a_rule_without_a_ramp_hold_the_rate_wanted_at_rest():
+    s = np.log(0.4 / 0.6)
+    gains = schedule(FixedGains(funnel="quintic", log_gain=0.1))
     at_rest = 0.5 * 0.1 * s**2 + 0.5 * (s * 0.4 * 0.6) ** 2
     assert gains.energy_bound[0] == pytest.approx(1.2 * at_rest + 0.05)
 
@@ -86,22 +109,14 @@ def test_rest_on_or_outside_the_border_gives_finite_gains_that_lead_back(gain_se
         assert np.all(np.isfinite(values))
         assert np.all(values > 0.0)
     funnel = Funnel(**SLICE, **GOAL, decay_rate=gains.decay_rate, shape=gains.funnel)
-    acceleration = funnel_acceleration(
-        resting,
-        np.zeros(2),
-        funnel,
-        0.0,
-        log_gain=gains.log_gain,
-        position_gain=gains.position_gain,
-        rate_gain=gains.rate_gain,
-    )
+    acceleration = funnel_acceleration(resting, np.zeros(2), funnel, 0.0, gains)
     assert np.all(np.isfinite(acceleration))
     assert np.all(np.sign(acceleration) == np.where(resting <= SLICE["slice_lower"], 1.0, -1.0))
 
 
 def test_a_goal_as_wide_as_the_slice_is_allowed():
     gains = schedule(ScheduledGains(), goal_lower=SLICE["slice_lower"], goal_upper=SLICE["slice_upper"])
-    assert gains.decay_rate.tolist() == [8.0, 8.0]
+    assert gains.decay_rate == pytest.approx([14.0, 14.0])
 
 
 @pytest.mark.parametrize(

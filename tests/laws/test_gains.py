@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from coop_drake.laws import FixedGains, ScheduledGains, TransitionGains
+from coop_drake.laws.gains import IDEAL_AGE
 
 
 def test_defaults_of_the_fixed_set_are_table_2():
@@ -24,12 +25,11 @@ def test_defaults_of_the_fixed_set_are_table_2():
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("rate_gain", 0.0, "rate_gain: 0.0 is not allowed; expected a positive number"),
-        ("rate_gain", float("nan"), "rate_gain: nan is not allowed; expected a finite number"),
-        ("energy_allowance", -0.5, "energy_allowance: -0.5 is not allowed; expected a positive number"),
+        ("energy_allowance", 0.0, "energy_allowance: 0.0 is not allowed; expected a positive number"),
+        ("energy_allowance", float("nan"), "energy_allowance: nan is not allowed; expected a finite number"),
         ("smoothing", -0.001, "smoothing: -0.001 is not allowed; expected zero or a positive number"),
-        ("funnel", "cubic", "funnel: 'cubic' is not allowed; expected one of exponential, smooth"),
         ("energy_factor", 0.9, "energy_factor: 0.9 is not allowed; expected a number of at least 1"),
+        ("saturation", 0.5, "saturation: 0.5 is not allowed; expected a positive number, less than 0.5"),
     ],
 )
 def test_bad_gains_are_refused_by_name(gain_set, name, value, message):
@@ -37,12 +37,23 @@ def test_bad_gains_are_refused_by_name(gain_set, name, value, message):
         gain_set(**{name: value})
 
 
-@pytest.mark.parametrize(
-    ("low", "high"), [("min_stiffness", "max_stiffness"), ("min_decay_rate", "max_decay_rate")]
-)
-def test_bounds_in_the_wrong_order_are_refused(low, high):
-    with pytest.raises(ValueError, match=f"^{low}: 9.0 is not allowed; expected at most {high}, 3$"):
-        ScheduledGains(**{low: 9.0, high: 3.0})
+def test_an_unknown_shape_of_a_funnel_is_refused():
+    with pytest.raises(
+        ValueError, match=r"^funnel: 'cubic' is not allowed; expected one of exponential, quintic$"
+    ):
+        FixedGains(funnel="cubic")
+
+
+def test_bounds_in_the_wrong_order_are_refused():
+    with pytest.raises(ValueError, match=r"^min_stiffness: 9.0 .* expected at most max_stiffness, 3$"):
+        ScheduledGains(min_stiffness=9.0, max_stiffness=3.0)
+
+
+def test_an_age_that_is_given_stays_and_an_ideal_team_gets_the_smallest():
+    gains = ScheduledGains()
+    assert gains.age == gains.for_age(0.0).age == IDEAL_AGE
+    assert gains.for_age(0.03).age == 0.03
+    assert ScheduledGains(command_age=0.002).for_age(0.03).age == 0.002
 
 
 def test_select_keeps_the_axes_asked_for():
@@ -51,11 +62,13 @@ def test_select_keeps_the_axes_asked_for():
         damping=5.0,
         governor_gain=5.0,
         smoothing=0.0,
-        funnel="smooth",
+        funnel="quintic",
         decay_rate=np.array([1.0, 2.0, 3.0]),
         log_gain=np.array([4.0, 5.0, 6.0]),
         position_gain=1.0,
         rate_gain=8.0,
+        ramp_rate=2.0,
+        saturation=0.02,
         energy_bound=np.array([7.0, 8.0, 9.0]),
     )
     own = gains.select(np.array([0, 2]))

@@ -7,6 +7,7 @@ from coop_drake.laws import (
     prescribed_acceleration,
     prescribed_energy,
 )
+from coop_drake.laws.ppc import ramped_gain
 
 FUNNEL = Funnel(
     slice_lower=np.array([0.0, -1.0, -1.0]),
@@ -18,7 +19,7 @@ FUNNEL = Funnel(
 GAINS = {"log_gain": np.array([1.0, 0.1, 0.1]), "position_gain": 1.0, "rate_gain": 8.0}
 
 
-def literal_law(x, v, bounds, kappa, k1, k2):
+def literal_law(x, v, bounds, kappa, k1, k2, k1_rate=0.0):
     """Return the back-stepping law of one axis in the letters of (18)-(20), v' by the chain rule."""
     lo, up, lo1, up1, lo2, up2 = bounds
     z1 = np.log((x - lo) / (up - x))
@@ -27,8 +28,29 @@ def literal_law(x, v, bounds, kappa, k1, k2):
     a1 = -(v - lo1) / (x - lo) ** 2 - (up1 - v) / (up - x) ** 2
     b1 = lo2 / (x - lo) + up2 / (up - x) - lo1 * (v - lo1) / (x - lo) ** 2 - up1 * (up1 - v) / (up - x) ** 2
     wanted = (b - k1 * z1) / a
-    wanted_rate = (b1 - k1 * (a * v - b)) / a - wanted * a1 / a
+    wanted_rate = (b1 - k1_rate * z1 - k1 * (a * v - b)) / a - wanted * a1 / a
     return -k2 * (v - wanted) + wanted_rate - kappa * a * z1
+
+
+@pytest.mark.parametrize("time", [0.0, 0.1, 0.7, 5.0])
+def test_the_law_with_a_ramped_gain_is_that_of_the_paper_with_its_rate(time):
+    bounds = funnel_bounds(FUNNEL, time)
+    x, v = 0.3 * bounds.lower + 0.7 * bounds.upper, np.array([0.4, -0.3, 1.0])
+    k1, k1_rate = ramped_gain(time, 3.0, 2.0)
+    ramped = {**GAINS, "position_gain": k1, "position_gain_rate": k1_rate}
+    acceleration = prescribed_acceleration(x, v, bounds, **ramped)
+    for i in range(3):
+        kappa, walls = GAINS["log_gain"][i], [w[i] for w in bounds]
+        literal = literal_law(x[i], v[i], walls, kappa, k1, 8.0, k1_rate)
+        assert acceleration[i] == pytest.approx(literal, rel=1e-9, abs=1e-9)
+
+
+def test_a_gain_is_ramped_in_from_zero_with_its_rate():
+    assert ramped_gain(0.0, 3.0, 2.0) == (0.0, 0.0)
+    assert ramped_gain(50.0, 3.0, 2.0) == pytest.approx((3.0, 0.0), abs=1e-12)
+    assert ramped_gain(0.7, 3.0, 0.0) == (3.0, 0.0)
+    ahead, behind = (ramped_gain(0.7 + h, 3.0, 2.0)[0] for h in (1e-6, -1e-6))
+    assert ramped_gain(0.7, 3.0, 2.0)[1] == pytest.approx((ahead - behind) / 2e-6, rel=1e-6)
 
 
 @pytest.mark.parametrize("time", [0.0, 0.1, 0.7, 5.0])
@@ -62,15 +84,16 @@ def test_beyond_a_wall_the_answer_is_finite_and_points_inside(distance):
     assert np.all(above < 0.0)
 
 
+@pytest.mark.parametrize("saturation", [1e-7, 0.02])
 @pytest.mark.parametrize("time", [0.0, 0.3, 40.0])
-def test_far_beyond_a_wall_the_answer_is_that_of_an_axis_just_inside(time):
+def test_far_beyond_a_wall_the_answer_is_that_of_an_axis_just_inside(time, saturation):
     """Trial steps that overshoot must not overshoot more with each stage of the integrator."""
     bounds, rate = funnel_bounds(FUNNEL, time), np.array([0.1, 0.0, -0.4])
-    inset = 1e-7 * (bounds.upper - bounds.lower)
+    inset, law = saturation * (bounds.upper - bounds.lower), {**GAINS, "saturation": saturation}
     below, above = bounds.lower - 1e9, bounds.upper + 1e9
     for inside, outside in ((bounds.lower + inset, below), (bounds.upper - inset, above)):
-        near = prescribed_acceleration(inside, rate, bounds, **GAINS)
-        assert prescribed_acceleration(outside, rate, bounds, **GAINS) == pytest.approx(near, rel=1e-6)
+        near = prescribed_acceleration(inside, rate, bounds, **law)
+        assert prescribed_acceleration(outside, rate, bounds, **law) == pytest.approx(near, rel=1e-6)
 
 
 def test_energy_is_the_log_term_plus_the_rate_error():

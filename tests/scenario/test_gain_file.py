@@ -10,7 +10,7 @@ from tests.support.scenarios import MODELS, write_scenario
 SCENARIO = MODELS / "base.scenario.yaml"
 
 
-@pytest.mark.parametrize("gains", [ScheduledGains(rate_gain=9.5), FixedGains(damping=7.0)])
+@pytest.mark.parametrize("gains", [ScheduledGains(age_phase=0.5), FixedGains(damping=7.0)])
 def test_what_is_dumped_is_read_back_and_selected(tmp_path, gains):
     file = tmp_path / "gains.yaml"
     file.write_text("# a remark\n" + dump_gains("mine", gains))
@@ -21,12 +21,12 @@ def test_what_is_dumped_is_read_back_and_selected(tmp_path, gains):
 
 
 def test_the_file_is_a_section_of_a_scenario(tmp_path):
-    text = dump_gains("mine", ScheduledGains(rate_gain=9.5))
+    text = dump_gains("mine", ScheduledGains(age_phase=0.5))
     plain = write_scenario(tmp_path / "room.scenario.yaml").read_text()
     indented = "".join(f"  {line}\n" for line in text.splitlines())
     (tmp_path / "room.scenario.yaml").write_text(f"{plain}\ngains:\n{indented}")
     scenario = load_scenario(tmp_path / "room.scenario.yaml")
-    assert scenario.gain_sets[scenario.selected_gains] == ScheduledGains(rate_gain=9.5)
+    assert scenario.gain_sets[scenario.selected_gains] == ScheduledGains(age_phase=0.5)
 
 
 def test_a_name_selects_and_nothing_changes_without_one():
@@ -38,7 +38,7 @@ def test_a_name_selects_and_nothing_changes_without_one():
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("selected: mine\nsets: {mine: !ScheduledGains {rate_gain: -1}}", r"gains.yaml: sets.mine.rate_gain"),
+        ("selected: mine\nsets: {mine: !ScheduledGains {age_phase: -1}}", r"gains.yaml: sets.mine.age_phase"),
         ("selected: other\nsets: {mine: !ScheduledGains {}}", r"gains.yaml: selected: 'other'"),
         ("selected: mine\nset: {}", r"gains.yaml: set: "),
         ("[1, 2]", r"gains.yaml: the file"),

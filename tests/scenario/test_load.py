@@ -95,7 +95,7 @@ def test_settings_of_every_section_are_read(tmp_path):
             "simulator: {max_time: 12, integration_scheme: runge_kutta2}\n"
             "visualization: {wall_height: 1, show_collision: true}\ngains:",
         ),
-        ("the paper's", "the paper's\n  sets: {gentle: !ScheduledGains {rate_gain: 5}}"),
+        ("the paper's", "the paper's\n  sets: {gentle: !ScheduledGains {age_phase: 0.5}}"),
         ("angle: 0.02}", "angle: 0.03}\n  joints: {robot_1: [null]}"),
     )
     scenario = load_scenario(path)
@@ -103,7 +103,7 @@ def test_settings_of_every_section_are_read(tmp_path):
     assert scenario.simulator == SimulatorSettings(max_time=12.0, integration_scheme="runge_kutta2")
     assert scenario.visualization.wall_height == 1.0
     assert scenario.visualization.show_collision
-    assert scenario.gain_sets["gentle"] == ScheduledGains(rate_gain=5.0)
+    assert scenario.gain_sets["gentle"] == ScheduledGains(age_phase=0.5)
     assert sorted(scenario.gain_sets) == ["gentle", "scheduled", "table_2"]
     assert scenario.goal.tolerances.angle == 0.03
     assert scenario.goal.joints == {"robot_1": (None,)}

@@ -222,9 +222,9 @@ CASES = {
         "one of !FixedGains, !ScheduledGains",
     ),
     "no gain tag": (
-        ("the paper's", "x\n  sets: {scheduled: {rate_gain: 5}}"),
+        ("the paper's", "x\n  sets: {scheduled: {age_phase: 0.5}}"),
         "gains.sets.scheduled",
-        {"rate_gain": 5},
+        {"age_phase": 0.5},
         "one of !FixedGains, !ScheduledGains",
     ),
     "gain key": (

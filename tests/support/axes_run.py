@@ -43,15 +43,7 @@ def play(transitions, gain_set, *, start, step=1e-3, time_limit=30.0, gated=True
     for i, (transition, gain, funnel) in enumerate(zip(transitions, gains, funnels, strict=True)):
 
         def law(x, v, t, funnel=funnel, gain=gain):
-            return funnel_acceleration(
-                x,
-                v,
-                funnel,
-                t,
-                log_gain=gain.log_gain,
-                position_gain=gain.position_gain,
-                rate_gain=gain.rate_gain,
-            )
+            return funnel_acceleration(x, v, funnel, t, gain)
 
         last = i + 1 == len(transitions)
         for k in range(round(time_limit / step)):

@@ -133,10 +133,7 @@ def _play(plan, index, state, field, distances, conditions, seen, limits):
         governor = governor_velocity(
             *field(z[4:6]), margin_of(z), gains.stiffness, gains.governor_gain, gains.smoothing
         )  # fmt: skip
-        axes = funnel_acceleration(
-            z[6 : 6 + n], z[6 + n :], funnel, t, log_gain=gains.log_gain, position_gain=gains.position_gain,
-            rate_gain=gains.rate_gain,
-        )  # fmt: skip
+        axes = funnel_acceleration(z[6 : 6 + n], z[6 + n :], funnel, t, gains)
         return np.concatenate([z[2:4], force, governor, z[6 + n :], axes])
 
     def leaves(z):

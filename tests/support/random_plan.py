@@ -19,9 +19,9 @@ def random_gains(rng: np.random.Generator) -> GainSet:
         return FixedGains(stiffness=50.0 * factor[0], damping=5.0 * factor[1], governor_gain=5.0 * factor[2])
     return ScheduledGains(
         wall_stiffness=20.0 * factor[0],
-        damping_factor=factor[1],
-        governor_factor=0.8 * factor[2],
-        rate_gain=8.0 * factor[3],
+        damping_factor=1.4 * factor[1],
+        governor_factor=1.2 * factor[2],
+        age_phase=0.35 * factor[3],
     )
 
 

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from coop_drake.laws import funnel_bounds, prescribed_acceleration
+from coop_drake.laws.ppc import ramped_gain
 from coop_drake.systems import AxisPpc, axis_laws
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
@@ -24,13 +25,16 @@ def law_by_hand(axes, position, rate, cell, time):
     law = axis_laws(PLAN, axes)[cell]
     bounds = funnel_bounds(law.funnel, time)
     gains = law.gains
+    position_gain, position_gain_rate = ramped_gain(time, gains.position_gain, gains.ramp_rate)
     acceleration = prescribed_acceleration(
         np.array(position),
         np.array(rate),
         bounds,
         log_gain=gains.log_gain,
-        position_gain=gains.position_gain,
+        position_gain=position_gain,
         rate_gain=gains.rate_gain,
+        position_gain_rate=position_gain_rate,
+        saturation=gains.saturation,
     )
     return acceleration, bounds
 

@@ -30,7 +30,7 @@ def called(*arguments):
 
 
 def test_a_gain_set_comes_out_that_the_scenario_takes(room, tmp_path):
-    result = called(room, "--budget", 2, "--workers", 1, "--vary", "rate_gain", "--out", tmp_path, "--json")
+    result = called(room, "--budget", 2, "--workers", 1, "--vary", "age_phase", "--out", tmp_path, "--json")
     assert result.exit_code == 0, result.output
     facts = json.loads(result.stdout.splitlines()[-1])
     assert facts["trials"] == 2
@@ -39,7 +39,7 @@ def test_a_gain_set_comes_out_that_the_scenario_takes(room, tmp_path):
     tuned = with_gains(load_scenario(room), facts["gains_file"])
     trials = json.loads((tmp_path / "trials.json").read_text())
     assert len(trials["trials"]) == 3
-    assert tuned.gain_sets["tuned"].rate_gain == trials["trials"][trials["best"]]["gains"]["rate_gain"]
+    assert tuned.gain_sets["tuned"].age_phase == trials["trials"][trials["best"]]["gains"]["age_phase"]
     assert (tmp_path / "tuning.png").stat().st_size > 10_000
     assert "seed 0. Verified" in (tmp_path / "gains.yaml").read_text()
 

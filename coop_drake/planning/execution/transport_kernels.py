@@ -13,7 +13,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import signed_distance
 from coop_drake.geometry.distances import nearest_fraction
-from coop_drake.laws.axis_table import LOG_GAIN, bounds_of, track_row
+from coop_drake.laws.axis_table import LOG_GAIN, SATURATION, bounds_of, track_row
 from coop_drake.laws.governor import (
     ATTRACTION_RATE,
     FIELD_SPEED,
@@ -23,7 +23,6 @@ from coop_drake.laws.governor import (
     slowdown_radius,
     tracking_energy,
 )
-from coop_drake.laws.ppc import SATURATION
 from coop_drake.laws.readiness import axis_arrival, axis_ready, clearance_margin, position_arrival
 from coop_drake.tree.pose import FloatArray
 
@@ -164,7 +163,7 @@ def _steps(state: FloatArray, time: float, gains: FloatArray, table: FloatArray)
     """Return the number of integration steps until the next check, enough for the fastest motion now."""
     fastest = max(sqrt(gains[0]), ATTRACTION_RATE)
     for i in range(table.shape[0]):
-        fastest = max(fastest, axis_frequency(table[i], time, state[6 + i], SATURATION))
+        fastest = max(fastest, axis_frequency(table[i], time, state[6 + i], table[i, SATURATION]))
     return int(min(max(np.ceil(PERIOD * fastest / RADIANS_PER_STEP), FEWEST_STEPS), MOST_STEPS))
 
 

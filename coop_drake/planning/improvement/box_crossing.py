@@ -12,7 +12,15 @@ from math import sqrt
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, LAW_COLUMNS, LOG_GAIN, track_row, write_row
+from coop_drake.laws.axis_table import (
+    GOAL_LOWER,
+    GOAL_UPPER,
+    LAW_COLUMNS,
+    LOG_GAIN,
+    SATURATION,
+    track_row,
+    write_row,
+)
 from coop_drake.laws.gain_schedule import Schedule, scheduled_axis, scheduled_governor
 from coop_drake.laws.governor import (
     FIELD_SPEED,
@@ -35,7 +43,7 @@ RADIANS_PER_STEP = 1.6
 """Longest step of an axis times the angular frequency of its motion [rad]: the fourth-order scheme is
 stable up to 2.8, and a comparison of boxes needs less accuracy than the estimate of a plan."""
 
-SATURATION = 1e-3
+LEAST_SATURATION = 1e-3
 """Smallest distance to a funnel bound, over the funnel's width, for which the step of an axis is shortened
 [-]."""
 
@@ -92,7 +100,7 @@ def _advance_position(
 @compiled
 def _advance_axis(state: FloatArray, at: int, m: int, time: float, row: FloatArray) -> None:
     """Advance one axis by one period, in as many steps as its stiffness needs now."""
-    fastest = axis_frequency(row, time, state[at], SATURATION)
+    fastest = axis_frequency(row, time, state[at], max(row[SATURATION], LEAST_SATURATION))
     steps = int(min(max(np.ceil(PERIOD * fastest / RADIANS_PER_STEP), 1.0), MOST_STEPS))
     h = PERIOD / steps
     for k in range(steps):
@@ -121,7 +129,12 @@ def _arrived(state: FloatArray, target: float, table: FloatArray, tolerance: flo
 
 @compiled
 def _may_leave(
-    state: FloatArray, target: float, clearance: float, stiffness: float, table: FloatArray, allowance: float
+    state: FloatArray,
+    target: float,
+    clearance: float,
+    stiffness: float,
+    table: FloatArray,
+    schedule: Schedule,
 ) -> bool:
     """Return whether the next box, of which only the clearance at the target is known, may be entered."""
     m = table.shape[0]
@@ -129,7 +142,8 @@ def _may_leave(
         row = table[a]
         if interval_margin(state[3 + a], row[GOAL_LOWER], row[GOAL_UPPER], LEAVING_EROSION) < 0.0:
             return False
-        if abs(state[3 + m + a]) > RATE_FRACTION * sqrt(2.0 * allowance * row[LOG_GAIN]):
+        allowance = schedule.energy_allowance * row[LOG_GAIN] + schedule.entry_energy
+        if abs(state[3 + m + a]) > RATE_FRACTION * sqrt(2.0 * allowance):
             return False
     s, v, g = state[0], state[1], state[2]
     # The next cell's clearance at p_G is at least that at the target less the distance to the target.
@@ -183,14 +197,16 @@ def cross_box(
     for a in range(m):
         ends = lower[a], upper[a], goal_intervals[0, a], goal_intervals[1, a]
         scheduled = scheduled_axis(schedule, a > 0, ends[0], ends[1], ends[2], ends[3], axis_rest[a])
-        gains_of_axes = schedule.position_gain, schedule.rate_gain
-        write_row(table[a], ends, scheduled, gains_of_axes, schedule.smooth)
+        gains_of_axes = (
+            schedule.position_gain, schedule.rate_gain, schedule.ramp_rate, schedule.saturation
+        )  # fmt: skip
+        write_row(table[a], ends, scheduled, gains_of_axes, schedule.quintic)
     time = 0.0
     while time <= time_limit:
         if tolerance > 0.0:
             if _arrived(state, arc_lengths[-1], table, tolerance):
                 return time
-        elif _may_leave(state, arc_lengths[-1], clearances[-1], gains[0], table, schedule.energy_allowance):
+        elif _may_leave(state, arc_lengths[-1], clearances[-1], gains[0], table, schedule):
             return time
         for _ in range(2):
             _advance_position(state, 0.5 * PERIOD, arc_lengths, clearances, gains, schedule.smoothing)

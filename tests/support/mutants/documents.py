@@ -33,11 +33,12 @@ _POSITIVE = [
     "governor_gain",
     "position_gain",
     "rate_gain",
+    "saturation",
     "inradius",
     "neck",
     "radius",
 ]
-_NOT_NEGATIVE = ["margin", "length", "estimated_time", "smoothing", "component"]
+_NOT_NEGATIVE = ["margin", "length", "estimated_time", "smoothing", "ramp_rate", "component"]
 
 
 def document_mutants(document: Document, every: int = 1) -> Iterator[Mutant]:

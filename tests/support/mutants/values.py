@@ -21,9 +21,17 @@ _GAINS = [
     "governor_factor",
     "funnel_acceleration",
     "min_decay_rate",
-    "max_decay_rate",
+    "decay_fraction",
     "max_log_gain",
+    "log_fraction",
     "log_acceleration",
+    "saturation",
+    "command_age",
+    "age_phase",
+    "max_rate_gain",
+    "position_fraction",
+    "ramp_fraction",
+    "entry_rate",
     "position_gain",
     "rate_gain",
     "energy_factor",
@@ -159,10 +167,9 @@ def _gains(data: dict[str, Any]) -> Iterator[Mutant]:
         yield _mutant("unknown tag", data, path, unknown, "no class has this name")
         bare = {key: value for key, value in gains.items() if key != "_tag"}
         yield _mutant("missing tag", data, path, bare, "it could be either class")
-        for low, high in (("min_stiffness", "max_stiffness"), ("min_decay_rate", "max_decay_rate")):
-            if low in gains:
-                value = 2.0 * gains[high]
-                yield _mutant("bounds exchanged", data, (*path, low), value, "the least is above the most")
+        if "min_stiffness" in gains:
+            value, why = 2.0 * gains["max_stiffness"], "the least is above the most"
+            yield _mutant("bounds exchanged", data, (*path, "min_stiffness"), value, why)
 
 
 def _load_shares(data: dict[str, Any]) -> Iterator[Mutant]:
