@@ -69,7 +69,7 @@ def test_limits_are_listed_in_words(listed):
 
 def test_units_stand_apart(listed):
     units = {key.name: key.unit for key in listed["deployment.actuators"].keys}
-    assert units == {"base_force": "N", "base_torque": "N m", "joint_effort": "N m or N"}
+    assert units == {"base_force": "N", "base_torque": "N m", "joint_effort": "N m or N", "lag": "s"}
 
 
 def test_the_scenario_that_is_shown_can_be_carried_out(tmp_path):

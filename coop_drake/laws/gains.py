@@ -125,9 +125,9 @@ class FixedGains:
 class ScheduledGains:
     """Rules by which gains follow the cell, and the age of the measurements on which efforts rest.
 
-    An effort answers to a measurement that is as old as the delay, and is held for a control period: on
-    average its age is tau = delay + period / 2. Rate gains are bounded by a fraction of 1 / tau, and all
-    others by the rate gain k2.
+    An effort answers to a measurement that is as old as the delay, is held for a control period, and lags
+    behind its command: on average its age is tau = delay + period / 2 + lag. Rate gains are bounded by a
+    fraction of 1 / tau, and all others by the rate gain k2.
 
     Attributes:
         command_age: tau [s]; null for that of the scenario's ``deployment``, or for 12.5 ms if that is

@@ -109,13 +109,14 @@ class Deployment:
 
     @property
     def command_age(self) -> float:
-        """Mean age of the measurements on which an effort rests: their delay and half a period [s].
+        """Mean age of the measurements on which an effort rests: delay, half a period and lag [s].
 
         A delay is rounded up to whole periods, see ``whole_periods`` of the systems.
         """
+        lag = self.actuators.lag
         if self.period is None:
-            return 0.0
-        return (ceil(self.measurements.delay / self.period - 1e-9) + 0.5) * self.period
+            return lag
+        return (ceil(self.measurements.delay / self.period - 1e-9) + 0.5) * self.period + lag
 
     @property
     def period(self) -> float | None:

@@ -1,10 +1,19 @@
 """A gain set in a file of its own goes where a name goes."""
 
+from dataclasses import replace
+
 import pytest
 
 from coop_drake.errors import ScenarioError
 from coop_drake.laws import FixedGains, ScheduledGains
-from coop_drake.scenario import dump_gains, load_scenario, with_gains
+from coop_drake.scenario import (
+    ActuatorLimits,
+    Deployment,
+    Measurements,
+    dump_gains,
+    load_scenario,
+    with_gains,
+)
 from tests.support.scenarios import MODELS, write_scenario
 
 SCENARIO = MODELS / "base.scenario.yaml"
@@ -54,3 +63,19 @@ def test_a_file_that_is_wrong_is_refused_with_its_key(tmp_path, text, complaint)
 def test_neither_name_nor_file_is_refused():
     with pytest.raises(ScenarioError, match="scheduled, table_2, or a file"):
         with_gains(load_scenario(SCENARIO), "fast")
+
+
+@pytest.mark.parametrize(
+    ("deployment", "age"),
+    [
+        (Deployment(), None),
+        (Deployment(control_rate=1000.0), None),
+        (Deployment(control_rate=200.0, measurements=Measurements(delay=0.012)), 0.0175),
+        (Deployment(control_rate=100.0, actuators=ActuatorLimits(lag=0.01)), 0.015),
+        (Deployment(actuators=ActuatorLimits(lag=0.02)), 0.02),
+    ],
+)
+def test_rules_without_an_age_of_their_own_get_that_of_the_deployment(deployment, age):
+    """Delays are rounded up to whole periods; a team below 12.5 ms keeps the gains of an ideal one."""
+    scenario = replace(load_scenario(SCENARIO), deployment=deployment)
+    assert scenario.gain_sets == {"scheduled": ScheduledGains(command_age=age), "table_2": FixedGains()}
