@@ -12,7 +12,7 @@ import pytest
 import typer
 
 from coop_drake.answers import load_plan
-from coop_drake.cli.guard import reporting
+from coop_drake.cli.reporter import reporting
 from tests.support.scenarios import MODELS
 
 # A shell that starts tests in the background has its children ignore Ctrl-C.

@@ -151,7 +151,7 @@ def test_the_doctor_says_what_is_wrong_and_what_to_do(monkeypatch):
         raise ImportError("libdrake.so is not there")
 
     monkeypatch.setattr(doctor, "_CHECKS", (("Drake", broken, "install drake anew"),))
-    monkeypatch.setattr(doctor, "_PACKAGES", ("no-such-package",))
+    monkeypatch.setattr("importlib.metadata.requires", lambda name: ["no-such-package>=1"])
     result = invoke("doctor", "--json")
     assert result.exit_code == 1
     facts = json.loads(result.stdout)

@@ -24,12 +24,12 @@ from coop_drake.cli.compare import compare_command
 from coop_drake.cli.diagram import diagram_command
 from coop_drake.cli.doctor import doctor_command
 from coop_drake.cli.examples import epilog
-from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.floor_plan import floor_plan_command
 from coop_drake.cli.kernel_cache import keep_kernels_somewhere
 from coop_drake.cli.maps import maps_command
 from coop_drake.cli.new import new_command
 from coop_drake.cli.plan import plan_command
+from coop_drake.cli.reporter import ExitCode
 from coop_drake.cli.reproduce import reproduce_command
 from coop_drake.cli.robot import robot_command
 from coop_drake.cli.run import run_command

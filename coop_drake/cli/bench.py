@@ -8,8 +8,7 @@ import sys
 import typer
 
 from coop_drake.cli.clone import root_of_clone
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import reporting
+from coop_drake.cli.reporter import ExitCode, reporting
 
 
 def bench_command(context: typer.Context) -> None:

@@ -9,13 +9,10 @@ from coop_drake.errors import CoopDrakeError
 
 
 def root_of_clone(package: str) -> Path:
-    """Return the folder of the clone that coop_drake runs from.
-
-    Args:
-        package: The top-level package that is needed beside coop_drake, such as ``benchmarks``.
+    """Return the folder of the clone that coop_drake runs from, where a top-level package stands beside it.
 
     Raises:
-        CoopDrakeError: If it is not there, as in an installed package.
+        CoopDrakeError: The package is not there, as in an installed coop_drake.
     """
     root = Path(coop_drake.__file__).resolve().parent.parent
     if not (root / package / "__init__.py").is_file():

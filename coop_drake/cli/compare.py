@@ -8,15 +8,12 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import typer
 from rich.markup import escape
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import reporting
 from coop_drake.cli.maps import map_cells
-from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath
+from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath, out_folder
 from coop_drake.cli.plan import report_no_plan, search_and_write
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import simulation_facts
 from coop_drake.cli.task import Task, read_task
@@ -49,13 +46,7 @@ _ROWS = (
 def compare_command(
     scenario: ScenarioPath,
     out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            metavar="DIR",
-            file_okay=False,
-            help="Where plan and comparison go; out/<scenario>/compare by default.",
-        ),
+        Path | None, out_folder("Where plan and comparison go; out/<scenario>/compare by default.")
     ] = None,
     gains: GainsName = None,
     machine: Machine = False,

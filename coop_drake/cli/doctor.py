@@ -14,26 +14,13 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import reporting
 from coop_drake.cli.maps import map_cache
 from coop_drake.cli.options import Machine
+from coop_drake.cli.reporter import ExitCode, reporting
 
 _LEAST_MEMORY = 1.0
 """Memory that a run needs, with a reserve: it peaks at about 0.6 [GB]."""
 
-_PACKAGES = (
-    "drake",
-    "numpy",
-    "scipy",
-    "shapely",
-    "numba",
-    "manifold3d",
-    "matplotlib",
-    "meshcat",
-    "typer",
-    "rich",
-)
 _MARKS = {True: "[green]ok[/]", False: "[red]wrong[/]", None: "[yellow]note[/]"}
 
 
@@ -91,9 +78,8 @@ def _versions() -> Iterator[Finding]:
     yield Finding("coop-drake", version("coop-drake"))
     core = [line.partition(";")[0] for line in requires("coop-drake") or [] if "extra ==" not in line]
     least = {name: numbers.split(",")[0] for name, _, numbers in (line.partition(">=") for line in core)}
-    for name in _PACKAGES:
-        needed = least.get(name, "")
-        remedy = f"pip install '{name}>={needed}'" if needed else f"pip install {name}"
+    for name, needed in least.items():
+        remedy = f"pip install '{name}>={needed}'"
         try:
             found = version(name)
         except PackageNotFoundError:

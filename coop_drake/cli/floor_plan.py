@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.guard import reporting
-from coop_drake.cli.options import Machine, Quiet
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.options import Machine, Quiet, out_file
+from coop_drake.cli.reporter import Reporter, reporting
 
 if TYPE_CHECKING:
     from coop_drake.floor_plans import FloorPlan
@@ -53,12 +52,7 @@ def floor_plan_command(
     unknown_is_free: Annotated[
         bool, typer.Option("--unknown-is-free", help="Take a map's unknown cells for floor.")
     ] = False,
-    out: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "--out", metavar="FILE", dir_okay=False, help="*.yaml: workspace; *.png or *.svg: picture."
-        ),
-    ] = None,
+    out: Annotated[list[Path] | None, out_file("*.yaml: workspace; *.png or *.svg: picture.")] = None,
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:

@@ -9,10 +9,9 @@ from pathlib import Path
 from rich.markup import escape
 
 from coop_drake.answers import Found
-from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.maps import map_cells
 from coop_drake.cli.plan import report_no_plan, search_and_write
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import Task, read_task
 from coop_drake.tuning import (

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Machine
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.reporter import Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import map_facts
 from coop_drake.cli.task import Task
@@ -47,11 +46,7 @@ def map_cache() -> MapStore:
 def map_cells(task: Task, plan: Plan, reporter: Reporter, *, fresh: bool = False) -> tuple[HarmonicMap, ...]:
     """Map every cell of a plan, and note how long it took and how accurate the maps are.
 
-    Args:
-        task: The scenario.
-        plan: The plan.
-        reporter: Takes note.
-        fresh: Whether maps in the cache are ignored.
+    ``fresh`` maps are all solved; others are read from the cache where it has them.
 
     Raises:
         FieldError: A cell cannot be mapped; the message names it, and the tolerance that was asked for.

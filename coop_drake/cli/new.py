@@ -11,10 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import reporting
-from coop_drake.cli.options import Machine, Quiet
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.options import Machine, Quiet, out_folder
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 
 if TYPE_CHECKING:
     from coop_drake.scenario.starter import Starter
@@ -83,10 +81,7 @@ def new_command(
         tuple[float, float, float] | None,
         typer.Option("--goal", metavar="X Y THETA", help="Where it shall go, in metres and radians."),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option("--out", metavar="DIR", file_okay=False, help="The folder; NAME by default."),
-    ] = None,
+    out: Annotated[Path | None, out_folder("The folder; NAME by default.")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace files that are there already.")] = False,
     machine: Machine = False,
     quiet: Quiet = False,

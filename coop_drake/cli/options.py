@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -11,6 +11,16 @@ from coop_drake.shipped import scenario_file, shipped_scenarios
 
 _ENDING = ".scenario.yaml"
 _SHIPPED_GAINS = ("scheduled", "table_2")
+
+
+def out_folder(meaning: str) -> Any:
+    """The option ``--out`` for a folder."""
+    return typer.Option("--out", metavar="DIR", file_okay=False, help=meaning)
+
+
+def out_file(meaning: str) -> Any:
+    """The option ``--out`` for a file."""
+    return typer.Option("--out", metavar="FILE", dir_okay=False, help=meaning)
 
 
 def complete_scenario(incomplete: str) -> list[str]:
@@ -67,18 +77,8 @@ GainsName = Annotated[
         autocompletion=complete_gains,
     ),
 ]
-ResultsFolder = Annotated[
-    Path | None,
-    typer.Option(
-        "--out", metavar="DIR", file_okay=False, help="Where results go; out/<scenario> by default."
-    ),
-]
-PictureFolder = Annotated[
-    Path | None,
-    typer.Option(
-        "--out", metavar="DIR", file_okay=False, help="Where the picture goes; out/<scenario> by default."
-    ),
-]
+ResultsFolder = Annotated[Path | None, out_folder("Where results go; out/<scenario> by default.")]
+PictureFolder = Annotated[Path | None, out_folder("Where the picture goes; out/<scenario> by default.")]
 Machine = Annotated[
     bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
 ]

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import GainsName, Machine, Quiet, ResultsFolder, ScenarioPath
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import answer_of, planning_facts, summary_rows
 from coop_drake.cli.task import Task, read_task
@@ -28,19 +25,16 @@ def plan_command(
 ) -> None:
     """Plan only: write the plan, or the proof that there is none."""
     with reporting(machine=machine, quiet=quiet) as reporter:
-        reporter.code = _plan(read_task(scenario, gains), out, reporter)
+        from coop_drake.answers import Found
 
-
-def _plan(task: Task, out: Path | None, reporter: Reporter) -> ExitCode:
-    from coop_drake.answers import Found
-
-    folder = ResultFolder.of(task.name, out)
-    result = search_and_write(task, folder, reporter)
-    if not isinstance(result, Found):
-        return report_no_plan(task, result, folder, reporter)
-    reporter.table(task.name, summary_rows(reporter.facts))
-    reporter.say(f"The plan is in {escape(str(folder.plan))}")
-    return ExitCode.DONE
+        task = read_task(scenario, gains)
+        folder = ResultFolder.of(task.name, out)
+        result = search_and_write(task, folder, reporter)
+        if isinstance(result, Found):
+            reporter.table(task.name, summary_rows(reporter.facts))
+            reporter.say(f"The plan is in {escape(str(folder.plan))}")
+        else:
+            reporter.code = report_no_plan(task, result, folder, reporter)
 
 
 def report_no_plan(
@@ -53,7 +47,7 @@ def report_no_plan(
     if folder is not None and folder.certificate.exists():
         reporter.say(f"The proof is in {escape(str(folder.certificate))}")
     reporter.say(f"What blocks, and what would help: coop-drake why {escape(str(task.scenario.path))}")
-    return ExitCode.INFEASIBLE if answer == "infeasible" else ExitCode.UNDECIDED
+    return ExitCode.of(answer)
 
 
 def search_and_write(task: Task, folder: ResultFolder, reporter: Reporter) -> PlanningResult:
@@ -63,8 +57,7 @@ def search_and_write(task: Task, folder: ResultFolder, reporter: Reporter) -> Pl
     from coop_drake.files import write_atomically
 
     result = search(task, reporter)
-    folder.make()
-    folder.forget_plan()
+    folder.forget("plan")
     if isinstance(result, Found):
         save_plan(result.plan, folder.plan)
         write_atomically(folder.path / "table_1.md", table_1(result.plan).encode())

@@ -1,30 +1,57 @@
-"""Shows people what a command does, by rich, and gives machines its facts as one JSON object."""
+"""How a command reports: progress and tables for people, facts as JSON for machines, errors, exit codes."""
 
 from __future__ import annotations
 
 import json
 import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from enum import IntEnum
 from functools import partial
 from time import perf_counter, process_time
 from typing import Any
 
+import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as ProgressBars
 from rich.table import Table
 
-from coop_drake.cli.exit_code import ExitCode
 from coop_drake.cli.kernel_clock import kernel_clock
-
-ProgressCallback = Callable[[str, float], None]
+from coop_drake.errors import CoopDrakeError, FieldError, FloorPlanError, ScenarioError, StallError
+from coop_drake.progress import Progress
 
 _SMALLEST_STEP = 0.002
 """Fraction by which a bar moves on; smaller steps cannot be seen on a terminal [-]."""
 _NEARLY = 0.999
 """Where a bar stops until its stage returns: only then it is over [-]."""
+
+_EXTRAS = {
+    "collada": "robots",
+    "defusedxml": "robots",
+    "ezdxf": "floor-plans",
+    "svgelements": "floor-plans",
+    "trimesh": "robots",
+}
+"""The extra of coop-drake that installs a package which only some commands import."""
+
+
+class ExitCode(IntEnum):
+    """What a command tells the shell that called it."""
+
+    DONE = 0
+    FAILED_RUN = 1
+    BAD_INPUT = 2
+    INFEASIBLE = 3
+    UNDECIDED = 4
+    INTERRUPTED = 130
+
+    @classmethod
+    def of(cls, answer: str) -> ExitCode:
+        """Return the code for an answer: ``found``, ``infeasible``, or any other, which is undecided."""
+        return {"found": cls.DONE, "infeasible": cls.INFEASIBLE}.get(answer, cls.UNDECIDED)
 
 
 class Reporter:
@@ -51,7 +78,7 @@ class Reporter:
         self._moving = not quiet and stream.isatty() and not self._console.is_dumb_terminal
 
     @contextmanager
-    def stage(self, name: str, facts: str = "", *, cpu: bool = False) -> Iterator[ProgressCallback]:
+    def stage(self, name: str, facts: str = "", *, cpu: bool = False) -> Iterator[Progress]:
         """Show a progress bar while a stage runs, on a terminal only.
 
         Args:
@@ -80,7 +107,7 @@ class Reporter:
     def _add(self, fact: str, seconds: float) -> None:
         self.facts[fact] = round(self.facts.get(fact, 0.0) + seconds, 4)
 
-    def _compiling(self, advance: ProgressCallback, kernel: str) -> None:
+    def _compiling(self, advance: Progress, kernel: str) -> None:
         if self._moving:
             advance(f"compiling {kernel} (first run only)", 0.0)
         elif not self._compiles:
@@ -88,7 +115,7 @@ class Reporter:
         self._compiles = True
 
     @contextmanager
-    def _bar(self, name: str) -> Iterator[ProgressCallback]:
+    def _bar(self, name: str) -> Iterator[Progress]:
         columns = (
             TextColumn("{task.description:<11}"),
             BarColumn(),
@@ -96,7 +123,7 @@ class Reporter:
             TimeElapsedColumn(),
             TextColumn("[dim]{task.fields[doing]}"),
         )
-        with Progress(*columns, console=self._console, disable=not self._moving) as bars:
+        with ProgressBars(*columns, console=self._console, disable=not self._moving) as bars:
             bar = bars.add_task(name, total=1.0, doing="")
             drawn = ("", 0.0)
 
@@ -114,13 +141,7 @@ class Reporter:
         self._console.print(text, soft_wrap=True)
 
     def table(self, title: str, rows: Sequence[tuple[str, ...]], headings: Sequence[str] = ("",)) -> None:
-        """Show the closing table.
-
-        Args:
-            title: Above it.
-            rows: Label, then one value for each heading.
-            headings: Of the columns of values.
-        """
+        """Show a table: of every row the label, then one value for each of the headings."""
         table = Table(title=title, title_justify="left", show_header=any(headings))
         table.add_column(style="bold")
         for heading in headings:
@@ -148,3 +169,68 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+@contextmanager
+def reporting(*, machine: bool = False, quiet: bool = False) -> Iterator[Reporter]:
+    """Run the body of a command, which sets ``reporter.code``, and leave with that exit code.
+
+    With ``machine`` standard output is for one JSON object, with ``quiet`` only errors are shown.
+
+    Raises:
+        typer.Exit: Always, with the exit code, unless the body raises an error that is a bug.
+    """
+    reporter = Reporter(machine=machine, quiet=quiet)
+    try:
+        try:
+            yield reporter
+        except BaseException as error:
+            if not _explain(error, reporter):
+                raise
+    finally:
+        reporter.close()
+    raise typer.Exit(int(reporter.code))
+
+
+def _explain(error: BaseException, reporter: Reporter) -> bool:
+    """Report an error and its exit code; False for a bug, and for what is no error of the body."""
+    details: dict[str, object] = {}
+    text, code = str(error), ExitCode.BAD_INPUT
+    if _is_interrupt(error):
+        text, code = "interrupted; files already written are whole", ExitCode.INTERRUPTED
+    elif isinstance(error, ScenarioError):
+        details = {"file": error.file, "key": error.key, "value": error.shown, "allowed": error.allowed}
+    elif isinstance(error, FloorPlanError):
+        details = {"file": error.file, "place": error.place, "remedy": error.remedy, "finding": error.finding}
+    elif isinstance(error, FieldError | StallError):
+        code = ExitCode.FAILED_RUN
+    elif isinstance(error, ModuleNotFoundError) and error.name in _EXTRAS:
+        extra = _EXTRAS[error.name]
+        text = f"the package {error.name} is not installed; expected: pip install 'coop-drake[{extra}]'"
+    elif isinstance(error, OSError):
+        text = _system_error(error)
+    elif not isinstance(error, CoopDrakeError):
+        if isinstance(error, Exception):
+            reporter.complain(f"{type(error).__name__}: {error}")
+        return False
+    reporter.complain(text, **details)
+    reporter.code = code
+    return True
+
+
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Whether Ctrl-C caused an error: compiled code and imports that it ends raise errors of their own."""
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def _system_error(error: OSError) -> str:
+    """What the operating system refused, as a sentence that names the file and what would help."""
+    if error.filename is None or error.strerror is None:
+        return str(error)
+    if isinstance(error, FileExistsError | NotADirectoryError):
+        return f"{error.filename}: a file stands where a folder is needed; expected another place, with --out"
+    return f"{error.filename}: {error.strerror.lower()}; expected a place that can be read and written"

@@ -9,10 +9,8 @@ import typer
 from rich.markup import escape
 
 from coop_drake.cli.clone import root_of_clone
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import reporting
-from coop_drake.cli.options import Machine, Quiet
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.options import Machine, Quiet, out_folder
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 
 
 def reproduce_command(
@@ -22,9 +20,7 @@ def reproduce_command(
             metavar="[SCENARIO]", help="A scenario with the paper's team; the shipped base by default."
         ),
     ] = None,
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", file_okay=False, help="Where the report goes.")
-    ] = Path("out/reproduction"),
+    out: Annotated[Path, out_folder("Where the report goes.")] = Path("out/reproduction"),
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:

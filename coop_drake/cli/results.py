@@ -5,9 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-_PLANNING = ("plan.json", "certificate.json", "table_1.md")
-_DIAGNOSIS = ("why.png", "why.svg")
 _SIMULATION = ("maps.json", "log.npz", "transport.html", "fig[01][0-9]_*.png", "summary.png")
+_FILES = {
+    "plan": ("plan.json", "certificate.json", "table_1.md", *_SIMULATION),
+    "simulation": _SIMULATION,
+    "diagnosis": ("why.png", "why.svg"),
+    "search": ("think_[0-9][0-9][0-9][0-9].png", "think.png", "think.gif", "think.html"),
+}
+"""Files of a plan and all that came of it, of a simulation, of a diagnosis, and of a recorded search."""
 
 
 @dataclass(frozen=True)
@@ -40,24 +45,8 @@ class ResultFolder:
         """The Meshcat recording."""
         return self.path / "transport.html"
 
-    def make(self) -> None:
-        """Make the folder."""
-        self.path.mkdir(parents=True, exist_ok=True)
-
-    def forget_plan(self) -> None:
-        """Remove an older plan and all that came of it, so that the folder never mixes two runs."""
-        self._remove(_PLANNING)
-        self.forget_simulation()
-
-    def forget_simulation(self) -> None:
-        """Remove an older simulation's log, certificates of maps, recording and figures."""
-        self._remove(_SIMULATION)
-
-    def forget_diagnosis(self) -> None:
-        """Remove an older diagnosis."""
-        self._remove(_DIAGNOSIS)
-
-    def _remove(self, patterns: tuple[str, ...]) -> None:
-        for pattern in patterns:
+    def forget(self, result: str) -> None:
+        """Remove the files of an older result, so that the folder never mixes two: a key of ``_FILES``."""
+        for pattern in _FILES[result]:
             for path in self.path.glob(pattern):
                 path.unlink()

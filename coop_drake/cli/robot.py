@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import reporting
-from coop_drake.cli.options import Machine, Quiet
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.options import Machine, Quiet, out_folder
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 
 if TYPE_CHECKING:
     from coop_drake.plant.joint_survey import SurveyedJoint
@@ -19,9 +17,7 @@ if TYPE_CHECKING:
 
 def robot_command(
     model: Annotated[Path, typer.Argument(metavar="MODEL", help="A *.urdf or *.sdf file; run xacro before.")],
-    out: Annotated[
-        Path, typer.Option("--out", metavar="DIR", file_okay=False, help="A folder for model and meshes.")
-    ],
+    out: Annotated[Path, out_folder("A folder for model and meshes.")],
     package: Annotated[
         list[str] | None,
         typer.Option("--package", metavar="NAME=DIR", help="Where package://NAME leads; may be repeated."),

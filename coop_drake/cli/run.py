@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import reporting
 from coop_drake.cli.maps import map_cells, write_certificates
 from coop_drake.cli.options import (
     BlocksName,
@@ -22,7 +20,7 @@ from coop_drake.cli.options import (
     ScenarioPath,
 )
 from coop_drake.cli.plan import report_no_plan, search_and_write
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import simulation_facts, summary_rows
 from coop_drake.cli.task import Task, read_task
@@ -56,8 +54,9 @@ def run_command(
         folder = ResultFolder.of(task.name, out)
         result = search_and_write(task, folder, reporter)
         if isinstance(result, Found):
-            options: dict[str, Any] = {"fresh_maps": fresh_maps, "live": live, "blocks": blocks}
-            reporter.code = carry_out(task, result.plan, folder, reporter, **options)
+            reporter.code = carry_out(
+                task, result.plan, folder, reporter, fresh_maps=fresh_maps, live=live, blocks=blocks
+            )
         else:
             reporter.code = report_no_plan(task, result, folder, reporter)
 
@@ -68,26 +67,25 @@ def carry_out(
     folder: ResultFolder,
     reporter: Reporter,
     *,
-    fresh_maps: bool = False,
-    live: bool = False,
-    blocks: Blocks = "named",
+    fresh_maps: bool,
+    live: bool,
+    blocks: Blocks,
 ) -> ExitCode:
     """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run.
 
-    Args:
-        task: The scenario.
-        plan: A plan for it.
-        folder: Where log, certificates of maps, recording and figures go.
-        reporter: Takes note of the facts and shows them.
-        fresh_maps: Whether all maps are solved anew.
-        live: Whether the run is shown in a browser.
-        blocks: Blocks of every robot, or one block for the team.
+    Log, certificates of maps, recording and figures go to the folder.
     """
     maps = map_cells(task, plan, reporter, fresh=fresh_maps)
     observer = _open_live_view(task, plan, reporter) if live else None
     with FigureProcesses() as figures:  # They import matplotlib while this process simulates.
         log = _simulate(task, plan, maps, folder, reporter, blocks, observer)
-        _draw(task, plan, log, folder, reporter, figures)
+        from coop_drake.viz import write_recording  # after the run, which needs no Meshcat
+
+        figures.draw(task.problem.workspace, task.problem.tree, plan, log, folder.path)
+        with reporter.stage("recording", "recording") as progress:  # here, while other processes draw
+            write_recording(task.scenario, plan, log, folder.recording, progress=progress)
+        with reporter.stage("drawing", "drawing"):
+            figures.wait()
     reporter.table(task.name, summary_rows(reporter.facts))
     reporter.say(
         f"Results are in {escape(str(folder.path))}; open {escape(str(folder.recording))} in a browser"
@@ -115,29 +113,10 @@ def _simulate(
     with reporter.stage("simulating", "simulation") as progress:
         log = simulate(task.scenario, plan, maps, blocks=blocks, progress=progress, observer=observer)
     reporter.facts.update(simulation_facts(plan, log), peak_memory_mb=peak_memory_mb())
-    folder.make()
-    folder.forget_simulation()
+    folder.forget("simulation")
     write_certificates(task, maps, folder)
     log.save(folder.path / "log.npz")
     return log
-
-
-def _draw(
-    task: Task,
-    plan: Plan,
-    log: SimulationLog,
-    folder: ResultFolder,
-    reporter: Reporter,
-    figures: FigureProcesses,
-) -> None:
-    """Write the recording here while other processes draw the figures."""
-    from coop_drake.viz import write_recording
-
-    figures.draw(task.problem.workspace, task.problem.tree, plan, log, folder.path)
-    with reporter.stage("recording", "recording") as progress:
-        write_recording(task.scenario, plan, log, folder.recording, progress=progress)
-    with reporter.stage("drawing", "drawing"):
-        figures.wait()
 
 
 def _open_live_view(task: Task, plan: Plan, reporter: Reporter) -> Callable[..., None]:

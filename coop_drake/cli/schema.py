@@ -9,17 +9,12 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.guard import reporting
-from coop_drake.cli.options import Quiet
+from coop_drake.cli.options import Quiet, out_file
+from coop_drake.cli.reporter import reporting
 
 
 def schema_command(
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", metavar="FILE", dir_okay=False, help="Where to write; standard output by default."
-        ),
-    ] = None,
+    out: Annotated[Path | None, out_file("Where to write; standard output by default.")] = None,
     quiet: Quiet = False,
 ) -> None:
     """Write the JSON Schema of scenario files, so that editors complete and check them."""

@@ -8,12 +8,11 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.guard import reporting
-from coop_drake.cli.options import Quiet, ScenarioPath
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.options import Quiet, ScenarioPath, out_file
+from coop_drake.cli.reporter import reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.simulate import read_plan
-from coop_drake.cli.task import Task, read_task
+from coop_drake.cli.task import read_task
 
 _PICTURES = (".png", ".svg")
 
@@ -23,33 +22,22 @@ def show_command(
     plan: Annotated[
         Path | None, typer.Option("--plan", metavar="FILE", help="A plan for it; its cells are drawn too.")
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            metavar="FILE",
-            dir_okay=False,
-            help="*.png or *.svg; show.png in the results by default.",
-        ),
-    ] = None,
+    out: Annotated[Path | None, out_file("*.png or *.svg; show.png in the results by default.")] = None,
     quiet: Quiet = False,
 ) -> None:
     """Draw the floor, the team at start and goal, and the cells of a plan."""
     if out is not None and out.suffix.lower() not in _PICTURES:
         raise typer.BadParameter(f"{out} ends neither in .png nor in .svg.")
     with reporting(quiet=quiet) as reporter:
-        _show(read_task(scenario), plan, out, reporter)
+        from coop_drake.drawing import house_style, save_figure
+        from coop_drake.viz.floor_figures import overview_figure
 
-
-def _show(task: Task, plan: Path | None, out: Path | None, reporter: Reporter) -> None:
-    from coop_drake.drawing import house_style, save_figure
-    from coop_drake.viz.floor_figures import overview_figure
-
-    found = None if plan is None else read_plan(task, plan, reporter)
-    caption = f"{task.name}: start and goal"
-    if found is not None:
-        caption += f", and the plan's {len(found.cells)} cells for the object's position"
-    path = out or ResultFolder.of(task.name, None).path / "show.png"
-    with house_style():
-        save_figure(overview_figure(task.problem, found, f"{caption}."), path)
-    reporter.say(f"The picture is {escape(str(path))}")
+        task = read_task(scenario)
+        found = None if plan is None else read_plan(task, plan, reporter)
+        caption = f"{task.name}: start and goal"
+        if found is not None:
+            caption += f", and the plan's {len(found.cells)} cells for the object's position"
+        path = out or ResultFolder.of(task.name, None).path / "show.png"
+        with house_style():
+            save_figure(overview_figure(task.problem, found, f"{caption}."), path)
+        reporter.say(f"The picture is {escape(str(path))}")

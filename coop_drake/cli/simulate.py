@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import BlocksName, FreshMaps, Live, Machine, Quiet, ResultsFolder, ScenarioPath
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.reporter import Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.run import carry_out
 from coop_drake.cli.summary import plan_facts
@@ -49,13 +48,7 @@ def simulate_command(
 
 
 def read_plan(task: Task, path: Path, reporter: Reporter, *, new_gains: bool = False) -> Plan:
-    """Read a plan that was made for this scenario.
-
-    Args:
-        task: The scenario.
-        path: The plan file.
-        reporter: Takes note of the plan's size.
-        new_gains: Whether the scenario's selected gains replace the plan's own.
+    """Read a plan that was made for this scenario; ``new_gains``: give it the scenario's selected gains.
 
     Raises:
         PlanError: The file is no plan, or belongs to another scenario.

@@ -19,7 +19,7 @@ _ROWS: tuple[tuple[str, str, str], ...] = (
     ("cells", "cells", "{}"),
     ("slices made", "slices", "{}"),
     ("margin kept", "margin_m", "{:.3f} m"),
-    ("narrowest neck", "narrowest_neck_m", "{:.3f} m"),
+    ("narrowest passage", "narrowest_neck_m", "{:.3f} m"),
     ("gains", "gains", "{}"),
     ("estimated transport", "estimated_seconds", "{:.1f} s"),
     ("first plan certified after", "first_plan_cpu_seconds", "{:.2f} s"),

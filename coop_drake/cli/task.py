@@ -31,11 +31,7 @@ class Task:
 
 
 def read_task(path: Path, gains: str | None = None) -> Task:
-    """Read a scenario and its models.
-
-    Args:
-        path: The scenario file.
-        gains: Name of the gain set to use, or a file that holds one; None for the one the scenario selects.
+    """Read a scenario and its models; ``gains`` as in `coop_drake.scenario.with_gains`.
 
     Raises:
         ScenarioError: The file, a model or the gain set is wrong.

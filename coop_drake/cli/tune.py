@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from coop_drake.cli.guard import reporting
-from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath
+from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath, out_folder
+from coop_drake.cli.reporter import reporting
 
 
 def tune_command(
@@ -43,12 +43,7 @@ def tune_command(
     workers: Annotated[
         int | None, typer.Option("--workers", metavar="N", min=1, help="Processes; one a core by default.")
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out", metavar="DIR", file_okay=False, help="Where results go; out/<scenario>/tuned by default."
-        ),
-    ] = None,
+    out: Annotated[Path | None, out_folder("Where results go; out/<scenario>/tuned by default.")] = None,
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Machine, Quiet, ScenarioPath
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.task import Task, read_task
 from coop_drake.errors import RefusalError
 

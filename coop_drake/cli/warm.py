@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
-from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Quiet, ScenarioPath
-from coop_drake.cli.reporter import ProgressCallback
+from coop_drake.cli.reporter import reporting
 from coop_drake.cli.task import Task, read_task
+from coop_drake.progress import Progress
 
 _SIDE_BY_SIDE = ("coop_drake.planning.warm_up", "coop_drake.fields.warm_up")
 """Modules that compile kernels when they are run; they share none."""
@@ -29,7 +29,7 @@ def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
             _compile(task, progress)
 
 
-def _compile(task: Task, progress: ProgressCallback) -> None:
+def _compile(task: Task, progress: Progress) -> None:
     from coop_drake.answers import Found
     from coop_drake.planning.planner import plan
     from coop_drake.simulation import build_maps, simulate

@@ -9,10 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 from rich.markup import escape
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Machine, Quiet, ScenarioPath
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import read_task
 
@@ -21,8 +19,6 @@ if TYPE_CHECKING:
 
 _FEWEST, _MOST = 2, 500
 """Numbers of keyframes that make a moving picture and still fit into a page that browsers open [-]."""
-_OURS = ("think_[0-9][0-9][0-9][0-9].png", "think.png", "think.gif", "think.html")
-"""Files of an older recording, which are removed before a new one is written."""
 
 
 def _checked_margin(value: float | None) -> float | None:
@@ -73,13 +69,13 @@ def watch_command(
     """Watch the planner search: pictures, a moving picture and a page to turn in space."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         task = read_task(scenario)
-        directory = ResultFolder.of(task.name, output, "think").path
-        reporter.code = _watch(task.problem, directory, frames, strategy, margin, reporter)
+        folder = ResultFolder.of(task.name, output, "think")
+        reporter.code = _watch(task.problem, folder, frames, strategy, margin, reporter)
 
 
 def _watch(
     problem: PlanningProblem,
-    directory: Path,
+    folder: ResultFolder,
     frames: int,
     strategy: str,
     margin: float | None,
@@ -100,28 +96,15 @@ def _watch(
         events=len(recording.events),
         frames=len(shown),
     )
-    _forget(directory)
+    folder.forget("search")
     with reporter.stage("drawing") as progress:
-        written = watching.write_pictures(recording, shown, directory, progress)
+        written = watching.write_pictures(recording, shown, folder.path, progress)
     with reporter.stage("scene") as progress:
-        written.append(watching.write_scene(recording, shown, directory / "think.html", progress))
+        written.append(watching.write_scene(recording, shown, folder.path / "think.html", progress))
     reporter.facts["bytes"] = {path.name: path.stat().st_size for path in written}
     reporter.say(f"[bold]{escape(shown[-1].headline)}[/]")
-    reporter.say(
-        f"{len(shown)} pictures are in {escape(str(directory))}; open {escape(str(written[-1]))} in a browser"
-    )
-    return _code(recording.verdict.value, recording.margin)
-
-
-def _forget(directory: Path) -> None:
-    """Remove an older recording, so that the folder never mixes two."""
-    for pattern in _OURS:
-        for path in directory.glob(pattern):
-            path.unlink()
-
-
-def _code(verdict: str, margin: float) -> ExitCode:
-    """Return the exit code: that no path keeps a margin proves nothing about the scenario itself."""
-    if verdict == "found":
-        return ExitCode.DONE
-    return ExitCode.INFEASIBLE if verdict == "infeasible" and margin == 0.0 else ExitCode.UNDECIDED
+    place, page = escape(str(folder.path)), escape(str(written[-1]))
+    reporter.say(f"{len(shown)} pictures are in {place}; open {page} in a browser")
+    if recording.verdict.value == "infeasible" and recording.margin > 0.0:
+        return ExitCode.UNDECIDED  # That no path keeps a margin proves nothing about the scenario itself.
+    return ExitCode.of(recording.verdict.value)

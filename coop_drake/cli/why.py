@@ -6,18 +6,10 @@ from time import process_time
 
 from rich.markup import escape
 
-from coop_drake.cli.exit_code import ExitCode
-from coop_drake.cli.guard import reporting
 from coop_drake.cli.options import Machine, PictureFolder, Quiet, ScenarioPath
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.reporter import ExitCode, reporting
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.task import Task, read_task
-
-_EXIT_CODES = {
-    "found": ExitCode.DONE,
-    "infeasible": ExitCode.INFEASIBLE,
-    "undecided": ExitCode.UNDECIDED,
-}
+from coop_drake.cli.task import read_task
 
 
 def why_command(
@@ -28,28 +20,23 @@ def why_command(
 ) -> None:
     """Say why there is no plan: what blocks, where, how much is missing, and what would help."""
     with reporting(machine=machine, quiet=quiet) as reporter:
+        from coop_drake.diagnosis import diagnose, diagnosis_figure, facts_of, rows_of, sentences_of
+        from coop_drake.drawing import house_style, save_figure
+
         task = read_task(scenario)
-        reporter.code = _explain(task, ResultFolder.of(task.name, out), reporter)
-
-
-def _explain(task: Task, folder: ResultFolder, reporter: Reporter) -> ExitCode:
-    """Diagnose, show a table and sentences, and draw the picture if there is anything to see."""
-    from coop_drake.diagnosis import diagnose, diagnosis_figure, facts_of, rows_of, sentences_of
-    from coop_drake.drawing import house_style, save_figure
-
-    before = process_time()
-    with reporter.stage("diagnosing") as progress:
-        diagnosis = diagnose(task.problem, progress)
-    reporter.facts.update(facts_of(diagnosis), diagnosis_cpu_seconds=round(process_time() - before, 4))
-    folder.forget_diagnosis()
-    with house_style():
-        figure = diagnosis_figure(task.problem, diagnosis)
+        folder, before = ResultFolder.of(task.name, out), process_time()
+        with reporter.stage("diagnosing") as progress:
+            diagnosis = diagnose(task.problem, progress)
+        reporter.facts.update(facts_of(diagnosis), diagnosis_cpu_seconds=round(process_time() - before, 4))
+        folder.forget("diagnosis")
+        with house_style():
+            figure = diagnosis_figure(task.problem, diagnosis)
+            if figure is not None:
+                for name in ("why.png", "why.svg"):
+                    save_figure(figure, folder.path / name)
+        reporter.table(task.name, rows_of(diagnosis))
+        for sentence in sentences_of(diagnosis):
+            reporter.say(escape(sentence))
         if figure is not None:
-            for name in ("why.png", "why.svg"):
-                save_figure(figure, folder.path / name)
-    reporter.table(task.name, rows_of(diagnosis))
-    for sentence in sentences_of(diagnosis):
-        reporter.say(escape(sentence))
-    if figure is not None:
-        reporter.say(f"The picture is {escape(str(folder.path / 'why.png'))}")
-    return _EXIT_CODES[diagnosis.answer.value]
+            reporter.say(f"The picture is {escape(str(folder.path / 'why.png'))}")
+        reporter.code = ExitCode.of(diagnosis.answer.value)
