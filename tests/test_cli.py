@@ -92,7 +92,7 @@ def test_people_see_bars_and_a_table_and_quiet_shows_nothing(room, tmp_path):
     shown = invoke("plan", room, "--out", tmp_path)
     assert shown.exit_code == 0
     assert "planning" in shown.stdout
-    assert "narrowest neck" in shown.stdout
+    assert "narrowest passage" in shown.stdout
     assert invoke("plan", room, "--out", tmp_path, "--quiet").output == ""
 
 

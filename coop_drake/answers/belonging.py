@@ -17,12 +17,7 @@ _SAME_GOAL = 1e-9
 
 
 def check_plan_belongs(plan: Plan, problem: PlanningProblem, path: Path) -> None:
-    """Refuse a plan that was made for another problem.
-
-    Args:
-        plan: The plan.
-        problem: The problem that it should answer.
-        path: The plan's file, for the message.
+    """Refuse a plan, read from the file at ``path``, that was made for another problem.
 
     Raises:
         PlanError: Names the first key in which they differ, its value, and the scenario's.

@@ -105,12 +105,9 @@ def write_document(path: Path | str, content: Mapping[str, Any], rows: Collectio
     """Write a document so that people and tools that compare texts can follow it; whole or not at all.
 
     Args:
-        path: Where to write it.
+        path: Where to write it; it is returned.
         content: Plain data; the entry ``digest`` is added.
         rows: Keys of the entries that are lists, with one line for every item; they stand last.
-
-    Returns:
-        The path written.
     """
     entries = {key: _line(value) for key, value in content.items() if key not in rows}
     entries["digest"] = _line(content_digest(content))

@@ -19,7 +19,6 @@ class MixedCell:
         upper: Upper ends, shape (1 + m,).
         polygon: Positions p_WL outside which nothing is free [m].
         width_fraction: Width of its widest interval divided by the range of that axis [-].
-        middle_is_free: Whether its middle configuration is free.
         finest: Whether every interval is below the resolution, so that it will not be halved any more.
     """
 
@@ -28,5 +27,4 @@ class MixedCell:
     upper: FloatArray
     polygon: Polygon
     width_fraction: float
-    middle_is_free: bool
     finest: bool

@@ -15,12 +15,8 @@ ROUNDING = 1e-9
 def check_plan(plan: Plan, file: str) -> None:
     """Refuse a plan that could not be executed safely.
 
-    Args:
-        plan: The plan.
-        file: Where it comes from, for the message.
-
     Raises:
-        PlanError: Names the file, the key and what is allowed.
+        PlanError: Names the file that it comes from, the key and what is allowed.
     """
     for k, cell in enumerate(plan.cells):
         _require_inside(cell.core, cell.safe, f"{file}: cells[{k}].core", f"cells[{k}].safe")

@@ -21,14 +21,7 @@ VERSION = 2
 def save_plan(plan: Plan, path: Path | str) -> Path:
     """Write a plan so that ``load_plan`` gives the same plan back, and saving that the same bytes.
 
-    The file is written whole or not at all.
-
-    Args:
-        plan: The plan.
-        path: Where to write it.
-
-    Returns:
-        The path written.
+    The file is written whole or not at all; its path is returned.
     """
     return write_document(path, _content(plan), rows=("cells", "transitions"))
 
@@ -43,10 +36,7 @@ def _content(plan: Plan) -> dict[str, Any]:
 
 
 def load_plan(path: Path | str) -> Plan:
-    """Read a plan that can be executed.
-
-    Args:
-        path: A file that ``save_plan`` wrote.
+    """Read a plan that can be executed from a file that ``save_plan`` wrote.
 
     Raises:
         PlanError: If it is not such a plan: names the file, the key, the value and what is allowed there.

@@ -39,34 +39,10 @@ class SavedProof:
 
 
 def save_proof(proof: InfeasibilityProof, problem: PlanningProblem, path: Path | str) -> Path:
-    """Write a proof of infeasibility; the file is written whole or not at all.
-
-    Args:
-        proof: The proof.
-        problem: The planning problem that has no solution.
-        path: Where to write it.
-
-    Returns:
-        The path written.
-    """
+    """Write a proof that a planning problem has no solution, whole or not at all; return the path."""
     kind = next(name for name, kind in KINDS.items() if isinstance(proof, kind))
     own = {"format": FORMAT, "version": VERSION, "problem": problem_digest(problem), "kind": kind}
     return write_document(path, own | to_plain(proof, KINDS[kind]), rows=("cells", "slices"))
-
-
-def load_proof(path: Path | str) -> SavedProof:
-    """Read a proof of infeasibility.
-
-    Args:
-        path: A file that ``save_proof`` wrote.
-
-    Raises:
-        PlanError: If the file is no such proof: names the file, the key, the value and what is allowed.
-    """
-    document = Document.load(path, "a proof of infeasibility")
-    saved = read_proof(document)
-    document.check_digest()
-    return saved
 
 
 def read_proof(document: Document) -> SavedProof:

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
+from coop_drake.geometry.parts import corners_of
 from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import Codec, DataError, Number, convert, convert_class
 
@@ -56,8 +57,7 @@ def _read_region(value: object, key: str) -> Polygon:
 
 
 def _write_region(polygon: Polygon) -> object:
-    rings = (polygon.exterior, *polygon.interiors)
-    outer, *holes = (shapely.get_coordinates(ring)[:-1].tolist() for ring in rings)
+    outer, *holes = (corners.tolist() for corners in corners_of(polygon))
     return {"outer": outer, "holes": holes}
 
 

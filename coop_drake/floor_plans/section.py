@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-import shapely
 from shapely import Polygon
+
+from coop_drake.geometry.parts import corners_of
+from coop_drake.tree.pose import FloatArray
 
 _DECIMALS = 9
 """Decimals of a metre that are written."""
@@ -18,7 +20,7 @@ def workspace_section(floor: Polygon, comment: str) -> str:
         floor: The floor [m].
         comment: One line of text to write above the section.
     """
-    outer, *holes = (_ring(ring) for ring in (floor.exterior, *floor.interiors))
+    outer, *holes = (_ring(corners) for corners in corners_of(floor))
     lines = [f"# {' '.join(comment.split())}", "workspace:", "  outer: [", *_indented(outer, 4), "  ]"]
     if holes:
         lines.append("  holes:")
@@ -27,9 +29,8 @@ def workspace_section(floor: Polygon, comment: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _ring(ring: shapely.LinearRing) -> list[str]:
-    corners = shapely.get_coordinates(ring)[:-1].round(_DECIMALS) + 0.0
-    return [f"[{_number(x)}, {_number(y)}]," for x, y in corners.tolist()]
+def _ring(corners: FloatArray) -> list[str]:
+    return [f"[{_number(x)}, {_number(y)}]," for x, y in (corners.round(_DECIMALS) + 0.0).tolist()]
 
 
 def _number(value: float) -> str:

@@ -1,4 +1,4 @@
-"""The polygons among the parts of a shape."""
+"""The polygons among the parts of a shape, and the corners of their rings."""
 
 from __future__ import annotations
 
@@ -6,11 +6,18 @@ import shapely
 from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.tree.pose import FloatArray
+
 
 def parts_of(shape: BaseGeometry) -> list[Polygon]:
     """The polygons that a shape consists of; lines, points and empty polygons are dropped."""
     parts = shapely.get_parts(shape)
     return [part for part in parts if isinstance(part, Polygon) and not part.is_empty]
+
+
+def corners_of(polygon: Polygon) -> list[FloatArray]:
+    """The corners of every ring as it stands, the outer ring first, none repeated, shape (n, 2) each [m]."""
+    return [shapely.get_coordinates(ring)[:-1] for ring in (polygon.exterior, *polygon.interiors)]
 
 
 def component_at(shape: BaseGeometry, point: Point) -> Polygon:

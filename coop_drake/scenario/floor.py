@@ -3,9 +3,8 @@
 import dataclasses
 from pathlib import Path
 
-import shapely
-
 from coop_drake.errors import ScenarioError
+from coop_drake.geometry.parts import corners_of
 from coop_drake.scenario.model import Scenario, Workspace
 from coop_drake.scenario.packages import package_map, resolve
 
@@ -35,10 +34,7 @@ def with_floor(scenario: Scenario) -> Scenario:
     names = [field.name for field in dataclasses.fields(FloorPlanSettings)]
     settings = FloorPlanSettings(**{name: getattr(workspace, name) for name in names})
     floor = read_floor_plan(path, settings, Inside(start.x, start.y, "start.object")).polygon
-    outer, *holes = (
-        tuple((float(x), float(y)) for x, y in shapely.get_coordinates(ring)[:-1])
-        for ring in (floor.exterior, *floor.interiors)
-    )
+    outer, *holes = (tuple((x, y) for x, y in corners.tolist()) for corners in corners_of(floor))
     return dataclasses.replace(scenario, workspace=Workspace(outer, tuple(holes)))
 
 

@@ -6,10 +6,12 @@ import dataclasses
 from pathlib import Path
 
 from coop_drake.errors import ScenarioError
+from coop_drake.scenario.document import write
 from coop_drake.scenario.floor import with_floor
 from coop_drake.scenario.model import Scenario
-from coop_drake.scenario.reading import read_file, write_text
+from coop_drake.scenario.reading import read_file
 from coop_drake.shipped import scenario_file, shipped_scenarios
+from coop_drake.typed_data import to_plain
 
 
 def load_scenario(path: Path | str) -> Scenario:
@@ -56,4 +58,4 @@ def read_scenario(path: Path | str) -> Scenario:
 
 def dump_scenario(scenario: Scenario) -> str:
     """Write a scenario as YAML text that :func:`load_scenario` reads back to the same values."""
-    return write_text(scenario)
+    return write(to_plain(scenario, Scenario))

@@ -13,13 +13,10 @@ if TYPE_CHECKING:
 
 
 def package_map(scenario_path: Path) -> PackageMap:
-    """Collect the packages that a scenario may name in ``package://`` addresses.
+    """Collect the packages that a scenario file may name in ``package://`` addresses.
 
-    A name is looked up in every ``package.xml`` beside the scenario file or in a folder above it, the nearest
-    first, then in coop_drake's own models, then in Drake's.
-
-    Args:
-        scenario_path: The scenario file.
+    A name is looked up in every ``package.xml`` beside the file or in a folder above it, the nearest first,
+    then in coop_drake's own models, then in Drake's.
 
     Raises:
         ScenarioError: A package.xml does not name its package.

@@ -1,21 +1,17 @@
-"""Reads one YAML file into one frozen dataclass, and writes one."""
+"""Reads one YAML file into one frozen dataclass."""
 
 from pathlib import Path
 from typing import TypeVar
 
 from coop_drake.errors import ScenarioError
-from coop_drake.scenario.document import parse, write
-from coop_drake.typed_data import DataError, convert_class, to_plain
+from coop_drake.scenario.document import parse
+from coop_drake.typed_data import DataError, convert_class
 
 T = TypeVar("T")
 
 
 def read_file(cls: type[T], path: Path) -> T:
-    """Read a file.
-
-    Args:
-        cls: A frozen dataclass of the types that :mod:`coop_drake.typed_data` knows.
-        path: The file.
+    """Read a file into a frozen dataclass of the types that :mod:`coop_drake.typed_data` knows.
 
     Raises:
         ScenarioError: The file cannot be read, is no YAML, or departs from the dataclass; with key and value.
@@ -26,8 +22,3 @@ def read_file(cls: type[T], path: Path) -> T:
         raise ScenarioError(str(path), error.key or "the file", error.value, error.allowed) from error
     except (OSError, UnicodeDecodeError) as error:
         raise ScenarioError(str(path), "the file", str(error), "a readable file") from error
-
-
-def write_text(value: object) -> str:
-    """Write a frozen dataclass as YAML text that :func:`read_file` reads back to the same values."""
-    return write(to_plain(value, type(value)))

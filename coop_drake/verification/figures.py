@@ -64,7 +64,10 @@ def check_figures(plan: Plan, gain_sets: Mapping[str, GainSet]) -> tuple[Check, 
     necks = [transition.neck for transition in plan.transitions]
     return (
         Check(
-            "a path to every target keeps the stated clearance", len(necks), min(necks), "m, narrowest neck"
+            "a path to every target keeps the stated clearance",
+            len(necks),
+            min(necks),
+            "m, narrowest passage",
         ),
         Check("inradii are distances, lengths no shorter than straight lines", 2 * len(necks)),
         Check("gains are those that the gain set gives for the cells", len(necks)),

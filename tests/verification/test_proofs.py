@@ -11,8 +11,9 @@ import shapely
 from shapely import Polygon
 
 from coop_drake.answers.digest import problem_digest
+from coop_drake.answers.document import Document
 from coop_drake.answers.proof import AngleBox, BlockedGoalProof, DiscProof, SlicesProof
-from coop_drake.answers.proof_file import load_proof, save_proof
+from coop_drake.answers.proof_file import read_proof, save_proof
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning import find_channel
 from coop_drake.planning.proofs.proof_making import slices_proof
@@ -65,7 +66,7 @@ def refusal(document, tmp_path, problem, *, signed=True):
 def test_proofs_are_stated_saved_and_verified(proofs, documents, tmp_path, kind):
     assert isinstance(proofs[kind], kind)
     path = save_proof(proofs[kind], KINDS[kind], tmp_path / "certificate.json")
-    again = save_proof(load_proof(path).proof, KINDS[kind], tmp_path / "again.json")
+    again = save_proof(read_proof(Document.load(path, "a proof")).proof, KINDS[kind], tmp_path / "again.json")
     assert again.read_bytes() == path.read_bytes()
     verified = verify_file(path, KINDS[kind], GAINS)
     assert verified.answer == "infeasible"

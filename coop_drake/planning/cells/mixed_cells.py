@@ -33,5 +33,5 @@ def mixed_cells(
         fraction = float(((upper - lower) / np.array(slices.axis_widths)).max())
         done = bool((upper - lower <= np.array(finest)).all())
         polygon = to_polygon(cell.region.section)
-        cells.append(MixedCell(robots, lower, upper, polygon, fraction, cell.kind is Kind.GUIDE, done))
+        cells.append(MixedCell(robots, lower, upper, polygon, fraction, done))
     return tuple(sorted(cells, key=lambda cell: -cell.width_fraction))
