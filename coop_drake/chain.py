@@ -26,7 +26,7 @@ _SCHEDULED = "scheduled"
 def plan(
     question: Scenario | PlanningProblem, gains: str | None = None, *, progress: Progress | None = None
 ) -> PlanningResult:
-    """Find a plan, or prove that none exists.
+    """Find a plan for a scenario or a planning problem, or prove that none exists.
 
     Args:
         question: A scenario, or a planning problem, which is planned with scheduled gains.
@@ -105,13 +105,7 @@ def why(question: Scenario | PlanningProblem, *, progress: Progress | None = Non
 
 
 def show(question: Scenario | PlanningProblem, plan: Plan | None = None, caption: str = "") -> Figure:
-    """Draw the floor, the team at start and goal, and the cells of a plan.
-
-    Args:
-        question: The scenario or the planning problem.
-        plan: A plan for it.
-        caption: Text under the picture.
-    """
+    """Draw the floor, the team at start and goal, and the cells of a plan if given, with a caption below."""
     from coop_drake.drawing import house_style
     from coop_drake.viz.floor_figures import overview_figure
 

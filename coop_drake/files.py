@@ -24,14 +24,8 @@ def cache_folder(kind: str) -> Path:
 def write_atomically(path: Path | str, content: bytes | Callable[[IO[bytes]], object]) -> Path:
     """Write a file as a whole: neither a crash nor Ctrl-C leaves a part of it.
 
-    The content goes to a temporary file beside the target, which then replaces the target.
-
-    Args:
-        path: The file; missing folders are made.
-        content: The bytes, or a function that writes them to the open binary file that it is given.
-
-    Returns:
-        The path of the file.
+    The content, bytes or a function that writes them to the open binary file, goes to a temporary file beside
+    the target, which then replaces the target. Missing folders are made. The path is returned.
 
     Raises:
         OSError: The folder cannot be written; no temporary file is left.

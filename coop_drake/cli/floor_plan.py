@@ -81,26 +81,25 @@ def _tell(plan: FloorPlan, file: Path, reporter: Reporter) -> None:
     """Note and show what was read."""
     x, y, right, top = plan.polygon.bounds
     taken = plan.drawn.area - plan.polygon.area
-    rings = (plan.polygon.exterior, *plan.polygon.interiors)
+    corners, drawn = plan.corners
     reporter.facts.update(
         width_m=right - x,
         height_m=top - y,
         area_m2=plan.polygon.area,
         taken_m2=taken,
         obstacles=len(plan.polygon.interiors),
-        corners=sum(len(ring.coords) - 1 for ring in rings),
-        corners_drawn=sum(len(ring.coords) - 1 for ring in (plan.drawn.exterior, *plan.drawn.interiors)),
+        corners=corners,
+        corners_drawn=drawn,
         other_rooms=len(plan.others),
         notes=list(plan.notes),
     )
-    facts = reporter.facts
     rows = [
         ("from", f"({x:.3f}, {y:.3f}) m"),
         ("to", f"({right:.3f}, {top:.3f}) m"),
         ("floor", f"{plan.polygon.area:.2f} m²"),
         ("taken by walls", f"{taken:.2f} m²"),
-        ("obstacles", f"{facts['obstacles']}"),
-        ("corners", f"{facts['corners']} of {facts['corners_drawn']} drawn"),
+        ("obstacles", f"{len(plan.polygon.interiors)}"),
+        ("corners", f"{corners} of {drawn} drawn"),
     ]
     if plan.others:
         rows.append(("other rooms", f"{len(plan.others)}, the largest {plan.others[0]:.2f} m²"))

@@ -18,8 +18,8 @@ def room_of_map(
     file: str,
     inside: Inside | None,
     *,
-    unknown_is_free: bool = False,
-    closing: float = 0.0,
+    unknown_is_free: bool,
+    closing: float,
 ) -> Room:
     """Find the room of connected free cells; cells that touch only at a corner are not connected.
 
@@ -43,9 +43,8 @@ def room_of_map(
     opened = room if radius < 1.0 else _opened(room, radius)
     opened = _without_checkers(opened)
     room, _ = _component(opened, cells, file, inside)
-    area = cells.resolution**2
-    floor = _outline(room, cells)
-    return Room(floor, tuple(area * count for count in others), tuple(notes))
+    areas = tuple(cells.resolution**2 * count for count in others)
+    return Room(_outline(room, cells), areas, tuple(notes))
 
 
 def _component(

@@ -6,7 +6,6 @@ import logging
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import groupby
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -96,7 +95,6 @@ def _one_line(finding: object) -> str:
 def _document(path: Path) -> Any:
     """The drawing, read without repairs: a repaired number could be a wall in another place."""
     from ezdxf.filemanagement import readfile
-    from ezdxf.lldxf.const import DXFError
 
     file, remedy = str(path), "save it anew as DXF (R2000 or later) from the CAD program"
     if b"EOF" not in path.read_bytes()[-64:]:
@@ -105,16 +103,7 @@ def _document(path: Path) -> Any:
         )
     try:
         return readfile(path)
-    except (
-        DXFError,
-        OSError,
-        ValueError,
-        TypeError,
-        AttributeError,
-        LookupError,
-        OverflowError,
-        RecursionError,
-    ) as error:
+    except Exception as error:  # On a damaged file ezdxf raises whatever it leads to.
         raise FloorPlanError(file, "the file", f"no readable DXF ({_one_line(error)})", remedy) from error
 
 
@@ -184,14 +173,11 @@ def _refuse_no_numbers(entity: Any, file: str, place: str) -> None:
 
 def _runs(pieces: list[Any]) -> Iterator[list[Any]]:
     """Groups of pieces that follow each other."""
-    run = 0
-    numbered = []
-    for index, piece in enumerate(pieces):
-        if index and not (pieces[index - 1][-1] == piece[0]).all():
-            run += 1
-        numbered.append((run, piece))
-    for _, group in groupby(numbered, key=lambda item: item[0]):
-        yield [piece for _, piece in group]
+    first = 0
+    for after in range(1, len(pieces) + 1):
+        if after == len(pieces) or not (pieces[after - 1][-1] == pieces[after][0]).all():
+            yield pieces[first:after]
+            first = after
 
 
 def _pieces(path: Any) -> Iterator[list[tuple[float, float]]]:

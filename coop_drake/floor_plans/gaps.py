@@ -13,8 +13,7 @@ from coop_drake.tree.pose import FloatArray
 def loose_ends(noded: BaseGeometry) -> FloatArray:
     """Points at which exactly one line ends and no other passes, in order, shape (n, 2) [m].
 
-    Args:
-        noded: Lines that meet at their ends only.
+    The lines, ``noded``, meet at their ends only.
     """
     lines = shapely.get_parts(noded)
     ends = np.vstack([shapely.get_coordinates(shapely.get_point(lines, at)) for at in (0, -1)])
@@ -24,13 +23,10 @@ def loose_ends(noded: BaseGeometry) -> FloatArray:
 
 
 def bridges(noded: BaseGeometry, gap: float) -> list[LineString]:
-    """Shortest lines from loose ends to other lines, none longer than the gap.
+    """Shortest lines from loose ends to other lines, none longer than the gap [m].
 
     A loose end goes to the nearest other one if there is one within the gap, otherwise to the nearest line.
-
-    Args:
-        noded: Lines that meet at their ends only.
-        gap: Longest bridge [m].
+    The lines, ``noded``, meet at their ends only.
     """
     ends = loose_ends(noded)
     if not len(ends) or gap <= 0.0:

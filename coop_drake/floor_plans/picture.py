@@ -7,14 +7,8 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from coop_drake.drawing import (
-    draw_polygon,
-    draw_workspace,
-    house_style,
-    legend_above,
-    new_figure,
-    save_figure,
-)
+from coop_drake.drawing import draw_polygon, draw_workspace, legend_above, new_figure, save_figure
+from coop_drake.drawing.canvas import house_style
 from coop_drake.drawing.colours import FLOOR, INK, LIGHT_GREY, VERMILLION
 from coop_drake.floor_plans.plan import FloorPlan
 from coop_drake.geometry.parts import parts_of
@@ -26,14 +20,7 @@ _TALLEST = 9.0
 
 
 def save_picture(plan: FloorPlan, path: Path, title: str, inside: tuple[float, float] | None = None) -> None:
-    """Write a preview as PNG or SVG.
-
-    Args:
-        plan: The floor plan.
-        path: Where to write.
-        title: Text above the picture, for example the file's name.
-        inside: The point that chose the room, marked if given [m].
-    """
+    """Write a preview as PNG or SVG with a title; the point that chose the room is marked if given [m]."""
     from matplotlib.patches import Patch
 
     x, y, right, top = plan.polygon.bounds
@@ -44,9 +31,8 @@ def save_picture(plan: FloorPlan, path: Path, title: str, inside: tuple[float, f
         axes = figure.add_subplot()
         draw_workspace(axes, plan.polygon)
         if taken.area > 1e-9:
-            draw_polygon(
-                axes, shapely.MultiPolygon(parts_of(taken)), facecolor=VERMILLION, edgecolor="none", zorder=2
-            )
+            red = shapely.MultiPolygon(parts_of(taken))
+            draw_polygon(axes, red, facecolor=VERMILLION, edgecolor="none", zorder=2)
         for ring in (plan.drawn.exterior, *plan.drawn.interiors):
             axes.plot(*shapely.get_coordinates(ring).T, color=LIGHT_GREY, linewidth=0.6, zorder=3)
         if inside is not None:
@@ -61,11 +47,9 @@ def save_picture(plan: FloorPlan, path: Path, title: str, inside: tuple[float, f
 
 def _caption(plan: FloorPlan) -> str:
     x, y, right, top = plan.polygon.bounds
-    corners = sum(len(ring.coords) - 1 for ring in (plan.polygon.exterior, *plan.polygon.interiors))
-    drawn = sum(len(ring.coords) - 1 for ring in (plan.drawn.exterior, *plan.drawn.interiors))
     facts = [
         f"{right - x:.2f} m by {top - y:.2f} m, {plan.polygon.area:.1f} m² of floor",
-        f"{len(plan.polygon.interiors)} obstacles, {corners} corners of {drawn} drawn",
+        "{} obstacles, {} corners of {} drawn".format(len(plan.polygon.interiors), *plan.corners),
     ]
     if plan.others:
         facts.append(f"{len(plan.others)} other rooms, the largest of {plan.others[0]:.1f} m²")

@@ -16,6 +16,7 @@ from coop_drake.floor_plans.map_file import OccupancyMap
 from coop_drake.floor_plans.rooms import Inside, Room, chosen_room, room_of
 from coop_drake.floor_plans.settings import FloorPlanSettings
 from coop_drake.floor_plans.walls import Drawing
+from coop_drake.geometry.parts import corners_of
 
 _LARGEST_FILE = 200_000_000
 """Larger files would fill the memory while they are read [bytes]."""
@@ -49,6 +50,11 @@ class FloorPlan:
     drawn: Polygon
     others: tuple[float, ...]
     notes: tuple[str, ...]
+
+    @property
+    def corners(self) -> tuple[int, int]:
+        """Number of corners of the floor, and of the floor as drawn."""
+        return sum(map(len, corners_of(self.polygon))), sum(map(len, corners_of(self.drawn)))
 
 
 def read_floor_plan(

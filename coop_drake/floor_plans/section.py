@@ -14,12 +14,7 @@ _WIDTH = 100
 
 
 def workspace_section(floor: Polygon, comment: str) -> str:
-    """YAML text of a floor's rings, rounded to a nanometre.
-
-    Args:
-        floor: The floor [m].
-        comment: One line of text to write above the section.
-    """
+    """YAML text of a floor's rings, rounded to a nanometre, below a comment of one line."""
     outer, *holes = (_ring(corners) for corners in corners_of(floor))
     lines = [f"# {' '.join(comment.split())}", "workspace:", "  outer: [", *_indented(outer, 4), "  ]"]
     if holes:

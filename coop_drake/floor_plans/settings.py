@@ -51,11 +51,7 @@ class FloorPlanSettings:
     unknown_is_free: bool = False
 
     def check(self, file: str) -> None:
-        """Refuse settings that no file can be read with.
-
-        Raises:
-            FloorPlanError: Naming the setting.
-        """
+        """Refuse settings that no file can be read with by a FloorPlanError that names the setting."""
         try:
             check_fields(self)
         except DataError as error:
@@ -68,11 +64,7 @@ class FloorPlanSettings:
         return max(0.25 * self.growth(), 1e-4)
 
     def growth(self, cell: float | None = None) -> float:
-        """Largest growth of walls [m].
-
-        Args:
-            cell: Edge of a map's cells [m], None for a drawing.
-        """
+        """Largest growth of walls [m]; ``cell`` is the edge of a map's cells [m], None for a drawing."""
         if self.tolerance is not None:
             return self.tolerance
         return 0.01 if cell is None else 1.5 * cell
@@ -80,9 +72,7 @@ class FloorPlanSettings:
     def metres(self, unit_of_file: float | None, file: str) -> float:
         """Length of one unit of the file's coordinates in W [m].
 
-        Args:
-            unit_of_file: The unit that the file names [m], None if it names none.
-            file: For messages.
+        ``unit_of_file`` is the unit that the file names [m], None if it names none.
 
         Raises:
             FloorPlanError: Neither the file nor the settings name the unit.

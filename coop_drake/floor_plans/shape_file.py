@@ -16,15 +16,8 @@ from coop_drake.errors import FloorPlanError
 from coop_drake.floor_plans.settings import FloorPlanSettings
 from coop_drake.floor_plans.walls import Drawing, Wall, refuse_many
 
-_KINDS = (
-    "Point",
-    "MultiPoint",
-    "LineString",
-    "MultiLineString",
-    "Polygon",
-    "MultiPolygon",
-    "GeometryCollection",
-)
+_PARTS = ("Point", "LineString", "Polygon")
+_KINDS = (*_PARTS, *(f"Multi{kind}" for kind in _PARTS), "GeometryCollection")
 _DEGREES = ("4326", "CRS84", "WGS84", "4258")
 """Names by which a file says that its coordinates are degrees."""
 _DEEPEST = 20
@@ -72,7 +65,7 @@ def read_geojson(path: Path, settings: FloorPlanSettings) -> Drawing:
         raise FloorPlanError(
             file, "crs", finding, "project it to plane coordinates in metres, for example to UTM"
         )
-    found = [(place, layer, shape) for place, layer, shape in _geometries(document, file, "the file", None)]
+    found = list(_geometries(document, file, "the file", None))
     known = sorted({layer for _, layer, _ in found if layer is not None})
     for layer in settings.layers:
         if layer not in known:
@@ -87,11 +80,7 @@ def read_geojson(path: Path, settings: FloorPlanSettings) -> Drawing:
 
 
 def _with_whole_rings(shape: BaseGeometry) -> BaseGeometry:
-    """Return the shape as it is.
-
-    Raises:
-        ValueError: A ring has two different corners only and encloses nothing.
-    """
+    """Return the shape; a ring with two different corners only, which encloses nothing, is a ValueError."""
     for polygon in shapely.get_parts(shape):
         rings = (polygon.exterior, *polygon.interiors) if isinstance(polygon, Polygon) else ()
         if any(0 < len(ring.coords) < 4 for ring in rings):

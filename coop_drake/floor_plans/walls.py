@@ -49,11 +49,7 @@ class Drawing:
 
 
 def refuse_many(file: str, points: int) -> None:
-    """Refuse files with too many points.
-
-    Raises:
-        FloorPlanError: There are more than ``_MOST_POINTS``.
-    """
+    """Refuse files with more than ``_MOST_POINTS`` points by a FloorPlanError."""
     if points > _MOST_POINTS:
         raise FloorPlanError(
             file,
