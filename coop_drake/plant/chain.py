@@ -1,10 +1,13 @@
 """Finds the base of a robot, which is the root of its model, and its joints from the base outwards."""
 
+from collections.abc import Callable
+from functools import partial
 from math import inf, isfinite, pi
 
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Joint, RigidBody
 
+from coop_drake.errors import ScenarioError
 from coop_drake.plant.parsing import bodies_of, joints_of, refusal
 from coop_drake.scenario import RobotAssembly, Scenario
 
@@ -37,27 +40,29 @@ def find_base(
         ScenarioError: A joint to the world, a joint that is neither fixed nor revolute nor prismatic, a joint
             without limits where limits are needed, or bodies that do not hang together.
     """
+    refuse = partial(refusal, scenario, robot)
     bodies = bodies_of(plant, robot.models)
     members = {int(body.index()) for body in bodies}
     inner: list[Joint] = []
     for joint in joints_of(plant):
         ends = {int(joint.parent_body().index()), int(joint.child_body().index())}
         if ends & members and int(plant.world_body().index()) in ends:
-            raise refusal(
-                scenario,
-                robot,
-                scoped(plant, joint),
-                "a robot that no joint ties to the world; its base moves freely",
-            )
+            allowed = "a robot that no joint ties to the world; its base moves freely"
+            raise refuse(scoped(plant, joint), allowed)
         if ends <= members:
-            _check_kind(scenario, robot, plant, joint)
+            _check_kind(refuse, robot.name, plant, joint)
             inner.append(joint)
-    _check_tree(scenario, robot, plant, inner)
-    children = {int(joint.child_body().index()) for joint in inner}
+    children: set[int] = set()
+    for joint in inner:
+        child = joint.child_body()
+        if int(child.index()) in children:
+            allowed = f"exactly one joint that leads to {scoped(plant, child)}; no closed loop"
+            raise refuse(scoped(plant, joint), allowed)
+        children.add(int(child.index()))
     roots = [body for body in bodies if int(body.index()) not in children]
     if len(roots) != 1:
         names = ", ".join(scoped(plant, body) for body in roots) or "none"
-        raise refusal(scenario, robot, names, "one body that no joint leads to: the base")
+        raise refuse(names, "one body that no joint leads to: the base")
     return roots[0], _outwards(roots[0], inner)
 
 
@@ -68,42 +73,19 @@ def limits_of(joint: Joint) -> tuple[float, float]:
     return (lower if lower > -_ENDLESS else -free, upper if upper < _ENDLESS else free)
 
 
-def _check_tree(scenario: Scenario, robot: RobotAssembly, plant: MultibodyPlant, joints: list[Joint]) -> None:
-    seen: set[int] = set()
-    for joint in joints:
-        child = joint.child_body()
-        if int(child.index()) in seen:
-            name = scoped(plant, child)
-            raise refusal(
-                scenario,
-                robot,
-                scoped(plant, joint),
-                f"exactly one joint that leads to {name}; closed loops are not supported",
-            )
-        seen.add(int(child.index()))
-
-
-def _check_kind(scenario: Scenario, robot: RobotAssembly, plant: MultibodyPlant, joint: Joint) -> None:
-    name, kind = scoped(plant, joint), joint.type_name()
+def _check_kind(
+    refuse: Callable[[str, str], ScenarioError], robot: str, plant: MultibodyPlant, joint: Joint
+) -> None:
+    name, kind, fixed = scoped(plant, joint), joint.type_name(), f"for it under fixed_joints.{robot}"
     if kind == "weld":
         return
     if kind not in MOVABLE:
-        raise refusal(
-            scenario,
-            robot,
-            name,
-            f"fixed, revolute or prismatic joints, not {kind}; or 0 for it under fixed_joints.{robot.name}",
-        )
+        raise refuse(name, f"fixed, revolute or prismatic joints, not {kind}; or 0 {fixed}")
     lower, upper = limits_of(joint)
     if not (isfinite(lower) and isfinite(upper)):
-        raise refusal(
-            scenario,
-            robot,
-            name,
-            f"prismatic joints with two finite limits; or a value for it under fixed_joints.{robot.name}",
-        )
+        raise refuse(name, f"prismatic joints with two finite limits; or a value {fixed}")
     if lower >= upper:
-        raise refusal(scenario, robot, name, f"a lower limit below the upper one, not {lower} and {upper}")
+        raise refuse(name, f"a lower limit below the upper one, not {lower} and {upper}")
 
 
 def _outwards(base: RigidBody, joints: list[Joint]) -> tuple[Joint, ...]:

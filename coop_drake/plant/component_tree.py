@@ -182,11 +182,8 @@ class _TreeReader:
         ]
         for place, (first, ours) in enumerate(geometries):
             for second, theirs in geometries[place + 1 :]:
-                if (
-                    ours
-                    and theirs
-                    and all(self.inspector.CollisionFiltered(a, b) for a in ours for b in theirs)
-                ):
+                filtered = (self.inspector.CollisionFiltered(a, b) for a in ours for b in theirs)
+                if ours and theirs and all(filtered):
                     pairs.add((first, second))
         return frozenset(pairs)
 

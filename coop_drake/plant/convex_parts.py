@@ -14,15 +14,10 @@ _STRAIGHT = 1e-12
 
 
 def convex_parts(outline: Polygon) -> list[Polygon]:
-    """Triangulate a polygon and merge neighbouring parts while they stay convex.
+    """Triangulate a valid polygon and merge neighbouring parts while they stay convex.
 
-    The corners of the parts are corners of the outline, so their union is exact.
-
-    Args:
-        outline: A valid polygon.
-
-    Returns:
-        Convex polygons, counter-clockwise, in an order that depends on the outline alone.
+    The corners of the parts are corners of the outline, so their union is exact. The parts are
+    counter-clockwise, in an order that depends on the outline alone.
     """
     triangles = constrained_delaunay_triangles(outline).geoms
     rings = sorted(_ring(t) for t in triangles if isinstance(t, Polygon) and t.area > 0.0)

@@ -24,12 +24,8 @@ def fix_joints(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant) ->
     """Replace every joint that the scenario fixes by a weld.
 
     A name is that of a joint, or a pattern with ``*`` and ``?``. A joint's own name takes precedence over
-    patterns; the value null excludes the joint from them.
-
-    Args:
-        scenario: Names the joints and their values.
-        assembly: The models of every robot.
-        plant: Not finalized; robots that it does not hold are skipped.
+    patterns; the value null excludes the joint from them. The plant is not finalized; robots that it does not
+    hold are skipped.
 
     Raises:
         ScenarioError: A name matches no joint, or two patterns match the same one, or a value is not
@@ -75,13 +71,11 @@ def _fix(scenario: Scenario, key: str, plant: MultibodyPlant, joint: Joint, valu
     if joint.type_name() in MOVABLE:
         lower, upper = limits_of(joint)
         if not lower - _ROUNDING <= value <= upper + _ROUNDING:
-            raise ScenarioError(
-                file, key, value, f"a value between the joint's limits {lower:g} and {upper:g}"
-            )
+            allowed = f"a value between the joint's limits {lower:g} and {upper:g}"
+            raise ScenarioError(file, key, value, allowed)
     elif value != 0.0:
-        raise ScenarioError(
-            file, key, value, f"0, the only place where a {joint.type_name()} joint can be fixed"
-        )
+        allowed = f"0, the only place where a {joint.type_name()} joint can be fixed"
+        raise ScenarioError(file, key, value, allowed)
     for index in list(plant.GetJointActuatorIndices()):
         actuator = plant.get_joint_actuator(index)
         if int(actuator.joint().index()) == int(joint.index()):

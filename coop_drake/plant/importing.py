@@ -18,16 +18,8 @@ if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
 _DRAKE = "http://drake.mit.edu"
-_UNREAD = ("calibration", "safety_controller", "verbose")
-_DROPPED = (
-    *_UNREAD,
-    "transmission",
-    "gazebo",
-    "ros2_control",
-    "plugin",
-    "sensor",
-    "mimic",
-)
+_DROPPED: tuple[str, ...] = ("calibration", "safety_controller", "verbose", "transmission", "gazebo")
+_DROPPED += ("ros2_control", "plugin", "sensor", "mimic")
 _GROUP = "own_links"
 _NEARLY_RIGHT = 1e-5
 """Largest error of a right angle in a file, which is corrected: tilted axes would leave the plane [rad]."""
@@ -68,7 +60,7 @@ def import_robot(path: Path, packages: Mapping[str, Path] | None = None) -> Impo
     root = _parse(path)
     work = _Work(path, dict(packages or {}))
     work.drop(root)
-    links = list(_all(root, "link"))
+    links = list(root.iter("link"))
     if not links:
         raise ScenarioError(str(path), "the file", path.name, "a model with links")
     for link in links:
@@ -92,10 +84,6 @@ def _parse(path: Path) -> Element:
     except (OSError, ParseError, DefusedXmlException, ValueError) as error:
         raise ScenarioError(str(path), "the file", str(error), "a readable URDF or SDF model") from error
     return root
-
-
-def _all(root: Element, tag: str) -> Iterator[Element]:
-    return root.iter(tag)
 
 
 @dataclass

@@ -38,11 +38,9 @@ class SurveyedJoint:
 
 
 def survey_joints(path: Path, values: Mapping[str, float] | None = None) -> tuple[SurveyedJoint, ...]:
-    """Judge every movable joint of a model whose base stands upright.
+    """Judge every movable joint of a model, with meshes that Drake reads, whose base stands upright.
 
-    Args:
-        path: The model, with meshes that Drake reads.
-        values: Where some joints are fixed, all others stand at zero [rad or m].
+    ``values`` say where some joints are fixed; all others stand at zero [rad or m].
 
     Raises:
         ScenarioError: Drake cannot read the model, or a value is for no joint of it.

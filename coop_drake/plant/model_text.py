@@ -63,8 +63,7 @@ class _FaultError(Exception):
 def fault_of(path: Path) -> str:
     """Describe the first fault in the text of a model file, with its line; an empty text if there is none.
 
-    Args:
-        path: A file that exists; its suffix says its format.
+    The file exists; its suffix says its format.
     """
     reader = _ModelText(path.suffix)
     try:

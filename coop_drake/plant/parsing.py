@@ -20,14 +20,9 @@ def add_models(
     plant: MultibodyPlant,
     scene_graph: SceneGraph | None,
 ) -> None:
-    """Process directives into a plant that is not finalized yet, and switch gravity off.
+    """Process some of the directives into a plant that is not finalized yet, and switch gravity off.
 
-    Args:
-        scenario: For messages.
-        assembly: The directives.
-        indices: Which of them.
-        plant: Receives the models.
-        scene_graph: Receives the geometry, if any is wanted.
+    The scene graph receives the geometry, if any is wanted.
 
     Raises:
         ScenarioError: Drake refuses a model or a directive, or would replace a mass or a size by a default.
@@ -117,11 +112,8 @@ def set_actuators(plant: MultibodyPlant, joints: Sequence[Joint]) -> None:
     """Give every joint of q exactly one actuator, so that the actuation input holds the torques in q's order.
 
     Drake adds actuators only to joints with an effort limit above zero in their file; here every arm joint is
-    driven. Effort limits and rotor inertias of the file are kept; Drake saturates torques at the limits.
-
-    Args:
-        plant: Not finalized yet.
-        joints: All joints of q, in q's order.
+    driven. Effort limits and rotor inertias of the file are kept; Drake saturates torques at the limits. The
+    plant must not be finalized yet.
     """
     stated: list[JointActuator] = [plant.get_joint_actuator(i) for i in plant.GetJointActuatorIndices()]
     kept = {

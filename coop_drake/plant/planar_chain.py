@@ -50,9 +50,6 @@ class BaseChain:
 def robot_chain(robot: RobotPlant) -> FloatArray:
     """The chain of a robot's own model, from its base to its end effector; masses are those of its context.
 
-    Args:
-        robot: The robot.
-
     Returns:
         Shape (n + 2, ``COLUMNS``), joints in the order of q_k, their places those in (z_k, z_k').
     """
@@ -77,21 +74,14 @@ def robot_chain(robot: RobotPlant) -> FloatArray:
 
 
 def base_chain(team: TeamPlant, robot: RobotModel) -> BaseChain:
-    """The chain from the object to a robot's base in the team's plant, whose tree begins at the object.
-
-    Args:
-        team: The team.
-        robot: One of its robots.
-    """
+    """The chain from the object to a robot's base in the team's plant, whose tree begins at the object."""
     plant = team.plant
     context = _at_zero(plant, plant.CreateDefaultContext())
     rates = plant.num_positions()
     path = _to_base(plant, robot)
     chain = np.zeros((len(path) + 2, COLUMNS))
-    chain[0, [POSITION, RATE]] = (
-        team.object_joint.position_start(),
-        rates + team.object_joint.velocity_start(),
-    )
+    pose = team.object_joint
+    chain[0, [POSITION, RATE]] = pose.position_start(), rates + pose.velocity_start()
     for row, joint in enumerate(path, 1):
         x, y, *motion = _joint(context, joint)
         chain[row, [X, Y, TURN, SLIDE_X, SLIDE_Y]] = x, y, *(-part for part in motion)  # from gripper to base
@@ -100,14 +90,9 @@ def base_chain(team: TeamPlant, robot: RobotModel) -> BaseChain:
     chain[-1, [X, Y]] = _origin(context, robot.base_body.body_frame())
     chain[-1, PARENT] = len(path)
     R = robot.base_body.EvalPoseInWorld(context).rotation().matrix()
-    joints = np.array(
-        [
-            [joint.position_start() for joint in robot.joints],
-            [rates + joint.velocity_start() for joint in robot.joints],
-        ],
-        dtype=np.int64,
-    ).reshape(2, -1)
-    return BaseChain(chain, float(np.arctan2(R[1, 0], R[0, 0])), joints)
+    places = [(joint.position_start(), rates + joint.velocity_start()) for joint in robot.joints]
+    joints = np.array(places, dtype=np.int64).reshape(-1, 2).T
+    return BaseChain(chain, float(np.arctan2(R[1, 0], R[0, 0])), np.ascontiguousarray(joints))
 
 
 def _to_base(plant: MultibodyPlant, robot: RobotModel) -> list[Joint]:

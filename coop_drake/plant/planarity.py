@@ -1,6 +1,7 @@
 """Planarity checks: bases stand upright, revolute axes are vertical and prismatic axes are horizontal."""
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -10,7 +11,7 @@ from pydrake.systems.framework import Context
 
 from coop_drake.plant.chain import scoped
 from coop_drake.plant.parsing import bodies_of, joints_of, refusal
-from coop_drake.scenario import Assembly, RobotAssembly, Scenario
+from coop_drake.scenario import Assembly, Scenario
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
 TILT = 1e-5
@@ -35,6 +36,7 @@ def object_frame(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant) 
         ScenarioError: The object has movable joints, a joint to the world, or several loose bodies.
     """
     instance = plant.GetModelInstanceByName(assembly.object_model)
+    refuse = partial(refusal, scenario, None)
     bodies = bodies_of(plant, [assembly.object_model])
     members = {int(body.index()) for body in bodies}
     children = set()
@@ -43,17 +45,15 @@ def object_frame(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant) 
         if not ends & members:
             continue
         if int(plant.world_body().index()) in ends:
-            raise refusal(scenario, None, scoped(plant, joint), "an object that no joint ties to the world")
+            raise refuse(scoped(plant, joint), "an object that no joint ties to the world")
         if ends <= members:
             if joint.type_name() != "weld":
-                raise refusal(
-                    scenario, None, scoped(plant, joint), "an object that is rigid: fixed joints only"
-                )
+                raise refuse(scoped(plant, joint), "an object that is rigid: fixed joints only")
             children.add(int(joint.child_body().index()))
     roots = [body for body in bodies if int(body.index()) not in children]
     if len(roots) != 1:
         names = ", ".join(scoped(plant, body) for body in roots) or "none"
-        raise refusal(scenario, None, names, "an object whose bodies hang together")
+        raise refuse(names, "an object whose bodies hang together")
     if plant.HasFrameNamed("__model__", instance):
         return plant.GetFrameByName("__model__", instance)
     return roots[0].body_frame()
@@ -68,12 +68,8 @@ def check_planar(
 ) -> None:
     """Refuse bases that are tilted and joints that would move bodies out of the plane.
 
-    Args:
-        scenario: For messages.
-        assembly: The team.
-        plant: Finalized.
-        context: Any configuration; the object's frame is upright in each of them.
-        chains: Base and joints of each robot.
+    The plant is finalized; the context may hold any configuration, as the object's frame is upright in each.
+    ``chains`` are base and joints of each robot.
 
     Raises:
         ScenarioError: Naming the base or the joint.
@@ -83,19 +79,12 @@ def check_planar(
         if not is_upright(R_WB[:, 2]) or R_WB[2, 2] < 0.0:
             raise refusal(scenario, robot, scoped(plant, base), "a base whose z axis points up when grasped")
         for joint in joints:
-            axis = axis_in_world(joint, context)
-            name = scoped(plant, joint)
-            if joint.type_name() == "revolute" and not is_upright(axis):
-                raise refusal(
-                    scenario, robot, name, f"a vertical axis, not {_text(axis)} in the world{_or_fix(robot)}"
-                )
-            if joint.type_name() == "prismatic" and abs(axis[2]) > TILT:
-                raise refusal(
-                    scenario,
-                    robot,
-                    name,
-                    f"an axis in the floor's plane, not {_text(axis)} in the world{_or_fix(robot)}",
-                )
+            axis, revolute = axis_in_world(joint, context), joint.type_name() == "revolute"
+            if not (is_upright(axis) if revolute else abs(axis[2]) <= TILT):
+                wanted = "a vertical axis" if revolute else "an axis in the floor's plane"
+                remedy = f"or a value for it under fixed_joints.{robot.name}"
+                allowed = f"{wanted}, not {_text(axis)} in the world; {remedy}"
+                raise refusal(scenario, robot, scoped(plant, joint), allowed)
 
 
 def check_masses(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant, context: Context) -> None:
@@ -104,21 +93,18 @@ def check_masses(scenario: Scenario, assembly: Assembly, plant: MultibodyPlant, 
     Raises:
         ScenarioError: The mass matrix is singular, the object has no mass, or a file adds constraints.
     """
+    refuse = partial(refusal, scenario, None)
     if plant.num_constraints() > 0:
-        raise refusal(
-            scenario, None, "constraints in the models", "joints that are not coupled to one another"
-        )
+        raise refuse("constraints in the models", "joints that are not coupled to one another")
     mass_matrix = plant.CalcMassMatrix(context)
     if not np.isfinite(mass_matrix).all():
-        raise refusal(scenario, None, "an infinite or undefined inertia", "finite masses and lengths")
+        raise refuse("an infinite or undefined inertia", "finite masses and lengths")
     values = np.linalg.eigvalsh(mass_matrix)
     if values[0] <= 1e-12 * values[-1]:
-        raise refusal(
-            scenario, None, f"least inertia {values[0]:.3g}", "masses and inertias that resist every motion"
-        )
+        raise refuse(f"least inertia {values[0]:.3g}", "masses and inertias that resist every motion")
     bodies = bodies_of(plant, [assembly.object_model])
     if sum(body.get_mass(context) for body in bodies) <= 0.0:
-        raise refusal(scenario, None, assembly.object_model, "an object with a positive mass")
+        raise refuse(assembly.object_model, "an object with a positive mass")
 
 
 def axis_in_world(joint: Joint, context: Context) -> FloatArray:
@@ -126,10 +112,6 @@ def axis_in_world(joint: Joint, context: Context) -> FloatArray:
     R_WF = joint.frame_on_parent().CalcRotationMatrixInWorld(context)
     axis = joint.revolute_axis() if joint.type_name() == "revolute" else joint.translation_axis()
     return np.asarray(R_WF.multiply(axis), dtype=float)
-
-
-def _or_fix(robot: RobotAssembly) -> str:
-    return f"; or a value for it under fixed_joints.{robot.name}"
 
 
 def _text(axis: FloatArray) -> str:

@@ -98,13 +98,6 @@ def polygon_body_files(
     return {f"{name}.sdf": sdf, **meshes}
 
 
-def polygon_body_sdf(
-    vertices: Sequence[Point], mass: float, name: str, height: float, inertia: float | None = None
-) -> str:
-    """The SDF text alone of :func:`polygon_body_files`."""
-    return polygon_body_files(vertices, mass, name, height, inertia=inertia)[f"{name}.sdf"]
-
-
 def write_polygon_body(files: dict[str, str], directory: Path) -> Path:
     """Write the files of :func:`polygon_body_files` into a directory; returns the SDF file's path."""
     directory.mkdir(parents=True, exist_ok=True)

@@ -13,9 +13,7 @@ from coop_drake.scenario import Scenario
 def planning_problem(scenario: Scenario, team: TeamPlant | None = None) -> PlanningProblem:
     """Put start, goal, walls and bodies together, and refuse inputs that are certainly mistakes.
 
-    Args:
-        scenario: The scenario.
-        team: The plant that was built from it; None to build it here.
+    ``team`` is the plant that was built from the scenario; None to build it here.
 
     Raises:
         ScenarioError: Models that make no team, joints that do not fit the robots or their limits, a start in

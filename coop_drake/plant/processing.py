@@ -23,16 +23,10 @@ _REPLACED = re.compile(r"invalid inertia|inertia matrix|central inertia|Using de
 def process(
     assembly: Assembly, indices: Sequence[int], plant: MultibodyPlant, scene_graph: SceneGraph | None
 ) -> str:
-    """Process directives; return what Drake reported as an error, or an empty text.
+    """Process some of the directives; return what Drake reported as an error, or an empty text.
 
     Warnings by which Drake says that it replaced a mass or a size count as errors; all others are passed on
-    to Drake's logger.
-
-    Args:
-        assembly: The directives and the packages that they refer to.
-        indices: Which of the directives.
-        plant: Receives the models.
-        scene_graph: Receives the geometry, if any is wanted.
+    to Drake's logger. The scene graph receives the geometry, if any is wanted.
     """
     directives = ModelDirectives(directives=[assembly.directives[index] for index in indices])
     parser = Parser(plant, scene_graph) if scene_graph else Parser(plant)

@@ -25,11 +25,8 @@ def read_once(read: Callable[Concatenate[Scenario, P], T]) -> Callable[Concatena
     """Keep what a function reads from a scenario for as long as the scenario is in use.
 
     A scenario that is loaded again, or changed by ``dataclasses.replace``, is another one: its files are read
-    anew.
-
-    Args:
-        read: Takes a scenario and hashable positional arguments; what it returns must not refer to the
-            scenario, and callers must not change it.
+    anew. The function takes a scenario and hashable positional arguments; what it returns must not refer to
+    the scenario, and callers must not change it.
     """
     kept: dict[int, dict[Hashable, T]] = {}
 
@@ -56,12 +53,9 @@ def add_copy(
     plant = builder.AddNamedSystem("plant", plant.Clone())
     scene_graph = builder.AddNamedSystem("scene_graph", scene_graph.Clone())
     for output, entry in (
-        (plant.get_geometry_pose_output_port(), scene_graph.GetInputPort("plant_pose")),
-        (
-            plant.GetOutputPort("deformable_body_configuration"),
-            scene_graph.GetInputPort("plant_configuration"),
-        ),
-        (scene_graph.get_query_output_port(), plant.get_geometry_query_input_port()),
+        ("geometry_pose", "plant_pose"),
+        ("deformable_body_configuration", "plant_configuration"),
     ):
-        builder.Connect(output, entry)
+        builder.Connect(plant.GetOutputPort(output), scene_graph.GetInputPort(entry))
+    builder.Connect(scene_graph.get_query_output_port(), plant.get_geometry_query_input_port())
     return plant, scene_graph

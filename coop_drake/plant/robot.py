@@ -94,11 +94,9 @@ class RobotPlant:
 
 
 def build_robot_plant(scenario: Scenario, k: int) -> RobotPlant:
-    """Build the model that robot k has of itself; all of one scenario share the plant, not its context.
+    """Build the model that robot k, in the scenario's order, has of itself.
 
-    Args:
-        scenario: The scenario.
-        k: Index of the robot in the scenario's order.
+    All models of one robot of a scenario share the plant, not its context.
 
     Raises:
         ScenarioError: As for the team's plant.

@@ -20,11 +20,7 @@ _GROWTH = 0.003
 def enclosed_in_fewer(points: FloatArray) -> FloatArray:
     """Corners of a convex polygon that encloses another, and reaches no more than 3 mm beyond it.
 
-    Args:
-        points: Corners of a convex polygon, shape (n, 2) [m].
-
-    Returns:
-        Fewer corners if the polygon has many, otherwise those given.
+    Shapes (n, 2) [m]; fewer corners if the polygon given has many, otherwise its own.
     """
     from coop_drake.geometry.simplify import simplify_inward
 

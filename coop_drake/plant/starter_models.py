@@ -12,18 +12,14 @@ _LINK_HEIGHT = 0.08
 """Width and height of a link, as in the shipped models [m]."""
 _ARM_HEIGHT = 0.4
 """Height of arms and grasps over the floor, as in the shipped models [m]."""
+_OBJECT_MASS = 1.0
+"""Mass of the object [kg]."""
 _BEND = 1.87
 """Limit of the joints on both sides, as in the shipped models [rad]."""
 
 
-def object_model(length: float, width: float, mass: float = 1.0) -> str:
-    """SDF of a box with a grasp frame in the middle of every side, x pointing out of it.
-
-    Args:
-        length: Along x [m].
-        width: Along y [m].
-        mass: Mass [kg].
-    """
+def object_model(length: float, width: float) -> str:
+    """SDF of a box of a length along x and a width along y [m]; every side has a grasp frame, x outwards."""
     grasps = (
         (0.5 * length, 0.0, 0.0),
         (-0.5 * length, 0.0, pi),
@@ -34,9 +30,8 @@ def object_model(length: float, width: float, mass: float = 1.0) -> str:
         f'    <frame name="grasp_{k}" attached_to="body"><pose>{x:.9g} {y:.9g} 0 0 0 {yaw!r}</pose></frame>'
         for k, (x, y, yaw) in enumerate(grasps)
     )
-    body = _link(
-        "body", f"0 0 {_ARM_HEIGHT} 0 0 0", "0 0 0", _box(length, width, 0.2), mass, OBJECT_IN_MODELS
-    )
+    pose, shape = f"0 0 {_ARM_HEIGHT} 0 0 0", _box(length, width, 0.2)
+    body = _link("body", pose, "0 0 0", shape, _OBJECT_MASS, OBJECT_IN_MODELS)
     return _sdf("object", f"{body}\n{frames}", "The carried object, with a grasp frame on every side.")
 
 

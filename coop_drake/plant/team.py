@@ -149,14 +149,9 @@ class TeamPlant:
 
 
 def build_team_plant(scenario: Scenario, builder: DiagramBuilder) -> TeamPlant:
-    """Add plant and scene graph of the whole team to a diagram.
+    """Add plant and scene graph of the whole team, connected to each other and finalized, to a diagram.
 
-    Args:
-        scenario: The scenario.
-        builder: Receives the two systems, connected to each other, finalized.
-
-    Returns:
-        The plant with names for its parts; it lives as long as the builder's diagram.
+    The plant lives as long as the builder's diagram.
 
     Raises:
         ScenarioError: The models do not make a team of holonomic planar manipulators that hold one object.

@@ -20,12 +20,8 @@ def check_joints(scenario: Scenario, team: TeamPlant) -> None:
     _check_section(scenario, team, "goal.joints", scenario.goal.joints)
     for robot in team.robots:
         if robot.joints and robot.name not in scenario.start.joints:
-            raise ScenarioError(
-                str(scenario.path),
-                f"start.joints.{robot.name}",
-                None,
-                f"a list of {len(robot.joints)}, the values of {', '.join(robot.joint_names)}",
-            )
+            allowed = f"a list of {len(robot.joints)}, the values of {', '.join(robot.joint_names)}"
+            raise ScenarioError(str(scenario.path), f"start.joints.{robot.name}", None, allowed)
 
 
 def _check_section(
@@ -39,18 +35,13 @@ def _check_section(
         robot = robots[name]
         if len(values) != len(robot.joints):
             names = ", ".join(robot.joint_names) or "no joints"
-            raise ScenarioError(
-                file, f"{key}.{name}", list(values), f"a list of {len(robot.joints)}, the values of {names}"
-            )
+            allowed = f"a list of {len(robot.joints)}, the values of {names}"
+            raise ScenarioError(file, f"{key}.{name}", list(values), allowed)
         for place, (value, joint) in enumerate(zip(values, robot.joints, strict=True)):
             lower, upper = limits_of(joint)
             if value is not None and not lower <= value <= upper:
-                raise ScenarioError(
-                    file,
-                    f"{key}.{name}[{place}]",
-                    value,
-                    f"a value of {robot.joint_names[place]} between its limits {lower:g} and {upper:g}",
-                )
+                allowed = f"a value of {robot.joint_names[place]} between its limits {lower:g} and {upper:g}"
+                raise ScenarioError(file, f"{key}.{name}[{place}]", value, allowed)
 
 
 def check_places(scenario: Scenario, problem: PlanningProblem) -> None:
@@ -61,19 +52,13 @@ def check_places(scenario: Scenario, problem: PlanningProblem) -> None:
     """
     file = str(scenario.path)
     for first, second, clearance in collisions(problem.tree, problem.start, problem.workspace):
-        raise ScenarioError(
-            file,
-            "start",
-            [float(value) for value in problem.start],
-            f"a configuration without collision ({first} touches {second}, clearance {clearance:.4f} m)",
-        )
+        allowed = f"a configuration without collision ({first} touches {second}, clearance {clearance:.4f} m)"
+        raise ScenarioError(file, "start", problem.start.tolist(), allowed)
     goal = scenario.goal.object.pose
     for body in problem.tree.components[0].bodies:
         clearance = wall_clearance(body, goal, problem.workspace)
         if body.robot is None and clearance <= 0.0:
+            found = f"{body.name} touches the walls, clearance {clearance:.4f} m"
             raise ScenarioError(
-                file,
-                "goal.object",
-                [goal.x, goal.y, goal.angle],
-                f"a pose inside the workspace ({body.name} touches the walls, clearance {clearance:.4f} m)",
+                file, "goal.object", [goal.x, goal.y, goal.angle], f"a pose inside the workspace ({found})"
             )

@@ -16,7 +16,6 @@ from coop_drake.plant.polygon_body import (
     main,
     planar_mass,
     polygon_body_files,
-    polygon_body_sdf,
     write_polygon_body,
 )
 from coop_drake.scenario import load_scenario
@@ -124,7 +123,6 @@ def test_command_line_writes_the_same_files(tmp_path):
     expected = polygon_body_files(U_SHAPE, 2.0, "u", 0.3, grasps=[(-0.5, 0, 3.14), (0.5, 0, 0)])
     assert path == tmp_path / "made" / "u.sdf"
     assert {file.name: file.read_text() for file in path.parent.iterdir()} == expected
-    assert polygon_body_sdf(U_SHAPE, 2.0, "u", 0.3) == polygon_body_files(U_SHAPE, 2.0, "u", 0.3)["u.sdf"]
 
 
 @pytest.mark.parametrize(
