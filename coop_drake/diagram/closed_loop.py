@@ -123,7 +123,7 @@ def build_closed_loop(
     for k, known in enumerate(knowledge):
         controller = build_robot_controller(known, replacements)
         if not scenario.deployment.ideal:
-            deployed.append(deploy(controller, scenario.deployment, k))
+            deployed.append(deploy(controller, scenario.deployment, k, team.robots[k].name))
             controller = deployed[-1].diagram
         builder.AddNamedSystem(f"robot_{k}_controller", controller)
         _connect(builder, station.diagram, planner, controller, k)

@@ -15,7 +15,7 @@ from pydrake.systems.primitives import (
     ZeroOrderHold,
 )
 
-from coop_drake.diagram.deployment import build_radio
+from coop_drake.diagram.radio import build_radio
 from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.diagram.station import TransportStation
 from coop_drake.errors import ScenarioError

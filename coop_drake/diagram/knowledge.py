@@ -50,6 +50,7 @@ def robot_knowledge(
             cells=cells,
             position_tolerance=scenario.goal.tolerances.position,
             period=scenario.deployment.period,
+            sample_offset=scenario.deployment.of_robot(robot.name).sample_offset,
         )
         for robot in team.robots
     ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem, OutputPort
-from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator, Integrator
+from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator, Integrator, ZeroOrderHold
 
 from coop_drake.answers.plan import Plan
 from coop_drake.plant import ObjectInertia, RobotPlant
@@ -50,6 +50,7 @@ class RobotKnowledge:
         cells: What the governor needs of every cell.
         position_tolerance: How close to the goal counts as arrived [m].
         period: Time between two computations [s]; None for continuous time.
+        sample_offset: Time of the first computation [s].
     """
 
     robot: RobotPlant
@@ -61,6 +62,7 @@ class RobotKnowledge:
     cells: Sequence[GovernedCell]
     position_tolerance: float
     period: float | None = None
+    sample_offset: float = 0.0
 
 
 Replacements = Mapping[str, Callable[[RobotKnowledge], LeafSystem]]
@@ -136,19 +138,23 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
 def _add_governor_state(
     builder: DiagramBuilder, knowledge: RobotKnowledge, command: OutputPort
 ) -> OutputPort:
-    """Add the integrator of p_G, whose rate is the first half of the governor's command."""
+    """Add the integrator of p_G, whose rate is the first half of the governor's command.
+
+    Its initial value is set when a context is made, if it is a discrete one. Drake's discrete integrator has
+    no offset; one in continuous time has the same values at the samples of a rate that is held in between.
+    """
     halves = builder.AddNamedSystem("governor_rate", Demultiplexer([2, 2]))
     builder.Connect(command, halves.get_input_port())
-    state = builder.AddNamedSystem("governor_state", _governor_state(knowledge))
-    builder.Connect(halves.get_output_port(0), state.get_input_port())
+    rate, period, offset = halves.get_output_port(0), knowledge.period, knowledge.sample_offset
+    if period is not None and offset > 0.0:
+        hold = builder.AddNamedSystem("governor_rate_hold", ZeroOrderHold(period, 2, offset))
+        builder.Connect(rate, hold.get_input_port())
+        rate = hold.get_output_port()
+    discrete = period is not None and offset == 0.0
+    integrator = DiscreteTimeIntegrator(2, period) if discrete else Integrator(knowledge.plan.start[:2])
+    state = builder.AddNamedSystem("governor_state", integrator)
+    builder.Connect(rate, state.get_input_port())
     return state.get_output_port()
-
-
-def _governor_state(knowledge: RobotKnowledge) -> Integrator | DiscreteTimeIntegrator:
-    """Build the integrator of p_G; a discrete one gets its initial value when a context is made."""
-    if knowledge.period is None:
-        return Integrator(knowledge.plan.start[:2])
-    return DiscreteTimeIntegrator(2, knowledge.period)
 
 
 def _connect_by_name(

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
 
+import numpy as np
 from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import Propeller, PropellerInfo
-from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import ConstantValueSource, Demultiplexer, Selector
 
+from coop_drake.diagram.disturbances import add_disturbances, tilt_floor
 from coop_drake.plant import SeparateTeam, TeamPlant, build_separate_team, build_team_plant
 from coop_drake.scenario import Scenario
 from coop_drake.systems import TeamSensor, build_selector, build_separate_sensor
@@ -52,8 +55,9 @@ def build_station(scenario: Scenario) -> TransportStation:
     builder = DiagramBuilder()
     team = (build_team_plant if scenario.plant.ideal else build_separate_team)(scenario, builder)
     plant = team.plant
-    _measure(builder, team)
-    _drive_robots(builder, team)
+    tilt_floor(team, scenario.deployment.floor)
+    states = _measure(builder, team)
+    _drive_robots(builder, team, states)
     builder.ExportOutput(plant.get_generalized_acceleration_output_port(), "generalized_acceleration")
     builder.ExportOutput(team.scene_graph.get_query_output_port(), "query_object")
     return TransportStation(builder.Build(), team)
@@ -83,15 +87,15 @@ def build_driven_station(scenario: Scenario) -> TransportStation:
     if scenario.deployment.period is None:
         _drive_bases(builder, team)
     else:
-        _drive_robots(builder, team)
+        _drive_robots(builder, team, ())
     builder.ExportOutput(team.plant.get_state_output_port(), "team_state")
     builder.ExportOutput(team.plant.get_generalized_acceleration_output_port(), "generalized_acceleration")
     builder.ExportOutput(team.scene_graph.get_query_output_port(), "query_object")
     return TransportStation(builder.Build(), team)
 
 
-def _measure(builder: DiagramBuilder, team: TeamPlant) -> None:
-    """Add the sensors of the object's pose and of every robot's own state."""
+def _measure(builder: DiagramBuilder, team: TeamPlant) -> list[OutputPort]:
+    """Add the sensors of the object's pose and of every robot's own state; return the latter."""
     names = ["object_pose", *(f"robot_{robot.index}_state" for robot in team.robots)]
     if isinstance(team, SeparateTeam):
         sensor = parts = builder.AddNamedSystem("team_sensor", build_separate_sensor(team))
@@ -102,20 +106,24 @@ def _measure(builder: DiagramBuilder, team: TeamPlant) -> None:
     builder.Connect(team.plant.get_state_output_port(), sensor.GetInputPort("team_state"))
     for i, name in enumerate(names):
         builder.ExportOutput(parts.get_output_port(i), name)
+    return [parts.get_output_port(i) for i in range(1, len(names))]
 
 
-def _drive_robots(builder: DiagramBuilder, team: TeamPlant) -> None:
+def _drive_robots(builder: DiagramBuilder, team: TeamPlant, states: Sequence[OutputPort]) -> None:
     """Add inputs for the effort of every robot: wrenches in W on the bases, torques on the joints."""
     plant, efforts = team.plant, builder.AddNamedSystem("efforts", _efforts(team))
     for i in range(efforts.num_input_ports()):
         builder.ExportInput(efforts.get_input_port(i), efforts.get_input_port(i).get_name())
-    thrusters = _add_thrusters(builder, team)
+    wrenches = add_disturbances(
+        builder, team, team.scenario.deployment, states, efforts.GetOutputPort("base_wrenches")
+    )
+    thrusters = _add_thrusters(builder, team, with_object=wrenches.size() > 3 * len(team.robots))
     # Thrusters push along the axes of the poses that they receive. These are the identity, so that they push
     # along the axes of W, however the bases turn.
     axes = AbstractValue.Make([RigidTransform()] * plant.num_bodies())
     world = builder.AddNamedSystem("world_axes", ConstantValueSource(axes))
     builder.Connect(world.get_output_port(), thrusters.get_body_poses_input_port())
-    builder.Connect(efforts.GetOutputPort("base_wrenches"), thrusters.get_command_input_port())
+    builder.Connect(wrenches, thrusters.get_command_input_port())
     if team.joints:
         builder.Connect(efforts.GetOutputPort("joint_torques"), plant.get_actuation_input_port())
 
@@ -134,22 +142,27 @@ def _efforts(team: TeamPlant) -> Selector:
 
 def _drive_bases(builder: DiagramBuilder, team: TeamPlant) -> None:
     """Add inputs for wrenches in the axes of the bases, and for the torques of all joints together."""
-    plant, thrusters = team.plant, _add_thrusters(builder, team)
+    plant, thrusters = team.plant, _add_thrusters(builder, team, with_object=False)
     builder.Connect(plant.get_body_poses_output_port(), thrusters.get_body_poses_input_port())
     builder.ExportInput(thrusters.get_command_input_port(), "base_forces")
     if team.joints:
         builder.ExportInput(plant.get_actuation_input_port(), "joint_torques")
 
 
-def _add_thrusters(builder: DiagramBuilder, team: TeamPlant) -> Propeller:
+def _add_thrusters(builder: DiagramBuilder, team: TeamPlant, *, with_object: bool) -> Propeller:
     """Add Drake's Propeller for the wrenches on bases: thrusts along x and y, a moment about z.
 
     A base wrench given as a generalized force would move the team in the same way, but the reaction at the
-    grasp could then not be read from the plant.
+    grasp could then not be read from the plant. The object may have three thrusters at L of its own, behind
+    those of the bases.
     """
+    places = [(robot.base_body.index(), np.zeros(3)) for robot in team.robots]
+    if with_object:
+        X_BL = team.object_frame.GetFixedPoseInBodyFrame()
+        places.append((team.object_body.index(), X_BL.translation()))
     thrusters = [
-        PropellerInfo(robot.base_body.index(), RigidTransform(R_BP), thrust, moment)
-        for robot in team.robots
+        PropellerInfo(body, RigidTransform(R_BP, p_BP), thrust, moment)
+        for body, p_BP in places
         for R_BP, thrust, moment in (
             (RotationMatrix.MakeYRotation(0.5 * pi), 1.0, 0.0),
             (RotationMatrix.MakeXRotation(-0.5 * pi), 1.0, 0.0),

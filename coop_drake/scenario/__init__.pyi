@@ -1,5 +1,15 @@
 from .assembly import Assembly, RobotAssembly, assemble
-from .deployment import ActuatorLimits, Deployment, Measurements, Messages
+from .deployment import (
+    ActuatorLimits,
+    Deployment,
+    Floor,
+    Measurements,
+    Messages,
+    PoseBias,
+    Push,
+    RobotDepartures,
+    Silence,
+)
 from .gain_file import dump_gains, with_gains
 from .load import dump_scenario, load_scenario
 from .model import (
@@ -21,6 +31,7 @@ __all__ = [
     "ActuatorLimits",
     "Assembly",
     "Deployment",
+    "Floor",
     "Gains",
     "Goal",
     "MapSettings",
@@ -28,8 +39,12 @@ __all__ = [
     "Messages",
     "ObjectPose",
     "PlantSettings",
+    "PoseBias",
+    "Push",
     "RobotAssembly",
+    "RobotDepartures",
     "Scenario",
+    "Silence",
     "SimulatorSettings",
     "Start",
     "Tolerances",

@@ -1,18 +1,19 @@
-"""Departures of a real team from the ideal one: sampling, noise, delays, limits, model errors, lost messages.
+"""Departures of a real team from the ideal one: what is sampled, noisy, late, limited, wrong, lost or pushed.
 
-This file holds the values alone. They are applied in one place, :mod:`coop_drake.diagram.deployment`, which
-puts blocks between every controller and the plant; only ``mass_error`` acts elsewhere, where the controllers'
-model of the team is made (:mod:`coop_drake.diagram.knowledge`). A new departure is a field here, a block
-there, tests in ``tests/diagram/test_deployment.py``, a mild and a harsh case in
-``tests/closed_loop/test_deployment.py``, a row of ``docs/how_to/deployment.md``, wrong values for it in
-``tests/support/mutants/values.py``, and ``docs/reference/scenario.md``, which ``python -m docs.generate``
-writes. ``scenario/validation.py`` refuses measurements and messages that are set without a control rate.
-Fused blocks refuse every departure that ``coop_drake/diagram/fused.py`` does not list.
+This file holds the values alone; :mod:`coop_drake.scenario.deployment_checks` refuses values that do not fit
+together. Three files apply them: :mod:`coop_drake.diagram.wrapping` puts blocks between every controller and
+the plant, :mod:`coop_drake.diagram.disturbances` adds forces to those of the robots, and
+:mod:`coop_drake.diagram.knowledge` makes the controllers' model of the team, in which ``mass_error`` acts. A
+new departure is a field here, a block there, tests in ``tests/diagram/test_deployment.py``, a mild and a
+harsh case in ``tests/closed_loop/test_deployment.py``, a row of ``docs/how_to/deployment.md``, wrong values
+for it in ``tests/support/mutants/values.py``, and ``docs/reference/scenario.md``, which ``python -m
+docs.generate`` writes. Fused blocks refuse every departure that ``coop_drake/diagram/fused.py`` does not
+list.
 """
 
 from dataclasses import dataclass, field
 from math import ceil
-from typing import Annotated
+from typing import Annotated, Literal
 
 from coop_drake.typed_data import Limits, NotNegative, Positive
 
@@ -27,8 +28,11 @@ Probability = Annotated[float, Limits(at_least=0.0, at_most=1.0)]
 ControlRate = Annotated[float, Limits(at_least=1.0, at_most=1e4)]
 """A control rate [Hz]; beyond 10 kHz it would only be a slow way to simulate continuous time."""
 
-MassError = Annotated[float, Limits(at_least=-0.9, at_most=10.0)]
-"""A relative error of masses [-]; at -1 the model would be massless."""
+RelativeError = Annotated[float, Limits(at_least=-0.9, at_most=10.0)]
+"""A relative error [-]; at -1 a model would be massless, and a measured rate always zero."""
+
+ALL_ROBOTS = "*"
+"""Name that stands for all robots without an entry of their own."""
 
 
 @dataclass(frozen=True)
@@ -40,12 +44,20 @@ class Measurements:
         angle_noise: Standard deviation of every measured angle and of every joint's position [rad or m].
         rate_noise: Standard deviation of every measured rate [m/s or rad/s].
         delay: Age of a measurement when the controller gets it, rounded up to whole control periods [s].
+        loss: Probability that a measurement is lost, so that the last one is used again; of the pose and of
+            the robot's own state separately [-].
+        late: Probability that a measurement which is not lost arrives late, and is used from then on unless
+            a newer one has arrived [-].
+        late_by: How much later, rounded up to whole control periods, at least one [s].
     """
 
     position_noise: NotNegative = 0.0
     angle_noise: NotNegative = 0.0
     rate_noise: NotNegative = 0.0
     delay: Delay = 0.0
+    loss: Probability = 0.0
+    late: Probability = 0.0
+    late_by: Delay = 0.0
 
 
 @dataclass(frozen=True)
@@ -82,6 +94,95 @@ class Messages:
 
 
 @dataclass(frozen=True)
+class PoseBias:
+    """Constant error of a measured pose of the object.
+
+    Attributes:
+        x: Error of the first coordinate in W [m].
+        y: Error of the second coordinate in W [m].
+        theta: Error of the angle [rad].
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    theta: float = 0.0
+
+
+@dataclass(frozen=True)
+class Silence:
+    """A robot that sends no reports for a while; its motors may fail with it. Needs a control rate.
+
+    Attributes:
+        begin: When it falls silent [s].
+        duration: For how long; null for the rest of the run [s].
+        motors: ``working`` for motors that go on as they are told, ``held`` for motors that give their last
+            effort all the time, ``limp`` for motors that give none.
+    """
+
+    begin: NotNegative
+    duration: Positive | None = None
+    motors: Literal["working", "held", "limp"] = "working"
+
+
+@dataclass(frozen=True)
+class RobotDepartures:
+    """What is wrong with a single robot.
+
+    Attributes:
+        pose_bias: Constant error of the object's pose as it measures it.
+        odometry_scale: By how much it overestimates the rates of its base, relative; may be negative [-].
+        sample_offset: By how much later than the others it measures and computes in every control period,
+            less than a period; needs a control rate [s].
+        clock_error: By how much its clock is ahead of the others', from which the time since a cell's entry
+            follows; may be negative [s].
+        switch_delay: How much later than the others it hears that the cell was switched, rounded up to whole
+            control periods; needs a control rate [s].
+        silence: When it sends no reports, null for never.
+    """
+
+    pose_bias: PoseBias = field(default_factory=PoseBias)
+    odometry_scale: RelativeError = 0.0
+    sample_offset: Delay = 0.0
+    clock_error: Annotated[float, Limits(at_least=-10.0, at_most=10.0)] = 0.0
+    switch_delay: Delay = 0.0
+    silence: Silence | None = None
+
+
+@dataclass(frozen=True)
+class Floor:
+    """Forces of the floor on the team.
+
+    Attributes:
+        coulomb_friction: Friction force against the motion of every base, whatever its speed [N].
+        viscous_friction: Friction force against the motion of every base for each unit of its speed [N s/m].
+        slope: Angle by which the floor falls along the x axis of W [rad].
+    """
+
+    coulomb_friction: NotNegative = 0.0
+    viscous_friction: NotNegative = 0.0
+    slope: Annotated[float, Limits(at_least=-1.0, at_most=1.0)] = 0.0
+
+
+@dataclass(frozen=True)
+class Push:
+    """A constant force from outside on one body for a while.
+
+    Attributes:
+        body: Name of the object or of a robot, whose base is pushed; the force acts at the origin of L or Bk.
+        force: Force in W [N].
+        torque: Torque about the vertical axis [N m].
+        time: When the push begins [s].
+        duration: How long it lasts; at least ``simulator.max_step_size`` [s].
+    """
+
+    body: str
+    force: tuple[float, float]
+    time: NotNegative
+    duration: Positive
+    torque: float = 0.0
+
+
+@dataclass(frozen=True)
 class Deployment:
     """The team as it would be built; without this section it is ideal and controlled in continuous time.
 
@@ -92,20 +193,30 @@ class Deployment:
         measurements: Noise and delay of what robots measure; needs a control rate.
         actuators: Largest efforts of the actuators.
         messages: Losses and delay of ready reports; needs a control rate.
+        robots: What is wrong with single robots, by name; ``"*"`` for all that have no entry of their own.
+        floor: Friction and slope of the floor.
+        pushes: Forces from outside.
         seed: Seed of noise and losses.
     """
 
     control_rate: ControlRate | None = None
-    mass_error: MassError = 0.0
+    mass_error: RelativeError = 0.0
     measurements: Measurements = field(default_factory=Measurements)
     actuators: ActuatorLimits = field(default_factory=ActuatorLimits)
     messages: Messages = field(default_factory=Messages)
+    robots: dict[str, RobotDepartures] = field(default_factory=dict)
+    floor: Floor = field(default_factory=Floor)
+    pushes: tuple[Push, ...] = ()
     seed: Annotated[int, Limits(at_least=0)] = 0
 
     @property
     def ideal(self) -> bool:
         """Whether nothing is switched on, so that the equations of the control law hold exactly."""
         return self == Deployment(seed=self.seed)
+
+    def of_robot(self, name: str) -> RobotDepartures:
+        """Return what is wrong with a robot."""
+        return self.robots.get(name, self.robots.get(ALL_ROBOTS, RobotDepartures()))
 
     @property
     def command_age(self) -> float:

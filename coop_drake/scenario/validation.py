@@ -1,9 +1,8 @@
 """Checks that relate several values of a scenario; the limits of single values stand in their types."""
 
-import dataclasses
-
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.assembly import assemble
+from coop_drake.scenario.deployment_checks import check_deployment
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.rings import check_workspace
 
@@ -22,24 +21,13 @@ def validate(scenario: Scenario) -> None:
     if scenario.gains.selected not in scenario.gains.sets:
         known = ", ".join(sorted(scenario.gains.sets))
         raise ScenarioError(file, "gains.selected", scenario.gains.selected, f"a gain set, one of {known}")
-    _check_control_rate(scenario)
     robots = [robot.name for robot in assemble(scenario).robots]
+    check_deployment(scenario, robots)
     for section in ("fixed_joints", "load_shares"):
         for name in getattr(scenario, section):
             if name not in robots:
                 raise ScenarioError(file, f"{section}.{name}", name, "a robot, one of " + ", ".join(robots))
     _check_load_shares(scenario, robots)
-
-
-def _check_control_rate(scenario: Scenario) -> None:
-    """Refuse noise, delays and losses of a team in continuous time, which has no samples and no messages."""
-    if scenario.deployment.control_rate is not None:
-        return
-    for section in ("measurements", "messages"):
-        for name, value in dataclasses.asdict(getattr(scenario.deployment, section)).items():
-            if value != 0.0:
-                key = f"deployment.{section}.{name}"
-                raise ScenarioError(str(scenario.path), key, value, "0 without deployment.control_rate")
 
 
 def _check_load_shares(scenario: Scenario, robots: list[str]) -> None:

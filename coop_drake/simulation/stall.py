@@ -96,11 +96,27 @@ def _readiness(plan: Plan, sample: Sample) -> dict[str, float]:
     return margins
 
 
-def _arrival(plan: Plan, sample: Sample, position_tolerance: float) -> dict[str, float]:
+def at_goal(plan: Plan, sample: Sample, position_tolerance: float) -> bool:
+    """Whether the object and the joints are where the plan ends, whatever the robots have measured.
+
+    Args:
+        plan: The plan.
+        sample: The present instant, in the last cell.
+        position_tolerance: How close to the goal counts as arrived [m].
+    """
+    return min(_places(plan, sample, position_tolerance).values()) >= 0.0
+
+
+def _places(plan: Plan, sample: Sample, position_tolerance: float) -> dict[str, float]:
     margins = _intervals(plan, sample)
     distance = float(np.hypot(*(sample.z[:2] - plan.goal_pose[:2])))
-    speed = float(np.hypot(*sample.rates[:2]))
     margins["the object reaches its goal position"] = position_arrival(distance, 0.0, position_tolerance)
+    return margins
+
+
+def _arrival(plan: Plan, sample: Sample, position_tolerance: float) -> dict[str, float]:
+    margins = _places(plan, sample, position_tolerance)
+    speed = float(np.hypot(*sample.rates[:2]))
     margins["the object and the joints come to rest"] = min(
         position_arrival(0.0, speed, position_tolerance),
         rest_margin(float(np.abs(sample.rates[2:]).max())),

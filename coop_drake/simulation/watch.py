@@ -10,7 +10,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.diagram import ClosedLoop
 from coop_drake.simulation.invariants import Invariants
 from coop_drake.simulation.recorder import Recorder
-from coop_drake.simulation.stall import blocking_margin, narrowest_funnel, patience
+from coop_drake.simulation.stall import at_goal, blocking_margin, narrowest_funnel, patience
 from coop_drake.simulation.telemetry import Sample, Telemetry
 
 __all__ = ["Watch"]
@@ -62,7 +62,7 @@ class Watch:
             self._observer(sample)
         if margins.violation:
             self.violation = margins.violation
-        elif sample.arrived:
+        elif sample.arrived and at_goal(self._loop.plan, sample, self._tolerance):
             self.reached = True
         elif sample.time - sample.entry > patience(self._loop.plan, sample.cell):
             self.give_up("stalled")

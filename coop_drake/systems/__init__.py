@@ -5,6 +5,9 @@ from coop_drake.systems.axis_ppc import AxisPpc
 from coop_drake.systems.block import Block
 from coop_drake.systems.cell_planner import CellPlanner
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
+from coop_drake.systems.floor_friction import FloorFriction
+from coop_drake.systems.interruption import Interruption
+from coop_drake.systems.lossy_measurement import LossyMeasurement
 from coop_drake.systems.message_channel import MessageChannel, clear_channel, whole_periods
 from coop_drake.systems.object_estimator import ObjectEstimator
 from coop_drake.systems.ready_monitor import ReadyMonitor
@@ -23,9 +26,12 @@ __all__ = [
     "AxisPpc",
     "Block",
     "CellPlanner",
+    "FloorFriction",
     "FusedCell",
     "FusedTeam",
     "GovernedCell",
+    "Interruption",
+    "LossyMeasurement",
     "MessageChannel",
     "ObjectEstimator",
     "ReadyMonitor",

@@ -69,6 +69,15 @@ def sections(cls: Any = Scenario, path: str = "") -> Iterator[Section]:
                 yield from sections(inner, f"{place}.NAME: {tag}")
         if dataclasses.is_dataclass(field.kind):
             yield from sections(field.kind, place)
+        yield from _inner_sections(field.kind, place)
+
+
+def _inner_sections(kind: Any, place: str) -> Iterator[Section]:
+    """Yield the sections of entries of mappings and lists, and of values that may be null."""
+    suffix = {dict: ".NAME", tuple: "[]"}.get(typing.get_origin(kind), "")
+    for part in typing.get_args(kind):
+        if isinstance(part, type) and dataclasses.is_dataclass(part) and not classes_by_tag(kind):
+            yield from sections(part, place + suffix)
 
 
 def _unit_apart(meaning: str) -> tuple[str, str]:

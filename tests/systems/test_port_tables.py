@@ -9,7 +9,15 @@ from pydrake.systems.framework import Diagram, LeafSystem
 
 from coop_drake import systems
 from coop_drake.diagram import build_closed_loop
-from coop_drake.scenario import Deployment, Messages, PlantSettings
+from coop_drake.scenario import (
+    Deployment,
+    Floor,
+    Measurements,
+    Messages,
+    PlantSettings,
+    RobotDepartures,
+    Silence,
+)
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.system_checks import SIZE_OF_ABSTRACT, port_sizes, state_of
 
@@ -18,6 +26,14 @@ BLOCKS = sorted(
     name
     for name, thing in vars(systems).items()
     if inspect.isclass(thing) and issubclass(thing, LeafSystem) and thing is not systems.Block
+)
+
+EVERYTHING = Deployment(
+    control_rate=100.0,
+    measurements=Measurements(loss=0.1),
+    messages=Messages(loss=0.1),
+    robots={"*": RobotDepartures(silence=Silence(1.0))},
+    floor=Floor(coulomb_friction=1.0),
 )
 
 
@@ -33,7 +49,7 @@ def blocks():
     scenario, plan = small_problem("base")
     found = {}
     for blocks, changes in (
-        ("named", {"deployment": Deployment(control_rate=100.0, messages=Messages(loss=0.1))}),
+        ("named", {"deployment": EVERYTHING}),
         ("named", {"plant": PlantSettings(grasps="constraints")}),
         ("fused", {}),
     ):
@@ -72,9 +88,9 @@ def test_a_block_without_state_has_none_and_any_other_says_which(blocks, name):
         assert re.search(r"^ *State: ", type(block).__doc__, re.MULTILINE)
 
 
-def test_only_the_cell_planner_and_the_radio_remember_anything(blocks):
+def test_only_the_cell_planner_and_what_models_failures_remember_anything(blocks):
     remembering = {name for name in BLOCKS if any(map(len, state_of(blocks[name][0].CreateDefaultContext())))}
-    assert remembering == {"CellPlanner", "MessageChannel"}
+    assert remembering == {"CellPlanner", "Interruption", "LossyMeasurement", "MessageChannel"}
 
 
 @pytest.mark.parametrize("name", BLOCKS)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from tests.support.mutants.mutant import Mutant, Place, block, dotted, put, without
@@ -64,6 +65,11 @@ _NOT_NEGATIVE = [
     "deployment.messages.repeat",
     "deployment.messages.delay",
     "deployment.actuators.lag",
+    "deployment.measurements.loss",
+    "deployment.measurements.late",
+    "deployment.measurements.late_by",
+    "deployment.floor.coulomb_friction",
+    "deployment.floor.viscous_friction",
 ]
 _BEYOND = {
     "planner.slice_overlap": (1.5, "slices overlap by a part of their width"),
@@ -79,11 +85,35 @@ _BEYOND = {
     "deployment.actuators.base_torque": (-5.0, "limits are magnitudes"),
     "deployment.actuators.joint_effort": (0.0, "nothing would move"),
     "deployment.actuators.lag": (60.0, "a motor does not take minutes"),
+    "deployment.measurements.loss": (1.5, "it is a probability"),
+    "deployment.floor.slope": (30.0, "it is an angle in radians"),
     "planner.strategy": ("astar", "no strategy has this name"),
     "simulator.integration_scheme": ("runge_kutta7", "no integrator has this name"),
     "gains.selected": ("table_3", "no gain set has this name"),
 }
-_NEEDS_RATE = ("measurements.position_noise", "measurements.delay", "messages.loss", "messages.delay")
+_NEEDS_RATE = (
+    "measurements.position_noise",
+    "measurements.delay",
+    "measurements.loss",
+    "messages.loss",
+    "messages.delay",
+)
+_OF_ROBOT = {
+    "pose_bias": ({"x": "left"}, "it is a length"),
+    "odometry_scale": (-1.5, "rates would be negative"),
+    "sample_offset": (0.01, "there is no sampling, and at 200 Hz it would be the next sample"),
+    "clock_error": (100.0, "no clock is minutes ahead"),
+    "switch_delay": (-0.1, "nothing is heard before it is said"),
+    "silence": ({"duration": 1.0}, "it begins at some time"),
+}
+_PUSH = {"body": "object", "force": [1.0, 2.0], "time": 1.0, "duration": 1.0}
+_OF_PUSH = {
+    "body": ("nobody", "no body has this name"),
+    "force": ([1.0], "it has two coordinates"),
+    "time": (-1.0, "the run begins at zero"),
+    "duration": (0.001, "a step of the simulation may miss it"),
+    "torque": ("much", "it is a number"),
+}
 
 
 def value_mutants(data: dict[str, Any]) -> Iterator[Mutant]:
@@ -99,6 +129,7 @@ def value_mutants(data: dict[str, Any]) -> Iterator[Mutant]:
     for name in _NEEDS_RATE:
         because = "controllers in continuous time neither measure nor report at instants"
         yield _mutant("without a control rate", data, _path(f"deployment.{name}"), 0.001, because)
+    yield from _departures(data)
     yield from _gains(data)
     yield from _load_shares(data)
 
@@ -170,6 +201,20 @@ def _gains(data: dict[str, Any]) -> Iterator[Mutant]:
         if "min_stiffness" in gains:
             value, why = 2.0 * gains["max_stiffness"], "the least is above the most"
             yield _mutant("bounds exchanged", data, (*path, "min_stiffness"), value, why)
+
+
+def _departures(data: dict[str, Any]) -> Iterator[Mutant]:
+    robot = next(iter(data["start"]["joints"]))
+    entries = [
+        ("robots", f"{robot}.{key}", {robot: {key: value}}, because)
+        for key, (value, because) in _OF_ROBOT.items()
+    ]
+    entries.append(("robots", "nobody", {"nobody": {}}, "no robot has this name"))
+    for key, (value, because) in _OF_PUSH.items():
+        entries.append(("pushes", f"[0].{key}", [{**_PUSH, key: value}], because))
+    for section, key, value, because in entries:
+        mutant = _mutant("departure", data, ("deployment", section), value, because)
+        yield replace(mutant, key=f"deployment.{section}.{key}".replace(".[", "["))
 
 
 def _load_shares(data: dict[str, Any]) -> Iterator[Mutant]:

@@ -1,0 +1,80 @@
+"""Forces on a team that are not its own: friction and slope of the floor, pushes from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import sin
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder, OutputPort
+from pydrake.systems.primitives import Adder, MatrixGain, TrajectorySource
+from pydrake.trajectories import PiecewisePolynomial
+
+from coop_drake.plant import TeamPlant
+from coop_drake.scenario import Deployment, Floor, Push
+from coop_drake.systems import FloorFriction
+
+_GRAVITY = 9.80665
+"""Standard acceleration of gravity [m/s^2]."""
+
+
+def tilt_floor(team: TeamPlant, floor: Floor) -> None:
+    """Let gravity pull all bodies of a plant down the slope of the floor, along x of W."""
+    if floor.slope:
+        team.plant.mutable_gravity_field().set_gravity_vector([_GRAVITY * sin(floor.slope), 0.0, 0.0])
+
+
+def add_disturbances(
+    builder: DiagramBuilder,
+    team: TeamPlant,
+    deployment: Deployment,
+    states: Sequence[OutputPort],
+    wrenches: OutputPort,
+) -> OutputPort:
+    """Add friction and pushes to the wrenches on all bases, and pushes on the object behind them.
+
+    Args:
+        builder: Receives the blocks.
+        team: The team.
+        deployment: What is switched on.
+        states: True state of every robot.
+        wrenches: Wrenches on all bases in W, of size 3 N.
+
+    Returns:
+        Wrenches on all bases, and where there are pushes, the one on the object at L: size 3 N or 3 N + 3.
+    """
+    floor, size = deployment.floor, wrenches.size()
+    if floor.coulomb_friction or floor.viscous_friction:
+        joints = [len(robot.joints) for robot in team.robots]
+        friction = builder.AddNamedSystem(
+            "floor_friction", FloorFriction(joints, floor.coulomb_friction, floor.viscous_friction)
+        )
+        for k, state in enumerate(states):
+            builder.Connect(state, friction.get_input_port(k))
+        wrenches = _sum(builder, "wrenches_less_friction", wrenches, friction.get_output_port())
+    if deployment.pushes:
+        names = [*(robot.name for robot in team.robots), team.scenario.object]
+        on_object = builder.AddNamedSystem("wrenches_with_object", MatrixGain(np.eye(size + 3, size)))
+        builder.Connect(wrenches, on_object.get_input_port())
+        pushes = builder.AddNamedSystem("pushes", TrajectorySource(_pushes(deployment.pushes, names)))
+        wrenches = _sum(builder, "pushed", on_object.get_output_port(), pushes.get_output_port())
+    return wrenches
+
+
+def _sum(builder: DiagramBuilder, name: str, first: OutputPort, second: OutputPort) -> OutputPort:
+    adder = builder.AddNamedSystem(name, Adder(2, first.size()))
+    builder.Connect(first, adder.get_input_port(0))
+    builder.Connect(second, adder.get_input_port(1))
+    return adder.get_output_port()
+
+
+def _pushes(pushes: Sequence[Push], names: Sequence[str]) -> PiecewisePolynomial:
+    """Return the sum of all pushes on each of the bodies named, as a function of time."""
+    times = sorted({0.0, *(push.time for push in pushes), *(push.time + push.duration for push in pushes)})
+    # The last sample is zero, and its value holds for ever.
+    values = np.zeros((3 * len(names), len(times)))
+    for push in pushes:
+        at = 3 * names.index(push.body)
+        lasting = [push.time <= time < push.time + push.duration for time in times]
+        values[at : at + 3, lasting] += np.array([[*push.force, push.torque]]).T
+    return PiecewisePolynomial.ZeroOrderHold([*times, times[-1] + 1.0], np.c_[values, values[:, -1]])

@@ -1,0 +1,29 @@
+"""The channel of a robot's reports, and the seeds of what is drawn for each robot."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.systems.primitives import LinearSystem
+
+from coop_drake.scenario import Deployment, Messages
+from coop_drake.systems import MessageChannel, clear_channel
+
+
+def build_radio(deployment: Deployment, robot: int) -> MessageChannel | LinearSystem:
+    """Build the channel of a robot's reports in a sampled team."""
+    messages, period = deployment.messages, deployment.period or 0.0
+    if messages == Messages():
+        return clear_channel(period)
+    return MessageChannel(
+        period,
+        delay=messages.delay,
+        loss=messages.loss,
+        repeat=messages.repeat,
+        seed=seed_of(deployment, robot),
+    )
+
+
+def seed_of(deployment: Deployment, robot: int, use: int = 0) -> int:
+    """Return the seed of what is drawn for a robot; each use has its own."""
+    words = [deployment.seed, robot, use] if use else [deployment.seed, robot]
+    return int(np.random.SeedSequence(words).generate_state(1)[0])

@@ -1,0 +1,211 @@
+"""The blocks that a deployment puts between one robot's controller and the rest of the loop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TypeAlias
+
+import numpy as np
+from pydrake.common import RandomDistribution
+from pydrake.systems.framework import DiagramBuilder, InputPort, LeafSystem, OutputPort
+from pydrake.systems.primitives import (
+    Adder,
+    AffineSystem,
+    DiscreteTimeDelay,
+    FirstOrderLowPassFilter,
+    Gain,
+    RandomSource,
+    Saturation,
+    ZeroOrderHold,
+)
+
+from coop_drake.diagram.radio import build_radio, seed_of
+from coop_drake.scenario import Deployment, PoseBias, RobotDepartures, Silence
+from coop_drake.systems import Interruption, LossyMeasurement, whole_periods
+from coop_drake.tree.pose import FloatArray
+
+Holding: TypeAlias = DiscreteTimeDelay | ZeroOrderHold | LossyMeasurement
+"""Blocks that hold measurements."""
+
+_STRONGEST = 1e5
+"""Limit of every effort where the scenario gives none [N, N m]. A controller outside its funnel may ask for
+any effort; without a limit the plant's state would overflow, which ends the process instead of the run."""
+
+_KILO = 1e3
+"""Unit of the lagging efforts [N, N m]. The integrator's error control compares states of all units with one
+number; efforts in newtons would ask for a thousandth of a newton, and for very short steps."""
+
+
+class Wrapping:
+    """Adds to a builder the blocks that a deployment asks for round one robot's controller.
+
+    Args:
+        builder: Receives them.
+        deployment: What is switched on.
+        robot: Index k of the robot.
+        name: Its name.
+    """
+
+    def __init__(self, builder: DiagramBuilder, deployment: Deployment, robot: int, name: str) -> None:
+        self._builder, self._deployment, self._robot = builder, deployment, robot
+        self._own = deployment.of_robot(name)
+        self.noises: list[RandomSource] = []
+        self.delays: list[Holding] = []
+
+    def measure(self, entry: InputPort) -> None:
+        """Export an input of the controller with its constant errors, noise, delay and losses."""
+        name, size, period = entry.get_name(), entry.size(), self._deployment.period
+        measurements = self._deployment.measurements
+        blocks = [(f"{name}_biased", _distortion(self._own, name, size))]
+        if period is not None:
+            blocks.append((f"{name}_measured", self._noise(name, size)))
+            delays = self._delays(size, whole_periods(measurements.delay, period))
+            blocks.extend((f"{name}_delay{i or ''}", delay) for i, delay in enumerate(delays))
+            blocks.append((f"{name}_received", self._losses(name, size, period)))
+        added = [(label, block) for label, block in blocks if block is not None]
+        self.delays.extend(block for _, block in added if isinstance(block, Holding))
+        self._lead(entry, added)
+
+    def hear(self, entry: InputPort) -> None:
+        """Export the input of the current cell, which a robot may hear late and time by a wrong clock."""
+        blocks: list[tuple[str, LeafSystem]] = []
+        if self._own.clock_error:
+            blocks.append(("clock_error", _affine(np.ones(2), np.array([0.0, -self._own.clock_error]))))
+        if self._deployment.period is not None:
+            delays = self._delays(2, whole_periods(self._own.switch_delay, self._deployment.period))
+            blocks.extend((f"switch_delay{i or ''}", delay) for i, delay in enumerate(delays))
+        self._lead(entry, blocks)
+
+    def actuate(self, effort: OutputPort) -> OutputPort:
+        """Return the effort after failures, hold, limits and lag."""
+        size, period, silence = effort.size(), self._deployment.period, self._own.silence
+        blocks: list[tuple[str, LeafSystem]] = []
+        if period is not None:
+            if silence is not None and silence.motors != "working":
+                blocks.append(("motors", self._interruption(size, silence, held=silence.motors == "held")))
+            blocks.append(("effort_hold", ZeroOrderHold(period, size, self._own.sample_offset)))
+        limits = _limits(self._deployment, size - 3)
+        blocks.append(("actuator_limits", Saturation(-limits, limits)))
+        if lag := self._deployment.actuators.lag:
+            blocks.append(("effort_in_kilonewtons", Gain(1.0 / _KILO, size)))
+            blocks.append(("actuator_lag", FirstOrderLowPassFilter(lag, size)))
+            blocks.append(("lagged_effort", Gain(_KILO, size)))
+        return self._append(effort, blocks)
+
+    def send(self, ready: OutputPort) -> OutputPort:
+        """Return the reports of a robot as the cell planner receives them."""
+        period, silence, offset = self._deployment.period, self._own.silence, self._own.sample_offset
+        if period is None:
+            return ready
+        blocks: list[tuple[str, LeafSystem]] = []
+        if silence is not None:
+            blocks.append(("reports", self._interruption(ready.size(), silence, held=True)))
+        if offset:
+            blocks.append(("reports_of_samples", ZeroOrderHold(period, ready.size(), offset)))
+        return self._append(ready, [*blocks, ("radio", build_radio(self._deployment, self._robot))])
+
+    def _append(self, port: OutputPort, blocks: Iterable[tuple[str, LeafSystem]]) -> OutputPort:
+        """Add blocks one after the other behind an output, and return the last one's output."""
+        for name, block in blocks:
+            self._builder.AddNamedSystem(name, block)
+            self._builder.Connect(port, block.get_input_port(0))
+            port = block.get_output_port(0)
+        return port
+
+    def _lead(self, entry: InputPort, blocks: Sequence[tuple[str, LeafSystem]]) -> None:
+        """Add blocks one after the other before an input, and export the first one's input by its name."""
+        name = entry.get_name()
+        for label, block in reversed(blocks):
+            if not self._builder.HasSubsystemNamed(label):
+                self._builder.AddNamedSystem(label, block)
+            self._builder.Connect(block.get_output_port(0), entry)
+            entry = block.get_input_port(0)
+        self._builder.ExportInput(entry, name)
+
+    def _noise(self, name: str, size: int) -> Adder | None:
+        """Add a source of noise for a measured port, and return the block that adds it; None for no noise."""
+        deviations = _deviations(self._deployment, name, size)
+        if not deviations.any():
+            return None
+        noise = RandomSource(RandomDistribution.kGaussian, size, self._deployment.period or 0.0)
+        self._builder.AddNamedSystem(f"{name}_noise", noise)
+        self.noises.append(noise)
+        scaled = self._append(noise.get_output_port(), [(f"{name}_deviations", Gain(deviations))])
+        adder = self._builder.AddNamedSystem(f"{name}_measured", Adder(2, size))
+        self._builder.Connect(scaled, adder.get_input_port(1))
+        return adder
+
+    def _delays(self, size: int, periods: int) -> list[Holding]:
+        """Return the blocks that delay a signal by a number of control periods.
+
+        Controllers compute at the instant at which a block takes its next sample, and before it does: one
+        period of the delay is already this.
+        """
+        period, offset = self._deployment.period, self._own.sample_offset
+        assert period is not None
+        if periods == 0:
+            return []
+        if offset == 0.0:
+            return [DiscreteTimeDelay(period, periods - 1, size)]
+        return [ZeroOrderHold(period, size, offset) for _ in range(periods)]
+
+    def _losses(self, name: str, size: int, period: float) -> LossyMeasurement | None:
+        m = self._deployment.measurements
+        if m.loss == 0.0 and m.late == 0.0:
+            return None
+        return LossyMeasurement(
+            size,
+            period,
+            loss=m.loss,
+            late=m.late,
+            late_by=m.late_by,
+            offset=self._own.sample_offset,
+            seed=seed_of(self._deployment, self._robot, 1 + (name == "robot_state")),
+        )
+
+    def _interruption(self, size: int, silence: Silence, *, held: bool) -> Interruption:
+        return Interruption(
+            size,
+            self._deployment.period or 0.0,
+            begin=silence.begin,
+            duration=silence.duration,
+            held=held,
+            offset=self._own.sample_offset,
+        )
+
+
+def _deviations(deployment: Deployment, name: str, size: int) -> FloatArray:
+    """Return the standard deviations of (x, y, angle), or of (x, y, angle, joints..., their rates)."""
+    m = deployment.measurements
+    count = 3 if name == "object_pose" else size // 2
+    positions = [m.position_noise, m.position_noise, *[m.angle_noise] * (count - 2)]
+    return np.array([*positions, *[m.rate_noise] * (size - count)])
+
+
+def _distortion(own: RobotDepartures, name: str, size: int) -> AffineSystem | None:
+    """Return the block of the constant errors of what a robot measures; None if it has none."""
+    factors, offsets = np.ones(size), np.zeros(size)
+    if name == "object_pose":
+        offsets += own.pose_bias.x, own.pose_bias.y, own.pose_bias.theta
+    else:
+        rates = size // 2
+        factors[rates : rates + 3] += own.odometry_scale
+    return None if own.pose_bias == PoseBias() and own.odometry_scale == 0.0 else _affine(factors, offsets)
+
+
+def _affine(factors: FloatArray, offsets: FloatArray) -> AffineSystem:
+    """Return Drake's block of y_i = f_i u_i + o_i, which has no state."""
+    n, none = len(factors), np.zeros(0)
+    return AffineSystem(
+        A=np.zeros((0, 0)), B=np.zeros((0, n)), f0=none, C=np.zeros((n, 0)), D=np.diag(factors), y0=offsets
+    )
+
+
+def _limits(deployment: Deployment, joints: int) -> FloatArray:
+    """Return the largest base wrench and joint torques, shape (3 + n,)."""
+    limits = deployment.actuators
+    force, torque, effort = (
+        _STRONGEST if limit is None else limit
+        for limit in (limits.base_force, limits.base_torque, limits.joint_effort)
+    )
+    return np.array([force, force, torque, *[effort] * joints])
