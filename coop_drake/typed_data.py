@@ -129,6 +129,9 @@ def below(key: str, name: object) -> str:
 def convert_class(value: object, cls: type[T], key: str = "") -> T:
     """Convert a mapping to a dataclass; what the class itself refuses by a :class:`DataError`, too.
 
+    A class with a function ``completed`` is given the mapping and its key first, and returns the mapping with
+    what the class itself adds.
+
     Raises:
         DataError: The first departure.
     """
@@ -136,13 +139,15 @@ def convert_class(value: object, cls: type[T], key: str = "") -> T:
     names = ", ".join(fields)
     if not isinstance(value, dict):
         raise DataError(key, value, f"a mapping with the keys {names}")
-    for name in value:
+    complete: Callable[[dict[str, Any], str], dict[str, Any]] | None = getattr(cls, "completed", None)
+    content = value if complete is None else complete(value, key)
+    for name in content:
         if name not in fields:
-            raise DataError(below(key, name), value[name], f"one of the keys {names}")
+            raise DataError(below(key, name), content[name], f"one of the keys {names}")
     for name, field in fields.items():
-        if field.default is MISSING and name not in value:
+        if field.default is MISSING and name not in content:
             raise DataError(below(key, name), None, "a value; this key is required")
-    entries = {name: convert(item, fields[name].kind, below(key, name)) for name, item in value.items()}
+    entries = {name: convert(item, fields[name].kind, below(key, name)) for name, item in content.items()}
     try:
         return cls(**entries)
     except DataError as error:  # Its key is relative to the class.

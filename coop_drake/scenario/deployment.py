@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from math import ceil
 from typing import Annotated, Literal
 
+from coop_drake.scenario.presets import Preset, with_preset
 from coop_drake.typed_data import Limits, NotNegative, Positive
 
 Delay = Annotated[float, Limits(at_least=0.0, at_most=10.0)]
@@ -187,6 +188,10 @@ class Deployment:
     """The team as it would be built; without this section it is ideal and controlled in continuous time.
 
     Attributes:
+        preset: The departures of a usual team, which the keys beside it replace one by one. ``mobile_base``:
+            200 Hz, measurements 10 ms late with noise of 1 mm, 0.5 mrad and 0.01 /s, masses believed 20 % too
+            large, base forces up to 300 N, actuators that lag by 5 ms, a fifth of the reports lost. A
+            scenario that was read holds the departures themselves.
         control_rate: How often controllers compute a new effort, which is held in between; null for
             controllers in continuous time [Hz].
         mass_error: By how much robots overestimate all masses and inertias, relative; may be negative [-].
@@ -199,6 +204,7 @@ class Deployment:
         seed: Seed of noise and losses.
     """
 
+    preset: Preset | None = None
     control_rate: ControlRate | None = None
     mass_error: RelativeError = 0.0
     measurements: Measurements = field(default_factory=Measurements)
@@ -208,6 +214,8 @@ class Deployment:
     floor: Floor = field(default_factory=Floor)
     pushes: tuple[Push, ...] = ()
     seed: Annotated[int, Limits(at_least=0)] = 0
+
+    completed = staticmethod(with_preset)
 
     @property
     def ideal(self) -> bool:

@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import ExtractSimulatorConfig, Simulator
 from pydrake.systems.primitives import ConstantVectorSource
 
-from coop_drake.laws import FixedGains
+from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.scenario import (
     ActuatorLimits,
     Deployment,
@@ -20,6 +20,7 @@ from coop_drake.scenario import (
     Silence,
 )
 from coop_drake.simulation import configure_simulator, simulate
+from coop_drake.typed_data import convert_class
 from tests.support.hand_over import assert_certified
 from tests.support.small_loop import small_maps, small_problem
 
@@ -141,6 +142,14 @@ def test_a_thousand_samples_a_second_are_survived_too():
     assert log.reached
     assert log.violation == ""
     assert min(log.funnel_margin.min(), log.slice_margin.min(), log.cell_clearance.min()) > 0.0
+
+
+@pytest.mark.parametrize(("seed", "mass_error"), [(0, 0.2), (1, -0.2), (2, 0.2)])
+def test_a_team_as_the_preset_describes_it_arrives(seed, mass_error):
+    preset = convert_class({"preset": "mobile_base", "mass_error": mass_error, "seed": seed}, Deployment)
+    log = run(preset, ScheduledGains().for_age(preset.command_age))
+    assert log.violation == ""
+    assert log.reached
 
 
 @pytest.mark.parametrize("name", HARSH)

@@ -54,12 +54,13 @@ def funnel_surpluses(plan: Plan, index: int, axes: np.ndarray, rates: np.ndarray
     below, above = axes - cell.lower, cell.upper - axes
     assert min(below.min(), above.min()) > 0.0
     s = np.log(below / above)
-    # Walls of the smooth funnel rest at its mouth; those of the printed one move at their fastest.
+    # Walls of the quintic funnel rest at its mouth; those of the printed one move at their fastest.
     speed = gains.decay_rate if gains.funnel == "exponential" else np.zeros_like(axes)
     lower_rate, upper_rate = (
         speed * (transition.goal_lower - cell.lower),
         speed * (transition.goal_upper - cell.upper),
     )
     inverse = 1.0 / below + 1.0 / above
-    wanted = (lower_rate / below + upper_rate / above - gains.position_gain * s) / inverse
+    pull = 0.0 if gains.ramp_rate > 0.0 else gains.position_gain  # a ramp of k1 begins at zero
+    wanted = (lower_rate / below + upper_rate / above - pull * s) / inverse
     return gains.energy_bound - 0.5 * gains.log_gain * s**2 - 0.5 * (rates - wanted) ** 2
