@@ -77,18 +77,17 @@ def _watch(
     problem: PlanningProblem,
     folder: ResultFolder,
     frames: int,
-    strategy: str,
+    strategy: Literal["cells", "paper", "portfolio"],
     margin: float | None,
     reporter: Reporter,
 ) -> ExitCode:
     """Record, then draw."""
     from coop_drake import watching
 
-    chosen = watching.Strategy(strategy)
     if margin is None:
-        margin = problem.settings.margin if chosen is watching.Strategy.PORTFOLIO else 0.0
+        margin = problem.settings.margin if strategy == "portfolio" else 0.0
     with reporter.stage("searching") as progress:
-        recording = watching.record_search(problem, chosen, margin, progress)
+        recording = watching.record_search(problem, strategy, margin, progress)
         shown = watching.keyframes(recording, frames)
     reporter.facts.update(
         answer=recording.verdict.value,

@@ -56,13 +56,7 @@ class Overlap:
 
 
 def contacts(workspace: Polygon, tree: ComponentTree, configuration: FloatArray) -> list[Contact]:
-    """Bodies that leave the floor, one entry for each side on which they do, the deepest first.
-
-    Args:
-        workspace: The floor W [m].
-        tree: The team.
-        configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
-    """
+    """Bodies that leave the floor W at z, shape (3 + n,), one entry for each side, the deepest first."""
     found = []
     shapely.prepare(workspace)
     for footprint in team_footprints(tree, configuration):
@@ -113,12 +107,7 @@ def _wall_corners(workspace: Polygon, footprint: BodyFootprint, part: BaseGeomet
 
 
 def overlaps(tree: ComponentTree, configuration: FloatArray) -> list[Overlap]:
-    """Pairs of bodies that overlap but must not, the deepest first.
-
-    Args:
-        tree: The team.
-        configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
-    """
+    """Pairs of bodies that overlap at z, shape (3 + n,), but must not, the deepest first."""
     poses = tree.poses(configuration)
     found = []
     for (i, j), (k, m) in tree.collision_pairs:

@@ -39,17 +39,10 @@ ASKED = 6
 
 
 def diagnose(problem: PlanningProblem, progress: Progress | None = None) -> Diagnosis:
-    """Say why no plan exists or none was found, and what would help.
+    """Say why no plan exists or none was found, and what would help; the same for the same problem.
 
     Amounts of a change that are too little rest on proofs of the planner, amounts that are enough on channels
     that it proved free. What is said about bodies and angles is read off one path and proves nothing.
-
-    Args:
-        problem: The problem, with the margin and the budgets of the planner.
-        progress: Called with a stage and the fraction of the budget that is spent.
-
-    Returns:
-        The diagnosis; the same for the same problem.
     """
     answer, report = find_channel(problem, progress)
     if isinstance(answer, Channel):
@@ -71,11 +64,7 @@ def find_passages(
 ) -> PassageFindings:
     """Move all walls back until there is a path, and find where that path leaves the original floor.
 
-    Args:
-        problem: The problem.
-        floor: Its floor, with walls that can be moved back.
-        planner: Plans variants of the problem within a work budget.
-        refuted: Whether the problem was proved infeasible as it is.
+    ``refuted``: whether the problem was proved infeasible as it is.
     """
 
     def eased(amount: float) -> PlanningProblem:

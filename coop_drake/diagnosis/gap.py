@@ -38,14 +38,9 @@ class Gap:
 
 
 def narrowest_gap(workspace: Polygon, walls: Sequence[FloatArray]) -> Gap | None:
-    """The narrowest gap between one of some points of the walls and the walls across the floor.
+    """The narrowest gap between some points of the walls, (2,) each [m], and the walls across the floor.
 
-    Args:
-        workspace: The floor W [m].
-        walls: Points of its boundary, shape (2,) each [m].
-
-    Returns:
-        The gap, None where no wall faces any of the points.
+    None where no wall faces any of the points.
     """
     edges = edges_of(orient(workspace))  # The floor lies to the left of every edge.
     floor = workspace.buffer(AWAY, join_style="mitre")

@@ -34,11 +34,6 @@ def blocked_pose(problem: PlanningProblem, floor: WidenedFloor, planner: Budgete
 
     The configuration shown has the least collision of those tried. That walls moved back by some distance are
     not enough is proved by the same sweeps that proved the goal to be blocked.
-
-    Args:
-        problem: The problem.
-        floor: Moves walls back.
-        planner: Counts the work.
     """
     z = _least_collision(problem)
 

@@ -12,11 +12,7 @@ SHOWN = 3
 
 
 def mixed_sentences(cells: Sequence[MixedCell]) -> list[str]:
-    """Where mixed cells remained, at which resolution, and which keys of ``planner`` to change.
-
-    Args:
-        cells: The cells of the last channel that are not free, the widest first.
-    """
+    """Where mixed cells, the widest first, remained, and which keys of ``planner`` to change."""
     sentences = [
         f"{len(cells)} cells on the last channel were proved neither free nor blocked; "
         f"the widest spans {100.0 * cells[0].width_fraction:.2g} % of an axis."

@@ -59,12 +59,6 @@ def blocking_passages(
 
     Those in which the path leaves the floor most are widened first, until a channel is found.
 
-    Args:
-        problem: The problem with the floor as it is.
-        floor: Moves walls back.
-        everywhere: What is known about moving all walls back.
-        planner: Answers variants.
-
     Returns:
         The passages in the order of the path, and whether a channel was found with only these widened.
     """

@@ -72,9 +72,7 @@ class CollidingStretch:
 def colliding_stretches(problem: PlanningProblem, path: FloatArray) -> list[CollidingStretch]:
     """The stretches of a path on which the team collides with walls, in the path's order.
 
-    Args:
-        problem: The problem, with the floor as it is.
-        path: Configurations from start to goal, shape (m, 3 + n) [m, rad].
+    The path has configurations from start to goal, shape (m, 3 + n) [m, rad], the problem the floor as it is.
     """
     found = [contacts(problem.workspace, problem.tree, z) for z in path]
     deepest = np.array([max((contact.depth for contact in here), default=0.0) for here in found])

@@ -21,9 +21,7 @@ from coop_drake.tree.pose import FloatArray
 def is_free(problem: PlanningProblem, path: FloatArray) -> tuple[bool, int]:
     """Try to prove a path free at margin zero, by covering it with free boxes.
 
-    Args:
-        problem: The problem.
-        path: Configurations from start to goal, theta unwrapped, shape (m, 3 + n) [m, rad].
+    The path, theta unwrapped, has shape (m, 3 + n) [m, rad].
 
     Returns:
         Whether the path is proved free (a failure proves nothing), and how many boxes were tried.
@@ -42,10 +40,6 @@ def is_free(problem: PlanningProblem, path: FloatArray) -> tuple[bool, int]:
 
 def widest_path(problem: PlanningProblem, channel: Channel) -> FloatArray:
     """A path through a channel that leaves each box where its overlap with the next one is widest.
-
-    Args:
-        problem: The problem that the channel solves.
-        channel: Boxes of which each overlaps the next.
 
     Returns:
         Configurations from start to goal, theta unwrapped, shape (m, 3 + n) [m, rad].

@@ -28,15 +28,7 @@ SIDE = 4.8
 
 
 def diagnosis_figure(problem: PlanningProblem, diagnosis: Diagnosis) -> Figure | None:
-    """Draw the whole floor, and every place that blocks enlarged beside it.
-
-    Args:
-        problem: The problem.
-        diagnosis: Its diagnosis.
-
-    Returns:
-        The figure; None if there is nothing to show.
-    """
+    """Draw the whole floor and, enlarged beside it, every place that blocks; None if nothing does."""
     places = _places(diagnosis)
     if not places:
         return None

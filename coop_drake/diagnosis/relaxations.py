@@ -93,10 +93,7 @@ def changes(tree: ComponentTree) -> list[TeamChange]:
 def try_changes(problem: PlanningProblem, planner: BudgetedPlanner, *, refuted: bool) -> list[Relaxation]:
     """Bracket every change alone; the largest amount comes first, as most changes do not help at all.
 
-    Args:
-        problem: The problem as it is.
-        planner: Answers variants.
-        refuted: Whether it was proved infeasible as it is.
+    ``refuted``: whether the problem was proved infeasible as it is.
     """
     return [
         Relaxation(change, _bracket(problem, change, planner, 0.0 if refuted else None))

@@ -35,14 +35,9 @@ NO_PROGRESS = 0.25
 def least_change(
     eased: Eased, amount: float, outcome: Outcome, planner: BudgetedPlanner, resolution: float
 ) -> tuple[float, Outcome]:
-    """Look for a smaller change that is enough for a path near the one found.
+    """Look for a smaller change that is enough for a path near the one found with an amount.
 
-    Args:
-        eased: The problem with an amount of the change.
-        amount: Amount with which a channel was found.
-        outcome: The outcome with this amount.
-        planner: Proves paths free.
-        resolution: How closely the amount is looked for.
+    ``resolution``: how closely the amount is looked for.
 
     Returns:
         The smallest amount with which such a path was proved free, and its outcome.
@@ -67,10 +62,7 @@ def least_change(
 def clear_elsewhere(eased: Eased, path: FloatArray, enough: float) -> FloatArray:
     """Move a path off the walls wherever it need not leave the floor; the place where it leaves most stays.
 
-    Args:
-        eased: The problem with the walls moved back by an amount [m].
-        path: A path that is free with ``enough``, shape (m, 3 + n).
-        enough: An amount [m].
+    The path, shape (m, 3 + n), is free with the walls moved back by the amount ``enough`` [m].
     """
     floor = eased(0.0)
     _, worst = amount_needed(eased, path, enough)

@@ -41,15 +41,10 @@ def object_bodies(tree: ComponentTree) -> frozenset[str]:
 
 
 def shrunk_bodies(tree: ComponentTree, names: Collection[str], factor: float) -> ComponentTree:
-    """Scale some bodies about a point of their footprint; joints and grasps stay where they are.
+    """Scale some bodies by a factor up to 1 about a point of their footprint; joints and grasps stay.
 
     The point is the centroid of the convex hull if all of the footprint is visible from there, else the
     centroid of the footprint's kernel, the set of points from which all of it is visible.
-
-    Args:
-        tree: The team.
-        names: Bodies to scale.
-        factor: New over old size, at most 1 [-].
     """
     components = tuple(
         replace(
@@ -68,11 +63,9 @@ def shrink_into_themselves(tree: ComponentTree, names: Collection[str]) -> bool:
 
 
 def widened_joints(tree: ComponentTree, amount: float) -> ComponentTree:
-    """Move both limits of every joint outwards; a revolute joint never gets more than a whole turn.
+    """Move both limits of every joint outwards [rad]; a revolute joint never gets more than a whole turn.
 
-    Args:
-        tree: The team.
-        amount: How far at either end [rad]; prismatic joints get 0.25 m for every radian.
+    Prismatic joints get 0.25 m for every radian.
     """
     components = tuple(
         component if component.joint is None else replace(component, joint=_widened(component.joint, amount))

@@ -67,9 +67,7 @@ class BudgetedPlanner:
     def ask(self, problem: PlanningProblem, stage: str) -> Outcome:
         """Sample some paths and explore once: a part of what the planner does, hence as sound.
 
-        Args:
-            problem: The variant; its margin and its budget of slices are set here.
-            stage: What this is done for, in a few words.
+        The variant's margin and its budget of slices are set here. The stage says what this is done for.
         """
         self._report(stage)
         if self.spent >= self._total:

@@ -49,15 +49,11 @@ def house_style() -> AbstractContextManager[None]:
 def new_figure(
     width: float, height: float, caption: str, *, margins: tuple[float, float, float] | None = None
 ) -> Figure:
-    """Return an empty figure with its caption underneath.
+    """Return an empty figure [in] with its caption underneath, broken into lines that fit the width.
 
-    Args:
-        width: Of the figure [in].
-        height: Of the figure [in].
-        caption: Text under the picture; it is broken into lines that fit the width.
-        margins: Space for labels at the left, at the right and at the top of the axes [in]; the space below
-            them follows from the caption. By default the labels are measured, which costs as much as
-            drawing the figure two more times.
+    ``margins`` are the spaces for labels at the left, at the right and at the top of the axes [in]; the space
+    below them follows from the caption. By default the labels are measured, which costs as much as drawing
+    the figure two more times.
     """
     figure = Figure(figsize=(width, height), layout=None if margins else "constrained")
     FigureCanvasAgg(figure)

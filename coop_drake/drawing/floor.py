@@ -60,15 +60,9 @@ def draw_team(
     alpha: float = 0.55,
     zorder: float = 3.0,
 ) -> None:
-    """Draw every body's footprint at one configuration.
+    """Draw every body's footprint at z = (x, y, theta, q...), shape (3 + n,) [m, rad].
 
-    Args:
-        ax: Where to draw.
-        tree: The team.
-        configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
-        colour: One colour for all bodies; by default the object's and each robot's own.
-        alpha: Opacity of the filling.
-        zorder: Drawing order.
+    Bodies have one colour, or by default the object's and each robot's own; ``alpha`` is that of the filling.
     """
     footprints = team_footprints(tree, configuration)
     own = [OBJECT if body.robot is None else robot_colour(body.robot) for body in footprints]

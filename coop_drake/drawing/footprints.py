@@ -28,12 +28,7 @@ class BodyFootprint:
 
 
 def team_footprints(tree: ComponentTree, configuration: FloatArray) -> list[BodyFootprint]:
-    """Return the footprint of every body, the object's first.
-
-    Args:
-        tree: The team.
-        configuration: z = (x, y, theta, q...), shape (3 + n,) [m, rad].
-    """
+    """Return the footprint of every body at z = (x, y, theta, q...), shape (3 + n,), the object's first."""
     footprints = []
     for component, X_WC in zip(tree.components, tree.poses(configuration), strict=True):
         for body in component.bodies:

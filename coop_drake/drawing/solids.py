@@ -54,13 +54,9 @@ def slab_mesh(shapes: Iterable[Polygon], bottom: float, top: float) -> TriangleM
 
 
 def extruded_section(section: CrossSection, bottom: float, top: float, tolerance: float) -> TriangleMesh:
-    """Return a section of many parts extruded from one height to another.
+    """Return a section of many parts, not empty, extruded from one height to another.
 
-    Args:
-        section: Positions, not empty [m].
-        bottom: Height of its bottom.
-        top: Height of its top.
-        tolerance: Distance by which outlines may move when they are simplified [m].
+    Its outline may move by the tolerance [m] when it is simplified.
     """
     simpler = section.simplify(tolerance)
     solid = (section if simpler.is_empty() else simpler).extrude(top - bottom).translate((0.0, 0.0, bottom))
@@ -72,10 +68,7 @@ def extruded_section(section: CrossSection, bottom: float, top: float, tolerance
 def ribbon_mesh(points: FloatArray, width: float, height: float) -> TriangleMesh:
     """Return a ribbon along a line on the floor, two triangles a piece, in the order of the line.
 
-    Args:
-        points: Shape (P, 2) [m]; at least two.
-        width: Of the ribbon [m].
-        height: Above the floor [m].
+    The line has two points or more, shape (P, 2) [m]; width of the ribbon and height above the floor [m].
     """
     along = np.gradient(points, axis=0)
     lengths = np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)

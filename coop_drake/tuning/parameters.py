@@ -75,17 +75,13 @@ _FIXED = (
 def tunable_parameters(gain_set: GainSet, names: Sequence[str] = ()) -> tuple[Parameter, ...]:
     """Return the parameters of a gain set, their ranges widened so that they contain its gains.
 
-    Args:
-        gain_set: The gain set with which the search begins.
-        names: Names of the gains that may change; all by default.
+    ``names`` are those of the gains that may change; all by default.
 
     Raises:
         TuningError: A name is no gain of this set that can be changed.
     """
-    known = {
-        parameter.name: parameter
-        for parameter in (_FIXED if isinstance(gain_set, FixedGains) else _SCHEDULED)
-    }
+    tunable = _FIXED if isinstance(gain_set, FixedGains) else _SCHEDULED
+    known = {parameter.name: parameter for parameter in tunable}
     for name in names:
         if name not in known:
             raise TuningError(f"--vary {name}: expected one of {', '.join(known)}")

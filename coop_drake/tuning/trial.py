@@ -103,12 +103,7 @@ class TrialRunner:
 
 
 def outcome_of(log: SimulationLog, cells: int) -> RunOutcome:
-    """Measure a run by every criterion.
-
-    Args:
-        log: The run.
-        cells: Number of the plan's cells.
-    """
+    """Measure a run of a plan with so many cells by every criterion."""
     arrived = log.reached and not log.violation
     done = 1.0 if arrived else float(log.cell_index[-1]) / cells
     values = {name: criterion.measure(log) for name, criterion in CRITERIA.items()}

@@ -17,13 +17,7 @@ TUNED = "tuned"
 
 
 def write_gains(gains: GainSet, remarks: Sequence[str], path: Path) -> Path:
-    """Write a gain set with comments before it.
-
-    Args:
-        gains: The gain set.
-        remarks: The comments, one line each.
-        path: The file.
-    """
+    """Write a gain set with comments before it, one line each."""
     comments = "".join(f"# {remark}\n" for remark in remarks)
     return write_atomically(path, (comments + dump_gains(TUNED, gains)).encode())
 

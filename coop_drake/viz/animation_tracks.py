@@ -20,9 +20,6 @@ def kept_frames(values: FloatArray, tolerance: float, *, longest: int) -> list[i
         values: Of every frame, shape (F, k).
         tolerance: Largest error of any component.
         longest: Largest number of frames from one kept frame to the next.
-
-    Returns:
-        Indices, ascending, with the first and the last frame.
     """
     last = len(values) - 1
     kept = {*range(0, last + 1, longest), last}

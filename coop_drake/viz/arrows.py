@@ -60,11 +60,7 @@ def arrow_path(index: int) -> str:
 
 
 def arrow_sizes(forces: FloatArray, of_a_metre: float) -> tuple[FloatArray, FloatArray]:
-    """Return how to draw forces.
-
-    Args:
-        forces: In W, shape (F, 2) [N].
-        of_a_metre: The force that a metre stands for [N].
+    """Return how to draw forces in W, shape (F, 2) [N], if a metre stands for some force [N].
 
     Returns:
         Directions, unwrapped, shape (F,) [rad], and scales of the arrow along its axes, shape (F, 3).

@@ -50,10 +50,6 @@ class _Place:
 def block_diagram_figure(loop: ClosedLoop, robot: int = 0) -> Figure:
     """Draw the whole loop, and below it the controller of one robot.
 
-    Args:
-        loop: The closed loop.
-        robot: Index of the robot.
-
     Raises:
         IndexError: The team has no such robot.
     """

@@ -32,11 +32,7 @@ class FigureProcesses:
         return self
 
     def draw(self, *arguments: Any) -> None:
-        """Begin to draw; each process draws a part.
-
-        Args:
-            arguments: Those of `coop_drake.viz.write_figures`.
-        """
+        """Begin to draw, with the arguments of `coop_drake.viz.write_figures`; each process draws a part."""
         for part, process in enumerate(self._processes):
             assert process.stdin is not None
             with process.stdin as pipe:

@@ -26,21 +26,10 @@ def write_figures(
     part: int = 0,
     parts: int = 1,
 ) -> list[Path]:
-    """Write figures 4 to 13 of the paper for this run, and a summary of the margins, as PNG.
+    """Write figures 4 to 13 of the paper and a summary of the margins as PNG; return the files written.
 
-    Figures 10 and 11 show one robot each; those of further robots are called Figure 11, too.
-
-    Args:
-        workspace: The floor [m].
-        tree: The team's component tree.
-        plan: What was executed.
-        log: What happened.
-        directory: Existing directory to write into.
-        part: Which part of the figures to write, where several processes write them.
-        parts: Into how many parts they are divided.
-
-    Returns:
-        The files written, in order.
+    Figures 10 and 11 show one robot each; those of further robots are called Figure 11, too. Where several
+    processes write them, each writes one ``part`` of so many ``parts``.
     """
     written = []
     with house_style():
@@ -60,11 +49,16 @@ def _figures(
     yield "fig05_path", partial(floor_figures.path_figure, workspace, tree, log)
     yield "fig06_position", partial(time_figures.position_figure, log)
     yield "fig07_angle", partial(time_figures.angle_figure, log)
-    yield "fig08_velocity", partial(time_figures.velocity_figure, log)
-    yield "fig09_angular_velocity", partial(time_figures.angular_velocity_figure, log)
+    curves, twist, wrench = partial(time_figures.curves_figure, log), log.object_twist, log.object_wrench
+    caption = "Figure 8. Linear velocity of the object."
+    yield "fig08_velocity", partial(curves, caption, twist[:, :2], "x velocity [m/s]", "y velocity [m/s]")
+    caption = "Figure 9. Angular velocity of the object."
+    yield "fig09_angular_velocity", partial(curves, caption, twist[:, 2:], "angular velocity [rad/s]")
     for robot, name in enumerate(log.robot_names):
         draw = partial(time_figures.joints_figure, tree, log, robot)
         yield f"fig{min(10 + robot, 11)}_joints_{name}", draw
-    yield "fig12_force", partial(time_figures.force_figure, log)
-    yield "fig13_torque", partial(time_figures.torque_figure, log)
+    caption = "Figure 12. Total force that the robots apply to the object."
+    yield "fig12_force", partial(curves, caption, wrench[:, :2], "x force [N]", "y force [N]")
+    caption = "Figure 13. Total torque that the robots apply to the object, about its centre of mass."
+    yield "fig13_torque", partial(curves, caption, wrench[:, 2:], "torque [N m]")
     yield "summary", partial(time_figures.summary_figure, log)

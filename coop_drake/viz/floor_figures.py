@@ -41,13 +41,10 @@ _TURNING = 0.3
 
 
 def overview_figure(problem: PlanningProblem, plan: Plan | None = None, caption: str = "") -> Figure:
-    """Draw a planning problem, and its plan if there is one.
+    """Draw a planning problem, and its plan if there is one, with a caption below.
 
-    Args:
-        problem: Floor, team, start and goal. Joints that the goal leaves free are drawn as the plan ends with
-            them, or as they start.
-        plan: Its cells are drawn as regions of the object's position, its targets as dots on a line.
-        caption: Text under the picture.
+    Joints that the goal leaves free are drawn as the plan ends with them, or as they start. The plan's cells
+    are regions of the object's position, its targets dots on a line.
     """
     figure, ax = _floor_axes(problem.workspace, caption)
     handles = team_legend(problem.tree)
@@ -89,13 +86,7 @@ def path_figure(workspace: Polygon, tree: ComponentTree, log: SimulationLog) -> 
 
 
 def _floor_axes(workspace: Polygon, caption: str, *, right: float = 0.15) -> tuple[Figure, Axes]:
-    """Return a figure whose axes show the floor and are just as large as it.
-
-    Args:
-        workspace: The floor [m].
-        caption: Text under the figure.
-        right: Space at the right of the axes [in].
-    """
+    """Return a figure whose axes show the floor, are just as large, and leave space at their right [in]."""
     x_min, y_min, x_max, y_max = frame_of(workspace)
     aspect = (y_max - y_min) / (x_max - x_min)
     height = min(_TALLEST, max(_LOWEST, _WIDTH * aspect))
@@ -118,12 +109,7 @@ def _draw_ends(ax: Axes, tree: ComponentTree, start: FloatArray, goal: FloatArra
 
 
 def _at_goal(asked: PlanningProblem | Plan, free: FloatArray) -> FloatArray:
-    """Return z = (x, y, theta, q...) at the goal, shape (3 + n,).
-
-    Args:
-        asked: Gives the goal's pose, and the goal of every joint that has one.
-        free: Values of all joints, of which those without a goal are taken, shape (n,) [rad or m].
-    """
+    """Return z = (x, y, theta, q...) at the goal; joints without a goal are those of ``free``, shape (n,)."""
     joints = [rest if goal is None else goal for goal, rest in zip(asked.goal_joints, free, strict=True)]
     return np.concatenate([asked.goal_pose, joints])
 

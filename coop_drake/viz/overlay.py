@@ -36,13 +36,8 @@ def page_content(
 ) -> dict[str, Any]:
     """Return what the page's script shows, as JSON has it.
 
-    Args:
-        scenario: Where it happened.
-        plan: What was executed.
-        log: What happened.
-        duration: Of the animation [s].
-        colours: Of the robots.
-        of_a_metre: The force that an arrow of a metre stands for [N].
+    ``duration`` is that of the animation [s], ``colours`` are the robots', and an arrow of a metre stands for
+    ``of_a_metre`` [N].
     """
     times = np.arange(0.0, duration + 0.5 / _RATE, 1.0 / _RATE)
     rows = np.maximum(np.searchsorted(log.times, times, side="right") - 1, 0)

@@ -23,29 +23,14 @@ _MOST_FRAMES = 4000
 def write_recording(
     scenario: Scenario, plan: Plan, log: SimulationLog, path: Path, *, progress: Progress | None = None
 ) -> None:
-    """Write the run as one self-contained HTML page; an interrupted write leaves no file behind.
-
-    Args:
-        scenario: Floor and team.
-        plan: Its cells.
-        log: The run.
-        path: The file.
-        progress: Called with a text and the fraction done.
-    """
+    """Write the run as one self-contained HTML page; an interrupted write leaves no file behind."""
     write_atomically(path, recording_html(scenario, plan, log, progress=progress).encode())
 
 
 def recording_html(
     scenario: Scenario, plan: Plan, log: SimulationLog, *, progress: Progress | None = None
 ) -> str:
-    """Return a run as a page: the scene, an animation of what was logged, and a player.
-
-    Args:
-        scenario: Floor and team.
-        plan: Its cells.
-        log: The run.
-        progress: Called with a text and the fraction done.
-    """
+    """Return a run as a page: the scene, an animation of what was logged, and a player."""
     meshcat = silent_meshcat()
     scene = TransportScene(scenario, plan, meshcat)
     duration = float(log.times[-1])

@@ -26,11 +26,7 @@ def animation_of(
 ) -> MeshcatAnimation:
     """Return the tracks of all that moves, appears or grows; the trail is put into the scene.
 
-    Args:
-        scene: The scene.
-        log: The run.
-        times: Of the frames, evenly spaced, shape (F,) [s].
-        progress: Called with a text and the fraction done.
+    ``times`` are those of the frames, evenly spaced, shape (F,) [s].
     """
     tracks = Tracks(1.0 / (times[1] - times[0]) if len(times) > 1 else 1.0)
     states = np.hstack([log.object_pose, log.joints])

@@ -10,9 +10,6 @@ from pydrake.geometry import Meshcat, MeshcatParams
 def silent_meshcat(parameters: MeshcatParams | None = None) -> Meshcat:
     """Start a Meshcat server and log no address; ``web_url()`` returns it.
 
-    Args:
-        parameters: Drake's parameters; its defaults if None.
-
     Raises:
         RuntimeError: No port is free.
     """

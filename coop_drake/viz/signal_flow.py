@@ -59,10 +59,8 @@ class SignalFlow:
 def signal_flow(diagram: Diagram, name: str, *, telemetry: frozenset[str] = frozenset()) -> SignalFlow:
     """Read the blocks and the connections of a Diagram, in an order that only depends on how it was built.
 
-    Args:
-        diagram: The Diagram; the inside of its blocks is not read.
-        name: Its name in the picture.
-        telemetry: Outputs of the Diagram that only logs read; they are left out.
+    The inside of the blocks is not read. Outputs of the Diagram that only logs read, its ``telemetry``, are
+    left out.
     """
     systems = {system.get_name(): system for system in diagram.GetSystems()}
     outputs = [(INPUTS, port) for port in _inputs(diagram)]

@@ -71,10 +71,7 @@ def place_camera(meshcat: Meshcat, workspace: Polygon, height: float) -> None:
 def set_stage(meshcat: Meshcat, workspace: Polygon, wall_height: float) -> None:
     """Light the floor and put up what stands still on it, translucent where bodies may be behind.
 
-    Args:
-        meshcat: Where to draw.
-        workspace: The floor [m].
-        wall_height: Height of walls and shelves [m].
+    Walls and shelves are ``wall_height`` high [m].
     """
     _set_light(meshcat)
     set_mesh(meshcat, "/stage/floor", flat_mesh(parts_of(workspace), 0.0), rgba(FLOOR_IN_SPACE))

@@ -81,13 +81,7 @@ class TeamView:
         return np.array([frame.CalcPoseInWorld(self._plant_context).translation() for frame in frames])
 
     def fix_to_object(self, name: str, mesh: TriangleMesh, colour: Rgba) -> None:
-        """Draw a mesh that moves with the object.
-
-        Args:
-            name: Its name.
-            mesh: Its vertices in L.
-            colour: Of the mesh.
-        """
+        """Draw a mesh that moves with the object, its vertices in L."""
         set_configuration(self.team, self._plant_context, np.zeros(3 + len(self.team.joint_names)))
         X_WB = self.team.object_body.EvalPoseInWorld(self._plant_context)
         path = f"{self._object_path}/{name}"

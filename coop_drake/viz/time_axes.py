@@ -17,24 +17,26 @@ _WIDTH = 7.5
 _MARGINS = (0.82, 0.15, 0.32)
 """Space at the left for tick labels and an axis label, at the right, and at the top for a legend [in]."""
 
+_SINGLE, _SEVERAL = 2.7, 1.8
+"""Height of the panel of a figure that has only one, and of one among several [in]."""
+
+_SINGLE, _SEVERAL = 2.7, 1.8
+"""Height of the panel of a figure that has only one, and of one among several [in]."""
+
 _GAP = 0.28
 """Space between two panels [in]: a legend fits."""
 
 
 def time_axes(
-    log: SimulationLog, caption: str, labels: list[str], *, height: float = 1.8
+    log: SimulationLog, caption: str, labels: list[str], *, height: float | None = None
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure with one panel per label, stacked over a common axis of time.
+    """Return a figure with one panel per label, stacked over a common axis of time, each of some height [in].
 
     A dashed vertical line marks every switch to the next cell, and the caption says so.
-
-    Args:
-        log: The run.
-        caption: Text under the figure.
-        labels: Label of the vertical axis of every panel.
-        height: Of every panel [in].
     """
     count = len(labels)
+    height = height or (_SINGLE if count == 1 else _SEVERAL)
+    height = height or (_SINGLE if count == 1 else _SEVERAL)
     caption = f"{caption} Dashed lines mark the switches from cell to cell."
     figure = new_figure(_WIDTH, count * (height + _GAP) + 1.0, caption, margins=_MARGINS)
     axes = figure.subplots(count, 1, sharex=True, squeeze=False, gridspec_kw={"hspace": _GAP / height})[:, 0]
@@ -59,12 +61,8 @@ def time_axes(
 def break_at_switches(log: SimulationLog, values: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return a line that is broken at every switch, so that a jump is not drawn as a slope.
 
-    Args:
-        log: The run, with T samples.
-        values: One value per sample, shape (T,).
-
-    Returns:
-        Times [s] and values, with one more entry at every switch: a NaN before the new cell's first value.
+    Times [s] and values, shape (T,), get one more entry at every switch: a NaN before the new cell's first
+    value.
     """
     places = np.flatnonzero(np.diff(log.cell_index)) + 1
     return np.insert(log.times, places, log.times[places]), np.insert(values.astype(float), places, np.nan)

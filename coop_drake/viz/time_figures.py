@@ -14,9 +14,6 @@ from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.time_axes import break_at_switches, time_axes
 
-_SINGLE = 2.7
-"""Height of the panel of a figure that has only one [in]."""
-
 
 def position_figure(log: SimulationLog) -> Figure:
     """Draw the object's position and the reference governor's over time."""
@@ -31,30 +28,15 @@ def position_figure(log: SimulationLog) -> Figure:
 
 def angle_figure(log: SimulationLog) -> Figure:
     """Draw the object's angle inside its funnel over time, and both measured from the funnel's middle."""
-    caption = (
-        "Figure 7. Angle of the object between the bounds of its funnel; below, both measured from the "
-        "funnel's middle."
-    )
+    caption = "Figure 7. Angle of the object between the bounds of its funnel; below, both measured from the "
     labels = ["θ [rad]", "θ, from the middle [rad]"]
-    figure, axes = time_axes(log, caption, labels, height=2.3)
+    figure, axes = time_axes(log, f"{caption}funnel's middle.", labels, height=2.3)
     middle = 0.5 * (log.funnel_lower[:, 0] + log.funnel_upper[:, 0])
     for ax, origin in zip(axes, (np.zeros_like(middle), middle), strict=True):
         _draw_funnel(ax, log, 0, origin)
         ax.plot(*break_at_switches(log, log.object_pose[:, 2] - origin), color=OBJECT, label="θ")
     legend_above(axes[0])
     return figure
-
-
-def velocity_figure(log: SimulationLog) -> Figure:
-    """Draw the object's linear velocity over time."""
-    caption = "Figure 8. Linear velocity of the object."
-    return _curves(log, caption, log.object_twist[:, :2], ["x velocity [m/s]", "y velocity [m/s]"])
-
-
-def angular_velocity_figure(log: SimulationLog) -> Figure:
-    """Draw the object's angular velocity over time."""
-    caption = "Figure 9. Angular velocity of the object."
-    return _curves(log, caption, log.object_twist[:, 2:], ["angular velocity [rad/s]"], height=_SINGLE)
 
 
 def joints_figure(tree: ComponentTree, log: SimulationLog, robot: int) -> Figure | None:
@@ -65,24 +47,12 @@ def joints_figure(tree: ComponentTree, log: SimulationLog, robot: int) -> Figure
     name = log.robot_names[robot]
     caption = f"Figure {min(10 + robot, 11)}. Joints of {name} between the bounds of their funnels."
     labels = [f"{joint.name.split('::')[-1]} [{joint.unit}]" for joint in joints]
-    figure, axes = time_axes(log, caption, labels, height=_SINGLE if len(joints) == 1 else 1.8)
+    figure, axes = time_axes(log, caption, labels)
     for joint, ax in zip(joints, axes, strict=True):
         _draw_funnel(ax, log, 1 + joint.index, np.zeros_like(log.times))
         ax.plot(log.times, log.joints[:, joint.index], color=robot_colour(robot), label="joint")
     legend_above(axes[0])
     return figure
-
-
-def force_figure(log: SimulationLog) -> Figure:
-    """Draw the total force that the robots apply to the object over time."""
-    caption = "Figure 12. Total force that the robots apply to the object."
-    return _curves(log, caption, log.object_wrench[:, :2], ["x force [N]", "y force [N]"])
-
-
-def torque_figure(log: SimulationLog) -> Figure:
-    """Draw the total torque that the robots apply to the object over time."""
-    caption = "Figure 13. Total torque that the robots apply to the object, about its centre of mass."
-    return _curves(log, caption, log.object_wrench[:, 2:], ["torque [N m]"], height=_SINGLE)
 
 
 def summary_figure(log: SimulationLog) -> Figure:
@@ -116,11 +86,9 @@ def summary_figure(log: SimulationLog) -> Figure:
     return figure
 
 
-def _curves(
-    log: SimulationLog, caption: str, values: FloatArray, labels: list[str], *, height: float = 1.8
-) -> Figure:
-    """Draw one curve of the object in every panel; values of shape (T, panels)."""
-    figure, axes = time_axes(log, caption, labels, height=height)
+def curves_figure(log: SimulationLog, caption: str, values: FloatArray, *labels: str) -> Figure:
+    """Draw one curve of the object over time in every panel; values of shape (T, panels)."""
+    figure, axes = time_axes(log, caption, list(labels))
     for ax, curve in zip(axes, values.T, strict=True):
         ax.plot(log.times, curve, color=OBJECT)
     return figure

@@ -29,14 +29,11 @@ def set_trail(meshcat: Meshcat, path: str, points: FloatArray) -> None:
 
 
 def trail_points(positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return points at even distances along the path.
-
-    Args:
-        positions: Of the object at every frame, shape (F, 2) [m].
+    """Return points at even distances along a path of the object, given at every frame, shape (F, 2) [m].
 
     Returns:
-        The points, shape (P, 2) [m], and how many segments between them the object has passed at every
-        frame, with fractions, shape (F,).
+        The points, shape (P, 2) [m], and how many segments between them the object has passed at every frame,
+        with fractions, shape (F,).
     """
     gone = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
     pieces = int(np.ceil(gone[-1] / STEP))

@@ -23,11 +23,7 @@ def write_tuning_figure(found: Search, path: Path) -> Path:
 
 
 def tuning_figure(found: Search) -> Figure:
-    """Draw every run that arrived by the criterion sought and another, and the best score trial by trial.
-
-    Args:
-        found: The search.
-    """
+    """Draw every run that arrived by the criterion sought and another, and the best score trial by trial."""
     sought = CRITERIA[max(found.objective.weights, key=lambda name: found.objective.weights[name])]
     other = CRITERIA["peak_force" if sought.name == "time" else "time"]
     failed = sum(not trial.outcome.arrived for trial in found.trials)

@@ -22,10 +22,7 @@ from coop_drake.watching.theta_layers import THETA, on_turn
 def cut(leaves: Iterable[Leaf], axis: int, point: FloatArray) -> list[Leaf]:
     """Return the leaves that a plane of theta and one joint meets; other joints have the point's values.
 
-    Args:
-        leaves: The leaves of a subdivision.
-        axis: The joint's axis, 1 or more; 0 keeps theta alone.
-        point: Values of (theta, q...), shape (1 + n,) [rad, m].
+    The joint's axis is 1 or more; 0 keeps theta alone. The point is (theta, q...), shape (1 + n,) [rad, m].
     """
     leaves = list(leaves)
     others = [other for other in range(1, len(point)) if other != axis]

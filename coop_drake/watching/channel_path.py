@@ -40,10 +40,10 @@ class PathPiece:
 
 
 def path_through(channel: Sequence[ChannelCell], start: FloatArray, goal: FloatArray) -> list[PathPiece]:
-    """Return a path from start to goal through the cells of a channel.
+    """Return a path from start to goal through the cells of a channel; each region meets the next.
 
     Args:
-        channel: Cells whose regions meet one after the other.
+        channel: The cells.
         start: (x, y, theta, q...), shape (2 + axes,) [m, rad].
         goal: (x, y, theta, q...) at the goal; NaN for joints that are free.
     """

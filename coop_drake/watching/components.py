@@ -31,11 +31,9 @@ class Components:
 
 
 def components_from_start(leaves: Sequence[Leaf], start: FloatArray) -> Components:
-    """Divide the over-cells into those that are joined to the start and the others.
+    """Divide the over-cells of a subdivision into those that are joined to the start and the others.
 
-    Args:
-        leaves: The leaves of a subdivision.
-        start: (x, y, theta, q...) with the joints that the subdivision has, shape (2 + axes,) [m, rad].
+    The start is (x, y, theta, q...) with the joints that the subdivision has, shape (2 + axes,) [m, rad].
     """
     cells = [(leaf, region) for leaf in leaves for region in leaf.regions(Kind.MIXED)]
     angles = [float(angle) for angle in start[2:]]

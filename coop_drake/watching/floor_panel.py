@@ -22,13 +22,7 @@ DASHES = (0.0, (1.4, 0.9))
 
 
 def draw_ends(ax: Axes, problem: PlanningProblem, goal_joints: FloatArray) -> None:
-    """Draw the floor, and the team's footprint at the start and at the goal.
-
-    Args:
-        ax: Where to draw.
-        problem: The planning problem.
-        goal_joints: Joint values to draw the goal with, shape (n,) [rad, m].
-    """
+    """Draw the floor, and the team's footprint at the start and at the goal with some joints, shape (n,)."""
     draw_workspace(ax, problem.workspace)
     goal = np.concatenate([problem.goal_pose, goal_joints])
     box = {"boxstyle": "round,pad=0.15", "facecolor": colours.PAPER, "edgecolor": "none", "alpha": 0.8}
@@ -40,14 +34,9 @@ def draw_ends(ax: Axes, problem: PlanningProblem, goal_joints: FloatArray) -> No
 
 
 def draw_section(ax: Axes, section: CrossSection, colour: str, alpha: float, *, width: float = 0.8) -> None:
-    """Fill a section, holes left open, and draw its outline.
+    """Fill a section, holes left open, and draw its outline of a width [points].
 
-    Args:
-        ax: Where to draw.
-        section: Positions [m].
-        colour: Of filling and outline.
-        alpha: Opacity of the filling; 0 draws the outline alone, above what is filled.
-        width: Of the outline [points].
+    Opacity 0 draws the outline alone, above what is filled.
     """
     rings = [np.vstack([ring, ring[:1]]) for ring in section.to_polygons()]
     if rings:

@@ -35,13 +35,10 @@ _STRIPS = (0.0, 1.0)  # Limits between which strips are drawn if theta is the on
 def keyframe_figure(
     recording: SearchRecording, frame: Keyframe, history: Sequence[tuple[int, int]]
 ) -> Figure:
-    """Draw one keyframe.
+    """Draw one keyframe of a recorded search.
 
-    Args:
-        recording: The recorded search.
-        frame: The keyframe.
-        history: Slices made and undecided cells on the channel at every search of this exploration, also of
-            those to come.
+    ``history`` has slices made and undecided cells on the channel at every search of this exploration, also
+    of those to come.
     """
     figure = Figure(figsize=_SIZE, dpi=100)
     FigureCanvasAgg(figure)

@@ -11,7 +11,7 @@ from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.captions import counters, headline
 from coop_drake.watching.channel_path import PathPiece, path_through
 from coop_drake.watching.components import Components, components_from_start
-from coop_drake.watching.projections import Projection, Projections
+from coop_drake.watching.projections import Projection, projection_of
 from coop_drake.watching.recording import SearchRecording
 from coop_drake.watching.search_states import SearchState, search_states
 
@@ -43,16 +43,12 @@ class Keyframe:
 def keyframes(recording: SearchRecording, most: int) -> list[Keyframe]:
     """Choose at most ``most`` states of a recording and work out what to draw of each."""
     frames: list[Keyframe] = []
-    projections: dict[str, Projections] = {}
     for state in search_states(recording.events, most):
-        own = projections.setdefault(state.question, Projections())
-        frames.append(_keyframe(recording, state, own, frames[-1] if frames else None))
+        frames.append(_keyframe(recording, state, frames[-1] if frames else None))
     return frames
 
 
-def _keyframe(
-    recording: SearchRecording, state: SearchState, projections: Projections, before: Keyframe | None
-) -> Keyframe:
+def _keyframe(recording: SearchRecording, state: SearchState, before: Keyframe | None) -> Keyframe:
     start, goal = recording.start_of(state.robots), recording.goal_of(state.robots)
     if before is not None and before.state.question != state.question:
         before = None
@@ -70,7 +66,7 @@ def _keyframe(
         state=state,
         headline=headline(recording, state),
         counters=counters(state),
-        projection=projections.of(leaves),
+        projection=projection_of(leaves),
         path=path,
         components=components_from_start(leaves, start) if apart else None,
         cut_at=cut_at,

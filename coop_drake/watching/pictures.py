@@ -36,12 +36,6 @@ def write_pictures(
 ) -> list[Path]:
     """Write ``think_0001.png`` and so on, a sheet ``think.png``, and a moving picture ``think.gif``.
 
-    Args:
-        recording: The recorded search.
-        frames: Its keyframes.
-        directory: Where to write; missing directories are made.
-        progress: Called with a text and the fraction done.
-
     Returns:
         The files written, pictures first, then sheet and moving picture.
     """

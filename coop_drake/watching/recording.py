@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from enum import Enum
+from typing import Literal
 
 import numpy as np
 from manifold3d import CrossSection, FillRule
@@ -34,15 +34,10 @@ BOXES = "boxes along a sampled path"
 """The question of the events that add the boxes of a channel one by one."""
 
 
-class Strategy(Enum):
-    """Which search is recorded."""
-
-    CELLS = "cells"
-    """The exploration of the whole team by cells."""
-    PAPER = "paper"
-    """The exploration by cells as the paper's Algorithms 1 and 2 are printed."""
-    PORTFOLIO = "portfolio"
-    """All that planning does: proofs of infeasibility where it tries them, and boxes along a sampled path."""
+Strategy = Literal["cells", "paper", "portfolio"]
+"""Which search is recorded: the exploration of the whole team by cells; that exploration as the paper's
+Algorithms 1 and 2 are printed; or all that planning does: proofs of infeasibility where it tries them, and
+boxes along a sampled path."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +46,6 @@ class SearchRecording:
 
     Attributes:
         problem: The planning problem.
-        strategy: How it was searched.
         margin: Clearance from the walls that was asked for [m].
         events: What happened, in order.
         verdict: How the search ended.
@@ -59,7 +53,6 @@ class SearchRecording:
     """
 
     problem: PlanningProblem
-    strategy: Strategy
     margin: float
     events: tuple[Event, ...]
     verdict: Verdict
@@ -91,17 +84,14 @@ def record_search(
 ) -> SearchRecording:
     """Search for a plan, and record every event of the search.
 
-    Args:
-        problem: The planning problem; its settings give the budget of slices.
-        strategy: Which search to record.
-        margin: Clearance to keep from the walls [m]; the portfolio takes less where there is less.
-        progress: Called with a text and the fraction of the work that is done.
+    The problem's settings give the budget of slices. The portfolio keeps less than the margin from the walls
+    [m] where there is less.
     """
-    if strategy is Strategy.PORTFOLIO:
+    if strategy == "portfolio":
         return _record_portfolio(problem, margin, progress)
     events: list[Event] = []
     swept = SweptTree(problem.tree)
-    algorithm = Exploration if strategy is Strategy.CELLS else PaperExploration
+    algorithm = Exploration if strategy == "cells" else PaperExploration
     free = marginal_workspace(problem, margin)
     exploration = algorithm(problem, free, swept, BodyPairs(swept), events.append)
     budget = problem.settings.max_slices
@@ -111,7 +101,7 @@ def record_search(
             progress(f"{slices} slices", slices / budget)
 
     outcome = exploration.run(budget, count)
-    return SearchRecording(problem, strategy, margin, tuple(events), outcome.verdict)
+    return SearchRecording(problem, margin, tuple(events), outcome.verdict)
 
 
 def _record_portfolio(problem: PlanningProblem, margin: float, progress: Progress | None) -> SearchRecording:
@@ -121,12 +111,12 @@ def _record_portfolio(problem: PlanningProblem, margin: float, progress: Progres
     answer, _ = find_channel(asked, progress, watch=events.append)
     if isinstance(answer, Channel):
         events += _box_events(answer, tuple(sorted({joint.robot for joint in problem.tree.joints})))
-        return SearchRecording(problem, Strategy.PORTFOLIO, answer.margin, tuple(events), Verdict.FOUND)
+        return SearchRecording(problem, answer.margin, tuple(events), Verdict.FOUND)
     verdict = Verdict.INFEASIBLE if answer.proved else Verdict.BUDGET
     last = events[-1] if events else None
     if not (isinstance(last, ExplorationEnded) and last.verdict == verdict.value):
         events += [ExplorationBegan(answer.reason, ()), ExplorationEnded(verdict.value, 0)]
-    return SearchRecording(problem, Strategy.PORTFOLIO, 0.0, tuple(events), verdict, answer.reason)
+    return SearchRecording(problem, 0.0, tuple(events), verdict, answer.reason)
 
 
 def _box_events(channel: Channel, robots: tuple[int, ...]) -> list[Event]:

@@ -75,13 +75,7 @@ def write_scene(
 def scene_page(
     recording: SearchRecording, frames: Sequence[Keyframe], progress: Progress | None = None
 ) -> str:
-    """Return the page: the channel in space, with play, pause and a slider over the keyframes.
-
-    Args:
-        recording: The recorded search.
-        frames: Its keyframes.
-        progress: Called with a text and the fraction done.
-    """
+    """Return the page: the channel in space, with play, pause and a slider over the keyframes."""
     scene = SceneCoordinates(recording.problem.workspace)
     separate = any(frame.components is not None for frame in frames)
     content = {

@@ -59,11 +59,9 @@ class SceneCoordinates:
         return _TURN_BEGINS + (_TURN_ENDS - _TURN_BEGINS) * fraction
 
     def heights(self, theta: Interval, gap: float) -> tuple[float, float]:
-        """Return the heights between which an interval of theta is drawn [scene units].
+        """Return the heights between which an interval of theta [rad] is drawn [scene units].
 
-        Args:
-            theta: The interval [rad].
-            gap: Fraction of the height that is left open.
+        A fraction ``gap`` of the height is left open.
         """
         low, high = (float(self.height(end)) for end in theta)
         inset = 0.5 * gap * (high - low)

@@ -55,12 +55,9 @@ class Surface:
 
 
 def put_mesh(vis: Any, mesh: TriangleMesh, surface: Surface) -> None:
-    """Put a mesh at a path of the scene; its identifiers follow from the path, so that pages repeat.
+    """Put a mesh, its vertices in units, at a path of the scene.
 
-    Args:
-        vis: Meshcat's visualizer at that path.
-        mesh: Vertices in units of the scene.
-        surface: How it is drawn.
+    Its identifiers follow from the path, so that pages repeat.
     """
     transparent = surface.opacity < 1.0 or not surface.hidden
     options: dict[str, Any] = {"transparent": transparent, "depthWrite": not transparent}

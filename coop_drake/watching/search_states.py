@@ -137,12 +137,8 @@ class SearchState:
 def search_states(events: Sequence[Event], most: int) -> list[SearchState]:
     """Fold events into at most ``most`` states, spread evenly over the steps, the last one included.
 
-    A step is a slice halved, a channel searched or an exploration begun or ended; steps in between are
-    merged into the next state. Where one exploration gives way to another there is always a state.
-
-    Args:
-        events: The events of an exploration in order; of several explorations one after the other.
-        most: Largest number of states, 2 or more.
+    A step is a slice halved, a channel searched or an exploration begun or ended; steps in between are merged
+    into the next state. Where one exploration gives way to another there is always a state.
 
     Raises:
         ValueError: Fewer than 2 states are asked for.

@@ -30,11 +30,7 @@ def on_turn(interval: Interval) -> list[Interval]:
 
 
 def layers(members: Iterable[tuple[Interval, Member]]) -> list[tuple[Interval, list[Member]]]:
-    """Return the layers of the turn between the ends of intervals of theta, with the members that each meets.
-
-    Args:
-        members: Intervals of theta [rad], and what belongs to each.
-    """
+    """Return the layers of the turn between the ends of intervals of theta, with the members meeting each."""
     placed = [(part, member) for interval, member in members for part in on_turn(interval)]
     found = []
     for lower, upper in pairwise(sorted({end for part, _ in placed for end in part})):

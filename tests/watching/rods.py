@@ -17,7 +17,7 @@ WIDE, NARROW = 0.22, 0.198
 
 
 def rod_recording(
-    corridor: float = WIDE, strategy: Strategy = Strategy.CELLS, margin: float = 0.0
+    corridor: float = WIDE, strategy: Strategy = "cells", margin: float = 0.0
 ) -> SearchRecording:
     """Record the search for the rod's path."""
     return record_search(rod_problem(corridor), strategy, margin)

@@ -12,9 +12,9 @@ from shapely import LineString, union_all
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.planning.cells.slices import holds, nearest_turn, share_facet
-from coop_drake.watching import Strategy, keyframes, record_search
+from coop_drake.watching import keyframes, record_search
 from coop_drake.watching.angle_panels import cut
-from coop_drake.watching.projections import Projections
+from coop_drake.watching.projections import projection_of
 from coop_drake.watching.recording import BOXES
 from coop_drake.watching.theta_layers import THETA, layers, on_turn
 from tests.watching.rods import NARROW, WIDE, jointed_rod, rod_recording
@@ -81,7 +81,7 @@ def test_the_line_runs_from_start_to_goal_inside_the_cells_of_the_channel(found)
 def test_projections_are_the_unions_of_the_cells_and_do_not_overlap(found):
     _, frames = found
     leaves = list(frames[-1].state.leaves.values())
-    projection = Projections().of(leaves)
+    projection = projection_of(leaves)
     for kinds, section in (
         ((Kind.FREE,), projection.free),
         ((Kind.FREE, Kind.GUIDE), projection.free + projection.guide),
@@ -93,14 +93,6 @@ def test_projections_are_the_unions_of_the_cells_and_do_not_overlap(found):
         assert area(section) == pytest.approx(exact.area, abs=0.01 * exact.length)
     for first, second in combinations((projection.free, projection.guide, projection.mixed), 2):
         assert area(first ^ second) == pytest.approx(0.0, abs=1e-6)
-
-
-def test_kept_projections_are_those_made_anew(found):
-    _, frames = found
-    for frame in frames:
-        anew = Projections().of(frame.state.leaves.values())
-        assert area(frame.projection.free) == area(anew.free)
-        assert area(frame.projection.mixed) == area(anew.mixed)
 
 
 def test_layers_fill_the_turn_and_hold_what_meets_them(found):
@@ -131,7 +123,7 @@ def test_intervals_of_theta_are_brought_onto_the_turn_drawn(interval, parts):
 
 
 def test_a_cut_tiles_theta_and_the_joint_without_gap_or_overlap():
-    recorded = record_search(jointed_rod(), Strategy.CELLS, 0.0)
+    recorded = record_search(jointed_rod(), "cells", 0.0)
     for frame in keyframes(recorded, 8):
         tiles = cut(frame.state.leaves.values(), 1, frame.cut_at)
         total = sum((b - a) * (d - c) for (a, b), (c, d) in (leaf.intervals for leaf in tiles))
@@ -154,10 +146,10 @@ def test_captions_say_what_happens_and_what_a_margin_is_worth(found, apart):
 
 
 def test_the_papers_algorithms_and_the_whole_portfolio_can_be_watched():
-    printed = keyframes(rod_recording(WIDE, Strategy.PAPER), 6)
+    printed = keyframes(rod_recording(WIDE, "paper"), 6)
     assert printed[0].state.slices < printed[-1].state.slices
     assert printed[-1].state.verdict in {"found", "below resolution", "budget spent"}
-    boxes = keyframes(rod_recording(0.6, Strategy.PORTFOLIO, 0.02), 500)
+    boxes = keyframes(rod_recording(0.6, "portfolio", 0.02), 500)
     laying = [frame for frame in boxes if frame.state.question == BOXES]
     assert len(laying) > 2
     for laid, frame in enumerate(laying):
@@ -167,7 +159,7 @@ def test_the_papers_algorithms_and_the_whole_portfolio_can_be_watched():
         assert laid == 0 or free.buffer(0.011).covers(line)
     assert boxes[-1].headline.startswith("Found")
     assert all(cell.kind is Kind.FREE for cell in boxes[-1].state.channel)
-    refuted = keyframes(rod_recording(NARROW, Strategy.PORTFOLIO, 0.02), 6)
+    refuted = keyframes(rod_recording(NARROW, "portfolio", 0.02), 6)
     assert refuted[-1].state.verdict == "infeasible"
 
 
