@@ -11,7 +11,7 @@ from .answers import (
     save_plan,
     table_1,
 )
-from .chain import plan, show, verify, why
+from .chain import plan, show, verify, verify_run, why
 from .diagnosis import Diagnosis, diagnosis_figure, rows_of, sentences_of
 from .diagram import ClosedLoop, build_closed_loop
 from .errors import CoopDrakeError
@@ -77,6 +77,7 @@ __all__ = [
     "summary_figure",
     "table_1",
     "verify",
+    "verify_run",
     "why",
     "write_figures",
     "write_recording",

@@ -15,6 +15,7 @@ from coop_drake.progress import Progress
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from coop_drake.answers.log import SimulationLog
     from coop_drake.diagnosis import Diagnosis
     from coop_drake.scenario import Scenario
     from coop_drake.verification import Verified
@@ -62,6 +63,8 @@ def verify(
 ) -> Verified:
     """Check a plan or a proof of infeasibility by code that shares nothing with the search.
 
+    The log of a run is checked by `verify_run`.
+
     Args:
         answer: What `plan` returned, its plan or its proof, or a file that holds one.
         question: The scenario or the planning problem that it answers.
@@ -87,6 +90,42 @@ def verify(
     if proof is None or isinstance(proof, Undecided):
         raise PlanError("an undecided answer proves nothing; expected a plan or a proof of infeasibility")
     return verify_proof(proof, problem, progress)
+
+
+def verify_run(
+    log: SimulationLog | Path | str,
+    plan: Plan | Path | str,
+    scenario: Scenario,
+    *,
+    progress: Progress | None = None,
+) -> Verified:
+    """Check a plan, and then by the log of a run that it was followed and nothing touched.
+
+    Args:
+        log: What `simulate` returned, or the file of a log.
+        plan: The plan that was followed, or its file.
+        scenario: The scenario that was simulated.
+        progress: Called with a stage and the fraction of it that is done.
+
+    Returns:
+        What was checked, and how close it came to being refused.
+
+    Raises:
+        PlanError: A file holds no log or no plan.
+        RefusalError: Names the first claim that does not hold; of a log array, index and time.
+    """
+    from coop_drake.answers.log import SimulationLog
+    from coop_drake.answers.plan_file import load_plan
+    from coop_drake.plant import planning_problem, run_setup
+    from coop_drake.verification import Verified, verify_plan
+    from coop_drake.verification.runs import verify_log
+
+    log = log if isinstance(log, SimulationLog) else SimulationLog.load(log)
+    plan = plan if isinstance(plan, Plan) else load_plan(plan)
+    problem = planning_problem(scenario)
+    of_plan = verify_plan(plan, problem, scenario.gain_sets, progress)
+    verified = verify_log(log, plan, problem, run_setup(scenario), progress)
+    return Verified(verified.answer, verified.subject, (*of_plan.checks, *verified.checks))
 
 
 def why(question: Scenario | PlanningProblem, *, progress: Progress | None = None) -> Diagnosis:

@@ -98,10 +98,10 @@ class StallError(CoopDrakeError):
 
 
 class RefusalError(CoopDrakeError):
-    """A plan or a proof does not hold; the message names the place and what is wrong there, with numbers.
+    """A plan, a proof or a log does not hold; the message says where and what is wrong there, with numbers.
 
     Args:
-        where: The place in the document, for example ``cells[3].safe``.
+        where: The place in the document, for example ``cells[3].safe``, or in the log, ``joints[12, 1]``.
         finding: What is wrong there.
     """
 

@@ -88,6 +88,21 @@ def test_a_run_leaves_plan_log_table_recording_and_figures(finished):
     assert facts["min_clearance_m"] == min(log.workspace_clearance.min(), log.body_clearance.min())
 
 
+def test_the_log_of_a_run_is_verified_and_an_altered_one_refused(finished, room, tmp_path):
+    out, _ = finished
+    result = invoke("verify", out / "log.npz", room, "--json")
+    assert result.exit_code == 0, result.stderr
+    facts = json.loads(result.stdout)
+    assert (facts["valid"], facts["answer"]) == (True, "arrived")
+    log = SimulationLog.load(out / "log.npz")
+    log.joints[20, 1] += 1e-3
+    log.save(tmp_path / "log.npz")
+    refused = invoke("verify", tmp_path / "log.npz", room, "--plan", out / "plan.json", "--json")
+    assert refused.exit_code == 1
+    assert json.loads(refused.stdout)["where"].startswith("object_pose, joints[20, ")
+    assert invoke("verify", tmp_path / "log.npz", room, "--quiet").exit_code == 2  # no plan beside it
+
+
 def test_people_see_bars_and_a_table_and_quiet_shows_nothing(room, tmp_path):
     shown = invoke("plan", room, "--out", tmp_path)
     assert shown.exit_code == 0

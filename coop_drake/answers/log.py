@@ -12,8 +12,6 @@ from coop_drake.answers.log_reader import read_arrays
 from coop_drake.files import write_atomically
 from coop_drake.tree.pose import FloatArray, IntArray
 
-__all__ = ["SimulationLog"]
-
 
 @dataclass(frozen=True)
 class SimulationLog:
@@ -31,6 +29,8 @@ class SimulationLog:
         base_poses: Pose of every robot's base frame Bk in W, shape (T, N, 3) [m, rad].
         joints: Every joint, shape (T, n) [rad or m].
         joint_rates: Their rates, shape (T, n) [rad/s or m/s].
+        accelerations: Accelerations of the object's pose and of every joint in the plant, shape (T, 3 + n)
+            [m/s^2, rad/s^2].
         governor_position: p_G as robot 0 keeps it, shape (T, 2) [m].
         governor_spread: Largest difference of a coordinate of p_G between robots, shape (T,) [m].
         funnel_lower: Lower funnel bound per axis, shape (T, 1 + n) [rad or m].
@@ -68,6 +68,7 @@ class SimulationLog:
     base_poses: FloatArray
     joints: FloatArray
     joint_rates: FloatArray
+    accelerations: FloatArray
     governor_position: FloatArray
     governor_spread: FloatArray
     funnel_lower: FloatArray

@@ -31,6 +31,7 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "base_poses": ("T", "N", 3),
     "joints": ("T", "n"),
     "joint_rates": ("T", "n"),
+    "accelerations": ("T", "coordinates"),
     "governor_position": ("T", 2),
     "funnel_lower": ("T", "axes"),
     "funnel_upper": ("T", "axes"),

@@ -1,4 +1,4 @@
-"""The command verify: checks a plan or a proof of infeasibility by code of its own."""
+"""The command verify: checks a plan, a proof of infeasibility or the log of a run by code of its own."""
 
 from __future__ import annotations
 
@@ -20,24 +20,37 @@ if TYPE_CHECKING:
 
 def verify_command(
     certificate: Annotated[
-        Path, typer.Argument(metavar="FILE", help="plan.json or certificate.json, as `plan` wrote it.")
+        Path,
+        typer.Argument(
+            metavar="FILE", help="plan.json or certificate.json, as `plan` wrote it, or log.npz of `run`."
+        ),
     ],
     scenario: ScenarioPath,
+    plan: Annotated[
+        Path | None,
+        typer.Option(help="The plan that a log belongs to; plan.json beside the log if not given."),
+    ] = None,
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Check a plan, or a proof that there is none, by code that shares nothing with the search."""
+    """Check a plan, a proof that there is none, or a run by its log, by code of its own."""
     with reporting(machine=machine, quiet=quiet) as reporter:
-        reporter.code = _verify(certificate, read_task(scenario), reporter)
+        reporter.code = _verify(certificate, plan, read_task(scenario), reporter)
 
 
-def _verify(certificate: Path, task: Task, reporter: Reporter) -> ExitCode:
-    from coop_drake.verification import verify_file
-
+def _verify(certificate: Path, plan: Path | None, task: Task, reporter: Reporter) -> ExitCode:
     begun = process_time()
     try:
         with reporter.stage("verifying") as progress:
-            verified = verify_file(certificate, task.problem, task.scenario.gain_sets, progress)
+            if certificate.suffix == ".npz":
+                from coop_drake.chain import verify_run
+
+                beside = certificate.with_name("plan.json")
+                verified = verify_run(certificate, plan or beside, task.scenario, progress=progress)
+            else:
+                from coop_drake.verification import verify_file
+
+                verified = verify_file(certificate, task.problem, task.scenario.gain_sets, progress)
     except RefusalError as error:
         reporter.facts["valid"] = False
         reporter.complain(f"{certificate}: {error}", where=error.where, finding=error.finding)

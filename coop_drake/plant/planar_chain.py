@@ -60,14 +60,14 @@ def robot_chain(robot: RobotPlant) -> FloatArray:
     for row, body in enumerate([robot.base_body, *(joint.child_body() for joint in robot.joints)]):
         welded = plant.GetBodiesWeldedTo(body)
         link_of.update({int(part.index()): row for part in welded})
-        chain[row, [MASS, COM_X, COM_Y, INERTIA]] = _inertia(plant, context, welded)
+        chain[row, [MASS, COM_X, COM_Y, INERTIA]] = bodies_inertia(plant, context, welded)
     chain[0, RATE] = 3 + n
     for row, joint in enumerate(robot.joints, 1):
         chain[row, [X, Y, TURN, SLIDE_X, SLIDE_Y]] = _joint(context, joint)
         chain[row, PARENT] = link_of[int(joint.parent_body().index())]
         chain[row, [POSITION, RATE]] = 2 + row, 5 + n + row
         chain[row, DAMPING] = joint.GetDampingVector(context)[0]
-        chain[row, ROTOR] = _rotor(plant, context, joint)
+        chain[row, ROTOR] = rotor_inertia(plant, context, joint)
     chain[-1, [X, Y]] = _origin(context, robot.gripper_frame)
     chain[-1, PARENT] = link_of[int(robot.gripper_frame.body().index())]
     return chain
@@ -131,10 +131,10 @@ def _joint(context: Context, joint: Joint) -> tuple[float, float, float, float, 
     return float(x), float(y), 0.0, float(axis[0]), float(axis[1])
 
 
-def _inertia(
+def bodies_inertia(
     plant: MultibodyPlant, context: Context, bodies: list[RigidBody]
 ) -> tuple[float, float, float, float]:
-    """Mass, centre of mass and inertia about it of bodies that are welded together."""
+    """Mass, centre of mass in W and inertia about it of bodies that do not move against each other."""
     whole = plant.CalcSpatialInertia(context, plant.world_frame(), [body.index() for body in bodies])
     if whole.get_mass() == 0.0:
         return 0.0, 0.0, 0.0, 0.0
@@ -143,7 +143,7 @@ def _inertia(
     return float(whole.get_mass()), float(com[0]), float(com[1]), float(about_com)
 
 
-def _rotor(plant: MultibodyPlant, context: Context, joint: Joint) -> float:
+def rotor_inertia(plant: MultibodyPlant, context: Context, joint: Joint) -> float:
     """Reflected inertia of the rotors that drive a joint."""
     actuators = [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
     return sum(

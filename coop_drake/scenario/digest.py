@@ -4,8 +4,6 @@ from coop_drake.answers.digest import content_digest
 from coop_drake.scenario.model import Scenario
 from coop_drake.typed_data import to_plain
 
-__all__ = ["scenario_digest"]
-
 _NOT_IN_A_RUN = ("planner", "gains", "maps", "visualization")
 """Sections that change a run only through its plan, or not at all."""
 

@@ -40,6 +40,7 @@ class Recorder:
             base_poses=self._samples("base_poses"),
             joints=z[:, 3:],
             joint_rates=rates[:, 3:],
+            accelerations=self._samples("accelerations"),
             governor_position=self._samples("governor_position"),
             governor_spread=self._samples("governor_spread"),
             funnel_lower=self._samples("funnel_lower"),

@@ -29,6 +29,7 @@ class Sample:
         entry: Time at which it was entered [s].
         z: Configuration, shape (3 + n,).
         rates: Rates of z, shape (3 + n,).
+        accelerations: Accelerations of z in the plant, shape (3 + n,).
         base_poses: Shape (N, 3).
         governor_position: As robot 0 keeps it, shape (2,).
         governor_spread: Largest difference to the other robots' copies.
@@ -51,6 +52,7 @@ class Sample:
     entry: float
     z: FloatArray
     rates: FloatArray
+    accelerations: FloatArray
     base_poses: FloatArray
     governor_position: FloatArray
     governor_spread: float
@@ -97,6 +99,7 @@ class Telemetry:
             entry=float(entry),
             z=z,
             rates=state[self._rates],
+            accelerations=values[at.realised],
             base_poses=values[at.base_poses],
             governor_position=governors[0],
             governor_spread=largest_difference(governors, governors[:1]),
@@ -109,7 +112,7 @@ class Telemetry:
             grasp_error=float(team.grasps.errors(self._plant_context).max()),
             base_wrenches=base_wrenches,
             joint_torques=values[at.joint_torques],
-            acceleration_error=largest_difference(values[at.accelerations], values[at.realised]),
+            acceleration_error=largest_difference(values[at.accelerations], values[at.realised][None, :3]),
             ready_margins=values[at.ready_margins],
             arrived=bool(arrived),
         )
@@ -162,9 +165,8 @@ def _instant(loop: ClosedLoop, ports: _PortRow) -> Any:
 
 
 def _realised(loop: ClosedLoop, ports: _PortRow) -> Any:
-    """Add the object's acceleration in the plant, shape (1, 3)."""
-    added = ports.add(loop.station.diagram, "generalized_acceleration")
-    return added[loop.team.velocity_index[:3]][None]
+    """Add the accelerations of z in the plant, shape (3 + n,)."""
+    return ports.add(loop.station.diagram, "generalized_acceleration")[loop.team.velocity_index]
 
 
 def _named_places(loop: ClosedLoop, ports: _PortRow) -> _Places:

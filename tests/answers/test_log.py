@@ -10,7 +10,7 @@ DIGESTS = ("plan_digest", "scenario_digest")
 ROWS, ROBOTS, JOINTS = 5, 2, 3
 SHAPES = {
     "times": (), "cell_index": (), "transition_start": (), "object_pose": (3,), "object_twist": (3,),
-    "base_poses": (ROBOTS, 3), "joints": (JOINTS,), "joint_rates": (JOINTS,),
+    "base_poses": (ROBOTS, 3), "joints": (JOINTS,), "joint_rates": (JOINTS,), "accelerations": (3 + JOINTS,),
     "governor_position": (2,), "governor_spread": (), "ready_margins": (ROBOTS,),
     "funnel_lower": (1 + JOINTS,), "funnel_upper": (1 + JOINTS,), "energy_margin": (), "object_wrench": (3,),
     "commanded_wrenches": (ROBOTS, 3), "measured_wrenches": (ROBOTS, 3), "base_wrenches": (ROBOTS, 3),

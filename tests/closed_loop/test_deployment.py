@@ -22,6 +22,7 @@ from coop_drake.scenario import (
 from coop_drake.simulation import configure_simulator, simulate
 from coop_drake.typed_data import convert_class
 from tests.support.hand_over import assert_certified
+from tests.support.run_checks import verified_run
 from tests.support.small_loop import small_maps, small_problem
 
 RATE = 100.0
@@ -117,10 +118,14 @@ def run(deployment, gain_set=None, max_time=6.0):
     return RUNS[key]
 
 
-def run_anew(deployment, gain_set=None, max_time=6.0):
+def deployed(deployment, gain_set=None, max_time=6.0):
     scenario, plan = small_problem("base", gain_set)
     simulator = replace(scenario.simulator, max_time=max_time)
-    return simulate(replace(scenario, deployment=deployment, simulator=simulator), plan, small_maps())
+    return replace(scenario, deployment=deployment, simulator=simulator), plan
+
+
+def run_anew(deployment, gain_set=None, max_time=6.0):
+    return simulate(*deployed(deployment, gain_set, max_time), small_maps())
 
 
 @pytest.mark.parametrize("name", MILD)
@@ -133,6 +138,7 @@ def test_a_mild_departure_is_survived(name):
     assert log.acceleration_error.max() > 1e-3  # it does depart
     assert log.energy_margin.min() >= 0.0
     assert_certified(small_problem("base")[1], log)
+    assert verified_run(*deployed(MILD[name]), log).answer == "arrived"
 
 
 def test_a_thousand_samples_a_second_are_survived_too():

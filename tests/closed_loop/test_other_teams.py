@@ -10,6 +10,7 @@ from coop_drake.scenario import load_scenario
 from coop_drake.simulation import simulate
 from tests.support.edited_scenario import write_edited, write_with_robot
 from tests.support.robot_models import Arm
+from tests.support.run_checks import verified_run
 from tests.support.small_loop import joint_names, small_maps
 from tests.support.small_plan import small_plan
 from tests.support.small_scenario import in_open_room
@@ -55,8 +56,9 @@ def assert_exact_arrival(log):
 )
 def test_a_team_of_unlike_robots(tmp_path, arm, start):
     path = write_with_robot(tmp_path, arm.text(), "sdf", ("robot_0: [0.0]", f"robot_0: {start}"))
-    _, log = run(path)
+    scenario, log = run(path)
     assert_exact_arrival(log)
+    assert verified_run(scenario, small_plan(joint_names(scenario)), log).answer == "arrived"
     assert len(log.joint_names) == 1 + len(arm.joints)
 
 

@@ -10,6 +10,7 @@ from coop_drake.diagram import build_closed_loop
 from coop_drake.plant import base_poses, build_separate_team, build_team_plant, set_configuration
 from coop_drake.scenario import PlantSettings
 from coop_drake.simulation import build_maps, simulate
+from tests.support.run_checks import verified_run
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.small_plan import ANGLE_TOLERANCE, POSITION_TOLERANCE, plan_by_hand
 from tests.support.small_scenario import small_scenario
@@ -28,6 +29,12 @@ def logs():
     return plan, *(
         simulate(replace(scenario, plant=plant), plan, maps) for plant in (PlantSettings(), SEPARATE)
     )
+
+
+def test_the_log_is_verified_up_to_what_grasps_yield(logs):
+    plan, _, log = logs
+    scenario = replace(small_problem("base")[0], plant=SEPARATE)
+    assert verified_run(scenario, plan, log).answer == "arrived"
 
 
 def test_the_object_arrives_and_rests(logs):

@@ -16,6 +16,7 @@ GOOD = Sample(
     entry=0.5,
     z=Z,
     rates=np.zeros(5),
+    accelerations=np.zeros(5),
     base_poses=np.zeros((2, 3)),
     governor_position=Z[:2],
     governor_spread=0.0,

@@ -55,6 +55,7 @@ def synthetic_log(problem: PlanningProblem, *, samples: int = 400) -> Simulation
         base_poses=np.stack([pose + np.array([0.1 * k, 0.0, 0.0]) for k in range(robots)], axis=1),
         joints=joints,
         joint_rates=np.gradient(joints, times, axis=0),
+        accelerations=np.zeros((samples, 3 + n)),
         governor_position=pose[:, :2] + 0.02,
         governor_spread=np.zeros(samples),
         funnel_lower=axes - width,

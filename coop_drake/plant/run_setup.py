@@ -1,0 +1,78 @@
+"""What the check of a log needs of a scenario and its models."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.multibody.tree import BodyIndex, RigidBody
+from pydrake.systems.framework import Context, DiagramBuilder
+
+from coop_drake.plant.component_tree import read_component_tree
+from coop_drake.plant.parsing import bodies_of
+from coop_drake.plant.planar_chain import bodies_inertia, rotor_inertia
+from coop_drake.plant.team import TeamPlant, build_team_plant
+from coop_drake.scenario import Floor, Scenario
+from coop_drake.scenario.digest import scenario_digest
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.verification.runs import BodyMass, RunSetup
+
+
+def run_setup(scenario: Scenario) -> RunSetup:
+    """Read a scenario's settings and masses, against which a log is checked.
+
+    Args:
+        scenario: The scenario.
+
+    Raises:
+        ScenarioError: The models do not make a team.
+    """
+    team = build_team_plant(scenario, DiagramBuilder())
+    context = team.plant.CreateDefaultContext()
+    team.plant.SetPositionsAndVelocities(context, np.zeros(team.plant.num_multibody_states()))
+    deployment = scenario.deployment
+    springs = team.plant.num_force_elements() > 1  # every plant has gravity
+    return RunSetup(
+        scenario_digest=scenario_digest(scenario),
+        robot_names=tuple(robot.name for robot in team.robots),
+        exact=scenario.ideal,
+        rigid=scenario.plant.ideal,
+        mechanics=scenario.plant.ideal
+        and not springs
+        and deployment.floor == Floor()
+        and not deployment.pushes,
+        one_clock=all(robot.clock_error == robot.switch_delay == 0.0 for robot in deployment.robots.values()),
+        grasps=np.array([[robot.X_LE.x, robot.X_LE.y] for robot in team.robots]),
+        bodies=tuple(_masses(team, context, read_component_tree(team))),
+        joint_damping=np.array([joint.GetDampingVector(context)[0] for joint in team.joints]),
+        joint_inertia=np.array([rotor_inertia(team.plant, context, joint) for joint in team.joints]),
+    )
+
+
+def _masses(team: TeamPlant, context: Context, tree: ComponentTree) -> list[BodyMass]:
+    """Masses of every robot's and the object's bodies in every component; the team stands at zero."""
+    plant, origins = team.plant, [np.zeros(2)]
+    groups = [_welded(team, team.object_body)]
+    for component in tree.components[1:]:
+        assert component.joint is not None
+        assert component.parent is not None
+        joint = team.joints[component.joint.index]
+        sides = [joint.parent_body(), joint.child_body()]
+        outer = sides[1] if int(sides[0].index()) in groups[component.parent] else sides[0]
+        groups.append(_welded(team, outer))
+        origins.append(origins[component.parent] + (component.joint.X_PJ.x, component.joint.X_PJ.y))
+    robots = [{int(body.index()) for body in bodies_of(plant, r.models)} for r in team.assembly.robots]
+    masses = []
+    for index, (group, origin) in enumerate(zip(groups, origins, strict=True)):
+        owned = [
+            *[(k, group & bodies) for k, bodies in enumerate(robots)],
+            (None, group - set().union(*robots)),
+        ]
+        for robot, members in owned:
+            bodies = [plant.get_body(BodyIndex(i)) for i in sorted(members)]
+            mass, x, y, inertia = bodies_inertia(plant, context, bodies)
+            if mass > 0.0:
+                masses.append(BodyMass(index, robot, mass, np.array([x, y]) - origin, inertia))
+    return masses
+
+
+def _welded(team: TeamPlant, body: RigidBody) -> set[int]:
+    return {int(part.index()) for part in team.plant.GetBodiesWeldedTo(body)}

@@ -1,0 +1,121 @@
+"""Delta E and the ready reports of an ideal team, computed again from the states.
+
+A robot is ready to leave a cell when each axis that it knows lies in its goal interval without a tenth at
+both ends and has an energy small enough for the next funnel, and when the object would provably stay in the
+next cell: Delta E = K d |d| / 2 - (|p'|^2 + K |p - p_G|^2) / 2 is at least (K / 2) (R / 2)^2. In the last
+cell it is ready when object and axes are at their goals and at rest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.tree.pose import FloatArray
+from coop_drake.verification.checks import Check
+from coop_drake.verification.runs.cells import signed_distances
+from coop_drake.verification.runs.funnels import entry_energies
+from coop_drake.verification.runs.rows import Rows
+
+GOAL_SHARE = 0.8
+"""Share of a goal interval, about its middle, in which an axis counts as arrived [-]."""
+
+ARRIVED_SHARE = 0.9
+"""Share of the position's tolerance within which the object counts as arrived [-]."""
+
+REST_SPEED = 0.01
+"""Largest speed of the object's origin that counts as rest [m/s]."""
+
+REST_RATE = 0.02
+"""Largest rate of an axis that counts as rest [rad/s or m/s]."""
+
+STEP = 2.0**-26
+"""Robots compute Delta E from a velocity that is rounded to a multiple of this [m/s]."""
+
+SAME = 1e-8
+"""Numbers that are computed twice may differ by so much [m, m^2/s^2, -]."""
+
+
+def check_energy_margin(rows: Rows) -> Check:
+    """Check Delta E: it is what it should be, never negative, and all robots have one p_G.
+
+    Raises:
+        RefusalError: Names array, index and time.
+    """
+    log = rows.log
+    margins, speeds = np.empty(len(log.times)), np.abs(log.object_twist[:, :2]).sum(axis=1)
+    for k in range(len(rows.plan.cells)):
+        members = log.cell_index == k
+        margins[members] = _energy_margin(rows, members, k)
+    rows.require_same("energy_margin", margins, SAME + STEP * speeds)
+    rows.require(log.energy_margin >= 0.0, "energy_margin", "is {:.3g}, negative", log.energy_margin)
+    rows.require_same("governor_spread", np.zeros(len(log.times)), SAME)
+    return Check("Delta E is right and never negative", len(log.times), float(margins.min()), "m²/s², least")
+
+
+def check_reports(rows: Rows, problem: PlanningProblem) -> Check:
+    """Check the margins that all robots report.
+
+    Raises:
+        RefusalError: Names array, index and time.
+    """
+    log, plan = rows.log, rows.plan
+    of_object, of_axes = np.empty(len(log.times)), np.empty(rows.z[:, 2:].shape)
+    tolerances = np.full(len(log.times), SAME)
+    for k in range(len(plan.cells)):
+        members = log.cell_index == k
+        if k + 1 < len(plan.cells):
+            of_object[members], of_axes[members], change = _leaving(rows, members, k)
+            tolerances[members] += change
+        else:
+            of_object[members], of_axes[members] = _arriving(rows, members, problem.position_tolerance)
+    joints = problem.tree.joints
+    own = [[0, *[1 + j.index for j in joints if j.robot == k]] for k in range(len(log.robot_names))]
+    of_robots = np.column_stack([of_axes[:, axes].min(axis=1) for axes in own])
+    margins = np.minimum(of_object[:, None], of_robots)
+    largest = rows.require_same("ready_margins", margins, tolerances[:, None])
+    return Check("reports are those of the states", margins.size, largest, "largest difference")
+
+
+def _leaving(rows: Rows, members: NDArray[np.bool_], cell: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Margins of object (m,) and axes (m, 1 + n) in a cell before the last, and what rounding changes."""
+    log, plan = rows.log, rows.plan
+    following, axes = plan.transitions[cell + 1].gains, rows.z[members, 2:]
+    energy = entry_energies(plan, cell + 1, axes, rows.rates[members, 2:])
+    settled = (following.energy_bound - energy) / np.maximum(energy, following.energy_bound)
+    margin = _energy_margin(rows, members, cell + 1)
+    floor = 0.5 * following.stiffness * (0.5 * plan.transitions[cell].inradius) ** 2
+    of_object = (margin - floor) / np.maximum(np.abs(margin), floor)
+    change = 2.0 * STEP * np.abs(log.object_twist[members, :2]).sum(axis=1) / floor
+    return of_object, np.minimum(_inside_goal(rows, members, cell), settled), change
+
+
+def _arriving(rows: Rows, members: NDArray[np.bool_], tolerance: float) -> tuple[FloatArray, FloatArray]:
+    """Margins of object (m,) and axes (m, 1 + n) in the last cell."""
+    distance = np.hypot(*(rows.z[members, :2] - rows.plan.goal_pose[:2]).T)
+    speed = np.hypot(*rows.rates[members, :2].T)
+    there, still = 1.0 - distance / (ARRIVED_SHARE * tolerance), 1.0 - speed / REST_SPEED
+    settled = 1.0 - np.abs(rows.rates[members, 2:]) / REST_RATE
+    inside = _inside_goal(rows, members, len(rows.plan.cells) - 1)
+    return np.minimum(there, still), np.minimum(inside, settled)
+
+
+def _inside_goal(rows: Rows, members: NDArray[np.bool_], cell: int) -> FloatArray:
+    transition = rows.plan.transitions[cell]
+    middle = 0.5 * (transition.goal_lower + transition.goal_upper)
+    half = 0.5 * GOAL_SHARE * (transition.goal_upper - transition.goal_lower)
+    inside: FloatArray = 1.0 - np.abs(rows.z[members, 2:] - middle) / half
+    return inside
+
+
+def _energy_margin(rows: Rows, members: NDArray[np.bool_], cell: int) -> FloatArray:
+    """Delta E of some rows in a cell [m^2/s^2], from velocities rounded as the robots round them."""
+    log, stiffness = rows.log, rows.plan.transitions[cell].gains.stiffness
+    reference = log.governor_position[members]
+    clearance = signed_distances(rows.plan.cells[cell].tidied, reference)
+    velocity = np.rint(log.object_twist[members, :2] / STEP) * STEP
+    lag = log.object_pose[members, :2] - reference
+    energy = 0.5 * (velocity**2).sum(axis=1) + 0.5 * stiffness * (lag**2).sum(axis=1)
+    margin: FloatArray = 0.5 * stiffness * clearance * np.abs(clearance) - energy
+    return margin

@@ -1,0 +1,95 @@
+"""Verify what a run's log states, from the log alone, its plan and its scenario.
+
+Each function raises a RefusalError at the first entry for which a statement does not hold:
+
+1. It belongs to the plan and the scenario: ``check_belonging`` below.
+2. Every number is finite, time passes, cells follow one another: ``rows.check_complete``.
+3. It begins at the plan's start and ends at the goal: ``ends``.
+4. Rates are the derivatives of positions: ``between.check_motion``.
+5. Every state lay in its cell and in its funnel: ``cells.check_cells``, ``funnels.check_funnels``.
+6. Robots report what their states say, and cells were entered one by one when all were ready: ``readiness``,
+   ``handovers``.
+7. Bases, wrenches and efforts go with the motion: ``grasps``, ``mechanics``.
+8. Nothing touched: ``clearances.check_clearances``.
+"""
+
+from __future__ import annotations
+
+from coop_drake.answers.log import SimulationLog
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.plan_file import plan_digest
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.errors import RefusalError
+from coop_drake.progress import Progress
+from coop_drake.verification.checks import Check, Verified
+from coop_drake.verification.runs.between import Between, check_motion
+from coop_drake.verification.runs.cells import check_cells
+from coop_drake.verification.runs.clearances import check_clearances
+from coop_drake.verification.runs.ends import check_arrival, check_start
+from coop_drake.verification.runs.funnels import check_funnels, check_stated_funnels
+from coop_drake.verification.runs.grasps import check_grasps, check_wrenches
+from coop_drake.verification.runs.handovers import check_handovers
+from coop_drake.verification.runs.mechanics import check_mechanics
+from coop_drake.verification.runs.readiness import check_energy_margin, check_reports
+from coop_drake.verification.runs.rows import Rows, check_complete
+from coop_drake.verification.runs.setup import RunSetup
+
+
+def verify_log(
+    log: SimulationLog,
+    plan: Plan,
+    problem: PlanningProblem,
+    setup: RunSetup,
+    progress: Progress | None = None,
+) -> Verified:
+    """Check everything that a log states about a run that arrived.
+
+    Args:
+        log: The log.
+        plan: The plan that it followed; ``verify_plan`` checks it.
+        problem: The problem that the plan solves.
+        setup: What the scenario says besides.
+        progress: Called with a phase and the fraction of it that is done.
+
+    Returns:
+        What was checked.
+
+    Raises:
+        RefusalError: Names the first entry for which a statement does not hold.
+    """
+    rows = Rows(log, plan)
+    checks = [check_belonging(rows, problem, setup), check_complete(rows), check_arrival(rows, problem)]
+    checks.append(check_start(rows))
+    between = Between.of(rows)
+    checks += [check_motion(rows, between), *check_cells(rows, between), check_stated_funnels(rows)]
+    if setup.one_clock:
+        checks += check_funnels(rows, between)
+    if setup.exact:
+        checks += [check_energy_margin(rows), check_reports(rows, problem)]
+    checks += check_handovers(rows, exact=setup.exact)
+    checks += [check_grasps(rows, problem, setup), check_wrenches(rows, setup)]
+    if setup.mechanics:
+        checks.append(check_mechanics(rows, problem, setup))
+    checks += check_clearances(rows, between, problem, progress)
+    return Verified("arrived", f"run of {log.times[-1]:.2f} s in {len(log.times)} rows", tuple(checks))
+
+
+def check_belonging(rows: Rows, problem: PlanningProblem, setup: RunSetup) -> Check:
+    """Check that a log is of this plan and of this scenario, and has their joints and robots.
+
+    Raises:
+        RefusalError: Names the entry and both values.
+    """
+    log, plan = rows.log, rows.plan
+    joints = tuple(joint.name for joint in problem.tree.joints)
+    for where, found, expected in (
+        ("plan_digest", log.plan_digest, plan_digest(plan)),
+        ("scenario_digest", log.scenario_digest, setup.scenario_digest),
+        ("joint_names", log.joint_names, joints),
+        ("robot_names", log.robot_names, setup.robot_names),
+    ):
+        if found != expected:
+            raise RefusalError(where, f"{found!r} is not that of the plan and the scenario, {expected!r}")
+    if len(log.times) < 2 or log.accelerations.shape[1] != 3 + len(joints):
+        raise RefusalError("times", f"has {len(log.times)} rows; expected the rows of a run of this team")
+    return Check("the log is of this plan and this scenario", 1)
