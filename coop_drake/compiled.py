@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import hashlib
+import inspect
+import os
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
-from typing import Any, TypeVar, cast, overload
+from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
 
-import numba
 import numpy as np
-from numba import types
-from numba.core.caching import FunctionCache, IndexDataCacheFile
-from numba.core.registry import CPUDispatcher
+
+from coop_drake.files import cache_folder
+from coop_drake.kernel_times import KERNEL_TIMES
+
+if TYPE_CHECKING:
+    from coop_drake.kernel_compiler import NumbaFunction
 
 F = TypeVar("F", bound=Callable[..., object])
 
@@ -39,39 +43,155 @@ def compiled(function: F | None = None, *, reassociate: bool = False) -> F | Cal
     Returns:
         The compiled function, or the decorator if only options are given.
     """
+    flags = _REASSOCIATED if reassociate else False
+    options = {"nogil": True, "error_model": "numpy", "fastmath": flags, "no_cfunc_wrapper": True}
 
     def decorate(function: F) -> F:
-        flags = _REASSOCIATED if reassociate else False
-        options = {"nogil": True, "error_model": "numpy", "fastmath": flags, "no_cfunc_wrapper": True}
-        dispatcher = numba.njit(**options)(function)
-        if not isinstance(dispatcher, CPUDispatcher):  # NUMBA_DISABLE_JIT is set: nothing is compiled
+        if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):  # Nothing is compiled.
             return function
-        dispatcher._cache = _KernelCache(function, "called from Python")
-        # Most functions are called from compiled ones only. Then the wrapper that unpacks Python's arguments,
-        # a sixth of the time to compile, is left out.
-        inner = numba.njit(no_cpython_wrapper=True, **options)(function)
-        inner._cache = _KernelCache(function, "called from compiled functions")
-        dispatcher.get_call_template = _by_type_alone(inner.get_call_template)
-        dispatcher.get_overload = inner.get_overload
-        return cast(F, dispatcher)
+        return cast(F, Kernel(cast(FunctionType, function), options))
 
     return decorate if function is None else decorate(function)
 
 
-def _by_type_alone(get_call_template: Callable[..., object]) -> Callable[..., object]:
-    """Let calls from compiled code share one version of a function, whatever constants they pass.
+class Kernel:
+    """A compiled function: one version for each list of types that it is called with.
 
-    Otherwise numba compiles a function anew for every constant: ``f(x, 1)`` and ``f(x, 2)`` would be two.
+    Numba is imported only where a version has to be compiled.
+
+    Args:
+        function: The function.
+        options: Numba's options.
+
+    Attributes:
+        loaded: How many versions were read from disk.
     """
 
-    def get(args: Sequence[types.Type], kws: Mapping[str, types.Type]) -> object:
-        typed = {name: types.unliteral(value) for name, value in kws.items()}
-        return get_call_template(tuple(types.unliteral(value) for value in args), typed)
+    def __init__(self, function: FunctionType, options: Mapping[str, object]) -> None:
+        update_wrapper(self, function)
+        self.loaded = 0
+        self._function, self._options, self._names = function, options, tuple(function.__globals__)
+        _file_digest(function.__code__.co_filename)  # Now: the file may be edited while the program runs.
+        self._count = function.__code__.co_argcount
+        self._versions: dict[tuple[object, ...], Callable[..., Any]] = {}
 
-    return get
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        """Call the version for the types of the arguments."""
+        if named or len(arguments) != self._count:
+            bound = inspect.signature(self._function).bind(*arguments, **named)
+            bound.apply_defaults()
+            arguments = bound.args
+        version = self._versions.get(tuple(map(_kind, arguments)))
+        return (version or self._version(arguments))(*arguments)
+
+    def __reduce__(self) -> str:
+        """Pickle by name, as a function is."""
+        return self._function.__qualname__
+
+    @property
+    def _numba_type_(self) -> object:
+        """What numba takes this for in the functions that call it."""
+        return self._numba.type
+
+    @cached_property
+    def _numba(self) -> NumbaFunction:
+        from coop_drake.kernel_compiler import NumbaFunction
+
+        return NumbaFunction(self._function, self._options, self.stamp)
+
+    @cached_property
+    def stamp(self) -> str:
+        """Digest of all that the machine code depends on."""
+        return kernel_stamp(self._function, self._names)
+
+    def _version(self, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+        """Load or compile the version for the types of some arguments."""
+        kinds = tuple(map(_kind, arguments))
+        words = [_words(kind) for kind in kinds]
+        if None in words:  # Numba knows more types; none of them is kept here.
+            return lambda *arguments: self._numba.call(arguments)
+        with KERNEL_TIMES.spent():
+            if kinds not in self._versions:
+                self._versions[kinds] = self._loaded_or_compiled(arguments, " ".join(map(str, words)))
+        return self._versions[kinds]
+
+    def _loaded_or_compiled(self, arguments: tuple[Any, ...], words: str) -> Callable[..., Any]:
+        from coop_drake.machine_code import load_machine_code, platform_stamp, write_machine_code
+
+        function = self._function
+        stamp = hashlib.sha256(
+            "\n".join((self.stamp, repr(self._options), platform_stamp())).encode()
+        ).hexdigest()
+        ending = hashlib.sha256(words.encode()).hexdigest()[:16]
+        source = Path(function.__code__.co_filename)
+        name = f"{source.stem}.{function.__qualname__}.{sys.implementation.cache_tag}.{ending}.kernel"
+        path = _folder(source.parent) / name
+        version = load_machine_code(path, stamp, function.__name__)
+        if version is not None:
+            self.loaded += 1
+            return version
+        version, kept = self._numba.entry(arguments, KERNEL_TIMES.announce)
+        if kept is not None:
+            write_machine_code(path, stamp, kept)
+        return version
 
 
-def kernel_stamp(function: FunctionType) -> str:
+_ARRAY_FLAGS = 0x1 | 0x2 | 0x100 | 0x400
+"""Bits of numpy's flags that machine code depends on: C order, Fortran order, aligned, writable."""
+
+_SCALARS = {float: "float", np.float64: "float", int: "int", np.int64: "int", bool: "bool", np.bool_: "bool"}
+
+_SEEN_MOST = 32
+"""Number of tuples whose kind is remembered; a command has a handful of teams and floors."""
+
+_seen: dict[int, tuple[object, object]] = {}
+"""Tuples by their identity, each with its kind; arrays in them keep their types."""
+
+
+def _kind(value: object) -> object:
+    """What numba's type of a value depends on, as something that can be compared and hashed."""
+    cls = type(value)
+    if cls is np.ndarray:
+        array = cast("np.ndarray[Any, Any]", value)
+        return array.dtype, array.ndim, array.flags.num & _ARRAY_FLAGS
+    if (scalar := _SCALARS.get(cls)) is not None:
+        return scalar
+    if isinstance(value, tuple):
+        seen = _seen.get(id(value))
+        if seen is not None and seen[0] is value:
+            return seen[1]
+        kind = (cls, *map(_kind, value))
+        if len(_seen) >= _SEEN_MOST:
+            _seen.clear()
+        _seen[id(value)] = value, kind
+        return kind
+    return cls
+
+
+def _words(kind: object) -> str | None:
+    """A kind as a text that is the same in every process; None for what is not kept."""
+    if isinstance(kind, str):
+        return kind
+    if not isinstance(kind, tuple):
+        return None
+    first, *rest = kind
+    if isinstance(first, np.dtype):
+        dimensions, flags = rest
+        order = "C" if flags & 0x1 else "F" if flags & 0x2 else "A"
+        return f"{first.str}{dimensions}{order}{flags & 0x500:x}" if first.kind in "fiub" else None
+    parts = [_words(part) for part in rest]
+    return None if None in parts else f"{first.__module__}.{first.__qualname__}({', '.join(map(str, parts))})"
+
+
+def _folder(beside: Path) -> Path:
+    """Where the machine code of the functions in a folder is kept: where numba keeps its own."""
+    place = f"{beside.name}_{hashlib.sha256(str(beside).encode()).hexdigest()}"
+    if named := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(named) / place
+    return beside / "__pycache__" if os.access(beside, os.W_OK) else cache_folder("kernels") / place
+
+
+def kernel_stamp(function: FunctionType, names: Iterable[str]) -> str:
     """Return a digest of all that a function's machine code depends on.
 
     Numba's own cache looks at the file that holds the function. The machine code also depends on what other
@@ -80,11 +200,13 @@ def kernel_stamp(function: FunctionType) -> str:
     that the function's module has imported, by name or as attributes of imported modules.
 
     Args:
-        function: The function before it is compiled; its module's imports have been executed.
+        function: The function before it is compiled.
+        names: Globals of its module when it was defined, after the module's imports.
     """
     attributes = _names_in(function.__code__)
     parts = [_file_digest(function.__code__.co_filename)]
-    for name, value in sorted(function.__globals__.items()):
+    for name in sorted(names):
+        value = function.__globals__[name]
         if isinstance(value, ModuleType):
             found = {f"{name}.{attribute}": getattr(value, attribute, None) for attribute in attributes}
         else:
@@ -103,8 +225,8 @@ def _names_in(code: CodeType) -> list[str]:
 
 def _description(value: object, module: str) -> str | None:
     """Return what a global adds to the stamp of a module's function; None if machine code cannot hold it."""
-    if isinstance(value, CPUDispatcher):
-        return None if value.py_func.__module__ == module else str(value._cache.stamp)
+    if isinstance(value, Kernel):
+        return None if value.__module__ == module else value.stamp
     if isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields"):
         defined_in = getattr(sys.modules.get(value.__module__), "__file__", None)
         return f"{value._fields} {_file_digest(defined_in) if defined_in else value.__module__}"
@@ -118,36 +240,3 @@ def _description(value: object, module: str) -> str | None:
 @cache
 def _file_digest(path: str) -> str:
     return hashlib.sha256(Path(path).read_bytes()).hexdigest()
-
-
-class _Index(IndexDataCacheFile):  # type: ignore[misc]
-    """Numba's index of the machine code of one function, empty where an older version of the code wrote it.
-
-    An index holds the types of arguments. Numba reads them before it compares stamps, which fails if one was
-    a class that is no longer there.
-    """
-
-    def _load_index(self) -> dict[object, str]:
-        try:
-            return cast(dict[object, str], super()._load_index())
-        except (ImportError, AttributeError):
-            return {}
-
-
-class _KernelCache(FunctionCache):  # type: ignore[misc]
-    """Numba's cache on disk with ``kernel_stamp`` in place of the digest of one file.
-
-    Args:
-        function: The function.
-        use: From where it is called; the machine code of each use is kept apart.
-    """
-
-    def __init__(self, function: Any, use: str) -> None:
-        super().__init__(function)
-        self.stamp, self._use = kernel_stamp(function), use
-        self._cache_file = _Index(
-            cache_path=self._cache_path, filename_base=self._impl.filename_base, source_stamp=self.stamp
-        )
-
-    def _index_key(self, sig: Any, codegen: Any) -> tuple[object, ...]:
-        return (*super()._index_key(sig, codegen), self._use)

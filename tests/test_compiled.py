@@ -40,7 +40,7 @@ from coop_drake.compiled import compiled
 def line(pair, x):
     return slope(x) + CONSTANT + TABLE[1] + pair.first
 
-print(line(Pair(0.25, 0.5), 2.0), slope(2.0), sum(line.stats.cache_hits.values()))
+print(line(Pair(0.25, 0.5), 2.0), slope(2.0), line.loaded)
 """
 
 BY_MODULE = """
@@ -51,7 +51,7 @@ from coop_drake.compiled import compiled
 def line(x):
     return between.slope(x) + between.CONSTANT + between.TABLE[1]
 
-print(line(2.0), between.slope(2.0), sum(line.stats.cache_hits.values()))
+print(line(2.0), between.slope(2.0), line.loaded)
 """
 
 ORIGINAL = {"name": "Original", "factor": 3.0, "constant": 1.0, "entry": 10.0, "fields": ("first", "second")}
@@ -108,6 +108,83 @@ def test_an_edit_in_another_file_compiles_its_users_anew(tmp_path, caller, first
         values |= edit
         write_callee(tmp_path, **values)
         assert run(tmp_path) == [result, str(2.0 * values["factor"]), "0"], edit
+
+
+GRID = """
+from typing import NamedTuple
+
+import numpy as np
+
+class Grid(NamedTuple):
+    values: np.ndarray
+    step: float
+"""
+
+KINDS = """
+import pickle
+import sys
+
+import numpy as np
+from grid import Grid
+
+from coop_drake.compiled import compiled
+
+@compiled
+def total(grid, weights, factor, shift=2.0):
+    return Grid(grid.values * factor + shift, grid.step), weights.sum()
+
+@compiled
+def refuse(value):
+    if value < 0:
+        raise ValueError("negative")
+    return value
+
+def called(values, factor, **named):
+    grid, weight = total(Grid(values, 0.5), np.arange(3)[::-1], factor, **named)
+    return f"{type(grid).__name__}:{grid.values.dtype}:{grid.values.sum()}:{grid.step}:{weight}"
+
+square = np.arange(4.0).reshape(2, 2)
+print(called(square, 2.0))
+print(called(np.asfortranarray(square), np.float64(3.0)))
+print(called(square[:, :1], True, shift=1))
+assert pickle.loads(pickle.dumps(total)) is total
+print(total.loaded, "numba" in sys.modules)
+try:
+    refuse(-1)
+except ValueError as error:
+    print(error, refuse(2.5))
+"""
+
+
+def write_kinds(folder: Path, first: str = "") -> None:
+    (folder / "grid.py").write_text(GRID)
+    (folder / "caller.py").write_text(first + KINDS)
+
+
+RESULTS = ["Grid:float64:20.0:0.5:3", "Grid:float64:26.0:0.5:3", "Grid:float64:4.0:0.5:3"]
+
+
+def test_machine_code_is_loaded_without_numba_and_gives_the_same(tmp_path):
+    write_kinds(tmp_path)
+    assert run(tmp_path) == [*RESULTS, "0", "True", "negative", "2.5"]
+    assert run(tmp_path) == [*RESULTS, "3", "False", "negative", "2.5"]
+
+
+def test_damaged_machine_code_is_replaced(tmp_path):
+    write_kinds(tmp_path)
+    run(tmp_path)
+    files = sorted(tmp_path.rglob("caller.total.*.kernel"))
+    for file, damage in zip(files, (b"", b"no pickle", b"\x80\x04N."), strict=True):
+        file.write_bytes(damage)
+    assert run(tmp_path) == [*RESULTS, "0", "True", "negative", "2.5"]
+    assert run(tmp_path) == [*RESULTS, "3", "False", "negative", "2.5"]
+
+
+def test_numba_loads_its_own_copy_where_its_libraries_are_not_as_expected(tmp_path):
+    unexpected = "import coop_drake.machine_code as code\ncode._LIBRARIES = ('_none',)\n"
+    write_kinds(tmp_path, unexpected)
+    for _ in range(2):
+        assert run(tmp_path) == [*RESULTS, "0", "True", "negative", "2.5"]
 
 
 def test_nothing_is_compiled_where_numba_is_told_so(tmp_path):

@@ -1,0 +1,134 @@
+"""Compiling by numba, and numba's own cache of machine code with a stamp that is never stale."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, cast
+
+import numba
+from numba import types
+from numba.core import event
+from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+
+
+class NumbaFunction:
+    """A function as numba knows it: one version for Python, one for compiled functions.
+
+    Most functions are called from compiled ones only. Then the wrapper that unpacks Python's arguments, a
+    sixth of the time to compile, is left out.
+
+    Args:
+        function: The function.
+        options: Numba's options.
+        stamp: Digest of all that its machine code depends on.
+
+    Attributes:
+        type: The type by which compiled functions call it.
+    """
+
+    def __init__(self, function: Callable[..., object], options: Mapping[str, object], stamp: str) -> None:
+        self._outer = numba.njit(**options)(function)
+        self._outer._cache = _KernelCache(function, stamp, "called from Python")
+        self._inner = numba.njit(no_cpython_wrapper=True, **options)(function)
+        self._inner._cache = _KernelCache(function, stamp, "called from compiled functions")
+        self._inner.get_call_template = _by_type_alone(self._inner.get_call_template)
+        self.type = types.Dispatcher(self._inner)
+
+    def call(self, arguments: Sequence[object]) -> object:
+        """Call it with arguments of any types that numba knows."""
+        return self._outer(*arguments)
+
+    def entry(
+        self, arguments: Sequence[object], compiling: Callable[[str], None]
+    ) -> tuple[Callable[..., Any], Sequence[Any] | None]:
+        """Compile it for the types of some arguments, or load what numba has kept of that.
+
+        Args:
+            arguments: Any arguments of these types.
+            compiling: Called with the name of each function before it is compiled.
+
+        Returns:
+            The function for just these types; and what numba keeps of it, None if it keeps nothing.
+        """
+        signature = tuple(map(self._outer.typeof_pyval, arguments))
+        with event.install_listener("numba:compile", _Announcer(compiling)):
+            self._outer.compile(signature)
+        return self._outer.overloads[signature].entry_point, self._outer._cache.kept
+
+
+class _Announcer(event.Listener):  # type: ignore[misc]
+    """Names each function that is compiled."""
+
+    def __init__(self, compiling: Callable[[str], None]) -> None:
+        self._compiling = compiling
+
+    def on_start(self, event: Any) -> None:
+        self._compiling(event.data["dispatcher"].py_func.__name__)
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+def _by_type_alone(get_call_template: Callable[..., object]) -> Callable[..., object]:
+    """Let calls from compiled code share one version of a function, whatever constants they pass.
+
+    Otherwise numba compiles a function anew for every constant: ``f(x, 1)`` and ``f(x, 2)`` would be two.
+    """
+
+    def get(args: Sequence[types.Type], kws: Mapping[str, types.Type]) -> object:
+        typed = {name: types.unliteral(value) for name, value in kws.items()}
+        return get_call_template(tuple(types.unliteral(value) for value in args), typed)
+
+    return get
+
+
+class _Index(IndexDataCacheFile):  # type: ignore[misc]
+    """Numba's index of the machine code of one function, empty where an older version of the code wrote it.
+
+    An index holds the types of arguments. Numba reads them before it compares stamps, which fails if one was
+    a class that is no longer there.
+    """
+
+    def _load_index(self) -> dict[object, str]:
+        try:
+            return cast(dict[object, str], super()._load_index())
+        except (ImportError, AttributeError):
+            return {}
+
+
+class _KernelCache(FunctionCache):  # type: ignore[misc]
+    """Numba's cache on disk with a stamp of ours in place of the digest of one file.
+
+    Args:
+        function: The function.
+        stamp: Digest of all that its machine code depends on.
+        use: From where it is called; the machine code of each use is kept apart.
+
+    Attributes:
+        kept: What was read or written last.
+    """
+
+    def __init__(self, function: Any, stamp: str, use: str) -> None:
+        cache = self
+
+        class Implementation(CompileResultCacheImpl):  # type: ignore[misc]
+            """Takes note of what numba keeps of a function."""
+
+            def reduce(self, result: Any) -> Any:
+                cache.kept = super().reduce(result)
+                return cache.kept
+
+            def rebuild(self, context: Any, kept: Any) -> Any:
+                cache.kept = kept
+                return super().rebuild(context, kept)
+
+        self._impl_class = Implementation
+        super().__init__(function)
+        self._use = use
+        self.kept: Any = None
+        self._cache_file = _Index(
+            cache_path=self._cache_path, filename_base=self._impl.filename_base, source_stamp=stamp
+        )
+
+    def _index_key(self, sig: Any, codegen: Any) -> tuple[object, ...]:
+        return (*super()._index_key(sig, codegen), self._use)
