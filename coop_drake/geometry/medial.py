@@ -1,23 +1,18 @@
-"""The medial graph of a polygon: the Voronoi graph of samples of its boundary, as far as it lies inside.
-
-scipy's graphs and triangulations are imported where they are used: to read a scenario takes neither.
-"""
+"""The medial graph of a polygon: the Voronoi graph of samples of its boundary, as far as it lies inside."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from heapq import heappop, heappush
 
 import numpy as np
-from numpy.typing import NDArray
+import shapely
 from shapely import Polygon
 
+from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import BoundaryDistance, edges_of
 from coop_drake.geometry.edge_pieces import IndexArray, cut_edges
-from coop_drake.tree.pose import FloatArray
-
-if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix
+from coop_drake.tree.pose import FloatArray, IntArray
 
 SHORTEST_SAMPLE = 2e-3
 """The boundary is sampled no finer than this [m]; narrower passages are still measured exactly."""
@@ -85,50 +80,109 @@ def widest_path(graph: Graph, start: int, end: int) -> IndexArray | None:
     Returns:
         Indices of the nodes, or None where no path exists.
     """
-    from scipy.sparse.csgraph import breadth_first_order, dijkstra, minimum_spanning_tree
-
-    count = len(graph.nodes)
-    # The widest path runs inside the spanning tree of greatest clearance; its weights must be positive.
-    tree = minimum_spanning_tree(_matrix(graph.pairs, 1.0 + graph.clearance.max() - graph.clearance, count))
-    _, before = breadth_first_order(tree, start, directed=False)
-    chain = _trace(before, start, end)
-    if chain is None:
+    order = np.argsort(-graph.clearance, kind="stable")
+    pairs = np.ascontiguousarray(graph.pairs[order], dtype=np.int64)
+    count = _joining(pairs, graph.clearance[order], len(graph.nodes), start, end)
+    if count == 0:
         return None
-    rows = {frozenset(pair): k for k, pair in enumerate(graph.pairs.tolist())}
-    widest = min(
-        graph.clearance[rows[frozenset(pair)]]
-        for pair in zip(chain[:-1].tolist(), chain[1:].tolist(), strict=True)
-    )
-    wide = graph.clearance >= widest
-    weights = _matrix(graph.pairs[wide], graph.length[wide] + 1e-9, count)
-    _, shortest = dijkstra(weights, directed=False, indices=np.array(start), return_predecessors=True)
-    return _trace(shortest, start, end)
-
-
-def _matrix(pairs: IndexArray, weights: FloatArray, count: int) -> csr_matrix:
-    from scipy.sparse import csr_matrix
-
-    return csr_matrix((weights, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-
-
-def _trace(before: NDArray[np.integer], start: int, end: int) -> IndexArray | None:
+    before = _shortest(pairs[:count], graph.length[order[:count]], len(graph.nodes), start, end)
     chain = [end]
     while chain[-1] != start:
-        previous = int(before[chain[-1]])
-        if previous < 0:
-            return None
-        chain.append(previous)
+        chain.append(int(before[chain[-1]]))
     return np.array(chain[::-1], dtype=np.intp)
+
+
+@compiled
+def _joining(pairs: IntArray, clearance: FloatArray, count: int, start: int, end: int) -> int:
+    """Number of edges, the widest first, that join two nodes, with all that are as wide as the last of them.
+
+    Args:
+        pairs: Ends of the edges, shape (edges, 2).
+        clearance: Their clearances, falling, shape (edges,) [m].
+        count: Number of nodes.
+        start: The one node.
+        end: The other node.
+
+    Returns:
+        The number, 0 if the edges do not join the nodes.
+    """
+    joined_to = np.arange(count)
+    for k in range(len(pairs)):
+        first, second = pairs[k, 0], pairs[k, 1]
+        while joined_to[first] != first:
+            joined_to[first] = joined_to[joined_to[first]]
+            first = joined_to[first]
+        while joined_to[second] != second:
+            joined_to[second] = joined_to[joined_to[second]]
+            second = joined_to[second]
+        joined_to[first] = second
+        one, other = start, end
+        while joined_to[one] != one:
+            one = joined_to[one]
+        while joined_to[other] != other:
+            other = joined_to[other]
+        if one == other:
+            last = k + 1
+            while last < len(pairs) and clearance[last] == clearance[k]:
+                last += 1
+            return last
+    return 0
+
+
+@compiled
+def _shortest(pairs: IntArray, length: FloatArray, count: int, start: int, end: int) -> IntArray:
+    """Dijkstra's algorithm on an undirected graph.
+
+    Args:
+        pairs: Ends of the edges, shape (edges, 2).
+        length: Their lengths, shape (edges,) [m].
+        count: Number of nodes.
+        start: Where paths begin.
+        end: Where the search stops; a path must exist.
+
+    Returns:
+        For each node that was reached the one before it, shape (nodes,).
+    """
+    first_of = np.zeros(count + 1, np.int64)
+    for k in range(len(pairs)):
+        first_of[pairs[k, 0] + 1] += 1
+        first_of[pairs[k, 1] + 1] += 1
+    for i in range(count):
+        first_of[i + 1] += first_of[i]
+    edges, filled = np.empty(2 * len(pairs), np.int64), first_of.copy()
+    for k in range(len(pairs)):
+        for side in range(2):
+            node = pairs[k, side]
+            edges[filled[node]] = k
+            filled[node] += 1
+    before, distance = np.full(count, -1), np.full(count, np.inf)
+    distance[start] = 0.0
+    waiting = [(0.0, start)]
+    while waiting:
+        reached, node = heappop(waiting)
+        if node == end:
+            break
+        if reached > distance[node]:
+            continue
+        for place in range(first_of[node], first_of[node + 1]):
+            k = edges[place]
+            other = pairs[k, 0] + pairs[k, 1] - node
+            longer = reached + length[k]
+            if longer < distance[other]:
+                distance[other] = longer
+                before[other] = node
+                heappush(waiting, (longer, other))
+    return before
 
 
 def _voronoi(samples: FloatArray) -> tuple[FloatArray, IndexArray, IndexArray]:
     """Voronoi vertices (n, 2), which pairs of them edges join, and which samples stand beside each edge."""
-    from scipy.spatial import Delaunay
-
-    # Centred, so that far-away samples lose no digits in the lifted paraboloid.
+    # Centred, so that far-away samples lose no digits.
     centre = samples.mean(axis=0)
-    delaunay = Delaunay(samples - centre)
-    corners = delaunay.points[delaunay.simplices]
+    points = samples - centre
+    triangles = shapely.delaunay_triangles(shapely.multipoints(points))
+    corners = shapely.get_coordinates(triangles).reshape(-1, 4, 2)[:, :3]
+    simplices = _indices(points, corners)
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     twice_area = 2.0 * (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
     flat = np.abs(twice_area) < 1e-14
@@ -138,11 +192,21 @@ def _voronoi(samples: FloatArray) -> tuple[FloatArray, IndexArray, IndexArray]:
         np.stack([v[:, 1] * uu - u[:, 1] * vv, u[:, 0] * vv - v[:, 0] * uu], axis=1) / twice_area[:, None]
     )
     nodes = corners[:, 0] + offset + centre
-    first = np.repeat(np.arange(len(nodes)), 3)
-    second = delaunay.neighbors.ravel().astype(np.intp)
-    walls = delaunay.simplices[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2).astype(np.intp)
-    once = (first < second) & ~flat[first] & ~flat[second]
-    return nodes, np.stack([first[once], second[once]], axis=1), walls[once]
+    # A side that two triangles share is dual to the Voronoi edge between their nodes.
+    sides = np.sort(simplices[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+    order = np.lexsort((sides[:, 1], sides[:, 0]))
+    shared = np.flatnonzero((sides[order[:-1]] == sides[order[1:]]).all(axis=1))
+    first, second = order[shared] // 3, order[shared + 1] // 3
+    kept = ~flat[first] & ~flat[second]
+    return nodes, np.stack([first[kept], second[kept]], axis=1), sides[order[shared]][kept]
+
+
+def _indices(points: FloatArray, corners: FloatArray) -> IndexArray:
+    """Which of some points, shape (n, 2), stand at the corners of triangles, shape (m, 3, 2)."""
+    keys, wanted = points[:, 0] + 1j * points[:, 1], corners[..., 0] + 1j * corners[..., 1]
+    order = np.argsort(keys, kind="stable")
+    found: IndexArray = order[np.searchsorted(keys[order], wanted)]
+    return found
 
 
 def _samples_of(polygon: Polygon) -> tuple[FloatArray, IndexArray]:
