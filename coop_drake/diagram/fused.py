@@ -21,9 +21,8 @@ from coop_drake.diagram.station import TransportStation
 from coop_drake.errors import ScenarioError
 from coop_drake.fields import VelocityField
 from coop_drake.plant import TeamPlant, base_chain, robot_chain
-from coop_drake.scenario import Deployment, Scenario
+from coop_drake.scenario import Control, Deployment, Scenario
 from coop_drake.systems import READY_SIZE, CellPlanner, FusedCell, FusedTeam, TeamController, axis_laws
-from coop_drake.tree.pose import FloatArray
 
 __all__ = ["FusedControllers", "add_fused_controllers", "build_team_controller"]
 
@@ -125,14 +124,8 @@ def _stacked(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> FusedTeam:
         chains=np.vstack(chains),
         base_chains=np.vstack([base.chain for base in bases]),
         yaws=np.array([base.yaw for base in bases]),
-        loads=np.array([_load(known) for known in knowledge]),
+        loads=np.array([known.load for known in knowledge]),
     )
-
-
-def _load(known: RobotKnowledge) -> FloatArray:
-    inertia = known.object_inertia
-    p_LE = known.X_LE.x, known.X_LE.y
-    return np.array([*p_LE, *inertia.p_LLcm, inertia.mass, inertia.inertia_about_com, known.load_share])
 
 
 def _report(
@@ -198,12 +191,15 @@ def _check(scenario: Scenario, knowledge: Sequence[RobotKnowledge]) -> None:
         refused = "plant.grasps", scenario.plant.grasps
     elif deployment != allowed:
         refused = "deployment", deployment
+    elif scenario.control != Control():
+        refused = "control", scenario.control
     elif any(robot.robot.has_springs for robot in knowledge):
         refused = "directives", "a robot with springs"
     if refused is not None:
         raise ScenarioError(
             str(scenario.path),
             *refused,
-            "an ideal plant without springs, of deployment only control_rate, mass_error, messages and seed: "
+            "an ideal plant without springs, no predictor or observer, of deployment only control_rate, "
+            "mass_error, messages and seed: "
             "fused blocks support only these; use `--blocks named` for the rest",
         )

@@ -9,10 +9,11 @@ from coop_drake.diagram.robot_controller import RobotKnowledge
 from coop_drake.errors import PlanError
 from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.laws.disturbance import observer_gains
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
 from coop_drake.plant import RobotPlant, TeamPlant, build_robot_plant
 from coop_drake.scenario import Scenario
-from coop_drake.systems import GovernedCell
+from coop_drake.systems import GovernedCell, whole_periods
 
 __all__ = ["robot_knowledge"]
 
@@ -38,7 +39,8 @@ def robot_knowledge(
         )
         for cell, transition, field_map in zip(plan.cells, plan.transitions, maps, strict=True)
     ]
-    factor = 1.0 + scenario.deployment.mass_error
+    factor, deployment, control = 1.0 + scenario.deployment.mass_error, scenario.deployment, scenario.control
+    delay = whole_periods(deployment.measurements.delay, deployment.period) if deployment.period else 0
     return [
         RobotKnowledge(
             robot=_robot(scenario, robot.index, factor),
@@ -49,8 +51,10 @@ def robot_knowledge(
             plan=plan,
             cells=cells,
             position_tolerance=scenario.goal.tolerances.position,
-            period=scenario.deployment.period,
-            sample_offset=scenario.deployment.of_robot(robot.name).sample_offset,
+            period=deployment.period,
+            sample_offset=deployment.of_robot(robot.name).sample_offset,
+            predicted_periods=delay if control.predictor else 0,
+            observer_gains=observer_gains(scenario.command_age) if control.observer else None,
         )
         for robot in team.robots
     ]

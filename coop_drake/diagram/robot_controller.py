@@ -13,15 +13,17 @@ from coop_drake.answers.plan import Plan
 from coop_drake.plant import ObjectInertia, RobotPlant
 from coop_drake.systems import (
     AxisPpc,
+    DisturbanceObserver,
     GovernedCell,
     ObjectEstimator,
     ReadyMonitor,
     ReferenceGovernor,
     RobotEffort,
+    StatePredictor,
     WrenchLaw,
     axis_laws,
 )
-from coop_drake.tree.pose import PlanarPose
+from coop_drake.tree.pose import FloatArray, PlanarPose
 
 __all__ = ["TELEMETRY", "Replacements", "RobotKnowledge", "build_robot_controller"]
 
@@ -51,6 +53,8 @@ class RobotKnowledge:
         position_tolerance: How close to the goal counts as arrived [m].
         period: Time between two computations [s]; None for continuous time.
         sample_offset: Time of the first computation [s].
+        predicted_periods: Age of its measurements that it predicts over, in control periods; 0 for none.
+        observer_gains: Gain and leak of its disturbance observer [1/s]; None for no observer.
     """
 
     robot: RobotPlant
@@ -63,6 +67,20 @@ class RobotKnowledge:
     position_tolerance: float
     period: float | None = None
     sample_offset: float = 0.0
+    predicted_periods: int = 0
+    observer_gains: tuple[float, float] | None = None
+
+    @property
+    def p_LE(self) -> FloatArray:
+        """The grasp in L, shape (2,) [m]."""
+        return np.array([self.X_LE.x, self.X_LE.y])
+
+    @property
+    def load(self) -> FloatArray:
+        """The robot's load, as ``end_effector_command`` takes it, shape (7,)."""
+        inertia = self.object_inertia
+        mass = inertia.mass, inertia.inertia_about_com
+        return np.array([*self.p_LE, *inertia.p_LLcm, *mass, self.load_share])
 
 
 Replacements = Mapping[str, Callable[[RobotKnowledge], LeafSystem]]
@@ -99,8 +117,14 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
         for block in blocks.values()
         for port in (block.get_output_port(i) for i in range(block.num_output_ports()))
     }
-    command = outputs["governor_command"]
-    outputs["governor_position"] = _add_governor_state(builder, knowledge, command)
+    halves = builder.AddNamedSystem("governor_rate", Demultiplexer([2, 2]))
+    builder.Connect(outputs["governor_command"], halves.get_input_port())
+    start, rate = knowledge.plan.start[:2], halves.get_output_port(0)
+    outputs["governor_position"] = _integrated(builder, knowledge, "governor_state", rate, start)
+    if "disturbance_observer" in blocks:
+        rate = outputs["observer_rate"]
+        at_rest = np.zeros(rate.size())
+        outputs["observed_rates"] = _integrated(builder, knowledge, "observer_state", rate, at_rest)
     _connect_by_name(builder, blocks, outputs)
     for name in ("robot_effort", "ready", *TELEMETRY):
         builder.ExportOutput(outputs[name], name)
@@ -108,8 +132,7 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
 
 
 def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
-    plan, cells, inertia = knowledge.plan, knowledge.cells, knowledge.object_inertia
-    p_LE = np.array([knowledge.X_LE.x, knowledge.X_LE.y])
+    plan, cells, inertia, p_LE = knowledge.plan, knowledge.cells, knowledge.object_inertia, knowledge.p_LE
     joints = range(knowledge.joints.start, knowledge.joints.stop)
     laws = axis_laws(plan, [0, *(1 + i for i in joints)])
     return {
@@ -132,39 +155,74 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
             plan.goal_pose[:2],
             knowledge.position_tolerance,
         ),
+        **_additions(knowledge),
     }
 
 
-def _add_governor_state(
-    builder: DiagramBuilder, knowledge: RobotKnowledge, command: OutputPort
-) -> OutputPort:
-    """Add the integrator of p_G, whose rate is the first half of the governor's command.
+def _additions(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
+    """Return the blocks that a scenario's section ``control`` adds."""
+    added: dict[str, LeafSystem] = {}
+    if knowledge.predicted_periods and knowledge.period is not None:
+        added["state_predictor"] = StatePredictor(
+            knowledge.robot,
+            knowledge.load,
+            knowledge.predicted_periods,
+            knowledge.period,
+            offset=knowledge.sample_offset,
+        )
+    if knowledge.observer_gains is not None:
+        joints = knowledge.joints.stop - knowledge.joints.start
+        added["disturbance_observer"] = DisturbanceObserver(joints, *knowledge.observer_gains)
+    return added
 
-    Its initial value is set when a context is made, if it is a discrete one. Drake's discrete integrator has
-    no offset; one in continuous time has the same values at the samples of a rate that is held in between.
+
+def _integrated(
+    builder: DiagramBuilder, knowledge: RobotKnowledge, name: str, rate: OutputPort, initial: FloatArray
+) -> OutputPort:
+    """Add the integrator of a rate; a discrete one gets its initial value when a context is made.
+
+    Drake's discrete integrator has no offset; one in continuous time has the same values at the samples of a
+    rate that is held in between.
     """
-    halves = builder.AddNamedSystem("governor_rate", Demultiplexer([2, 2]))
-    builder.Connect(command, halves.get_input_port())
-    rate, period, offset = halves.get_output_port(0), knowledge.period, knowledge.sample_offset
+    period, offset, size = knowledge.period, knowledge.sample_offset, rate.size()
     if period is not None and offset > 0.0:
-        hold = builder.AddNamedSystem("governor_rate_hold", ZeroOrderHold(period, 2, offset))
+        hold = builder.AddNamedSystem(f"{name}_rate_hold", ZeroOrderHold(period, size, offset))
         builder.Connect(rate, hold.get_input_port())
         rate = hold.get_output_port()
     discrete = period is not None and offset == 0.0
-    integrator = DiscreteTimeIntegrator(2, period) if discrete else Integrator(knowledge.plan.start[:2])
-    state = builder.AddNamedSystem("governor_state", integrator)
+    state = builder.AddNamedSystem(
+        name, DiscreteTimeIntegrator(size, period) if discrete else Integrator(initial)
+    )
     builder.Connect(rate, state.get_input_port())
     return state.get_output_port()
+
+
+_REPLACED = {
+    "state_predictor": {"robot_state": "predicted_state", "object_pose": "predicted_pose"},
+    "disturbance_observer": {
+        "governor_command": "compensated_command",
+        "axis_acceleration": "compensated_axes",
+    },
+}
+"""Which signals others get in place of those that a block takes in."""
+
+_COMPENSATED = ("wrench_law", "robot_effort")
+"""Blocks that command; all others take the accelerations that the law wants."""
 
 
 def _connect_by_name(
     builder: DiagramBuilder, blocks: Mapping[str, LeafSystem], outputs: Mapping[str, OutputPort]
 ) -> None:
-    """Connect every input to the output of the same name; export inputs that no block computes."""
+    """Connect every input to the output of its name or to its replacement; export what no block computes."""
     outside: set[str] = set()
-    for block in blocks.values():
+    for label, block in blocks.items():
+        renamed: dict[str, str] = {}
+        if "state_predictor" in blocks and label != "state_predictor":
+            renamed |= _REPLACED["state_predictor"]
+        if "disturbance_observer" in blocks and label in _COMPENSATED:
+            renamed |= _REPLACED["disturbance_observer"]
         for port in (block.get_input_port(i) for i in range(block.num_input_ports())):
-            name = port.get_name()
+            name = renamed.get(port.get_name(), port.get_name())
             if name in outputs:
                 builder.Connect(outputs[name], port)
             elif name in outside:

@@ -139,9 +139,7 @@ def robot_effort(
     last = chain.shape[0] - 1
     motion = _move(chain, robot)
     _accelerate(chain, robot, axes, motion)
-    alpha = command[2] - motion[last, _ALPHA]
-    ax = command[0] - motion[last, _AX] + alpha * motion[last, _Y]
-    ay = command[1] - motion[last, _AY] - alpha * motion[last, _X]
+    ax, ay, alpha = _of_root(motion[last], command)
     forces = np.zeros((last + 1, 3))  # on each link from its parent, about its reference point
     forces[last, 0], forces[last, 1], forces[last, 2] = command[3], command[4], command[5]
     for i in range(last, -1, -1):
@@ -157,6 +155,37 @@ def robot_effort(
         along = motion[i, _UX] * forces[i, 0] + motion[i, _UY] * forces[i, 1]
         of_joint = chain[i, DAMPING] * robot[int(chain[i, RATE])] + chain[i, ROTOR] * axes[i]
         effort[2 + i] = chain[i, TURN] * forces[i, 2] + along + of_joint
+
+
+@compiled
+def base_acceleration(
+    chain: FloatArray, robot: FloatArray, command: FloatArray, axes: FloatArray
+) -> tuple[float, float, float]:
+    """Return the acceleration of the base with which ``robot_effort`` gives what is asked for, (25)-(32).
+
+    Args:
+        chain: From the robot's base to its end effector.
+        robot: (z_k, z_k'), shape (2 (3 + n),).
+        command: x''_E first, shape (3,) or more [m/s^2, rad/s^2].
+        axes: Accelerations of the object's angle, not used here, and of the joints, shape (1 + n,).
+
+    Returns:
+        Acceleration of Bk in W and angular acceleration [m/s^2, rad/s^2].
+    """
+    motion = _move(chain, robot)
+    _accelerate(chain, robot, axes, motion)
+    return _of_root(motion[chain.shape[0] - 1], command)
+
+
+@compiled
+def _of_root(frame: FloatArray, command: FloatArray) -> tuple[float, float, float]:
+    """Return the root's acceleration that gives the last frame of a chain the acceleration commanded."""
+    alpha = command[2] - frame[_ALPHA]
+    return (
+        command[0] - frame[_AX] + alpha * frame[_Y],
+        command[1] - frame[_AY] - alpha * frame[_X],
+        alpha,
+    )
 
 
 @compiled

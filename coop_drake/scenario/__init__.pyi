@@ -1,4 +1,5 @@
 from .assembly import Assembly, RobotAssembly, assemble
+from .control import Control
 from .deployment import (
     ActuatorLimits,
     Deployment,
@@ -30,6 +31,7 @@ from .packages import package_map
 __all__ = [
     "ActuatorLimits",
     "Assembly",
+    "Control",
     "Deployment",
     "Floor",
     "Gains",

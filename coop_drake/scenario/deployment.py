@@ -227,15 +227,15 @@ class Deployment:
         return self.robots.get(name, self.robots.get(ALL_ROBOTS, RobotDepartures()))
 
     @property
-    def command_age(self) -> float:
-        """Mean age of the measurements on which an effort rests: delay, half a period and lag [s].
+    def whole_delay(self) -> float:
+        """Delay of measurements, rounded up to whole periods as ``whole_periods`` of the systems does [s]."""
+        period = self.period
+        return 0.0 if period is None else ceil(self.measurements.delay / period - 1e-9) * period
 
-        A delay is rounded up to whole periods, see ``whole_periods`` of the systems.
-        """
-        lag = self.actuators.lag
-        if self.period is None:
-            return lag
-        return (ceil(self.measurements.delay / self.period - 1e-9) + 0.5) * self.period + lag
+    @property
+    def command_age(self) -> float:
+        """Mean age of the measurements on which an effort rests: delay, half a period and lag [s]."""
+        return self.whole_delay + 0.5 * (self.period or 0.0) + self.actuators.lag
 
     @property
     def period(self) -> float | None:

@@ -5,6 +5,7 @@ from coop_drake.systems.axis_ppc import AxisPpc
 from coop_drake.systems.block import Block
 from coop_drake.systems.cell_planner import CellPlanner
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
+from coop_drake.systems.disturbance_observer import DisturbanceObserver
 from coop_drake.systems.floor_friction import FloorFriction
 from coop_drake.systems.interruption import Interruption
 from coop_drake.systems.lossy_measurement import LossyMeasurement
@@ -15,6 +16,7 @@ from coop_drake.systems.reference_governor import GovernedCell, ReferenceGoverno
 from coop_drake.systems.robot_effort import RobotEffort
 from coop_drake.systems.selector import build_selector
 from coop_drake.systems.sensors import TeamSensor, build_separate_sensor
+from coop_drake.systems.state_predictor import StatePredictor
 from coop_drake.systems.team_controller import TeamController
 from coop_drake.systems.team_kernels import FusedCell, FusedTeam
 from coop_drake.systems.wrench_law import WrenchLaw
@@ -26,6 +28,7 @@ __all__ = [
     "AxisPpc",
     "Block",
     "CellPlanner",
+    "DisturbanceObserver",
     "FloorFriction",
     "FusedCell",
     "FusedTeam",
@@ -37,6 +40,7 @@ __all__ = [
     "ReadyMonitor",
     "ReferenceGovernor",
     "RobotEffort",
+    "StatePredictor",
     "TeamController",
     "TeamSensor",
     "WrenchLaw",

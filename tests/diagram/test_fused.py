@@ -8,7 +8,7 @@ import pytest
 from coop_drake.diagram import build_closed_loop
 from coop_drake.errors import ScenarioError
 from coop_drake.plant import set_configuration
-from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
+from coop_drake.scenario import ActuatorLimits, Control, Deployment, Measurements, Messages
 from coop_drake.simulation import simulate
 from coop_drake.simulation.telemetry import Telemetry
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
@@ -153,13 +153,14 @@ def test_a_sampled_fused_run_is_the_sampled_named_one():
 
 
 @pytest.mark.parametrize(
-    "deployment",
+    "wanted",
     [
-        Deployment(control_rate=100.0, measurements=Measurements(position_noise=0.01)),
-        Deployment(actuators=ActuatorLimits(base_force=50.0)),
+        {"deployment": Deployment(control_rate=100.0, measurements=Measurements(position_noise=0.01))},
+        {"deployment": Deployment(actuators=ActuatorLimits(base_force=50.0))},
+        {"control": Control(observer=True)},
     ],
 )
-def test_what_only_named_blocks_do_is_refused(deployment):
+def test_what_only_named_blocks_do_is_refused(wanted):
     scenario, plan = small_problem("base")
-    with pytest.raises(ScenarioError, match=r"deployment: .* fused blocks support only these"):
-        build_closed_loop(replace(scenario, deployment=deployment), plan, small_maps(), blocks="fused")
+    with pytest.raises(ScenarioError, match=rf"{next(iter(wanted))}: .* fused blocks support only these"):
+        build_closed_loop(replace(scenario, **wanted), plan, small_maps(), blocks="fused")

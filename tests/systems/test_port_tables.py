@@ -10,6 +10,7 @@ from pydrake.systems.framework import Diagram, LeafSystem
 from coop_drake import systems
 from coop_drake.diagram import build_closed_loop
 from coop_drake.scenario import (
+    Control,
     Deployment,
     Floor,
     Measurements,
@@ -30,7 +31,7 @@ BLOCKS = sorted(
 
 EVERYTHING = Deployment(
     control_rate=100.0,
-    measurements=Measurements(loss=0.1),
+    measurements=Measurements(loss=0.1, delay=0.02),
     messages=Messages(loss=0.1),
     robots={"*": RobotDepartures(silence=Silence(1.0))},
     floor=Floor(coulomb_friction=1.0),
@@ -49,7 +50,7 @@ def blocks():
     scenario, plan = small_problem("base")
     found = {}
     for blocks, changes in (
-        ("named", {"deployment": EVERYTHING}),
+        ("named", {"deployment": EVERYTHING, "control": Control(predictor=True, observer=True)}),
         ("named", {"plant": PlantSettings(grasps="constraints")}),
         ("fused", {}),
     ):
@@ -88,9 +89,10 @@ def test_a_block_without_state_has_none_and_any_other_says_which(blocks, name):
         assert re.search(r"^ *State: ", type(block).__doc__, re.MULTILINE)
 
 
-def test_only_the_cell_planner_and_what_models_failures_remember_anything(blocks):
+def test_only_the_cell_planner_and_what_models_failures_remember_anything_but_a_predictor(blocks):
     remembering = {name for name in BLOCKS if any(map(len, state_of(blocks[name][0].CreateDefaultContext())))}
-    assert remembering == {"CellPlanner", "Interruption", "LossyMeasurement", "MessageChannel"}
+    failures = {"Interruption", "LossyMeasurement", "MessageChannel"}
+    assert remembering == {"CellPlanner", "StatePredictor"} | failures
 
 
 @pytest.mark.parametrize("name", BLOCKS)
