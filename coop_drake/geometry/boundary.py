@@ -7,7 +7,7 @@ from typing import cast
 
 import numpy as np
 import shapely
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from shapely import Polygon
 
 from coop_drake.compiled import compiled
@@ -67,6 +67,26 @@ def _signed_distances(edges: FloatArray, points: FloatArray) -> FloatArray:
     return result
 
 
+@compiled
+def _shortened(edges: FloatArray, points: FloatArray) -> NDArray[np.intp]:
+    """Indices of the points that ``BoundaryDistance.shortened`` keeps."""
+    clearance = np.inf
+    for k in range(len(points) - 1):
+        a, b = points[k], points[k + 1]
+        clearance = min(clearance, _segment_clearance(edges, a[0], a[1], b[0], b[1]))
+    kept, here = [0], 0
+    while here < len(points) - 1:
+        there, a = here + 1, points[here]
+        while there + 1 < len(points):
+            b = points[there + 1]
+            if _segment_clearance(edges, a[0], a[1], b[0], b[1]) < clearance:
+                break
+            there += 1
+        kept.append(there)
+        here = there
+    return np.array(kept)
+
+
 class BoundaryDistance:
     """Signed distance to the boundary of a polygon with holes, d of (15).
 
@@ -110,6 +130,15 @@ class BoundaryDistance:
         """
         rows = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 2)
         return _signed_distances(self._edges, rows)
+
+    def shortened(self, points: FloatArray) -> FloatArray:
+        """A way without points that it can do without: straight on it keeps the clearance of the whole way.
+
+        Args:
+            points: The way, shape (n, 2) [m].
+        """
+        shorter: FloatArray = points[_shortened(self._edges, np.ascontiguousarray(points))]
+        return shorter
 
     def along(self, start: ArrayLike, end: ArrayLike) -> float:
         """Smallest distance of a straight segment to the boundary.

@@ -10,13 +10,14 @@ from manifold3d import CrossSection, FillRule
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.polygon import orient
 
+from coop_drake.geometry import under_kernels
 from coop_drake.geometry.convex import following
 from coop_drake.geometry.safeguards import checked_buffer, second_opinion
 from coop_drake.geometry.sum_kernels import fitting_cycles
 from coop_drake.tree.pose import FloatArray
 
 SAFE_SIDE = 1e-6
-"""How far a workspace is shrunk or grown once [m]: a hundred times the clipping library's grid."""
+"""How far a workspace or a footprint is shrunk once [m]: a hundred times the clipping library's grid."""
 
 
 class FreeSpace:
@@ -33,13 +34,16 @@ class FreeSpace:
     Args:
         rings: Outer rings counter-clockwise, holes clockwise, each of shape (n, 2) [m].
         over: Whether positions that are left out are called blocked; else those that are kept, free.
+        grown: The grown workspace, if footprints are to be shrunk instead of growing it, but for thin ones.
 
     Attributes:
         edges: Its edges (x0, y0, x1, y1), shape (E, 4) [m].
     """
 
-    def __init__(self, rings: Sequence[FloatArray], *, over: bool = False) -> None:
-        self.rings, self._over = tuple(map(_without_repeats, rings)), over
+    def __init__(
+        self, rings: Sequence[FloatArray], *, over: bool = False, grown: FreeSpace | None = None
+    ) -> None:
+        self.rings, self._over, self._grown = tuple(map(_without_repeats, rings)), over, grown
         tails = [following(ring) for ring in self.rings]
         starts = np.concatenate(self.rings) if self.rings else np.empty((0, 2))
         ends = np.concatenate(tails) if tails else np.empty((0, 2))
@@ -63,8 +67,16 @@ class FreeSpace:
 
     @classmethod
     def over(cls, workspace: Polygon | MultiPolygon) -> FreeSpace:
-        """The workspace grown by ``SAFE_SIDE``, so that rounding never loses a position."""
-        return cls(polygon_rings(checked_buffer(workspace, SAFE_SIDE)), over=True)
+        """The workspace, and footprints shrunk by ``SAFE_SIDE``, so that rounding never loses a position.
+
+        Walls are not thinned, because a hair-thin wall would vanish. Only footprints too thin to be shrunk
+        are subtracted from a grown workspace, and so is every one if a ring crosses itself.
+        """
+        grown, rings = (
+            cls(polygon_rings(checked_buffer(workspace, SAFE_SIDE)), over=True),
+            polygon_rings(workspace),
+        )
+        return cls(rings, over=True, grown=grown) if all(Polygon(ring).is_valid for ring in rings) else grown
 
     def minus(self, footprint: FloatArray) -> CrossSection:
         """Positions p with p + F inside the workspace.
@@ -72,6 +84,11 @@ class FreeSpace:
         Args:
             footprint: Convex polygon F, counter-clockwise, relative to p, shape (n, 2) [m].
         """
+        if self._grown is not None:
+            shrunk = under_kernels.shrunk(footprint, SAFE_SIDE)
+            if len(shrunk) == 0:
+                return self._grown.minus(footprint)
+            footprint = shrunk
         try:
             found: CrossSection | None = self._clipped(footprint)
         except (RuntimeError, ValueError):

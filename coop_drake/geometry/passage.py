@@ -81,7 +81,7 @@ class PassageFinder:
         if chain is not None:
             best = max(
                 straight,
-                self._measure(self._shorten(graph.nodes[chain])),
+                self._measure(self._distance.shortened(graph.nodes[chain])),
                 key=lambda passage: passage.clearance,
             )
         if best.clearance <= 0.0:
@@ -108,20 +108,6 @@ class PassageFinder:
                 length=np.append(graph.length, away[nodes][seen]),
             )
         return graph
-
-    def _shorten(self, points: FloatArray) -> FloatArray:
-        """Leave out points as long as the straight way keeps the clearance of the whole path."""
-        clearance = min(self._distance.along(a, b) for a, b in pairwise(points))
-        kept, here = [0], 0
-        while here < len(points) - 1:
-            there = here + 1
-            while (
-                there + 1 < len(points) and self._distance.along(points[here], points[there + 1]) >= clearance
-            ):
-                there += 1
-            kept.append(there)
-            here = there
-        return points[kept]
 
     def _measure(self, points: FloatArray) -> Passage:
         clearances = [self._distance.along(a, b) for a, b in pairwise(points)]

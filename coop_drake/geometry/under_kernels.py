@@ -81,6 +81,22 @@ def half_planes_polygon(angles: FloatArray, offsets: FloatArray) -> FloatArray:
 
 
 @compiled
+def shrunk(vertices: FloatArray, distance: float) -> FloatArray:
+    """Find points that keep a distance from the boundary of a convex polygon.
+
+    Args:
+        vertices: Convex ring, counter-clockwise, shape (n, 2) [m].
+        distance: The distance [m].
+
+    Returns:
+        Vertices of a convex polygon, shape (m, 2); no rows where it has no interior.
+    """
+    angles = edge_directions(vertices)
+    found: FloatArray = half_planes_polygon(angles, support(vertices, angles) - distance)
+    return found
+
+
+@compiled
 def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> FloatArray:
     """Find points that a convex polygon covers at every angle of an interval about the origin.
 

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from shapely import Polygon, box
+from shapely import Polygon, box, union_all
 
+from coop_drake.answers.plan import Undecided
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
+from coop_drake.laws import ScheduledGains
 from coop_drake.planning.boxes.channel import Channel
+from coop_drake.planning.planner import plan
 from coop_drake.planning.search.search import find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
+from coop_drake.verification import verify_proof
 from tests.support.cases import disc, rectangle
 from tests.support.soundness import assert_channel_is_sound
 
@@ -42,6 +46,11 @@ OPEN_FLOORS = {
 }
 CLOSED_FLOORS = {
     "a hole from wall to wall": Polygon(ROOM, [[(2, 0), (2.2, 1.5), (2, 3), (1.8, 1.5)]]),
+    "a wall of a micrometre but for a slit": Polygon(ROOM, [box(2, 1e-3, 2 + 1e-6, 2.999).exterior]),
+    "a wall of a picometre but for a slit": Polygon(ROOM, [box(2, 1e-3, 2 + 1e-12, 2.999).exterior]),
+    "a slanted notch of a nanometre": Polygon(
+        [(0, 0), (2, 0), (2.3, 2.999), (2 + 1e-9, 0), (4, 0), (4, 3), (0, 3)]
+    ),
     "nothing": Polygon(),
     "a room too small": box(0.4, 0.4, 0.55, 0.55),
 }
@@ -88,9 +97,22 @@ def test_an_odd_floor_with_a_wide_way_is_crossed(name: str) -> None:
 
 @pytest.mark.parametrize("name", CLOSED_FLOORS)
 def test_an_odd_floor_without_a_way_is_refuted(name: str) -> None:
-    answer, _ = find_channel(question(CLOSED_FLOORS[name]))
+    problem = question(CLOSED_FLOORS[name])
+    answer, _ = find_channel(problem)
     assert not isinstance(answer, Channel)
-    assert answer.proved
+    assert answer.proof is not None
+    if not problem.workspace.is_empty:
+        verify_proof(answer.proof, problem)
+
+
+def test_a_corridor_a_millimetre_wider_than_a_disc_is_called_too_narrow() -> None:
+    """The centre of the disc may pass, but a governor would need hours."""
+    rooms = [box(0, 0, 2, 2), box(1.9, 0.7, 4.1, 1.301), box(4, 0, 6, 2)]
+    problem = question(union_all(rooms), (1.0, 1.0, 0.0), (5.0, 1.0, 0.5), alone(disc(0.3)))
+    answer = plan(problem, ScheduledGains(), gain_set_name="scheduled")
+    assert isinstance(answer, Undecided)
+    assert "a free path exists, but a plan along it cannot be executed" in answer.reason
+    assert "expected at least 2 mm" in answer.reason
 
 
 def test_a_floor_that_crosses_itself_is_left_undecided() -> None:

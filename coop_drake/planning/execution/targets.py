@@ -21,6 +21,10 @@ __all__ = ["choose_targets"]
 LARGEST_PARTS = 3
 """Of an overlap in several parts only this many are considered, those with the largest inscribed disc."""
 
+MOST_CANDIDATES = 4
+"""No overlap adopts targets of others beyond so many [-]: in long aisles all overlaps share theirs, and every
+pair costs a search for a passage."""
+
 SHARED_FRACTION = 0.7
 """A target serves another overlap too if its clearance there is this fraction of the clearance of that
 overlap's own target [-]."""
@@ -97,14 +101,14 @@ def _adopt(
     parts: Sequence[Polygon],
     clearances: Sequence[float],
 ) -> None:
-    """Add those points of a neighbouring overlap that have enough clearance in one of the parts."""
+    """Add points of a neighbouring overlap that have enough clearance in one of the parts, up to a number."""
     for point in others:
         known = any(np.array_equal(point, mine) for mine in layer)
         fits = any(
             BoundaryDistance(part)(point) >= SHARED_FRACTION * clearance
             for part, clearance in zip(parts, clearances, strict=True)
         )
-        if fits and not known:
+        if fits and not known and len(layer) < MOST_CANDIDATES:
             layer.append(point)
 
 
