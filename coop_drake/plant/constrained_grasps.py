@@ -53,8 +53,8 @@ class ConstrainedGrasp:
 class ConstrainedGrasps:
     """Grasps that are weld constraints, which are nearly rigid.
 
-    Drake does not report the forces of a constraint. The wrench on the object is the base's wrench less the
-    force that the robot's own motion takes.
+    Drake does not report the forces of a constraint. The wrench on the object is what acts on the base less
+    the force that the robot's own motion takes.
 
     Args:
         plant: Finalized.
@@ -65,17 +65,25 @@ class ConstrainedGrasps:
         self._plant, self._grasps = plant, tuple(grasps)
         self._rows = [grasp.base_joint.velocity_start() + np.arange(3) for grasp in grasps]
 
-    def wrenches(self, context: Context, base_wrenches: FloatArray) -> FloatArray:
+    def wrenches(self, context: Context) -> FloatArray:
         """As in :class:`coop_drake.plant.grasps.Grasps`, with the acceleration of the step that begins."""
         forces = MultibodyForces(self._plant)
         self._plant.CalcForceElementsContribution(context, forces)
         acceleration = self._plant.get_generalized_acceleration_output_port().Eval(context)
         needed = self._plant.CalcInverseDynamics(context, acceleration, forces)
-        wrenches: FloatArray = base_wrenches - np.array([needed[rows] for rows in self._rows])
+        wrenches = self._on_bases(context) - np.array([needed[rows] for rows in self._rows])
         for wrench, grasp in zip(wrenches, self._grasps, strict=True):
             r = grasp.lever(context)
             wrench[2] -= r[0] * wrench[1] - r[1] * wrench[0]
         return wrenches
+
+    def _on_bases(self, context: Context) -> FloatArray:
+        """Return the wrench on every base at Bk in W: the robot's, friction and pushes, shape (N, 3)."""
+        sums = {int(grasp.base_joint.child_body().index()): np.zeros(6) for grasp in self._grasps}
+        for force in self._plant.get_applied_spatial_force_input_port().Eval(context):
+            if int(force.body_index) in sums:  # forces on bases act at Bk
+                sums[int(force.body_index)] += force.F_Bq_W.get_coeffs()
+        return np.array([(total[3], total[4], total[2]) for total in sums.values()])
 
     def errors(self, context: Context) -> FloatArray:
         """As in :class:`coop_drake.plant.grasps.Grasps`."""

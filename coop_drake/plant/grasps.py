@@ -19,12 +19,11 @@ from coop_drake.tree.pose import FloatArray
 class Grasps(Protocol):
     """The grasps of all robots, in the scenario's order."""
 
-    def wrenches(self, context: Context, base_wrenches: FloatArray) -> FloatArray:
+    def wrenches(self, context: Context) -> FloatArray:
         """Wrench on the object at every Ek in W, shape (N, 3) [N, N m].
 
         Args:
             context: The plant's, inside the diagram's, all inputs connected.
-            base_wrenches: Wrench on every base at Bk in W, shape (N, 3) [N, N m].
         """
         ...
 
@@ -47,7 +46,7 @@ class WeldedGrasps:
         self._places = [place for place, _ in welds]
         self._frames = [weld.frame_on_child() for _, weld in welds]
 
-    def wrenches(self, context: Context, base_wrenches: FloatArray) -> FloatArray:
+    def wrenches(self, context: Context) -> FloatArray:
         """As in :class:`Grasps`; the reaction on a weld's child acts on the robot, in the joint's frame."""
         reactions = self._reactions.Eval(context)
         rows = [

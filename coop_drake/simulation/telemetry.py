@@ -108,7 +108,7 @@ class Telemetry:
             energy_margin=float(values[at.energy_margins].min()),
             object_wrench=total_wrench(commanded, self._grasps, team.object_inertia.p_LLcm, z[2]),
             commanded_wrenches=commanded,
-            measured_wrenches=team.grasps.wrenches(self._plant_context, base_wrenches),
+            measured_wrenches=team.grasps.wrenches(self._plant_context),
             grasp_error=float(team.grasps.errors(self._plant_context).max()),
             base_wrenches=base_wrenches,
             joint_torques=values[at.joint_torques],

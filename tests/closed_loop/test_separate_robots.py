@@ -8,7 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.diagram import build_closed_loop
 from coop_drake.plant import base_poses, build_separate_team, build_team_plant, set_configuration
-from coop_drake.scenario import PlantSettings
+from coop_drake.scenario import Deployment, Floor, PlantSettings, Push
 from coop_drake.simulation import build_maps, simulate
 from tests.support.run_checks import verified_run
 from tests.support.small_loop import small_maps, small_problem
@@ -116,3 +116,23 @@ def test_controllers_are_the_same_and_know_nothing_of_it():
     for one, another in zip(ideal.controllers, other.controllers, strict=True):
         assert port_sizes(one) == port_sizes(another)
         assert [s.get_name() for s in one.GetSystems()] == [s.get_name() for s in another.GetSystems()]
+
+
+def test_wrenches_at_the_grasps_are_those_of_one_tree_under_friction_and_pushes():
+    """Of a team that is pushed, on bases that rub: read from constraints, and from joints."""
+    scenario, plan = small_problem("base")
+    deployment = Deployment(
+        floor=Floor(20.0, 5.0, 0.05), pushes=(Push("robot_0", (30.0, 10.0), time=0.0, duration=1.0),)
+    )
+    deployed = replace(scenario, deployment=deployment, simulator=replace(scenario.simulator, max_time=0.1))
+    tree, separate = (
+        simulate(replace(deployed, plant=plant), plan, small_maps()) for plant in (PlantSettings(), SEPARATE)
+    )
+    times = np.array([0.02, 0.05, 0.08])
+    for robot in range(2):
+        for axis in range(3):
+            found, expected = (
+                np.interp(times, log.times, log.measured_wrenches[:, robot, axis]) for log in (separate, tree)
+            )
+            np.testing.assert_allclose(found, expected, atol=0.5)
+    assert np.abs(tree.measured_wrenches[1:] - tree.commanded_wrenches[1:]).max() > 10.0

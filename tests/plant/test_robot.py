@@ -90,7 +90,7 @@ def test_effort_is_what_moves_the_robot_and_what_its_hand_gives_away(scenario):
     plant.get_applied_spatial_force_input_port().FixValue(context, Value(applied))
     acceleration = plant.get_generalized_acceleration_output_port().Eval(context)
     spatial = plant.get_body_spatial_accelerations_output_port().Eval(context)
-    on_object = team.grasps.wrenches(context, wrenches)
+    on_object = team.grasps.wrenches(context)
     for robot in team.robots:
         own = robot_dynamics(scenario, robot.index)
         own.set_state(*own_state(team, robot, context, z, z_rate))
