@@ -12,8 +12,6 @@ import numpy as np
 
 from coop_drake.errors import PlanError
 
-__all__ = ["read_arrays"]
-
 _DAMAGE = (
     OSError,
     ValueError,

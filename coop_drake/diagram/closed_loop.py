@@ -19,8 +19,6 @@ from coop_drake.plant import TeamPlant, set_configuration
 from coop_drake.scenario import Scenario
 from coop_drake.systems import Block, CellPlanner
 
-__all__ = ["Blocks", "ClosedLoop", "build_closed_loop"]
-
 Blocks = Literal["named", "fused"]
 """How the controllers are built: a block for each law of each robot, or one block for them all."""
 

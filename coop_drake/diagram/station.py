@@ -18,8 +18,6 @@ from coop_drake.plant import SeparateTeam, TeamPlant, build_separate_team, build
 from coop_drake.scenario import Scenario
 from coop_drake.systems import TeamSensor, build_selector, build_separate_sensor
 
-__all__ = ["TransportStation", "build_driven_station", "build_station"]
-
 
 @dataclass(frozen=True)
 class TransportStation:

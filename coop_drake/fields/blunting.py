@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import shapely
-from numpy.typing import NDArray
 from shapely import Polygon
 
 from coop_drake.errors import FieldError, UnmappableError
-from coop_drake.fields.goals import check_domain
+from coop_drake.fields.goals import check_polygon
 from coop_drake.geometry.boundary import edges_of
+from coop_drake.geometry.parts import corners_of, extent_of
 from coop_drake.geometry.simplify import vertex_angles
-
-ComplexArray = NDArray[np.complex128]
+from coop_drake.tree.pose import ComplexArray
 
 _DEPTH = 0.01
 """Distance from the tip at which a spike is cut, per size of the domain [-]."""
@@ -46,13 +45,11 @@ def blunted(domain: Polygon, *, sharpest: float = 10.0, depth: float | None = No
         FieldError: If the domain is no valid polygon, or the angle or depth is out of bounds.
         UnmappableError: If there is no room to blunt a corner, which is named.
     """
-    check_domain(domain)
+    check_polygon(domain, "domain")
     if not 0.0 < sharpest <= 45.0 or (depth is not None and not depth > 0.0):
         raise FieldError(f"sharpest must be in (0, 45] degrees, depth positive, got {sharpest} and {depth}")
     oriented = shapely.orient_polygons(shapely.remove_repeated_points(shapely.force_2d(domain)))
-    x0, y0, x1, y1 = domain.bounds
-    size = float(np.hypot(x1 - x0, y1 - y0))
-    limit = np.deg2rad(sharpest)
+    size, limit = extent_of(domain), np.deg2rad(sharpest)
     angles = vertex_angles(oriented)
     if min(angles.min(), 2.0 * np.pi - angles.max()) >= limit:
         return domain
@@ -66,9 +63,10 @@ def blunted(domain: Polygon, *, sharpest: float = 10.0, depth: float | None = No
             reach[k] = min(depth or _DEPTH * size, _FRACTION * _free(walls, first + k, first + (k - 1) % n))
             if reach[k] <= _LEAST * size:
                 _refuse(z[k], own[k])
-        rings.append(np.concatenate([_replacement(z, k, own[k], reach[k]) for k in range(n)]))
+        corners = np.concatenate([_replacement(z, k, own[k], reach[k]) for k in range(n)])
+        rings.append(np.column_stack((corners.real, corners.imag)))
         first += n
-    result = Polygon(*_as_rings(rings))
+    result = Polygon(rings[0], rings[1:])
     _certify(domain, result, _ROUNDING * size, limit)
     return result
 
@@ -96,34 +94,19 @@ def _replacement(z: ComplexArray, k: int, angle: float, reach: float) -> Complex
     return np.concatenate(([z[k] + across * back], z[k] + reach * axis * _SQUARE, [z[k] + across * out]))
 
 
-def _as_rings(rings: list[ComplexArray]) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
-    """Coordinates of the outer ring and of the holes."""
-    outer, *holes = [np.column_stack((z.real, z.imag)) for z in rings]
-    return outer, holes
-
-
 def _certify(domain: Polygon, result: Polygon, rounding: float, limit: float) -> None:
-    """Check that the result is a valid polygon in the domain without sharp corners.
-
-    Raises:
-        UnmappableError: With the sharpest corner that is left.
-    """
+    """Refuse a result that is no valid polygon in the domain, or the sharpest corner that is left."""
     angles = vertex_angles(result)
     lack = np.minimum(angles, 2.0 * np.pi - angles)
     worst = int(np.argmin(lack))
     if result.is_valid and domain.buffer(rounding).covers(result) and lack[worst] >= limit:
         return
-    oriented = shapely.orient_polygons(result)
-    rings = [shapely.get_coordinates(ring)[:-1] for ring in (oriented.exterior, *oriented.interiors)]
-    _refuse(complex(*np.vstack(rings)[worst]), angles[worst])
+    corners = np.vstack(corners_of(shapely.orient_polygons(result)))
+    _refuse(complex(*corners[worst]), angles[worst])
 
 
 def _refuse(place: complex, angle: float) -> None:
-    """Name a corner that cannot be blunted.
-
-    Raises:
-        UnmappableError: Always.
-    """
+    """Raise an UnmappableError that names a corner which cannot be blunted."""
     x, y, degrees = place.real, place.imag, float(np.rad2deg(angle))
     raise UnmappableError(
         f"no room to blunt the corner at ({x:.6g}, {y:.6g}) m with interior angle {degrees:.3g} degrees",

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from coop_drake.fields.harmonic_map import HarmonicMap
-from coop_drake.fields.outline import IntArray, Outline, outline_of
-from coop_drake.fields.quadrature import FloatArray
+from coop_drake.fields.outline import Outline, outline_of
+from coop_drake.tree.pose import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,7 @@ class BoundarySamples:
 
 
 def sample_boundary(harmonic_map: HarmonicMap, per_edge: int = 65) -> BoundarySamples:
-    """Sample the boundary, more densely towards the corners.
-
-    Args:
-        harmonic_map: The map.
-        per_edge: Samples on each edge.
-    """
+    """Sample the boundary, so many times on each edge, more densely towards the corners."""
     outline = outline_of(harmonic_map.region, harmonic_map.target)
     part = 0.5 - 0.5 * np.cos(np.pi * (np.arange(per_edge) + 0.5) / per_edge)
     start, side = outline.vertices[:, None], (outline.ends - outline.vertices)[:, None]

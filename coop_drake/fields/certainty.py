@@ -9,8 +9,7 @@ import shapely
 
 from coop_drake.errors import FieldError
 from coop_drake.fields.harmonic_map import HarmonicMap
-from coop_drake.fields.points import as_points
-from coop_drake.fields.quadrature import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 _UNCERTAIN = 0.1
 """Sine of the error above which a direction counts as unknown: six degrees [-]."""
@@ -22,7 +21,7 @@ _LEAST_DISTANCE = 0.1
 """Smallest distance from the walls at which a leaf's sample is judged, in sizes of the leaf [-]."""
 
 
-def direction_error(harmonic_map: HarmonicMap, points: FloatArray) -> FloatArray:
+def direction_error(harmonic_map: HarmonicMap, points: FloatArray, distance: FloatArray) -> FloatArray:
     """Bound on the error of the direction of adj(J) (q_d - T).
 
     The error of T is harmonic, and so is each of its components, along whatever axis; none is above the
@@ -32,14 +31,20 @@ def direction_error(harmonic_map: HarmonicMap, points: FloatArray) -> FloatArray
     Args:
         harmonic_map: The map.
         points: Points inside its region, shape (n, 2) [m].
+        distance: Their distances r, or less, from the boundary, shape (n,) [m].
 
     Returns:
         Sines of the largest angles between true and computed direction, shape (n,) [-]; 1 and more say
         that the direction is not known at all.
     """
-    p = as_points(points)
-    distance = np.asarray(shapely.distance(harmonic_map.region.boundary, shapely.points(p)))
-    return _bound(harmonic_map, p, distance)
+    T, J = harmonic_map(points)
+    line = harmonic_map.goal_image - T
+    x = J[:, 1, 1] * line[:, 0] - J[:, 0, 1] * line[:, 1]
+    y = J[:, 0, 0] * line[:, 1] - J[:, 1, 0] * line[:, 0]
+    error = harmonic_map.certificate.error_bound
+    of_J, of_line = 4.0 * error / (pi * np.maximum(distance, 1e-300)), 2.0 * error
+    lost = of_J * (np.hypot(*line.T) + of_line) + np.linalg.norm(J, axis=(1, 2)) * of_line
+    return np.asarray(lost / np.maximum(np.hypot(x, y), 1e-300))
 
 
 def check_certainty(harmonic_map: HarmonicMap) -> None:
@@ -60,7 +65,9 @@ def check_certainty(harmonic_map: HarmonicMap) -> None:
     at_goal = shapely.distance(harmonic_map.goal, shapely.points(centres)) < _LEAST_DISTANCE * sizes
     centres[at_goal] += _ASIDE * sizes[at_goal, None]
     distance = shapely.distance(harmonic_map.region.boundary, shapely.points(centres))
-    unknown = _bound(harmonic_map, centres, np.maximum(distance, _LEAST_DISTANCE * sizes)) > _UNCERTAIN
+    unknown = (
+        direction_error(harmonic_map, centres, np.maximum(distance, _LEAST_DISTANCE * sizes)) > _UNCERTAIN
+    )
     part = float((sizes * sizes)[unknown].sum() / (sizes * sizes).sum())
     if part > _MOST:
         x, y = centres[np.argmax(np.where(unknown, distance, -1.0))]
@@ -69,15 +76,3 @@ def check_certainty(harmonic_map: HarmonicMap) -> None:
             f"({x:.6g}, {y:.6g}) m: there the Jacobian's determinant is below the map's error; cut the "
             "domain open (`cut_open`), move the goal, or ask for a smaller tolerance"
         )
-
-
-def _bound(harmonic_map: HarmonicMap, points: FloatArray, distance: FloatArray) -> FloatArray:
-    """The bound of `direction_error` for given distances from the boundary, shape (n,) [m]."""
-    T, J = harmonic_map(points)
-    line = harmonic_map.goal_image - T
-    x = J[:, 1, 1] * line[:, 0] - J[:, 0, 1] * line[:, 1]
-    y = J[:, 0, 0] * line[:, 1] - J[:, 1, 0] * line[:, 0]
-    error = harmonic_map.certificate.error_bound
-    of_J, of_line = 4.0 * error / (pi * np.maximum(distance, 1e-300)), 2.0 * error
-    lost = of_J * (np.hypot(*line.T) + of_line) + np.linalg.norm(J, axis=(1, 2)) * of_line
-    return np.asarray(lost / np.maximum(np.hypot(x, y), 1e-300))

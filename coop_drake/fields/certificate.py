@@ -9,9 +9,9 @@ import numpy as np
 
 from coop_drake.fields.evaluation import evaluate_many
 from coop_drake.fields.flat_map import FlatMap, rounding_of
-from coop_drake.fields.outline import ComplexArray, IntArray, Outline
+from coop_drake.fields.outline import Outline
 from coop_drake.fields.panels import Panels
-from coop_drake.fields.quadrature import FloatArray
+from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 
 #: Chebyshev points [-]: denser than the nodes of a panel, and different from them.
 _ON_PANEL = np.sort(np.cos(np.pi * (np.arange(23) + 0.5) / 23))
@@ -79,15 +79,10 @@ def certify(
     unknowns: int,
     condition: float,
 ) -> MapCertificate:
-    """Sample the residual on every panel and far down every corner.
+    """Sample the residual on every panel and far down every corner of a map, evaluated as its users do.
 
-    Args:
-        outline: The rings.
-        panels: Their panels.
-        flat: The map, evaluated as its users evaluate it.
-        hole_images: c_k, shape (holes, 2).
-        unknowns: Size of the linear system, to report.
-        condition: Estimate of its condition, to report.
+    The images of the holes, c_k, have shape (holes, 2); the size of the linear system and its condition are
+    reported as they are given.
     """
     position, expected, edge = _samples(outline, panels, hole_images)
     vertices = np.minimum(np.abs(position - outline.vertices[edge]), np.abs(position - outline.ends[edge]))

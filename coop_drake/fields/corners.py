@@ -14,7 +14,8 @@ from math import ceil, cos, log, log1p, pi, sin
 
 import numpy as np
 
-from coop_drake.fields.quadrature import FloatArray, gauss_nodes, interpolation
+from coop_drake.fields.quadrature import gauss_nodes, interpolation
+from coop_drake.tree.pose import FloatArray
 
 _BROAD = 4.0 * pi / 9.0  # gap between the legs from which one panel resolves the other leg at every scale
 _DOUBLINGS = 7  # 2^7 dyadic levels: what the next would add is below rounding for every angle
@@ -41,11 +42,8 @@ def leg_panels(angle: float, closeness: float) -> tuple[FloatArray, FloatArray]:
     """Breakpoints of one leg scaled to [0, 1]: of the grid, and of its ring [1/2, 1].
 
     A corner that is neither sharp nor nearly a slit has one panel a leg and one in its ring; otherwise the
-    ring is split so that no panel is longer than ``closeness`` times its distance to the other leg.
-
-    Args:
-        angle: Interior angle [rad], in (0, 2 pi).
-        closeness: Longest panel per unit of distance.
+    ring is split so that no panel is longer than ``closeness`` times its distance to the other leg. The
+    interior angle lies in (0, 2 pi) [rad].
     """
     gap = min(angle, 2.0 * pi - angle)
     if gap >= _BROAD - 1e-9:
@@ -66,12 +64,9 @@ def panel_nodes(breaks: FloatArray, nodes: int) -> tuple[FloatArray, FloatArray]
 
 @lru_cache(maxsize=4096)
 def corner_operator(angle: float, nodes: int, closeness: float) -> CornerOperator:
-    """Operators of one corner.
+    """Operators of one corner of an interior angle [rad], with so many Gauss nodes on a panel.
 
-    Args:
-        angle: Interior angle [rad].
-        nodes: Gauss nodes on a panel.
-        closeness: Longest panel per unit of distance, see `leg_panels`.
+    ``closeness``: longest panel per unit of distance, see `leg_panels`.
     """
     grid, ring = leg_panels(angle, closeness)
     x_grid, w_grid = panel_nodes(grid, nodes)

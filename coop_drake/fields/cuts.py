@@ -67,11 +67,7 @@ def _what_stays_open(
 
 
 def _certify(domain: Polygon, cell: Polygon, goal: Point | Polygon, kept: GeometryCollection) -> None:
-    """Check that the cell lies in the domain, holds what must stay open, and is simply connected.
-
-    Raises:
-        FieldError: If it does not.
-    """
+    """Refuse a cell that leaves the domain, closes what must stay open, or is not simply connected."""
     if cell.is_empty or not cell.is_valid or not domain.buffer(_ROUNDING * domain.length).covers(cell):
         raise FieldError(f"the slits leave no valid cell around the goal; {_REMEDY}")
     lines = [part for part in shapely.get_parts(kept) if isinstance(part, LineString)]

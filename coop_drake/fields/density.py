@@ -23,10 +23,10 @@ from threadpoolctl import ThreadpoolController  # type: ignore[import-untyped]
 from coop_drake.fields.corners import corner_operator
 from coop_drake.fields.double_layer import double_layer
 from coop_drake.fields.nodes import Nodes, place_nodes
-from coop_drake.fields.outline import ComplexArray, IntArray, Outline
+from coop_drake.fields.outline import Outline
 from coop_drake.fields.panels import Panels
-from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.skeletons import Cluster, solve_clusters
+from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)

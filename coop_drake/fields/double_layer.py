@@ -9,10 +9,8 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.fields.nodes import Nodes
-from coop_drake.fields.outline import ComplexArray, IntArray
-from coop_drake.fields.quadrature import FloatArray, legendre_transform
-
-__all__ = ["NEAR", "DoubleLayer", "block", "double_layer", "legendre_moments", "mark_near"]
+from coop_drake.fields.quadrature import legendre_transform
+from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 
 NEAR = 4.3
 """|zeta - 1| + |zeta + 1| below which panels are integrated exactly, zeta the target in a panel's coordinate
@@ -51,13 +49,9 @@ class DoubleLayer(NamedTuple):
 
 
 def double_layer(grid: Nodes, segments: ComplexArray, panel_edge: IntArray, nodes: int) -> DoubleLayer:
-    """Prepare 2 K of a discretisation.
+    """Prepare 2 K of a discretisation, with so many Gauss nodes on a panel.
 
-    Args:
-        grid: The nodes.
-        segments: Centre and half vector of each regular panel, shape (panels, 2).
-        panel_edge: Edge of each regular panel, shape (panels,).
-        nodes: Gauss nodes on a panel.
+    Segments are centre and half vector of each regular panel, shape (panels, 2).
     """
     start, target = _near_pairs(grid.position, grid.edge, segments, panel_edge)
     weight = _near_weights(grid.position, segments, start, target, legendre_transform(nodes))
@@ -77,13 +71,9 @@ def double_layer(grid: Nodes, segments: ComplexArray, panel_edge: IntArray, node
 
 @compiled(reassociate=True)
 def block(k: DoubleLayer, rows: IntArray, columns: IntArray, row_of: IntArray) -> FloatArray:
-    """Entries of 2 K at ``rows`` x ``columns``, stored column by column.
+    """Entries of 2 K at ``rows``, the targets, x ``columns``, the sources, stored column by column.
 
-    Args:
-        k: The layer.
-        rows: The nodes that are targets.
-        columns: The nodes that are sources.
-        row_of: Scratch of shape (n,), -1 throughout before and after.
+    ``row_of`` is scratch of shape (n,), -1 throughout before and after.
     """
     m = len(rows)
     x, y, edge, corner = k.x[rows], k.y[rows], k.edge[rows], k.corner[rows]
@@ -117,14 +107,8 @@ def mark_near(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Mark the nodes outside a set but not far from it: as sources on the set, and as its targets.
 
-    These are the nodes in a disc around the set, and those whose entry with a node of the set has exact
-    weights.
-
-    Args:
-        k: The layer.
-        own: The nodes of the set.
-        disc: Centre and radius [m].
-        row_of: Scratch as for `block`.
+    These are the nodes in a disc (x, y, radius) around the set [m], and those whose entry with a node of the
+    set has exact weights. ``row_of`` is scratch as for `block`.
 
     Returns:
         Masks of shape (n,), False on the set itself.

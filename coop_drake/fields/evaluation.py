@@ -22,10 +22,8 @@ from coop_drake.fields.flat_map import (
     rows_of,
 )
 from coop_drake.fields.near_field import Sums, add, corner_sums, is_at_vertex, panel_sums
-from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.walls import is_inside, nearest_on_walls
-
-__all__ = ["evaluate_many", "evaluate_one"]
+from coop_drake.tree.pose import FloatArray
 
 
 @compiled(reassociate=True)

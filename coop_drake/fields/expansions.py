@@ -33,12 +33,9 @@ from coop_drake.fields.flat_map import (
     row,
     rows_of,
 )
-from coop_drake.fields.outline import IntArray
-from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.sources import FAR, gather, seen_from
 from coop_drake.fields.walls import is_inside
-
-__all__ = ["grown"]
+from coop_drake.tree.pose import FloatArray, IntArray
 
 _REACH = 2.8
 """Distance of a far source per radius of the box: 2.8^-28 of the series is left out, 3e-13 [-]."""
@@ -92,11 +89,9 @@ class _Boxes(NamedTuple):
 
 
 def grown(m: MapArrays, *, opened: bool) -> MapArrays:
-    """Divide the leaves of a map until few sources are near any of them.
+    """Divide the leaves of a map, valid if large, until few sources are near any of them.
 
-    Args:
-        m: A map with leaves that are valid, if large.
-        opened: Whether corners may be opened into their rings, and panels have their refined densities.
+    ``opened``: whether corners may be opened into their rings, and panels have their refined densities.
     """
     flat, scratch = flatten(m, np.zeros(2), 0.0), np.empty((6, _most_nodes(m)))
     todo = np.empty((LEVELS * (2 * max(int(m.corner_index[:, 1].max()), 1) + 1) + 1, 3), dtype=np.int64)

@@ -6,8 +6,6 @@ from coop_drake.compiled import compiled
 from coop_drake.fields.flat_map import BOXES, LEAF_SQUARE, LOCAL, ORDER, ROOT, FlatMap, integer, row
 from coop_drake.fields.near_field import Sums
 
-__all__ = ["far_field", "leaf_at"]
-
 
 @compiled(reassociate=True)
 def leaf_at(m: FlatMap, x: float, y: float) -> int:

@@ -7,10 +7,8 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.fields.evaluation import evaluate_one
 from coop_drake.fields.flat_map import FlatMap, centre_of
-from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.walls import is_inside, nearest_on_walls
-
-__all__ = ["flat_field", "velocities_in_field", "velocity_in_field"]
+from coop_drake.tree.pose import FloatArray
 
 _STRAIGHT = 1e-6
 """Fraction of the slowdown radius within which the way to a point goal is taken as straight: closer still,
@@ -34,13 +32,9 @@ def flat_field(edges: FloatArray, image: FloatArray, radius: float, max_speed: f
 
 @compiled(reassociate=True)
 def velocity_in_field(flat: FlatMap, field: FloatArray, x: float, y: float) -> tuple[float, float]:
-    """Velocity at a point of W, eq. (13) [m/s].
+    """Velocity at a point of W [m], eq. (13) [m/s].
 
-    Args:
-        flat: The map, from `VelocityField.kernel_arguments` as is the next.
-        field: What the field adds to it.
-        x: The point [m].
-        y: The point [m].
+    The first two arguments are `VelocityField.kernel_arguments`: the map, and what the field adds to it.
     """
     centre = centre_of(flat)
     x, y = x - centre[0], y - centre[1]

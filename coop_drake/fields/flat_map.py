@@ -12,26 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.fields.outline import IntArray
-from coop_drake.fields.quadrature import FloatArray
-
-__all__ = [
-    "INSIDE",
-    "LEVELS",
-    "ON_BOUNDARY",
-    "ORDER",
-    "OUTSIDE",
-    "REFINED_NODES",
-    "FlatMap",
-    "MapArrays",
-    "centre_of",
-    "flatten",
-    "integer",
-    "rounding_of",
-    "row",
-    "rows_of",
-    "unflatten",
-]
+from coop_drake.tree.pose import FloatArray, IntArray
 
 REFINED_NODES = 20
 """Gauss nodes on a panel after the density has been interpolated (`refinement`)."""
@@ -107,12 +88,9 @@ _INTEGERS = (CORNER_INDEX, BOXES, LEAF_STATE, NEAR_START, NEAR)
 
 
 def flatten(arrays: MapArrays, centre: FloatArray, rounding: float) -> FlatMap:
-    """Lay out a map in one array.
+    """Lay out a map in one array, with the origin of its coordinates in W, shape (2,) [m].
 
-    Args:
-        arrays: The map.
-        centre: Origin of its coordinates in W [m], shape (2,).
-        rounding: How far outside still counts as on the wall [m].
+    ``rounding``: how far outside still counts as on the wall [m].
     """
     table = np.full((len(arrays), _ENTRY), -1.0)
     start = _HEAD + table.size

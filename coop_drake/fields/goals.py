@@ -9,8 +9,9 @@ from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.errors import FieldError
-from coop_drake.fields.quadrature import FloatArray
+from coop_drake.geometry.parts import extent_of
 from coop_drake.geometry.simplify import sharpest_angle, simplify_inward
+from coop_drake.tree.pose import FloatArray
 
 _ON = 1e-9
 """An edge closer to the goal's boundary than this fraction of the domain's diameter lies on it [-]."""
@@ -60,27 +61,14 @@ def region_to_map(
     return domain, pole_of(goal)
 
 
-def check_domain(domain: Polygon) -> None:
-    """Refuse a domain that is no valid polygon.
-
-    Raises:
-        FieldError: With what is wrong and what is allowed.
-    """
-    _check_polygon(domain, "domain")
-
-
 def check_question(domain: Polygon, goal: Point | Polygon) -> None:
-    """Refuse a domain that is no valid polygon, or a goal that is not in it.
-
-    Raises:
-        FieldError: With what is wrong and what is allowed.
-    """
-    check_domain(domain)
+    """Refuse by a FieldError a domain that is no valid polygon, or a goal that is not in it."""
+    check_polygon(domain, "domain")
     if isinstance(goal, Point):
         if goal.is_empty or not np.isfinite(goal.coords[0]).all() or not domain.contains(goal):
             raise FieldError(f"the goal {goal.wkt} must lie strictly inside the domain{_extent(domain)}")
         return
-    _check_polygon(goal, "goal region")
+    check_polygon(goal, "goal region")
     if not domain.buffer(1e-9 * domain.length).covers(goal):
         raise FieldError("the goal region must lie in the domain; intersect it with the domain first")
 
@@ -93,15 +81,10 @@ def pole_of(goal: Polygon) -> Point:
 
 
 def goal_edges(points: FloatArray, goal: BaseGeometry, scale: float) -> NDArray[np.bool_]:
-    """Which edges of a ring bound the goal region.
+    """Which edges of a ring bound the goal region; a point bounds nothing.
 
-    Args:
-        points: Vertices of the ring, each once, shape (n, 2) [m].
-        goal: The goal; a point bounds nothing.
-        scale: Diameter of the domain [m].
-
-    Returns:
-        One flag for the edge that starts at each vertex, shape (n,).
+    The ring has its vertices once, shape (n, 2) [m], in a domain of a diameter ``scale`` [m]; one flag for
+    the edge that starts at each vertex, shape (n,).
     """
     if isinstance(goal, Point):
         return np.zeros(len(points), dtype=bool)
@@ -109,8 +92,8 @@ def goal_edges(points: FloatArray, goal: BaseGeometry, scale: float) -> NDArray[
     return np.asarray(shapely.distance(goal.boundary, middles) < _ON * scale, dtype=np.bool_)
 
 
-def _check_polygon(shape: object, name: str) -> None:
-    """Refuse what is not one valid polygon with an area."""
+def check_polygon(shape: object, name: str) -> None:
+    """Refuse by a FieldError what is not one valid polygon with an area."""
     if not isinstance(shape, Polygon):
         hint = "; take one of its parts" if hasattr(shape, "geoms") else ""
         kinds = "a shapely Polygon" if name == "domain" else "a shapely Point or Polygon"
@@ -125,7 +108,7 @@ def _check_polygon(shape: object, name: str) -> None:
 
 def _without_tiny_edges(domain: Polygon) -> Polygon:
     """The domain, simplified inward by no more than tiny edges are long if it has any."""
-    scale = _diameter(domain)
+    scale = extent_of(domain)
     rings = [shapely.get_coordinates(ring) for ring in (domain.exterior, *domain.interiors)]
     shortest = min(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).min()) for ring in rings)
     return simplify_inward(domain, _TINY * scale) if shortest < _TINY * scale else domain
@@ -143,7 +126,7 @@ def _piece_to_keep(domain: Polygon, goal: Polygon, inside: Point | None) -> Poly
     Raises:
         FieldError: If the point is needed but missing, or outside the domain.
     """
-    least = _SLIVER * _diameter(domain)
+    least = _SLIVER * extent_of(domain)
     parts = shapely.get_parts(domain.difference(goal))
     pieces = [p for p in parts if isinstance(p, Polygon) and p.area > least * p.length]
     if inside is None and len(pieces) > 1:
@@ -160,7 +143,7 @@ def _piece_to_keep(domain: Polygon, goal: Polygon, inside: Point | None) -> Poly
 
 def _can_collapse(domain: Polygon, piece: Polygon, goal: Polygon) -> bool:
     """Whether the goal is a hole of its own or one arc of the outer ring, clear of cusps and narrow gaps."""
-    scale = _diameter(domain)
+    scale = extent_of(domain)
     rings = [piece.exterior, *piece.interiors]
     on_goal = [goal_edges(shapely.get_coordinates(ring)[:-1], goal, scale) for ring in rings]
     bounding = [k for k, flags in enumerate(on_goal) if flags.any()]
@@ -169,13 +152,7 @@ def _can_collapse(domain: Polygon, piece: Polygon, goal: Polygon) -> bool:
     k = bounding[0]
     arcs = int(np.sum(on_goal[k] & ~np.roll(on_goal[k], 1)))
     alone = bool(on_goal[k].all()) if k > 0 else arcs == 1
-    near = _NEAR * _diameter(goal)
+    near = _NEAR * extent_of(goal)
     walls = [ring for m, ring in enumerate(rings) if m != k]
     clear = all(goal.distance(ring) > near for ring in walls)
     return alone and clear and sharpest_angle(piece) >= min(_SHARPEST, 0.999 * sharpest_angle(domain))
-
-
-def _diameter(shape: BaseGeometry) -> float:
-    """Diagonal of the bounding box [m]."""
-    x0, y0, x1, y1 = shape.bounds
-    return float(np.hypot(x1 - x0, y1 - y0))

@@ -10,9 +10,9 @@ from coop_drake.fields.evaluation import evaluate_many
 from coop_drake.fields.goals import region_to_map
 from coop_drake.fields.outline import outline_of
 from coop_drake.fields.points import as_points
-from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.solving import Solution, solve
 from coop_drake.fields.tolerance import TOLERANCE
+from coop_drake.tree.pose import FloatArray
 
 
 class HarmonicMap:
@@ -34,6 +34,13 @@ class HarmonicMap:
         goal: Point to reach, or region of the domain to collapse.
         tolerance: Largest error of T that is accepted, as certified.
         inside: A point of the piece to map where a goal region splits the domain.
+        solution: The result of solving with these arguments before; None to solve.
+
+    Attributes:
+        region: F: the domain, less a goal region and what lies beyond it [m].
+        goal: The goal as it was given [m].
+        target: The shape whose image is the goal's: the goal, or its pole if it cannot collapse [m].
+        solution: The result of solving.
 
     Raises:
         FieldError: If the domain or the goal is not usable.
@@ -47,21 +54,11 @@ class HarmonicMap:
         *,
         tolerance: float = TOLERANCE,
         inside: Point | None = None,
+        solution: Solution | None = None,
     ) -> None:
-        self._goal = goal
-        self._region, self._target = region_to_map(domain, goal, inside)
-        self._solution = solve(outline_of(self._region, self._target), self._target, tolerance)
-
-    @classmethod
-    def from_solution(
-        cls, domain: Polygon, goal: Point | Polygon, solution: Solution, *, inside: Point | None = None
-    ) -> HarmonicMap:
-        """The map of a solution that was solved before with these arguments."""
-        harmonic_map = cls.__new__(cls)
-        harmonic_map._goal = goal
-        harmonic_map._region, harmonic_map._target = region_to_map(domain, goal, inside)
-        harmonic_map._solution = solution
-        return harmonic_map
+        self.goal = goal
+        self.region, self.target = region_to_map(domain, goal, inside)
+        self.solution = solution or solve(outline_of(self.region, self.target), self.target, tolerance)
 
     def __call__(self, points: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """T and its Jacobian.
@@ -76,35 +73,15 @@ class HarmonicMap:
             T, shape (..., 2), and J = dT/dp, shape (..., 2, 2) [1/m].
         """
         p = as_points(points)
-        T, J = evaluate_many(self._solution.flat, p.reshape(-1, 2) - self._solution.centre)
+        T, J = evaluate_many(self.solution.flat, p.reshape(-1, 2) - self.solution.centre)
         return T.reshape(p.shape), J.reshape(*p.shape, 2)
-
-    @property
-    def region(self) -> Polygon:
-        """F: the domain, less a goal region and what lies beyond it [m]."""
-        return self._region
-
-    @property
-    def goal(self) -> Point | Polygon:
-        """The goal as it was given [m]."""
-        return self._goal
-
-    @property
-    def target(self) -> Point | Polygon:
-        """The shape whose image is the goal's: the goal, or its pole if it cannot collapse [m]."""
-        return self._target
 
     @property
     def goal_image(self) -> FloatArray:
         """q_d, the goal's image in the disk, shape (2,)."""
-        return self._solution.goal_image.copy()
+        return self.solution.goal_image.copy()
 
     @property
     def certificate(self) -> MapCertificate:
         """The certified bound on the error of the map."""
-        return self._solution.certificate
-
-    @property
-    def solution(self) -> Solution:
-        """The result of solving, see `from_solution`."""
-        return self._solution
+        return self.solution.certificate

@@ -28,8 +28,6 @@ from coop_drake.fields.flat_map import (
 )
 from coop_drake.fields.quadrature import gauss_nodes
 
-__all__ = ["Sums", "add", "corner_sums", "density_of", "is_at_vertex", "panel_ends", "panel_sums"]
-
 _NEAR = 2.9
 """|zeta - 1| + |zeta + 1| below which the Gauss nodes are too few and the Legendre functions are needed
 [-]."""
@@ -71,19 +69,10 @@ def density_of(m: FlatMap, k: int, place: int, level: int) -> int:
 def panel_ends(
     m: FlatMap, k: int, place: int, level: int, x: float, y: float, rx: float, ry: float
 ) -> tuple[float, float, float, float]:
-    """Ends of panel (k, place, level), in the boundary's direction, seen from a point.
+    """Ends of panel (k, place, level), as in `MapArrays`, in the boundary's direction, seen from a point.
 
-    Args:
-        m: The map.
-        k: The corner, -1 for a regular panel.
-        place: Which regular panel, or which panel of a ring, counted over the incoming and then the outgoing
-            leg.
-        level: The ring, 0 the outermost.
-        x: First coordinate of the point [m].
-        y: Second coordinate of the point [m].
-        rx: First coordinate of the point seen from the vertex [m]; more precise than the difference where the
-            point was moved.
-        ry: Second coordinate of the point seen from the vertex [m].
+    The point is (x, y) [m], and (rx, ry) seen from the vertex of corner k [m], which is more precise than the
+    difference where the point was moved.
     """
     if k < 0:
         p = row(m, PANELS, place, 4)

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from coop_drake.fields.corners import leg_panels, panel_nodes
-from coop_drake.fields.outline import ComplexArray, IntArray, Outline
+from coop_drake.fields.outline import Outline
 from coop_drake.fields.panels import Panels
-from coop_drake.fields.quadrature import FloatArray, gauss_nodes
+from coop_drake.fields.quadrature import gauss_nodes
+from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -38,12 +39,8 @@ class Nodes:
 def place_nodes(outline: Outline, panels: Panels, angles: FloatArray, nodes: int, closeness: float) -> Nodes:
     """Place ``nodes`` Gauss nodes on every panel.
 
-    Args:
-        outline: The rings.
-        panels: Their panels.
-        angles: Interior angle of each corner [rad], shape (corners,).
-        nodes: Gauss nodes on a panel.
-        closeness: Longest panel per unit of distance, see `leg_panels`.
+    The interior angles of the corners have shape (corners,) [rad]. ``closeness``: longest panel per unit of
+    distance, see `leg_panels`.
     """
     v, following, preceding = outline.vertices, outline.following, outline.preceding
     length = np.abs(v[following] - v)

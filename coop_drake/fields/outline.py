@@ -11,10 +11,8 @@ from shapely import Point, Polygon
 
 from coop_drake.errors import FieldError, UnmappableError
 from coop_drake.fields.goals import goal_edges
-from coop_drake.fields.quadrature import FloatArray
-
-ComplexArray = NDArray[np.complex128]
-IntArray = NDArray[np.int64]
+from coop_drake.geometry.parts import extent_of
+from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 
 _SHARPEST = 1.0
 """Corners with a smaller angle are refused: their panels would take minutes [degrees]."""
@@ -88,7 +86,7 @@ def outline_of(region: Polygon, target: Point | Polygon) -> Outline:
     """
     oriented = shapely.orient_polygons(shapely.force_2d(region))
     centre = complex(*oriented.envelope.centroid.coords[0])
-    scale = float(np.hypot(*np.subtract(region.bounds[2:], region.bounds[:2])))
+    scale = extent_of(region)
     _refuse_touching_rings(oriented, scale)
     vertices, touching, rings = [], [], []
     for index, ring in enumerate((oriented.exterior, *oriented.interiors)):

@@ -9,10 +9,11 @@ from coop_drake.fields.density import Density
 from coop_drake.fields.expansions import grown
 from coop_drake.fields.flat_map import LEVELS, ON_BOUNDARY, ORDER, REFINED_NODES, MapArrays
 from coop_drake.fields.nodes import Nodes
-from coop_drake.fields.outline import IntArray, Outline
+from coop_drake.fields.outline import Outline
 from coop_drake.fields.panels import Panels
-from coop_drake.fields.quadrature import FloatArray, legendre_transform
+from coop_drake.fields.quadrature import legendre_transform
 from coop_drake.fields.refinement import refine
+from coop_drake.tree.pose import FloatArray, IntArray
 
 _MARGIN = 1.0 + 1e-9
 """Size of the quadtree's square per size of the domain, so that rounding leaves no vertex outside [-]."""
@@ -164,12 +165,8 @@ def _descend(angle: float, closeness: float, incoming: FloatArray) -> tuple[Floa
 def _descending(inward: FloatArray, field: FloatArray) -> FloatArray:
     """The field that comes in at every level, even and odd part: columns (u, v) level by level.
 
-    Args:
-        inward: From one level to the next, shape (2, n, n).
-        field: At the outermost level, shape (2, n, 2).
-
-    Returns:
-        Shape (2, n, 2 (LEVELS + 1)).
+    ``inward`` leads from one level to the next, shape (2, n, n); the field at the outermost level has shape
+    (2, n, 2), the result (2, n, 2 (LEVELS + 1)).
     """
     power = inward
     while field.shape[-1] < 2 * (LEVELS + 1):

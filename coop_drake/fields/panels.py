@@ -8,10 +8,8 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.fields.outline import Outline
-from coop_drake.fields.quadrature import FloatArray
 from coop_drake.geometry.distances import squared_distance
-
-__all__ = ["Panels", "lay_panels", "point_distance", "segment_distance"]
+from coop_drake.tree.pose import FloatArray
 
 _MAX_ANGLE = np.pi / 3
 """Span of the boundary angle that one panel resolves with ten nodes to 1e-8 [rad]."""

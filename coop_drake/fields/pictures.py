@@ -18,7 +18,7 @@ from coop_drake.drawing import draw_polygon, new_figure
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, PAPER, VERMILLION, WALL
 from coop_drake.fields.boundary import BoundarySamples, sample_boundary
 from coop_drake.fields.harmonic_map import HarmonicMap
-from coop_drake.fields.quadrature import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 _SIDE = 4.2  # height of a panel [in]
 _FINE = 400  # points on a grid line across the region

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coop_drake.errors import FieldError
-from coop_drake.fields.quadrature import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 
 def as_points(points: ArrayLike) -> FloatArray:

@@ -6,9 +6,8 @@ from functools import cache
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from coop_drake.tree.pose import FloatArray
 
 
 @cache

@@ -23,26 +23,19 @@ from coop_drake.fields.flat_map import (
 )
 from coop_drake.fields.near_field import panel_ends
 from coop_drake.fields.nodes import Nodes, place_nodes
-from coop_drake.fields.outline import ComplexArray, IntArray, Outline
+from coop_drake.fields.outline import Outline
 from coop_drake.fields.panels import Panels
-from coop_drake.fields.quadrature import FloatArray, legendre_transform
+from coop_drake.fields.quadrature import legendre_transform
 from coop_drake.fields.sources import solved_nodes
-
-__all__ = ["refine"]
+from coop_drake.tree.pose import ComplexArray, FloatArray, IntArray
 
 
 def refine(
     outline: Outline, panels: Panels, angles: FloatArray, density: Density, closeness: float, m: MapArrays
 ) -> tuple[Nodes, FloatArray]:
-    """Interpolate a density to `REFINED_NODES` nodes on a panel.
+    """Interpolate a density to `REFINED_NODES` nodes on a panel; arguments as in `place_nodes`.
 
-    Args:
-        outline: The rings.
-        panels: Their panels.
-        angles: Interior angle of each corner [rad], shape (corners,).
-        density: The solution.
-        closeness: Longest panel per unit of distance, see `leg_panels`.
-        m: The map with the solved nodes in the leaves of its quadtree, corners not opened.
+    The map ``m`` has the solved nodes in the leaves of its quadtree, corners not opened.
 
     Returns:
         The finer nodes, and on them: the density on regular panels, on corner blocks the field that comes in
@@ -67,16 +60,10 @@ def _subtract(
     m: FlatMap, edge: IntArray, coefficients: FloatArray,
     target: ComplexArray, target_edge: IntArray, target_corner: IntArray, out: FloatArray,
 ) -> None:  # fmt: skip
-    """Subtract 2 K density, by the same rules as between the solved nodes.
+    """Subtract 2 K density at targets, shape (n,) [m], by the same rules as between the solved nodes.
 
-    Args:
-        m: The map with the solved nodes in the leaves of its quadtree.
-        edge: Edge of each solved node.
-        coefficients: Legendre coefficients of the density of regular panels, shape (panels, nodes, 2).
-        target: Points where 2 K density is evaluated [m], shape (n,).
-        target_edge: Edge of each target.
-        target_corner: Corner block of each target, -1 on regular panels.
-        out: The array that the result is subtracted from, shape (n, 2).
+    ``edge`` is that of each solved node; the density of regular panels comes as Legendre coefficients, shape
+    (panels, nodes, 2); corner blocks of targets are -1 on regular panels.
     """
     p = coefficients.shape[1]
     moments = np.empty(max(p, 2))

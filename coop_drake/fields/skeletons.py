@@ -27,8 +27,7 @@ import numpy as np
 import scipy.linalg
 
 from coop_drake.fields.double_layer import DoubleLayer, block, mark_near
-from coop_drake.fields.outline import IntArray
-from coop_drake.fields.quadrature import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
 
 DENSE = 1_500
 """Unknowns up to which one dense system is as fast; below it nothing is compressed."""

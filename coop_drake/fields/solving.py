@@ -16,7 +16,7 @@ from coop_drake.fields.flat_map import FlatMap, MapArrays, flatten, unflatten
 from coop_drake.fields.outline import Outline
 from coop_drake.fields.packing import pack_layers
 from coop_drake.fields.panels import Panels, lay_panels
-from coop_drake.fields.quadrature import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 _GAIN = 4.0
 """Factor by which the error falls with every further node on a panel, approximately [-]."""
@@ -67,12 +67,9 @@ class Solution(NamedTuple):
 
 
 def solve(outline: Outline, goal: Point | Polygon, tolerance: float) -> Solution:
-    """Solve with more and more nodes until the certificate is good enough.
+    """Solve with more and more nodes until the certified error is within the tolerance.
 
-    Args:
-        outline: The rings.
-        goal: The target, whose image is looked up if it is a point.
-        tolerance: Largest certified error.
+    The image of the goal, the target, is looked up if it is a point.
 
     Raises:
         UnmappableError: If more nodes do not reduce the error, or would be too many, or the system is so

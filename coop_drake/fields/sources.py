@@ -23,9 +23,8 @@ from coop_drake.fields.flat_map import (
 )
 from coop_drake.fields.near_field import density_of, panel_ends
 from coop_drake.fields.panels import point_distance
-from coop_drake.fields.quadrature import FloatArray, gauss_nodes
-
-__all__ = ["FAR", "gather", "seen_from", "solved_nodes"]
+from coop_drake.fields.quadrature import gauss_nodes
+from coop_drake.tree.pose import FloatArray
 
 FAR = 2.2
 """|zeta| from which the solved nodes of a panel are enough to integrate over it [-]."""
@@ -34,7 +33,7 @@ _GAUSS_X, _GAUSS_W = gauss_nodes(REFINED_NODES)
 
 @compiled(reassociate=True)
 def seen_from(m: FlatMap, k: int, place: int, level: int, x: float, y: float) -> tuple[float, float, float]:
-    """How a source is seen from a point.
+    """How a source is seen from a point [m].
 
     Returns:
         Its distance; the distance of a panel's middle or of a corner's vertex; the half length of a panel or
@@ -75,22 +74,11 @@ def gather(
     m: FlatMap, k: int, place: int, level: int, opened: bool, seen: tuple[float, float, float],
     x: float, y: float, radius: float, nodes: FloatArray,
 ) -> int:  # fmt: skip
-    """Write the nodes of a source that is far from a box.
+    """Write the nodes of a source that is far from a box; return how many.
 
-    Args:
-        m: The map.
-        k: The source, as the next two.
-        place: See `MapArrays`.
-        level: See `MapArrays`.
-        opened: Whether refined densities are known.
-        seen: The source seen from the box's centre, from `seen_from`.
-        x: The box's centre [m].
-        y: The box's centre [m].
-        radius: Its half diagonal [m].
-        nodes: Receives columns (position seen from the centre, line element, mu_u, mu_v), shape (6, .).
-
-    Returns:
-        How many nodes were written.
+    The source is ``seen`` from the box's centre (x, y) [m]; ``radius`` is the half diagonal of the box [m],
+    ``opened`` whether refined densities are known. The nodes are columns (position seen from the centre, line
+    element, mu_u, mu_v), shape (6, .).
     """
     if (place < 0 and level == 0) or (k < 0 and (not opened or seen[1] - radius >= FAR * seen[2])):
         first, last = solved_nodes(m, k, place)

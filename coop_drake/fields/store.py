@@ -40,38 +40,27 @@ class MapStore:
     Args:
         folder: The folder; it is made when the first map is kept.
         limit: Size [bytes] to which `trim` reduces the folder, removing the maps used longest ago.
+
+    Attributes:
+        found: How many maps were read instead of solved.
     """
 
     def __init__(self, folder: Path, *, limit: int = 1_000_000_000) -> None:
         self.folder = folder
         self.limit = limit
-        self._found, self._lock = 0, Lock()
-
-    @property
-    def found(self) -> int:
-        """How many maps were read instead of solved."""
-        return self._found
+        self.found, self._lock = 0, Lock()
 
     def map_of(self, domain: Polygon, goal: Point | Polygon, *, tolerance: float) -> HarmonicMap:
-        """Read a map, or solve and keep it.
-
-        Args:
-            domain: The cell [m].
-            goal: Point to reach, or region to collapse [m].
-            tolerance: Largest error of T that is accepted.
-
-        Raises:
-            FieldError: As `HarmonicMap` does.
-        """
+        """Read a map, or solve and keep it; arguments and errors are those of `HarmonicMap`."""
         key = _key(domain, goal, tolerance)
         path = self.folder / (key + _SUFFIX)
         solution = _read(path, key)
-        if solution is not None:
+        harmonic_map = HarmonicMap(domain, goal, tolerance=tolerance, solution=solution)
+        if solution is None:
+            _write(path, key, harmonic_map.solution)
+        else:
             with self._lock:
-                self._found += 1
-            return HarmonicMap.from_solution(domain, goal, solution)
-        harmonic_map = HarmonicMap(domain, goal, tolerance=tolerance)
-        _write(path, key, harmonic_map.solution)
+                self.found += 1
         return harmonic_map
 
     def files(self) -> list[Path]:

@@ -9,8 +9,9 @@ import shapely
 from numpy.typing import ArrayLike, NDArray
 
 from coop_drake.fields.points import as_points
-from coop_drake.fields.quadrature import FloatArray
 from coop_drake.fields.velocity_field import VelocityField
+from coop_drake.geometry.parts import extent_of
+from coop_drake.tree.pose import FloatArray
 
 _TURN = 0.2
 """Largest turn of the direction within a step [rad]."""
@@ -58,8 +59,7 @@ def trace_streamlines(field: VelocityField, starts: ArrayLike, *, max_steps: int
     """
     here = as_points(starts).reshape(-1, 2).copy()
     goal, region = field.harmonic_map.goal, field.harmonic_map.region
-    x0, y0, x1, y1 = region.bounds
-    size, close = float(np.hypot(x1 - x0, y1 - y0)), _ARRIVED * field.slowdown_radius
+    size, close = extent_of(region), _ARRIVED * field.slowdown_radius
     times, reach = np.zeros(len(here)), np.full(len(here), _FIRST * size)
     going = np.flatnonzero(shapely.distance(goal, shapely.points(here)) > close)
     history = [(np.arange(len(here)), here.copy())]

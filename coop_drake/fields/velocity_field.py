@@ -13,8 +13,8 @@ from coop_drake.fields.flat_field import flat_field, velocities_in_field
 from coop_drake.fields.flat_map import FlatMap
 from coop_drake.fields.harmonic_map import HarmonicMap
 from coop_drake.fields.points import as_points
-from coop_drake.fields.quadrature import FloatArray
 from coop_drake.geometry.boundary import edges_of
+from coop_drake.tree.pose import FloatArray
 
 
 class VelocityField:
@@ -60,13 +60,7 @@ class VelocityField:
         self._field = flat_field(around, solution.goal_image, self.slowdown_radius, self.max_speed)
 
     def __call__(self, points: ArrayLike) -> FloatArray:
-        """Velocity at one point or at many.
-
-        Args:
-            points: p in W, shape (..., 2) [m].
-
-        Returns:
-            Velocity in W, shape (..., 2) [m/s].
+        """Velocity in W at one point or at many, shape (..., 2) [m] to (..., 2) [m/s].
 
         Raises:
             FieldError: If the points have another shape or are not finite.

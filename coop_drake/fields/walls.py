@@ -5,22 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.fields.quadrature import FloatArray
 from coop_drake.geometry.distances import nearest_fraction, ray_crosses
-
-__all__ = ["is_inside", "nearest_on_walls"]
+from coop_drake.tree.pose import FloatArray
 
 
 @compiled(reassociate=True)
 def is_inside(numbers: FloatArray, first: int, count: int, x: float, y: float) -> bool:
     """Whether a point is inside, by the number of walls that a ray to the right crosses.
 
-    Args:
-        numbers: An array that holds the walls of all rings one after the other.
-        first: Where the first wall stands in it.
-        count: How many there are.
-        x: The point [m].
-        y: The point [m].
+    The walls of all rings, so many, stand one after the other in an array, from index ``first`` on.
     """
     inside = False
     for e in range(first, first + 4 * count, 4):

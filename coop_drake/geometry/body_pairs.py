@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,23 +61,24 @@ class BodyPairs:
 
     def touching(self, intervals: Intervals) -> BodyPair | None:
         """First pair that may touch somewhere in the slice; None proves the whole slice free of contact."""
-        for number, pair in enumerate(self.pairs):
-            key = (number, *[intervals[axis] for axis in pair.axes])
-            touch = self._touch.get(key)
-            if touch is None:
-                touch = self._touch[key] = self._may_touch(pair, intervals)
-            if touch:
-                return pair
-        return None
+        return self._first(self._may_touch, self._touch, intervals)
 
     def overlapping(self, intervals: Intervals) -> BodyPair | None:
         """First pair that overlaps all over the slice: proves that no configuration in it is free."""
+        return self._first(self._must_overlap, self._overlap, intervals)
+
+    def _first(
+        self,
+        test: Callable[[BodyPair, Intervals], bool],
+        known: dict[tuple[object, ...], bool],
+        intervals: Intervals,
+    ) -> BodyPair | None:
+        """First pair that passes a test; results are cached by the intervals that move the pair."""
         for number, pair in enumerate(self.pairs):
             key = (number, *[intervals[axis] for axis in pair.axes])
-            overlap = self._overlap.get(key)
-            if overlap is None:
-                overlap = self._overlap[key] = self._must_overlap(pair, intervals)
-            if overlap:
+            if key not in known:
+                known[key] = test(pair, intervals)
+            if known[key]:
                 return pair
         return None
 

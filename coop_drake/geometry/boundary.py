@@ -15,8 +15,6 @@ from coop_drake.errors import GeometryError
 from coop_drake.geometry.distances import ray_crosses, segments_cross, squared_distance
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BoundaryDistance", "edges_of", "signed_distance"]
-
 
 def edges_of(polygon: Polygon) -> FloatArray:
     """Edges of every ring of a polygon as rows ``(x0, y0, x1, y1)``, shape (edges, 4) [m]."""
@@ -28,10 +26,7 @@ def edges_of(polygon: Polygon) -> FloatArray:
 def signed_distance(edges: FloatArray, x: float, y: float) -> float:
     """Distance of a point to the nearest edge [m], positive inside: a ray from there crosses an odd number.
 
-    Args:
-        edges: Edges (x0, y0, x1, y1) of closed rings, shape (E, 4) [m].
-        x: First coordinate of the point [m].
-        y: Second coordinate [m].
+    The edges (x0, y0, x1, y1) are those of closed rings, shape (E, 4) [m].
     """
     nearest = np.inf
     inside = False
@@ -93,6 +88,9 @@ class BoundaryDistance:
     Args:
         polygon: The region, with holes or without [m].
 
+    Attributes:
+        edges: Edges of every ring as rows ``(x0, y0, x1, y1)``, shape (edges, 4) [m].
+
     Raises:
         GeometryError: If the polygon is empty.
     """
@@ -100,36 +98,17 @@ class BoundaryDistance:
     def __init__(self, polygon: Polygon) -> None:
         if polygon.is_empty:
             raise GeometryError("an empty polygon has no boundary to measure a distance to")
-        self._edges = np.ascontiguousarray(edges_of(polygon))
-
-    @property
-    def edges(self) -> FloatArray:
-        """Edges of every ring as rows ``(x0, y0, x1, y1)``, shape (edges, 4) [m]."""
-        return self._edges
+        self.edges = np.ascontiguousarray(edges_of(polygon))
 
     def __call__(self, point: ArrayLike) -> float:
-        """Distance of one point to the boundary.
-
-        Args:
-            point: Position, shape (2,) [m].
-
-        Returns:
-            Distance [m], positive inside the polygon, negative outside.
-        """
+        """Distance of one point, shape (2,) [m], to the boundary: positive inside, negative outside [m]."""
         x, y = cast(FloatArray, point)
-        return signed_distance(self._edges, float(x), float(y))
+        return signed_distance(self.edges, float(x), float(y))
 
     def batch(self, points: ArrayLike) -> FloatArray:
-        """Distances of many points.
-
-        Args:
-            points: Positions, shape (n, 2) [m].
-
-        Returns:
-            Distances, shape (n,) [m], positive inside the polygon, negative outside.
-        """
+        """Distances of many points, shape (n, 2) to (n,) [m], positive inside, negative outside."""
         rows = np.ascontiguousarray(points, dtype=np.float64).reshape(-1, 2)
-        return _signed_distances(self._edges, rows)
+        return _signed_distances(self.edges, rows)
 
     def shortened(self, points: FloatArray) -> FloatArray:
         """A way without points that it can do without: straight on it keeps the clearance of the whole way.
@@ -141,14 +120,9 @@ class BoundaryDistance:
         return shorter
 
     def along(self, start: ArrayLike, end: ArrayLike) -> float:
-        """Smallest distance of a straight segment to the boundary.
+        """Smallest distance of the straight segment between two points, (2,) each, to the boundary [m].
 
-        Args:
-            start: One end, shape (2,) [m].
-            end: The other end, shape (2,) [m].
-
-        Returns:
-            Distance [m], zero where the segment crosses the boundary, also for a segment that lies outside.
+        Zero where the segment crosses the boundary; also positive for a segment that lies outside.
         """
         (ax, ay), (bx, by) = cast(FloatArray, start), cast(FloatArray, end)
-        return _segment_clearance(self._edges, float(ax), float(ay), float(bx), float(by))
+        return _segment_clearance(self.edges, float(ax), float(ay), float(bx), float(by))

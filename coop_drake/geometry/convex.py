@@ -15,25 +15,9 @@ def following(ring: FloatArray) -> FloatArray:
     return np.concatenate((ring[1:], ring[:1]))
 
 
-def preceding(ring: FloatArray) -> FloatArray:
-    """Rotate a ring by one entry, so that entry i is what preceded entry i; the shape (n, ...) stays."""
-    return np.concatenate((ring[-1:], ring[:-1]))
-
-
 def normals(angles: FloatArray) -> FloatArray:
     """Unit vectors at the angles; shape (k,) [rad] to (k, 2)."""
     result = np.empty((*angles.shape, 2))
     np.cos(angles, out=result[..., 0])
     np.sin(angles, out=result[..., 1])
     return result
-
-
-def edge_angles(vertices: FloatArray) -> FloatArray:
-    """Angles of the outward normals of a counter-clockwise ring; shape (n, 2) to (n,), empty for a point.
-
-    Two vertices make a segment with a normal on either side.
-    """
-    if len(vertices) < 2:
-        return np.empty(0)
-    edges = following(vertices) - vertices
-    return np.arctan2(-edges[:, 0], edges[:, 1])

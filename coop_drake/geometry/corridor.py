@@ -13,8 +13,6 @@ from coop_drake.geometry.boundary import BoundaryDistance, signed_distance
 from coop_drake.geometry.parts import component_at
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["corridor_around"]
-
 STRIDE = 0.5
 """Distance of the discs along the path, over the clearance there [-]."""
 

@@ -11,18 +11,6 @@ from math import hypot
 from coop_drake.compiled import compiled
 from coop_drake.tree.pose import FloatArray
 
-__all__ = [
-    "meets_ring",
-    "nearest_fraction",
-    "ray_crosses",
-    "ring_holds",
-    "segments_cross",
-    "separated",
-    "squared_distance",
-    "squared_ring_distance",
-    "twice_area",
-]
-
 
 @compiled
 def twice_area(ax: float, ay: float, bx: float, by: float, cx: float, cy: float) -> float:
@@ -79,16 +67,8 @@ def meets_ring(
 ) -> bool:
     """Whether the segment a-b meets a ring of two or more vertices or what it encloses; False for a point.
 
-    The segment is clipped by the half-plane of every edge.
-
-    Args:
-        vertices: Vertices, shape (V, 2) [m].
-        first: First vertex of the ring.
-        last: The vertex after its last.
-        ax: First coordinate of the segment's one end; with the next three [m].
-        ay: Second coordinate.
-        bx: First coordinate of the other end.
-        by: Second coordinate.
+    The segment is clipped by the half-plane of every edge. The ring is rows first to last - 1 of the
+    vertices, shape (V, 2) [m].
     """
     if last - first == 1:
         return False
@@ -151,8 +131,7 @@ def separated(first: FloatArray, second: FloatArray, gap: float = 0.0) -> bool:
 
     With a negative gap polygons that overlap less deep than that count as separated, too.
     """
-    apart: bool = _edge_separates(first, second, gap) or _edge_separates(second, first, gap)
-    return apart
+    return _edge_separates(first, second, gap) or _edge_separates(second, first, gap)
 
 
 @compiled

@@ -11,8 +11,6 @@ from coop_drake.compiled import compiled
 from coop_drake.geometry.distances import squared_distance
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["IndexArray", "cut_edges"]
-
 IndexArray = NDArray[np.intp]
 
 

@@ -42,11 +42,7 @@ class Graph:
 
 
 def medial_graph(polygon: Polygon, distance: BoundaryDistance) -> tuple[Graph, FloatArray]:
-    """Build the medial graph.
-
-    Args:
-        polygon: The region, with holes or without [m].
-        distance: Distance to its boundary.
+    """Build the medial graph of a region, with holes or without, given the distance to its boundary.
 
     Returns:
         The graph, and the clearance of each node, shape (n,) [m], not positive for nodes outside.
@@ -70,15 +66,9 @@ def medial_graph(polygon: Polygon, distance: BoundaryDistance) -> tuple[Graph, F
 
 
 def widest_path(graph: Graph, start: int, end: int) -> IndexArray | None:
-    """Nodes of the path whose narrowest edge is widest, the shortest one among equally wide.
+    """Nodes of the path whose narrowest edge is widest, the shortest among equally wide, or None.
 
-    Args:
-        graph: The graph; no edge occurs twice.
-        start: Index of the first node.
-        end: Index of the last node.
-
-    Returns:
-        Indices of the nodes, or None where no path exists.
+    No edge of the graph occurs twice.
     """
     order = np.argsort(-graph.clearance, kind="stable")
     pairs = np.ascontiguousarray(graph.pairs[order], dtype=np.int64)

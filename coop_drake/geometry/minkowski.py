@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 from manifold3d import CrossSection, FillRule
 from shapely import MultiPolygon, Polygon
-from shapely.geometry.polygon import orient
 
 from coop_drake.geometry import under_kernels
 from coop_drake.geometry.convex import following
+from coop_drake.geometry.parts import polygon_rings
 from coop_drake.geometry.safeguards import checked_buffer, second_opinion
 from coop_drake.geometry.sum_kernels import fitting_cycles
 from coop_drake.tree.pose import FloatArray
@@ -79,11 +79,7 @@ class FreeSpace:
         return cls(rings, over=True, grown=grown) if all(Polygon(ring).is_valid for ring in rings) else grown
 
     def minus(self, footprint: FloatArray) -> CrossSection:
-        """Positions p with p + F inside the workspace.
-
-        Args:
-            footprint: Convex polygon F, counter-clockwise, relative to p, shape (n, 2) [m].
-        """
+        """Positions p with p + F inside the workspace; F is convex, counter-clockwise, shape (n, 2) [m]."""
         if self._grown is not None:
             shrunk = under_kernels.shrunk(footprint, SAFE_SIDE)
             if len(shrunk) == 0:
@@ -95,7 +91,11 @@ class FreeSpace:
             found = None
         if found is not None and self._plausible(found, footprint[0]):
             return found
-        return self._fallback(footprint) if self._over else CrossSection()
+        if not self._over:
+            return CrossSection()
+        return CrossSection(
+            second_opinion(self.rings, self.edges.reshape(-1, 2, 2), footprint), FillRule.Positive
+        )
 
     def _clipped(self, footprint: FloatArray) -> CrossSection:
         convex = np.ascontiguousarray(footprint, dtype=float)
@@ -113,11 +113,6 @@ class FreeSpace:
         beyond = max(lower[0] - x_min, lower[1] - y_min, x_max - upper[0], y_max - upper[1])
         return bool(beyond <= SAFE_SIDE and 0.0 <= found.area() <= self._most_area)
 
-    def _fallback(self, footprint: FloatArray) -> CrossSection:
-        """The difference by another library, or a box that holds every possible position."""
-        rings = second_opinion(self.rings, self.edges.reshape(-1, 2, 2), footprint)
-        return CrossSection(rings, FillRule.Positive)
-
 
 def _without_repeats(ring: FloatArray) -> FloatArray:
     """The ring without vertices that repeat the one before."""
@@ -132,24 +127,8 @@ def _area(ring: FloatArray) -> float:
     return 0.5 * float((points[:, 0] * tail[:, 1] - points[:, 1] * tail[:, 0]).sum())
 
 
-def polygon_rings(shape: Polygon | MultiPolygon) -> list[FloatArray]:
-    """Rings of a polygon or of several, outer ones counter-clockwise, holes clockwise, not closed."""
-    parts = shape.geoms if isinstance(shape, MultiPolygon) else [shape]
-    rings: list[FloatArray] = []
-    for part in parts:
-        if part.is_empty:
-            continue
-        oriented = orient(part)
-        rings += [np.asarray(ring.coords)[:-1] for ring in (oriented.exterior, *oriented.interiors)]
-    return rings
-
-
 def to_polygon(component: CrossSection) -> Polygon:
-    """One connected region as a shapely polygon.
-
-    Args:
-        component: One outline with any number of holes, as ``CrossSection.decompose`` returns it.
-    """
+    """One connected region, with any number of holes, as a shapely polygon."""
     rings = [np.asarray(ring, dtype=float) for ring in component.to_polygons()]
     outer = max(range(len(rings)), key=lambda i: float(np.ptp(rings[i][:, 0]) * np.ptp(rings[i][:, 1])))
     return Polygon(rings[outer], [ring for i, ring in enumerate(rings) if i != outer])

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import shapely
 from shapely import Point, Polygon
 from shapely.geometry.base import BaseGeometry
+from shapely.geometry.polygon import orient
 
 from coop_drake.tree.pose import FloatArray
 
@@ -18,6 +20,17 @@ def parts_of(shape: BaseGeometry) -> list[Polygon]:
 def corners_of(polygon: Polygon) -> list[FloatArray]:
     """The corners of every ring as it stands, the outer ring first, none repeated, shape (n, 2) each [m]."""
     return [shapely.get_coordinates(ring)[:-1] for ring in (polygon.exterior, *polygon.interiors)]
+
+
+def polygon_rings(shape: BaseGeometry) -> list[FloatArray]:
+    """The corners of all rings of a shape's polygons, outer rings counter-clockwise, holes clockwise [m]."""
+    return [corners for part in parts_of(shape) for corners in corners_of(orient(part))]
+
+
+def extent_of(shape: BaseGeometry) -> float:
+    """Diagonal of the bounding box of a shape [m]."""
+    x_min, y_min, x_max, y_max = shape.bounds
+    return float(np.hypot(x_max - x_min, y_max - y_min))
 
 
 def component_at(shape: BaseGeometry, point: Point) -> Polygon:

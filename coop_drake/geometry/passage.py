@@ -16,6 +16,9 @@ from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.medial import Graph, medial_graph, widest_path
 from coop_drake.tree.pose import FloatArray
 
+POLE = 1e-3
+"""How much more clearance than the pole another point may have [m]; less where the polygon is thin."""
+
 LINKS = 24
 """An end is linked to this many nearest nodes of the medial graph, besides those whose disc holds it."""
 
@@ -57,11 +60,7 @@ class PassageFinder:
         return medial_graph(self._polygon, self._distance)
 
     def find(self, start: ArrayLike, end: ArrayLike) -> Passage:
-        """Widest passage between two points, the shortest one among equally wide.
-
-        Args:
-            start: Point inside the polygon, shape (2,) [m].
-            end: Point inside the polygon, shape (2,) [m].
+        """Widest passage between two points, (2,) each [m], the shortest one among equally wide.
 
         Raises:
             GeometryError: If an end lies outside, or no passage joins them.
@@ -117,12 +116,8 @@ class PassageFinder:
         return Passage(LineString(points), float(clearances[worst]), narrowest)
 
 
-def pole(polygon: Polygon, tolerance: float = 1e-3) -> tuple[FloatArray, float]:
+def pole(polygon: Polygon) -> tuple[FloatArray, float]:
     """Pole of inaccessibility: the point of a polygon farthest from its boundary.
-
-    Args:
-        polygon: The region, with holes or without [m].
-        tolerance: How much more clearance another point may have [m]; less where the polygon is thin.
 
     Returns:
         The point, shape (2,) [m], and its clearance [m].
@@ -135,7 +130,7 @@ def pole(polygon: Polygon, tolerance: float = 1e-3) -> tuple[FloatArray, float]:
     half_width = polygon.area / polygon.length
     # Edges that are shorter than floating point can tell divide by zero inside GEOS, without harm.
     with np.errstate(divide="ignore", invalid="ignore"):
-        radius = shapely.maximum_inscribed_circle(polygon, tolerance=min(tolerance, 0.1 * half_width))
+        radius = shapely.maximum_inscribed_circle(polygon, tolerance=min(POLE, 0.1 * half_width))
     centre = shapely.get_coordinates(radius)[0]
     return centre, BoundaryDistance(polygon)(centre)
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 import shapely
 from manifold3d import CrossSection
 from shapely import MultiPolygon, Polygon
 from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.geometry.parts import polygon_rings
 from coop_drake.tree.pose import FloatArray
 
 _FAILURES = (RuntimeError, ValueError, ArithmeticError)
@@ -21,10 +21,7 @@ _ROUNDING = 1e-6
 def shared(first: CrossSection, second: CrossSection, *, over: bool) -> CrossSection:
     """Intersection of two regions; where clipping fails, the smaller over-region or the empty under-region.
 
-    Args:
-        first: A region.
-        second: Another one.
-        over: Whether positions that are left out are called blocked; else those that are kept, free.
+    Of an over-region what is left out is called blocked, of another one what is kept is called free.
     """
     smaller = min(first, second, key=CrossSection.area)
     try:
@@ -58,12 +55,7 @@ def meet(first: CrossSection, second: CrossSection, *, otherwise: bool) -> bool:
 
 
 def checked_buffer(workspace: Polygon | MultiPolygon, distance: float) -> Polygon | MultiPolygon:
-    """Workspace grown or shrunk by a distance; where that fails, its bounding box or the empty polygon.
-
-    Args:
-        workspace: W [m].
-        distance: Positive to enclose W, negative to stay inside it [m].
-    """
+    """W, grown or shrunk where the distance is negative [m]; if that fails, its bounding box, or nothing."""
     try:
         result = workspace.buffer(distance, join_style="mitre")
         nested = result.covers(workspace) if distance > 0.0 else workspace.covers(result)
@@ -97,16 +89,7 @@ def second_opinion(rings: Sequence[FloatArray], edges: FloatArray, footprint: Fl
             floor = shapely.symmetric_difference(floor, Polygon(ring))
         sums = (edges[:, :, None, :] - footprint).reshape(len(edges), -1, 2)
         walls = shapely.union_all(shapely.convex_hull(shapely.linestrings(sums)))
-        left = shapely.transform(floor, lambda points: points - start).difference(walls)
-        return [ring for part in shapely.get_parts(left) for ring in _rings(part)]
+        return polygon_rings(shapely.transform(floor, lambda points: points - start).difference(walls))
     except (ShapelyError, ValueError):
         corners = edges.reshape(-1, 2) - start
-        return _rings(shapely.box(*corners.min(axis=0), *corners.max(axis=0)))
-
-
-def _rings(part: BaseGeometry) -> list[FloatArray]:
-    """Rings of a polygon, the outer one counter-clockwise, holes clockwise; none of anything else."""
-    if not isinstance(part, Polygon) or part.is_empty:
-        return []
-    oriented = shapely.orient_polygons(part, exterior_cw=False)
-    return [np.asarray(ring.coords)[:-1] for ring in (oriented.exterior, *oriented.interiors)]
+        return polygon_rings(shapely.box(*corners.min(axis=0), *corners.max(axis=0)))

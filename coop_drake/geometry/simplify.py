@@ -12,9 +12,8 @@ from shapely import Polygon
 from coop_drake.compiled import compiled
 from coop_drake.geometry.distances import segments_cross, squared_distance, twice_area
 from coop_drake.geometry.edge_pieces import IndexArray
+from coop_drake.geometry.parts import corners_of
 from coop_drake.tree.pose import FloatArray
-
-__all__ = ["sharpest_angle", "simplify_inward", "vertex_angles"]
 
 DROP, PROLONG = 1, 2
 """What may be done at a vertex: leave it out, or let it and the next one make way for one new corner."""
@@ -39,7 +38,7 @@ def simplify_inward(polygon: Polygon, tolerance: float, slack: float = 0.0) -> P
         The simplified polygon, oriented; the polygon itself where no step is possible.
     """
     oriented = shapely.orient_polygons(polygon)
-    rings = [shapely.get_coordinates(ring)[:-1] for ring in (oriented.exterior, *oriented.interiors)]
+    rings = corners_of(oriented)
     sizes = np.array([len(ring) for ring in rings])
     points = np.vstack(rings)
     starts = np.repeat(np.cumsum(sizes) - sizes, sizes)
@@ -55,10 +54,8 @@ def simplify_inward(polygon: Polygon, tolerance: float, slack: float = 0.0) -> P
 
 def vertex_angles(polygon: Polygon) -> FloatArray:
     """Interior angle at every vertex of every ring, shape (n,) [rad], in (0, 2 pi)."""
-    oriented = shapely.orient_polygons(polygon)
     angles = []
-    for ring in (oriented.exterior, *oriented.interiors):
-        points = shapely.get_coordinates(ring)[:-1]
+    for points in corners_of(shapely.orient_polygons(polygon)):
         arriving, leaving = points - np.roll(points, 1, axis=0), np.roll(points, -1, axis=0) - points
         cross = arriving[:, 0] * leaving[:, 1] - arriving[:, 1] * leaving[:, 0]
         angles.append(np.pi - np.arctan2(cross, (arriving * leaving).sum(axis=1)))

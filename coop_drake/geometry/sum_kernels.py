@@ -88,14 +88,7 @@ def _width(ring: FloatArray, axis: int) -> float:
 
 @compiled
 def _bends_in(points: FloatArray, before: int, here: int, after: int) -> bool:
-    """Whether a corner of the outline points into the floor, or is a needle, which blocks no more than that.
-
-    Args:
-        points: Vertices, shape (E, 2) [m].
-        before: The vertex before the corner.
-        here: The corner.
-        after: The vertex after it.
-    """
+    """Whether a corner of the outline points into the floor, or is a needle, which blocks no more."""
     ax, ay = points[here, 0] - points[before, 0], points[here, 1] - points[before, 1]
     bx, by = points[after, 0] - points[here, 0], points[after, 1] - points[here, 1]
     cross, dot = ax * by - ay * bx, ax * bx + ay * by

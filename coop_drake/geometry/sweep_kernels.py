@@ -32,10 +32,9 @@ the growth of the sweep itself."""
 
 @compiled
 def arc_parts(half_width: float) -> int:
-    """Number of chords or tangents that replace an arc: their error vanishes faster than the slice's width.
+    """Number of chords or tangents that replace an arc, given half of its angle [rad].
 
-    Args:
-        half_width: Half of the arc's angle [rad].
+    Their error vanishes faster than the slice's width.
     """
     return max(1, ceil(sqrt(_PARTS_PER_ANGLE * min(half_width, pi))))
 
@@ -44,8 +43,7 @@ def arc_parts(half_width: float) -> int:
 def disc_turn(half_width: float) -> float:
     """Largest angle between neighbouring normals of a polygon that replaces a disc [rad].
 
-    Args:
-        half_width: Half of the widest interval of the sweep [rad or m]: the wider, the coarser the polygon.
+    The wider the widest interval of the sweep, of which half is given [rad or m], the coarser the polygon.
     """
     return min(0.6, max(0.05, 0.9 * sqrt(half_width))) if half_width > 0.0 else 0.6
 
@@ -144,7 +142,10 @@ def support(vertices: FloatArray, angles: FloatArray) -> FloatArray:
 
 @compiled
 def edge_directions(vertices: FloatArray) -> FloatArray:
-    """Angles of the outward normals of a counter-clockwise ring; shape (n, 2) to (n,), empty for a point."""
+    """Angles of the outward normals of a counter-clockwise ring; shape (n, 2) to (n,), empty for a point.
+
+    Two vertices make a segment with a normal on either side.
+    """
     count = len(vertices) if len(vertices) > 1 else 0
     angles = np.empty(count)
     for i in range(count):
@@ -208,20 +209,14 @@ def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> Flo
             off = max(abs(off - _TURN * np.rint(off / _TURN)) - half_width, 0.0)
             best = max(best, radii[i] * cos(off))
         offsets[k] = best
-    swept: FloatArray = circumscribed(directions, offsets)
-    return swept
+    return circumscribed(directions, offsets)
 
 
 @compiled
 def over_prismatic(vertices: FloatArray, x0: float, y0: float, x1: float, y1: float) -> FloatArray:
-    """Enclose a convex set moved by every displacement from (x0, y0) to (x1, y1): the hull of both ends.
+    """Enclose a convex set moved by every displacement from (x0, y0) to (x1, y1) [m]: the hull of both ends.
 
-    Args:
-        vertices: Convex ring or one point or a segment, shape (n, 2) [m].
-        x0: First coordinate of the displacement at the interval's lower end [m].
-        y0: Second coordinate [m].
-        x1: First coordinate of the displacement at its upper end [m].
-        y1: Second coordinate [m].
+    The set is a convex ring, one point or a segment, shape (n, 2) [m].
     """
     edges = edge_directions(vertices)
     angles = np.empty(len(edges) + 4)
@@ -235,25 +230,21 @@ def over_prismatic(vertices: FloatArray, x0: float, y0: float, x1: float, y1: fl
     for k in range(len(directions)):
         x, y = cos(directions[k]), sin(directions[k])
         offsets[k] += max(x * x0 + y * y0, x * x1 + y * y1)
-    swept: FloatArray = circumscribed(directions, offsets)
-    return swept
+    return circumscribed(directions, offsets)
 
 
 @compiled
 def grown(vertices: FloatArray, radius: float, largest_turn: float) -> FloatArray:
-    """Enclose a convex set grown by a radius in a polygon.
+    """Enclose a convex set grown by a radius [m] in a polygon.
 
-    Args:
-        vertices: Convex ring or one point or a segment, shape (n, 2) [m].
-        radius: Growth [m].
-        largest_turn: Largest angle between neighbouring normals [rad].
+    The set is a convex ring, one point or a segment, shape (n, 2) [m]; neighbouring normals of the polygon
+    are at most ``largest_turn`` apart [rad].
     """
     directions = closed_directions(edge_directions(vertices), largest_turn)
     offsets = support(vertices, directions)
     for k in range(len(offsets)):
         offsets[k] += radius
-    outer: FloatArray = circumscribed(directions, offsets)
-    return outer
+    return circumscribed(directions, offsets)
 
 
 @compiled

@@ -1,4 +1,9 @@
-"""Over- and under-footprints of the team over a compound slice, eq. (6), cached by the ancestors' slices."""
+"""Over- and under-footprints of the team over a compound slice, eq. (6), cached by the ancestors' slices.
+
+A sweep over one joint maps convex sets to convex sets: the over-sweep encloses every placed copy, the
+under-sweep is enclosed by every placed copy. Rigid motions are bijections, so sweeps nest over a product of
+intervals. The verifier has over-sweeps of its own, in ``verification``.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +11,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.geometry.sweep_kernels import disc_turn, over_piece
-from coop_drake.geometry.sweeps import common_disc, inscribed, under_prismatic, under_revolute
+from coop_drake.geometry.convex import normals
+from coop_drake.geometry.sweep_kernels import closed_directions, disc_turn, edge_directions, over_piece
+from coop_drake.geometry.under_kernels import common_disc, under_prismatic, under_revolute
 from coop_drake.tree.component_tree import ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, team_arrays
+
+_NUDGE = 1e-6
+"""Angle on either side of a direction at which the vertices of an edge are looked for [rad]."""
 
 Interval = tuple[float, float]
 Intervals = tuple[Interval, ...]
@@ -59,7 +68,7 @@ class SweptTree:
         self.pieces: tuple[Piece, ...] = tuple(pieces)
         self.arrays: TeamArrays = team_arrays(tree)
         self._over: dict[tuple[object, ...], FloatArray] = {}
-        self._under: dict[tuple[object, ...], FloatArray | None] = {}
+        self._under: dict[tuple[object, ...], FloatArray] = {}
 
     def over(self, index: int, intervals: Intervals, stages: int | None = None) -> FloatArray:
         """Polygon that encloses a piece at every configuration of a slice, the object's origin at p_WL = 0.
@@ -88,8 +97,10 @@ class SweptTree:
         count = len(piece.axes) if stages is None else stages
         if len(piece.shape.vertices) == 1:
             centres = self._swept(index, intervals, count, rounded=False)
-            return common_disc(centres, piece.shape.radius, self._turn(piece, intervals, count))
-        return self._under_stage(index, intervals, count)
+            found = common_disc(centres, piece.shape.radius, self._turn(piece, intervals, count))
+        else:
+            found = self._under_stage(index, intervals, count)
+        return found if len(found) else None
 
     @staticmethod
     def _turn(piece: Piece, intervals: Intervals, stages: int) -> float:
@@ -101,29 +112,30 @@ class SweptTree:
         lower, upper = bounds[:, 0].copy(), bounds[:, 1].copy()
         return over_piece(self.arrays, index, lower, upper, count, rounded)
 
-    def _under_stage(self, index: int, intervals: Intervals, count: int) -> FloatArray | None:
+    def _under_stage(self, index: int, intervals: Intervals, count: int) -> FloatArray:
+        """The under-sweep over the first joints of a piece; no rows if it is empty."""
         piece = self.pieces[index]
         key = (index, count, *[intervals[axis] for axis in piece.axes[:count]])
         if key not in self._under:
             self._under[key] = self._make_under(piece, index, intervals, count)
         return self._under[key]
 
-    def _make_under(self, piece: Piece, index: int, intervals: Intervals, count: int) -> FloatArray | None:
+    def _make_under(self, piece: Piece, index: int, intervals: Intervals, count: int) -> FloatArray:
         if count == 0:
             shape = piece.shape
             if shape.radius == 0.0:
-                return shape.vertices if len(shape.vertices) > 2 else None
+                return shape.vertices if len(shape.vertices) > 2 else np.empty((0, 2))
             return inscribed(shape.vertices, shape.radius, self._turn(piece, intervals, len(piece.axes)))
         inner = self._under_stage(index, intervals, count - 1)
-        if inner is None:
-            return None
+        if not len(inner):
+            return inner
         joint = self.tree.components[piece.chain[count - 1]].joint
         interval = intervals[piece.axes[count - 1]]
         if joint is None or joint.kind == "revolute":
             swept = under_revolute(inner, *_turning(joint, interval))
         else:
             swept = under_prismatic(inner, *_sliding(joint, interval))
-        return swept if joint is None or swept is None else joint.X_PJ.apply(swept)
+        return swept if joint is None or not len(swept) else joint.X_PJ.apply(swept)
 
 
 def _turning(joint: TreeJoint | None, interval: Interval) -> tuple[float, float]:
@@ -132,7 +144,19 @@ def _turning(joint: TreeJoint | None, interval: Interval) -> tuple[float, float]
     return sign * 0.5 * (interval[0] + interval[1]), 0.5 * (interval[1] - interval[0])
 
 
-def _sliding(joint: TreeJoint, interval: Interval) -> tuple[FloatArray, FloatArray]:
-    """Displacements in J at both ends of an interval of a prismatic joint."""
-    axis = np.array(joint.axis)
-    return axis * interval[0], axis * interval[1]
+def _sliding(joint: TreeJoint, interval: Interval) -> tuple[float, float, float, float]:
+    """Displacements in J, (x, y) each, at both ends of an interval of a prismatic joint."""
+    (x, y), (lower, upper) = joint.axis, interval
+    return x * lower, y * lower, x * upper, y * upper
+
+
+def inscribed(vertices: FloatArray, radius: float, largest_turn: float) -> FloatArray:
+    """Polygon inside a convex set grown by a radius: its vertices lie on arcs about the set's vertices."""
+    directions = closed_directions(edge_directions(vertices), largest_turn)
+    before, after = (
+        np.argmax(normals(directions + nudge) @ vertices.T, axis=1) for nudge in (-_NUDGE, _NUDGE)
+    )
+    corners = vertices[np.stack((before, after), axis=1)]
+    ring = (corners + radius * normals(directions)[:, None, :]).reshape(-1, 2)
+    distinct: FloatArray = ring[np.abs(ring - np.roll(ring, 1, axis=0)).max(axis=1) > 1e-9]
+    return distinct

@@ -10,6 +10,7 @@ from shapely import Polygon
 
 from coop_drake.geometry.boundary import edges_of
 from coop_drake.geometry.edge_pieces import IndexArray, cut_edges
+from coop_drake.geometry.parts import extent_of
 from coop_drake.tree.pose import FloatArray
 
 PIECES_PER_GAP = 1.0
@@ -39,15 +40,10 @@ class Triangles:
 
 
 def triangulate(polygon: Polygon) -> Triangles:
-    """Triangulate a polygon, its rings cut into pieces that are short where the opposite wall is near.
-
-    Args:
-        polygon: The region, with holes or without [m].
-    """
+    """Triangulate a polygon, its rings cut into pieces that are short where the opposite wall is near."""
     polygon = shapely.remove_repeated_points(polygon)
     sizes = [len(ring.coords) - 1 for ring in (polygon.exterior, *polygon.interiors)]
-    finest = float(np.hypot(*np.subtract(polygon.bounds[2:], polygon.bounds[:2]))) / FINEST
-    pieces, owners = cut_edges(edges_of(polygon), finest, np.inf, PIECES_PER_GAP)
+    pieces, owners = cut_edges(edges_of(polygon), extent_of(polygon) / FINEST, np.inf, PIECES_PER_GAP)
     ring_of = np.repeat(np.arange(len(sizes)), sizes)[owners]
     cut = [pieces[ring_of == k] for k in range(len(sizes))]
     triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(Polygon(cut[0], cut[1:])))

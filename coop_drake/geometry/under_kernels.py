@@ -129,43 +129,31 @@ def under_revolute(vertices: FloatArray, centre: float, half_width: float) -> Fl
             angles[size] = centre + angle + half_chord * (2.0 * part + 1.0 - parts)
             distances[size] = offset * cos(half_chord)
             size += 1
-    found: FloatArray = half_planes_polygon(angles[:size], distances[:size])
-    return found
+    return half_planes_polygon(angles[:size], distances[:size])
 
 
 @compiled
 def under_prismatic(vertices: FloatArray, x0: float, y0: float, x1: float, y1: float) -> FloatArray:
-    """Find points that a convex polygon covers at every displacement from (x0, y0) to (x1, y1).
+    """Find points that a convex polygon covers at every displacement from (x0, y0) to (x1, y1) [m].
 
-    They are the points that both end copies cover.
-
-    Args:
-        vertices: Convex ring, counter-clockwise, shape (n, 2) [m].
-        x0: First coordinate of the displacement at the interval's lower end [m].
-        y0: Second coordinate [m].
-        x1: First coordinate of the displacement at its upper end [m].
-        y1: Second coordinate [m].
+    They are the points that both end copies cover; no rows where there are none. The ring is
+    counter-clockwise, shape (n, 2) [m].
     """
     angles = edge_directions(vertices)
     offsets = support(vertices, angles)
     for k in range(len(angles)):
         x, y = cos(angles[k]), sin(angles[k])
         offsets[k] += min(x * x0 + y * y0, x * x1 + y * y1)
-    found: FloatArray = half_planes_polygon(angles, offsets)
-    return found
+    return half_planes_polygon(angles, offsets)
 
 
 @compiled
 def common_disc(centres: FloatArray, radius: float, largest_turn: float) -> FloatArray:
-    """Polygon inside every disc of one radius whose centre lies in a convex polygon.
+    """Polygon inside every disc of one radius [m] whose centre lies in a convex polygon, shape (n, 2) [m].
 
     A point is within the radius of every centre if it is of every vertex; from their middle each ray leaves
-    the common part at the nearest exit.
-
-    Args:
-        centres: Vertices that enclose the centres, shape (n, 2) [m].
-        radius: Radius of all discs [m].
-        largest_turn: Angle between neighbouring vertices of the result [rad].
+    the common part at the nearest exit. Neighbouring vertices of the result are ``largest_turn`` apart [rad];
+    it has no rows where the discs have no common part.
     """
     low_x, low_y, high_x, high_y = np.inf, np.inf, -np.inf, -np.inf
     for i in range(len(centres)):

@@ -9,8 +9,9 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.laws.funnels import Funnel, axis_bounds
-from coop_drake.laws.gains import FloatArray, TransitionGains
+from coop_drake.laws.gains import TransitionGains
 from coop_drake.laws.ppc import ramped_gain, track_axis
+from coop_drake.tree.pose import FloatArray
 
 __all__ = [
     "ENERGY_BOUND",

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.gains import FloatArray, FunnelShape
-
-__all__ = ["CLOSING", "Funnel", "FunnelBounds", "axis_bounds", "decay_factor", "funnel_bounds"]
+from coop_drake.laws.gains import FunnelShape
+from coop_drake.tree.pose import FloatArray
 
 CLOSING = 5.0
 """lambda times the time T_f after which a quintic funnel is closed [-]: e^-5 is below a hundredth, so

@@ -9,8 +9,9 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.laws.funnels import CLOSING, axis_bounds
-from coop_drake.laws.gains import FixedGains, FloatArray, GainSet, ScheduledGains, TransitionGains
+from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains, TransitionGains
 from coop_drake.laws.ppc import ramped_gain, track_axis
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Schedule", "schedule_of", "scheduled_axis", "scheduled_governor", "transition_gains"]
 

@@ -6,9 +6,9 @@ from typing import Annotated, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import EXACT, DataError, Limits, NotNegative, Positive, Vector, check_fields
 
-FloatArray = NDArray[np.float64]
 FunnelShape = Literal["exponential", "quintic"]
 
 IDEAL_AGE = 0.0125

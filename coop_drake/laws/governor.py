@@ -14,19 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.gains import FloatArray
-
-__all__ = [
-    "ATTRACTION_RATE",
-    "FIELD_SPEED",
-    "VELOCITY_STEP",
-    "energy_margin",
-    "governed_acceleration",
-    "governor_velocity",
-    "object_energy_margin",
-    "slowdown_radius",
-    "tracking_energy",
-]
+from coop_drake.tree.pose import FloatArray
 
 Value = TypeVar("Value", float, FloatArray)
 

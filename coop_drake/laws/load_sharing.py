@@ -11,16 +11,7 @@ from math import cos, sin
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.gains import FloatArray
-
-__all__ = [
-    "acceleration_at",
-    "end_effector_command",
-    "object_twist",
-    "rotated",
-    "total_wrench",
-    "wrench_share",
-]
+from coop_drake.tree.pose import FloatArray
 
 
 @compiled

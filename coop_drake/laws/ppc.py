@@ -6,15 +6,7 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.laws.funnels import FunnelBounds
-from coop_drake.laws.gains import FloatArray
-
-__all__ = [
-    "SATURATION",
-    "prescribed_acceleration",
-    "prescribed_energy",
-    "ramped_gain",
-    "track_axis",
-]
+from coop_drake.tree.pose import FloatArray
 
 SATURATION = 1e-7
 """Smallest distance to a funnel bound that the law as printed computes with, over the funnel's width [-].

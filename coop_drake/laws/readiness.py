@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from coop_drake.compiled import compiled
 from coop_drake.laws.axis_table import ENERGY_BOUND, GOAL_LOWER, GOAL_UPPER, track_row
-from coop_drake.laws.gains import FloatArray
 from coop_drake.laws.governor import energy_margin
+from coop_drake.tree.pose import FloatArray
 
 __all__ = [
     "CLEARANCE_FRACTION",

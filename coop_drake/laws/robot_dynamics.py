@@ -10,13 +10,10 @@ to be inverted.
 from math import atan2
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.gains import FloatArray
 from coop_drake.laws.load_sharing import object_twist, rotated
-
-IntArray = NDArray[np.int64]
+from coop_drake.tree.pose import FloatArray, IntArray
 
 PARENT, X, Y, TURN, SLIDE_X, SLIDE_Y, POSITION, RATE, MASS, COM_X, COM_Y, INERTIA, DAMPING, ROTOR = range(14)
 COLUMNS = 14

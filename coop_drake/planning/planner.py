@@ -16,8 +16,6 @@ from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.planning.search.search import find_path
 from coop_drake.progress import Progress
 
-__all__ = ["plan"]
-
 FINER_ATTEMPTS = 2
 """Number of further searches after a path that cannot be executed, each with half the margin."""
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from math import inf
 
-__all__ = ["SETTLING_TIME", "SPEED_PER_CLEARANCE", "transition_time", "travel_time"]
-
 SETTLING_TIME = 0.6
 """Time that angles and joints need at any distance, for choices made before gains are known [s]."""
 

@@ -23,13 +23,12 @@ from coop_drake.laws.robot_dynamics import (
     SLIDE_X,
     SLIDE_Y,
     TURN,
-    IntArray,
     X,
     Y,
 )
 from coop_drake.plant.robot import RobotPlant
 from coop_drake.plant.team import RobotModel, TeamPlant
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,6 @@ from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, team_arrays
 
-__all__ = ["Clearance", "TeamClearance"]
-
 
 @dataclass(frozen=True)
 class Clearance:

@@ -13,8 +13,6 @@ from coop_drake.geometry.distances import meets_ring, ring_holds, squared_distan
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
 
-__all__ = ["nearest_pair", "nearest_to_walls"]
-
 
 @compiled
 def nearest_to_walls(

@@ -6,8 +6,6 @@ import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-__all__ = ["joint_limits_kept_by_funnels"]
-
 
 @contextmanager
 def joint_limits_kept_by_funnels() -> Iterator[None]:

@@ -15,8 +15,6 @@ from coop_drake.errors import FieldError
 from coop_drake.fields import HarmonicMap, MapStore
 from coop_drake.fields.tolerance import TOLERANCE
 
-__all__ = ["build_maps", "certificate_rows"]
-
 _MOST_WORKERS = 8  # More of them wait for one another: between kernels they share one interpreter.
 
 

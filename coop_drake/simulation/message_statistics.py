@@ -9,8 +9,6 @@ import numpy as np
 
 from coop_drake.answers.log import SimulationLog
 
-__all__ = ["MessageStatistics", "communication"]
-
 REPORT = struct.Struct("<H?")
 """Payload of a report [3 bytes]: the index of the cell that it is about, and whether its sender is ready to
 leave."""

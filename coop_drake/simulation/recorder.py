@@ -11,8 +11,6 @@ from coop_drake.simulation.invariants import Margins
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Recorder"]
-
 
 class Recorder:
     """Collects the accepted steps of a run."""

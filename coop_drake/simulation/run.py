@@ -23,8 +23,6 @@ from coop_drake.simulation.joint_limits import joint_limits_kept_by_funnels
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.simulation.watch import Watch
 
-__all__ = ["configure_simulator", "simulate"]
-
 
 def simulate(
     scenario: Scenario,

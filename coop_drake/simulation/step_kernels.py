@@ -12,8 +12,6 @@ from coop_drake.simulation.convex_distance import nearest_pair, nearest_to_walls
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, moved, place
 
-__all__ = ["largest_difference", "margins", "team_distances"]
-
 
 @compiled
 def team_distances(team: TeamArrays, walls: FloatArray, z: FloatArray) -> tuple[float, int, float, int]:

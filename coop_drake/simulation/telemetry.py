@@ -16,8 +16,6 @@ from coop_drake.simulation.step_kernels import largest_difference
 from coop_drake.systems.team_kernels import telemetry_parts
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Sample", "Telemetry", "port_reader"]
-
 
 @dataclass(frozen=True)
 class Sample:

@@ -13,8 +13,6 @@ from coop_drake.simulation.recorder import Recorder
 from coop_drake.simulation.stall import at_goal, blocking_margin, narrowest_funnel, patience
 from coop_drake.simulation.telemetry import Sample, Telemetry
 
-__all__ = ["Watch"]
-
 
 class Watch:
     """The simulator's monitor: called on every accepted step, it ends the run on arrival, violation or stall.

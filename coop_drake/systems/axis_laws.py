@@ -14,8 +14,6 @@ from coop_drake.laws.funnels import Funnel
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["AxisLaw", "axis_laws"]
-
 
 @dataclass(frozen=True)
 class AxisLaw:

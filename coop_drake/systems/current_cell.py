@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["CURRENT_CELL_SIZE", "READY_SIZE", "index_of"]
-
 CURRENT_CELL_SIZE = 2
 """Size of the message of the current cell: its index [-] and the time of its entry [s]."""
 

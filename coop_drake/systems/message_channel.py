@@ -11,8 +11,6 @@ from pydrake.systems.primitives import LinearSystem
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import READY_SIZE
 
-__all__ = ["MessageChannel", "clear_channel", "whole_periods"]
-
 _NOTHING = (-1.0, -1.0)
 
 

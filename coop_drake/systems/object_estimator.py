@@ -10,8 +10,6 @@ from coop_drake.plant import RobotPlant, robot_chain
 from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["ObjectEstimator"]
-
 
 class ObjectEstimator(Block):
     """Joins the object's pose with its twist A_k^-1 J_k z_k' from the robot's own motion: (27) and (29).

@@ -8,8 +8,6 @@ from coop_drake.laws.robot_dynamics import robot_effort
 from coop_drake.plant import RobotPlant, robot_chain
 from coop_drake.systems.block import Block
 
-__all__ = ["RobotEffort"]
-
 
 class RobotEffort(Block):
     """Actuation M z'' + C z' + G + J^T tau_e of one robot from its own model, state and commands: (22)-(34).

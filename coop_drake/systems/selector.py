@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 
 from pydrake.systems.primitives import Selector, SelectorParams
 
-__all__ = ["build_selector"]
-
 
 def build_selector(inputs: Mapping[str, int], outputs: Mapping[str, Sequence[tuple[int, int]]]) -> Selector:
     """Build a Selector, whose outputs are made of elements of its inputs.

@@ -7,13 +7,11 @@ from pydrake.systems.framework import BasicVector, Context
 from pydrake.systems.primitives import Selector
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.robot_dynamics import IntArray, read_robot
+from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.plant import SeparateTeam, TeamPlant, base_chain
 from coop_drake.systems.block import Block
 from coop_drake.systems.selector import build_selector
-from coop_drake.tree.pose import FloatArray
-
-__all__ = ["TeamSensor", "build_separate_sensor"]
+from coop_drake.tree.pose import FloatArray, IntArray
 
 
 @compiled

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coop_drake.compiled import compiled
 from coop_drake.laws.axis_table import track_axes, write_bounds
@@ -13,11 +12,9 @@ from coop_drake.laws.load_sharing import end_effector_command, rotated
 from coop_drake.laws.robot_dynamics import read_robot, robot_effort
 from coop_drake.systems.governor_kernels import govern
 from coop_drake.systems.ready_kernels import robot_ready
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
 
 __all__ = ["FusedCell", "FusedTeam", "drive_team", "report_readiness", "telemetry_parts", "telemetry_size"]
-
-IntArray = NDArray[np.int64]
 
 
 class FusedCell(NamedTuple):

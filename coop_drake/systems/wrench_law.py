@@ -9,8 +9,6 @@ from coop_drake.laws.load_sharing import end_effector_command
 from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["WrenchLaw"]
-
 
 class WrenchLaw(Block):
     """Turns the object's desired acceleration into one robot's share of the load: (21), (28) and (31).

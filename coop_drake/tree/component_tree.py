@@ -56,7 +56,7 @@ class TreeJoint:
       ``planarity.py``, ``joint_survey.py``, ``fixing.py`` and ``planar_chain.py``, all in ``plant/``;
     - to its geometry: ``unit`` below, ``ComponentTree.reach``, ``tree/team_arrays.py`` (its pose) and
       ``tree/levers.py``; ``geometry/sweep_kernels.py`` and ``swept_tree.py`` (over-sweeps),
-      ``geometry/under_kernels.py`` and ``sweeps.py`` (under-sweeps);
+      ``geometry/under_kernels.py`` (under-sweeps);
     - to the control laws: ``laws/robot_dynamics.py`` (velocities and forces);
     - to the planner: ``answers/problem.py`` (room beyond limits), ``planning/cells/split_rules.py``
       (``finest_widths``), ``planning/search/rescaling.py`` and ``diagnosis/team_changes.py``;

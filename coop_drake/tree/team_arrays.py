@@ -13,8 +13,6 @@ from coop_drake.tree.pose import FloatArray, IntArray
 if TYPE_CHECKING:
     from coop_drake.tree.component_tree import ComponentTree, ConvexShape, TreeJoint
 
-__all__ = ["TeamArrays", "moved", "place", "team_arrays"]
-
 
 class TeamArrays(NamedTuple):
     """A component tree as arrays: C components, P convex pieces, V vertices of all pieces, K pairs of pieces.

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from coop_drake.errors import TuningError
-from coop_drake.laws.gains import FixedGains, FloatArray, GainSet
+from coop_drake.laws.gains import FixedGains, GainSet
+from coop_drake.tree.pose import FloatArray
 
 
 @dataclass(frozen=True)

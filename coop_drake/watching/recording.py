@@ -10,7 +10,7 @@ from manifold3d import CrossSection, FillRule
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.minkowski import polygon_rings
+from coop_drake.geometry.parts import polygon_rings
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.boxes.channel import Channel
 from coop_drake.planning.cells.cell_graph import Kind

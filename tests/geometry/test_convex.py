@@ -2,16 +2,16 @@ import numpy as np
 import pytest
 from shapely import Polygon, box
 
-from coop_drake.geometry.convex import edge_angles, normals
+from coop_drake.geometry.convex import normals
 from coop_drake.geometry.distances import separated
-from coop_drake.geometry.sweep_kernels import circumscribed, closed_directions, support
+from coop_drake.geometry.sweep_kernels import circumscribed, closed_directions, edge_directions, support
 from coop_drake.geometry.under_kernels import half_planes_polygon
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
 def test_supports_at_the_edges_rebuild_the_polygon() -> None:
-    directions = closed_directions(edge_angles(SQUARE), 0.75 * np.pi)
+    directions = closed_directions(edge_directions(SQUARE), 0.75 * np.pi)
     rebuilt = Polygon(circumscribed(directions, support(SQUARE, directions)))
     assert rebuilt.symmetric_difference(Polygon(SQUARE)).area == pytest.approx(0.0, abs=1e-7)
 
@@ -24,7 +24,7 @@ def test_directions_are_closed_and_distinct() -> None:
 
 
 def test_half_planes_of_a_polygon_rebuild_it_from_inside() -> None:
-    angles = edge_angles(SQUARE)
+    angles = edge_directions(SQUARE)
     offsets = (normals(angles) * SQUARE).sum(axis=1)
     rebuilt = half_planes_polygon(angles, offsets)
     assert Polygon(SQUARE).contains(Polygon(rebuilt))
@@ -32,8 +32,8 @@ def test_half_planes_of_a_polygon_rebuild_it_from_inside() -> None:
 
 
 def test_redundant_and_repeated_half_planes_change_nothing() -> None:
-    angles = np.concatenate((edge_angles(SQUARE), edge_angles(SQUARE), [0.3]))
-    offsets = np.concatenate(((normals(edge_angles(SQUARE)) * SQUARE).sum(axis=1), [5.0] * 5))
+    angles = np.concatenate((edge_directions(SQUARE), edge_directions(SQUARE), [0.3]))
+    offsets = np.concatenate(((normals(edge_directions(SQUARE)) * SQUARE).sum(axis=1), [5.0] * 5))
     rebuilt = half_planes_polygon(angles, offsets)
     assert Polygon(rebuilt).area == pytest.approx(1.0, abs=1e-7)
 

@@ -5,7 +5,8 @@ from hypothesis import strategies as st
 from shapely import MultiPoint, MultiPolygon, Polygon, box, union_all
 from shapely.affinity import translate
 
-from coop_drake.geometry.minkowski import SAFE_SIDE, FreeSpace, polygon_rings, to_polygon
+from coop_drake.geometry.minkowski import SAFE_SIDE, FreeSpace, to_polygon
+from coop_drake.geometry.parts import polygon_rings
 from tests.support.trees import room
 
 POINTS = st.lists(st.tuples(st.floats(-0.6, 0.6), st.floats(-0.6, 0.6)), min_size=3, max_size=9)

@@ -6,7 +6,8 @@ from shapely import LineString, MultiPoint, Point, Polygon
 from shapely.affinity import rotate
 
 from coop_drake.geometry.sweep_kernels import grown, over_prismatic, over_revolute
-from coop_drake.geometry.sweeps import common_disc, inscribed, under_prismatic, under_revolute
+from coop_drake.geometry.swept_tree import inscribed
+from coop_drake.geometry.under_kernels import common_disc, under_prismatic, under_revolute
 
 RECTANGLE = np.array([[0.1, -0.1], [0.6, -0.1], [0.6, 0.1], [0.1, 0.1]])
 ROUND_PIVOT = np.array([[-0.3, -0.2], [0.6, -0.2], [0.5, 0.3], [-0.2, 0.25]])
@@ -36,7 +37,7 @@ def test_the_under_sweep_lies_in_every_turned_copy(
     ring: np.ndarray, centre: float, half: float, share: float
 ) -> None:
     sweep = under_revolute(ring, centre, half)
-    if sweep is not None:
+    if len(sweep):
         assert turned(ring, centre + share * half).covers(Polygon(sweep))
 
 
@@ -44,7 +45,7 @@ def test_many_turns_leave_no_more_than_one() -> None:
     """Chords of arcs that are longer than a turn would leap over what they stand for."""
     for turns in np.arange(1.0, 30.0, 0.5):
         sweep = under_revolute(ROUND_PIVOT, 0.3, turns * np.pi)
-        assert sweep is not None
+        assert len(sweep)
         assert np.hypot(*sweep.T).max() < 0.2
 
 
@@ -58,7 +59,7 @@ def test_lines_that_coincide_but_for_rounding_are_taken_at_the_innermost(
     ring = 0.3 * np.column_stack((np.cos(bearings), np.sin(bearings))) + np.array([aside, 0.0])
     half = steps * np.pi / corners
     sweep = under_revolute(ring, 0.25 * np.pi, half)
-    if sweep is not None:
+    if len(sweep):
         for share in (-1.0, 0.0, 1.0):
             assert turned(ring, 0.25 * np.pi + share * half).covers(Polygon(sweep))
 
@@ -80,16 +81,16 @@ def test_excess_vanishes_with_the_slice(ring: np.ndarray) -> None:
     missing = []
     for half in (0.02, 0.002, 0.0002):
         under = under_revolute(ring, 0.7, half)
-        assert under is not None
+        assert len(under)
         missing.append(area - Polygon(under).area)
     assert missing[1] < 0.15 * missing[0]
     assert missing[2] < 0.15 * missing[1]
 
 
 def test_turning_by_pi_or_more_leaves_nothing_beside_the_pivot() -> None:
-    assert under_revolute(RECTANGLE, 0.0, 0.5 * np.pi) is None
+    assert under_revolute(RECTANGLE, 0.0, 0.5 * np.pi).size == 0
     full = under_revolute(ROUND_PIVOT, 0.0, np.pi)
-    assert full is not None
+    assert len(full)
     radius = Polygon(ROUND_PIVOT).exterior.distance(Point(0, 0))
     assert np.hypot(*full.T).max() <= radius
 
@@ -102,9 +103,9 @@ def test_prismatic_sweeps_are_exact(ring: np.ndarray, dx: float, dy: float, shar
     exact = MultiPoint(np.concatenate((ring + first, ring + last))).convex_hull
     assert over.covers(exact)
     assert over.area == pytest.approx(exact.area, abs=1e-6)
-    under = under_prismatic(ring, first, last)
+    under = under_prismatic(ring, *first, *last)
     common = Polygon(ring + first).intersection(Polygon(ring + last))
-    if under is None:
+    if not len(under):
         assert common.area < 1e-6
     else:
         assert Polygon(ring + first + share * (last - first)).covers(Polygon(under))
@@ -125,6 +126,6 @@ def test_grown_and_inscribed_bracket_a_capsule(turn: float) -> None:
 @given(st.lists(st.tuples(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2)), min_size=1, max_size=5))
 def test_common_disc_lies_in_the_disc_about_every_centre(points: list[tuple[float, float]]) -> None:
     common = common_disc(np.array(points), 0.25, 0.2)
-    if common is not None:
+    if len(common):
         for x, y in points:
             assert np.hypot(common[:, 0] - x, common[:, 1] - y).max() <= 0.25

@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.minkowski import polygon_rings
+from coop_drake.geometry.parts import polygon_rings
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.boxes.box_kernels import box_clearance
 from coop_drake.planning.boxes.certify import box_arrays

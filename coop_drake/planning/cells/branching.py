@@ -14,8 +14,6 @@ from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.halves import Halves
 from coop_drake.planning.cells.slices import Slices, holds, share_facet
 
-__all__ = ["StrongBranching", "TrialSplit"]
-
 
 @dataclass(frozen=True)
 class TrialSplit:

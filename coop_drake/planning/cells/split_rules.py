@@ -25,8 +25,6 @@ from coop_drake.planning.cells.halves import Halves
 from coop_drake.planning.cells.slices import Slices
 from coop_drake.tree.levers import axis_levers
 
-__all__ = ["SplitOrder", "finest_widths"]
-
 LARGEST_SWEEP_RATIO = 16.0
 """An axis is not tried if another axis of the slice sweeps the team this many times as far [-]: halving it
 would make slices so thin that its own halvings show no effect."""

@@ -13,8 +13,6 @@ from coop_drake.errors import PlanError
 from coop_drake.planning.boxes.channel import Channel
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["Bounds", "check_ends", "final_intervals", "goal_intervals", "turned_to_start"]
-
 GOAL_FRACTION = 0.9
 """Fraction of a tolerance that a goal interval takes, so that its edges are within tolerance [-]."""
 

@@ -14,8 +14,6 @@ from coop_drake.planning.execution.channel_ends import goal_intervals
 from coop_drake.planning.execution.targets import choose_targets
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["path_through"]
-
 
 def path_through(
     problem: PlanningProblem, channel: Channel, targets: Sequence[FloatArray] | None = None

@@ -14,8 +14,6 @@ from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.planning.travel_time import SETTLING_TIME
 from coop_drake.tree.pose import FloatArray, IntArray
 
-__all__ = ["Waypoints", "choose_boxes"]
-
 LONGEST = 20.0
 """A box that takes longer than this is not used [s]: two of them with a waypoint between are faster."""
 

@@ -25,8 +25,6 @@ from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_inside
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["PathCovering", "cover_path"]
-
 LENGTH_STEP, ANGLE_STEP = 0.3, 0.15
 """Waypoints are no farther apart than this in position [m] and in every angle or joint [rad or m]: twice as
 many would make the choice of boxes four times as slow."""

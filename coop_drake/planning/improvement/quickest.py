@@ -20,8 +20,6 @@ from coop_drake.planning.search.rescaling import Rescaling
 from coop_drake.progress import Progress
 from coop_drake.tree.usual_unit import usual_unit
 
-__all__ = ["quickest_plan"]
-
 
 def quickest_plan(
     problem: PlanningProblem,

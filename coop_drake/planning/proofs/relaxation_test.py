@@ -8,8 +8,6 @@ from coop_drake.planning.questions.relaxation import relaxed
 from coop_drake.planning.sampling.sampler import Sampler
 from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
 
-__all__ = ["RelaxationTest"]
-
 SAMPLES = 8_000
 """Samples for every subsystem: twice those of a first attempt, because a failure costs an exploration."""
 

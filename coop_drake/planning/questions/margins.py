@@ -14,8 +14,8 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError
 from coop_drake.geometry import safeguards
 from coop_drake.geometry.convex import normals
-from coop_drake.geometry.minkowski import FreeSpace, polygon_rings, to_polygon
-from coop_drake.geometry.parts import parts_of
+from coop_drake.geometry.minkowski import FreeSpace, to_polygon
+from coop_drake.geometry.parts import parts_of, polygon_rings
 from coop_drake.tree.component_tree import Component, ComponentTree
 from coop_drake.tree.pose import FloatArray
 

@@ -10,8 +10,6 @@ from coop_drake.errors import PlanError
 from coop_drake.tree.component_tree import TreeJoint
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["check_question", "goal_beyond_limits"]
-
 
 def check_question(problem: PlanningProblem) -> None:
     """Refuse a question without meaning.

@@ -12,8 +12,6 @@ from shapely import Point, Polygon
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape
 
-__all__ = ["inscribed_disc", "relaxed"]
-
 POLE_TOLERANCE = 1e-4
 """Accuracy of the radius of an inscribed disc, unless another one is asked for [m]."""
 

@@ -12,8 +12,6 @@ from coop_drake.planning.sampling.sampler import Sampler
 from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["best_candidate", "margins_to_try", "moved_from_obstacles"]
-
 LEAST_CLEARANCE = 0.002
 """Clearance that candidates keep [m], as paths of the first attempts do."""
 

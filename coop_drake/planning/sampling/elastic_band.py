@@ -14,8 +14,6 @@ from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import team_arrays
 
-__all__ = ["CLEARANCE_PRICE", "estimated_duration", "path_clearance", "smoothed"]
-
 CLEARANCE_PRICE = 0.12
 """Cost of a unit length of the path for its narrowness, times the clearance there [m]."""
 

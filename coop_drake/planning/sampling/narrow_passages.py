@@ -19,16 +19,6 @@ from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import team_arrays
 
-__all__ = [
-    "Eased",
-    "amount_needed",
-    "are_free",
-    "ease_less",
-    "repaired",
-    "widened_floor",
-    "with_larger_least_clearance",
-]
-
 BODY_GAP = 0.002
 """Distance that bodies of the team keep from each other [m]."""
 

@@ -12,7 +12,8 @@ from shapely import MultiPolygon, Polygon
 from coop_drake.compiled import compiled
 from coop_drake.geometry.convex import following
 from coop_drake.geometry.distances import ray_crosses, squared_distance
-from coop_drake.geometry.minkowski import FreeSpace, polygon_rings
+from coop_drake.geometry.minkowski import FreeSpace
+from coop_drake.geometry.parts import polygon_rings
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
 

@@ -12,8 +12,6 @@ from coop_drake.tree.component_tree import Body, Component, ComponentTree, Conve
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.team_arrays import TeamArrays, team_arrays
 
-__all__ = ["Subsystem", "SubsystemHierarchy"]
-
 DISC_TOLERANCE, DISC_SHRINKAGE = 1e-3, 0.98
 """Accuracy of a guiding disc over its piece's perimeter, and the factor by which it is smaller than the
 largest one, so that it also passes where the piece does within that accuracy [-]."""

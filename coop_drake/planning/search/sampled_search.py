@@ -25,8 +25,6 @@ from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["BoxSequence", "SampledSearch", "luby"]
-
 CLEARANCES = (0.015, 0.002)
 """Clearances from the walls with which paths are sampled, in turns [m]: the larger one leaves space for long
 boxes, the smaller one lets narrow passages through."""

@@ -33,8 +33,6 @@ from coop_drake.planning.search.sampled_search import BoxSequence, SampledSearch
 from coop_drake.progress import Progress
 from coop_drake.tree.usual_unit import usual_unit
 
-__all__ = ["find_channel", "find_path"]
-
 ATTEMPTS_PER_ROUND = 4
 """Sampled attempts in every round of the search."""
 
