@@ -116,7 +116,7 @@ class BoundaryDistance:
         Args:
             points: The way, shape (n, 2) [m].
         """
-        shorter: FloatArray = points[_shortened(self._edges, np.ascontiguousarray(points))]
+        shorter: FloatArray = points[_shortened(self.edges, np.ascontiguousarray(points))]
         return shorter
 
     def along(self, start: ArrayLike, end: ArrayLike) -> float:

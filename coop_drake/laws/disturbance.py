@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.gains import FloatArray
+from coop_drake.tree.pose import FloatArray
 
 PHASE = 0.1
 """The observer's gain times the age of commands [rad]: the age turns the observer's loop by as much, a
