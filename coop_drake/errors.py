@@ -101,7 +101,7 @@ class RefusalError(CoopDrakeError):
     """A plan, a proof or a log does not hold; the message says where and what is wrong there, with numbers.
 
     Args:
-        where: The place in the document, for example ``cells[3].safe``, or in the log, ``joints[12, 1]``.
+        where: The place in the document, for example ``cells[3].tidied``, or in the log, ``joints[12, 1]``.
         finding: What is wrong there.
     """
 

@@ -26,7 +26,7 @@ class Planned:
         first_plan_cpu_seconds: To the first certified plan, or to the verdict [CPU s].
         slices: Compound slices swept.
         cells: Cells of the plan, 0 if there is no plan.
-        margin_m: Margin of the plan's cores, 0 if there is no plan [m].
+        neck_m: Clearance of the plan's narrowest passage, 0 if there is no plan [m].
         transport_seconds: Estimated duration of the transport, 0 if there is no plan [s].
     """
 
@@ -35,7 +35,7 @@ class Planned:
     first_plan_cpu_seconds: float
     slices: int
     cells: int
-    margin_m: float
+    neck_m: float
     transport_seconds: float
 
 
@@ -84,6 +84,6 @@ def _planned(ask: Callable[[], PlanningResult]) -> Planned:
         first_plan_cpu_seconds=seconds if first is None else first,
         slices=report.slices,
         cells=0 if found is None else len(found.cells),
-        margin_m=0.0 if found is None else found.margin,
+        neck_m=0.0 if found is None else min(t.neck for t in found.transitions),
         transport_seconds=0.0 if found is None else sum(t.estimated_time for t in found.transitions),
     )

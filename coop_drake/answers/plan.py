@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from coop_drake.answers.proof import InfeasibilityProof
-from coop_drake.answers.region import Region
+from coop_drake.answers.region import Points, Region
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.typed_data import EXACT, NotNegative, Number, Positive, Vector
@@ -25,15 +25,12 @@ class Cell:
     Attributes:
         lower: Lower ends of (theta, q...), theta unwrapped along the plan, shape (1 + n,) [rad, m].
         upper: Upper ends, shape (1 + n,).
-        safe: S_i, positions proved safe for every angle in the intervals [m].
-        core: The part of S_i that keeps the plan's margin [m].
-        tidied: Q_i inside S_i, simply connected, fit for a map and for the governor [m].
+        tidied: Q_i, positions that are safe for every angle in the intervals, simply connected, fit for a map
+            and for the governor [m].
     """
 
     lower: Vector
     upper: Vector
-    safe: Region
-    core: Region
     tidied: Region
 
 
@@ -45,13 +42,14 @@ class Transition:
         target: Point that the governor steers to, shape (2,) [m].
         goal_lower: Lower ends of the goal intervals of (theta, q...), shape (1 + n,).
         goal_upper: Upper ends, shape (1 + n,).
-        inradius: R_i, distance of the target to the boundary of ``goal_region`` [m].
+        inradius: R_i, radius of a disc about the target inside Q_i and Q_(i+1); in the last cell it is within
+            the tolerance of the goal [m].
         neck: b_i, widest clearance that a path to the target can keep inside Q_i [m].
-        length: Length of such a path [m].
+        length: Length of ``path`` [m].
         estimated_time: Estimated duration [s].
         only_angles: True where the position is already at the target and only angles move.
         gains: Gains of the governor and of the funnels.
-        goal_region: Region of Q_i and Q_(i+1) around the target; for the last cell around the goal [m].
+        path: Such a path from where the cell is entered to the target, shape (k, 2) [m].
     """
 
     target: Vector
@@ -63,7 +61,7 @@ class Transition:
     estimated_time: Annotated[NotNegative, EXACT]
     only_angles: bool
     gains: TransitionGains
-    goal_region: Region
+    path: Points
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,7 +71,6 @@ class Plan:
     Attributes:
         problem: Digest of the planning problem that it solves; empty for a plan made by hand.
         gain_set: Name of the gain set the gains were scheduled with.
-        margin: rho, clearance that the cores keep from the walls [m].
         joint_names: Names of q's entries, length n.
         start: z = (x, y, theta, q...), shape (3 + n,).
         goal_pose: (x, y, theta), theta unwrapped along the plan, shape (3,).
@@ -84,7 +81,6 @@ class Plan:
 
     problem: str = ""
     gain_set: str
-    margin: Annotated[NotNegative, EXACT]
     joint_names: tuple[str, ...]
     start: Vector
     goal_pose: Vector

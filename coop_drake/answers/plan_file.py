@@ -14,7 +14,7 @@ from coop_drake.typed_data import to_plain
 FORMAT = "coop_drake plan"
 """What the document says it is."""
 
-VERSION = 2
+VERSION = 3
 """Version of its layout; another one is refused."""
 
 
@@ -23,15 +23,16 @@ def save_plan(plan: Plan, path: Path | str) -> Path:
 
     The file is written whole or not at all; its path is returned.
     """
-    return write_document(path, _content(plan), rows=("cells", "transitions"))
+    return write_document(path, plan_document(plan), rows=("cells", "transitions"))
 
 
 def plan_digest(plan: Plan) -> str:
     """Return the digest that ``save_plan`` writes into a plan's file."""
-    return content_digest(_content(plan))
+    return content_digest(plan_document(plan))
 
 
-def _content(plan: Plan) -> dict[str, Any]:
+def plan_document(plan: Plan) -> dict[str, Any]:
+    """The content of a plan's file without its digest, as plain data."""
     return {"format": FORMAT, "version": VERSION, **to_plain(plan, Plan)}
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from coop_drake.answers.region import Region
-from coop_drake.typed_data import EXACT, Limits, Positive, Vector
+from coop_drake.answers.region import Region, Ring
+from coop_drake.typed_data import EXACT, Limits, Vector
 
 Index = Annotated[int, Limits(at_least=0), EXACT]
 
@@ -28,16 +28,46 @@ class OverCell:
 
 
 @dataclass(frozen=True)
+class InnerSweep:
+    """A convex polygon that lies inside a piece of a body at every configuration of a slice.
+
+    Attributes:
+        piece: Number of the piece, in the order of components, bodies and shapes.
+        polygon: Vertices relative to the object's origin, in directions of W, shape (n, 2) [m].
+    """
+
+    piece: Index
+    polygon: Ring
+
+
+@dataclass(frozen=True)
+class Overlap:
+    """A point that lies inside two pieces at every configuration of a slice.
+
+    Attributes:
+        pieces: Numbers of the two pieces, ascending.
+        point: The point in the frame of the nearest component that carries both, shape (2,) [m].
+    """
+
+    pieces: tuple[Index, ...]
+    point: Vector
+
+
+@dataclass(frozen=True)
 class AngleBox:
-    """Intervals of theta and of the joints of the robots that are kept.
+    """Intervals of theta and of the joints of the robots that are kept, with what shows collisions in them.
 
     Attributes:
         lower: Lower ends of the nominal intervals of (theta, kept joints...), shape (1 + m,) [rad, m].
         upper: Upper ends, shape (1 + m,).
+        overlaps: Where two pieces overlap in the whole slice, if that is known.
+        inner_sweeps: What pieces cover: positions at which it meets a wall are in collision.
     """
 
     lower: Vector
     upper: Vector
+    overlaps: tuple[Overlap, ...]
+    inner_sweeps: tuple[InnerSweep, ...]
 
 
 @dataclass(frozen=True)
@@ -76,14 +106,12 @@ class DiscProof:
     Attributes:
         component: Index of the component in the tree.
         centre: The disc's centre in the component's frame, shape (2,) [m].
-        radius: Its radius [m].
-        cells: Regions of the centre's positions in W that cover all those at which the disc fits.
+        slices: One slice of all angles; its cells and inner sweeps are about the centre's positions in W.
     """
 
     component: Index
     centre: Vector
-    radius: Annotated[Positive, EXACT]
-    cells: tuple[OverCell, ...]
+    slices: tuple[OverSlice, ...]
 
 
 @dataclass(frozen=True)

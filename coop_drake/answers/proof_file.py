@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.document import Document, write_document
@@ -14,7 +15,7 @@ from coop_drake.typed_data import to_plain
 FORMAT = "coop_drake proof of infeasibility"
 """What the document says it is."""
 
-VERSION = 1
+VERSION = 2
 """Version of its layout; another one is refused."""
 
 KINDS: dict[str, type[InfeasibilityProof]] = {
@@ -40,9 +41,15 @@ class SavedProof:
 
 def save_proof(proof: InfeasibilityProof, problem: PlanningProblem, path: Path | str) -> Path:
     """Write a proof that a planning problem has no solution, whole or not at all; return the path."""
+    return write_document(path, proof_document(proof, problem), rows=("slices",))
+
+
+def proof_document(proof: InfeasibilityProof, problem: PlanningProblem) -> dict[str, Any]:
+    """The content of a proof's file without its digest, as plain data."""
     kind = next(name for name, kind in KINDS.items() if isinstance(proof, kind))
     own = {"format": FORMAT, "version": VERSION, "problem": problem_digest(problem), "kind": kind}
-    return write_document(path, own | to_plain(proof, KINDS[kind]), rows=("cells", "slices"))
+    content: dict[str, Any] = own | to_plain(proof, KINDS[kind])
+    return content
 
 
 def read_proof(document: Document) -> SavedProof:
@@ -57,9 +64,8 @@ def read_proof(document: Document) -> SavedProof:
     proof = document.read(kind, head=("format", "version", "problem", "kind"))
     if isinstance(proof, DiscProof):
         document.check_length("centre", 2)
-    elif not proof.slices:
+    if not proof.slices:
         document.refuse("slices", [], "at least one slice")
-    else:
-        for k, part in enumerate(proof.slices):
-            document.check_intervals(f"slices[{k}].", max(1, len(part.lower)), points=True)
+    for k, part in enumerate(proof.slices):
+        document.check_intervals(f"slices[{k}].", max(1, len(part.lower)), points=True)
     return SavedProof(document.content["problem"], proof)

@@ -1,6 +1,7 @@
 """Regions in files: the rings of a polygon, without their closing corners."""
 
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from typing import Annotated
 
@@ -13,14 +14,14 @@ from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import Codec, DataError, Number, convert, convert_class
 
 
-def _read_ring(value: object, key: str) -> FloatArray:
-    """Read the corners of a ring, shape (n, 2) [m]."""
+def _read_points(value: object, key: str, *, least: int) -> FloatArray:
+    """Read a list of points, shape (n, 2) [m]."""
     if _holds_pairs(value):
-        corners = np.array(value, dtype=np.float64)
-        if len(corners) >= 3 and np.isfinite(corners).all():
-            return corners
+        points = np.array(value, dtype=np.float64)
+        if len(points) >= least and np.isfinite(points).all():
+            return points
     convert(value, tuple[tuple[Number, Number], ...], key)  # This is slower; it names the wrong entry.
-    raise DataError(key, value, "a list of at least 3 corners")
+    raise DataError(key, value, f"a list of at least {least} {'corners' if least > 2 else 'points'}")
 
 
 def _holds_pairs(value: object) -> bool:
@@ -30,7 +31,10 @@ def _holds_pairs(value: object) -> bool:
     return set(map(type, chain.from_iterable(value))) <= {int, float}
 
 
-Ring = Annotated[FloatArray, Codec(_read_ring, np.ndarray.tolist)]
+Ring = Annotated[FloatArray, Codec(partial(_read_points, least=3), np.ndarray.tolist)]
+
+Points = Annotated[FloatArray, Codec(partial(_read_points, least=2), np.ndarray.tolist)]
+"""A polyline that a file holds as the list of its points [m]."""
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,6 @@ _ROWS: tuple[tuple[str, str, str], ...] = (
     ("answer", "answer", "{}"),
     ("cells", "cells", "{}"),
     ("slices made", "slices", "{}"),
-    ("margin kept", "margin_m", "{:.3f} m"),
     ("narrowest passage", "narrowest_neck_m", "{:.3f} m"),
     ("gains", "gains", "{}"),
     ("estimated transport", "estimated_seconds", "{:.1f} s"),
@@ -72,7 +71,6 @@ def plan_facts(plan: Plan) -> dict[str, Any]:
     """Return the size of a plan and what it promises."""
     return {
         "cells": len(plan.cells),
-        "margin_m": plan.margin,
         "narrowest_neck_m": min(transition.neck for transition in plan.transitions),
         "estimated_seconds": sum(transition.estimated_time for transition in plan.transitions),
         "gains": plan.gain_set,

@@ -84,7 +84,7 @@ class Invariants:
     def __init__(self, clearance: TeamClearance, plan: Plan, *, exact: bool = True) -> None:
         self._clearance, self._exact = clearance, exact
         self._cells = [
-            (BoundaryDistance(cell.safe).edges, np.array(cell.lower), np.array(cell.upper))
+            (BoundaryDistance(cell.tidied).edges, np.array(cell.lower), np.array(cell.upper))
             for cell in plan.cells
         ]
         self._axes = ("object angle", *plan.joint_names)

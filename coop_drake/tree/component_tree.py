@@ -60,8 +60,7 @@ class TreeJoint:
     - to the control laws: ``laws/robot_dynamics.py`` (velocities and forces);
     - to the planner: ``answers/problem.py`` (room beyond limits), ``planning/cells/split_rules.py``
       (``finest_widths``), ``planning/search/rescaling.py`` and ``diagnosis/team_changes.py``;
-    - independently of all these to ``solids.py``, ``outer_sweeps.py`` and ``inner_sweeps.py`` of
-      ``verification/``.
+    - independently of all these to ``checking/team.py`` and to ``verification/question.py``.
 
     Attributes:
         name: Scoped name, for example ``robot_0::elbow``.

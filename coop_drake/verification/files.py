@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import shapely
-
 from coop_drake.answers import plan_file, proof_file
 from coop_drake.answers.digest import content_digest
 from coop_drake.answers.document import Document
@@ -15,9 +13,8 @@ from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
 from coop_drake.progress import Progress
 from coop_drake.verification.checks import Check, Verified
-from coop_drake.verification.plans import verify_plan
+from coop_drake.verification.exact import verify_plan, verify_proof
 from coop_drake.verification.problem_match import check_digest
-from coop_drake.verification.proofs import verify_proof
 
 __all__ = ["verify_file"]
 
@@ -45,18 +42,15 @@ def verify_file(
     """
     document = Document.load(path, "a plan or a proof of infeasibility")
     form = document.check_entry("format", plan_file.FORMAT, proof_file.FORMAT)
-    try:
-        if form == plan_file.FORMAT:
-            plan = plan_file.read_plan(document)
-            unaltered = _check_unaltered(document)
-            verified = verify_plan(plan, problem, gain_sets, progress)
-        else:
-            saved = proof_file.read_proof(document)
-            unaltered = _check_unaltered(document)
-            check_digest(saved.problem, problem)
-            verified = verify_proof(saved.proof, problem, progress)
-    except shapely.errors.GEOSException as error:
-        raise RefusalError("document", f"geometry in it cannot be worked with: {error}") from error
+    if form == plan_file.FORMAT:
+        plan = plan_file.read_plan(document)
+        unaltered = _check_unaltered(document)
+        verified = verify_plan(plan, problem, gain_sets, progress)
+    else:
+        saved = proof_file.read_proof(document)
+        unaltered = _check_unaltered(document)
+        check_digest(saved.problem, problem)
+        verified = verify_proof(saved.proof, problem, progress)
     return Verified(verified.answer, verified.subject, (unaltered, *verified.checks))
 
 

@@ -10,10 +10,7 @@ from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
-from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
-
-__all__ = ["check_digest", "check_problem", "goal_box", "same_angle"]
 
 SAME_ANGLE = 1e-9
 """Two angles that differ by this, whole turns aside, are one angle that was rounded [rad]."""
@@ -22,15 +19,6 @@ SAME_ANGLE = 1e-9
 def same_angle(first: float, second: float) -> bool:
     """Whether two angles are the same up to whole turns and rounding [rad]."""
     return abs(remainder(float(first - second), tau)) <= SAME_ANGLE
-
-
-def goal_box(problem: PlanningProblem) -> tuple[FloatArray, FloatArray]:
-    """Ends of the intervals of (theta, q...) at the goal, a free joint's its limits, shape (1 + n,) each."""
-    ends = [(float(problem.goal_pose[2]),) * 2]
-    for joint, goal in zip(problem.tree.joints, problem.goal_joints, strict=True):
-        ends.append((joint.lower, joint.upper) if goal is None else (goal, goal))
-    lower, upper = np.array(ends).T
-    return lower, upper
 
 
 def check_digest(digest: str, problem: PlanningProblem) -> None:

@@ -9,7 +9,7 @@ from shapely.geometry.base import BaseGeometry
 from coop_drake.answers.plan import Plan
 from coop_drake.drawing.colours import BLUE, GREEN, OBJECT
 from coop_drake.drawing.solids import flat_mesh
-from coop_drake.geometry.parts import parts_of
+from coop_drake.geometry.parts import component_at, parts_of
 from coop_drake.viz.paint import rgba, set_mesh
 
 CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR = BLUE, GREEN, OBJECT
@@ -32,7 +32,7 @@ def set_cells(meshcat: Meshcat, plan: Plan) -> None:
     for index, (cell, transition) in enumerate(zip(plan.cells, plan.transitions, strict=True)):
         of_cell, of_goal = cell_paths(index)
         _set_area(meshcat, of_cell, cell.tidied, 0.004, CELL_COLOUR)
-        _set_area(meshcat, of_goal, transition.goal_region, 0.012, GOAL_COLOUR)
+        _set_area(meshcat, of_goal, _goal_region(plan, index), 0.012, GOAL_COLOUR)
         target = Point(transition.target).buffer(_TARGET, quad_segs=4)
         _set_flat(meshcat, f"{of_goal}/target", target, 0.020, GOAL_COLOUR, 1.0)
         for path in (of_cell, of_goal):
@@ -48,6 +48,14 @@ def set_goal(meshcat: Meshcat, footprint: BaseGeometry) -> None:
 def cell_paths(index: int) -> tuple[str, str]:
     """Return the paths of a cell and of its goal region."""
     return f"/plan/cells/{index:03d}", f"/plan/goal_regions/{index:03d}"
+
+
+def _goal_region(plan: Plan, index: int) -> BaseGeometry:
+    """What a cell and the next one share around the target; in the last cell the disc about the goal."""
+    target = Point(plan.transitions[index].target)
+    if index + 1 == len(plan.cells):
+        return target.buffer(plan.transitions[index].inradius)
+    return component_at(plan.cells[index].tidied & plan.cells[index + 1].tidied, target)
 
 
 def _set_area(meshcat: Meshcat, path: str, shape: BaseGeometry, height: float, colour: str) -> None:

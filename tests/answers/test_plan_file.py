@@ -58,19 +58,20 @@ def test_saving_again_gives_the_same_bytes(plan, saved, tmp_path):
 
 @given(st.floats(allow_nan=False, allow_infinity=False, min_value=0.0), st.floats(-3.0, 3.0))
 @settings(max_examples=50, deadline=None)
-def test_numbers_survive_to_the_last_bit(plan, tmp_path_factory, margin, joint):
+def test_numbers_survive_to_the_last_bit(plan, tmp_path_factory, length, joint):
     path = tmp_path_factory.mktemp("plans") / "plan.json"
-    changed = replace(plan, margin=margin, goal_joints=(joint, None))
+    moved = replace(plan.transitions[0], length=length)
+    changed = replace(plan, transitions=(moved, *plan.transitions[1:]), goal_joints=(joint, None))
     assert_same(load_plan(save_plan(changed, path)), changed)
 
 
 def test_holes_are_kept(plan, tmp_path):
-    x0, y0, x1, y1 = plan.cells[1].safe.buffer(1.0).bounds
+    x0, y0, x1, y1 = plan.cells[1].tidied.buffer(1.0).bounds
     hall = box(x0, y0, x1, y1).difference(box(x0 + 0.1, y0 + 0.1, x0 + 0.2, y0 + 0.2))
-    cells = (plan.cells[0], replace(plan.cells[1], safe=hall), plan.cells[2])
+    cells = (plan.cells[0], replace(plan.cells[1], tidied=hall), plan.cells[2])
     changed = replace(plan, cells=cells)
     loaded = load_plan(save_plan(changed, tmp_path / "plan.json"))
-    assert len(loaded.cells[1].safe.interiors) == 1
+    assert len(loaded.cells[1].tidied.interiors) == 1
     assert_same(loaded, changed)
 
 
@@ -106,12 +107,18 @@ FAR = {"outer": [[90, 90], [91, 90], [91, 91]], "holes": []}
             drop("cells", 1, "upper"),
             r"cells\[1\].upper: None is not allowed; expected a value; this key is required",
         ),
-        (put(1, "colour"), r"colour: 1 is not allowed; expected one of the keys problem, gain_set, margin"),
+        (
+            put(1, "colour"),
+            r"colour: 1 is not allowed; expected one of the keys problem, gain_set, joint_names",
+        ),
         (put("song", "format"), r"format: 'song' is not allowed; expected 'coop_drake plan'"),
-        (put(1, "version"), r"version: 1 is not allowed; expected 2"),
+        (put(1, "version"), r"version: 1 is not allowed; expected 3"),
         (put(True, "version"), r"version: True is not allowed"),
         (put(7, "gain_set"), r"gain_set: 7 is not allowed; expected a text"),
-        (put(-0.1, "margin"), r"margin: -0.1 is not allowed; expected zero or a positive number"),
+        (
+            put(-0.1, "transitions", 0, "length"),
+            r"transitions\[0\].length: -0.1 is not allowed; expected zero or a positive number",
+        ),
         (put(float("nan"), "start", 2), r"start\[2\]: nan is not allowed; expected a finite number"),
         (put("a", "start", 0), r"start\[0\]: 'a' is not allowed"),
         (put([0.0, 1.0], "goal_pose"), r"goal_pose: .* is not allowed; expected 3 entries, not 2"),
@@ -123,20 +130,19 @@ FAR = {"outer": [[90, 90], [91, 90], [91, 91]], "holes": []}
             put(9.0, "cells", 0, "lower", 1),
             r"cells\[0\].upper\[1\]: .* expected more than cells\[0\].lower\[1\], 9",
         ),
-        (put(BOW, "cells", 2, "safe"), r"cells\[2\].safe: .* cross neither .*Self-intersection"),
+        (put(BOW, "cells", 2, "tidied"), r"cells\[2\].tidied: .* cross neither .*Self-intersection"),
         (
-            put([[0, 0]], "cells", 2, "safe", "outer"),
-            r"cells\[2\].safe.outer: .* a list of at least 3 corners",
+            put([[0, 0]], "cells", 2, "tidied", "outer"),
+            r"cells\[2\].tidied.outer: .* a list of at least 3 corners",
         ),
         (
-            put([0, 0, 0], "cells", 2, "safe", "outer", 1),
-            r"cells\[2\].safe.outer\[1\]: .* expected a list of 2",
+            put([0, 0, 0], "cells", 2, "tidied", "outer", 1),
+            r"cells\[2\].tidied.outer\[1\]: .* expected a list of 2",
         ),
-        (put(FAR, "cells", 1, "core"), r"cells\[1\].core: leaves cells\[1\].safe"),
-        (put(FAR, "cells", 1, "tidied"), r"cells\[1\].tidied: leaves cells\[1\].safe"),
+        (put(FAR, "cells", 1, "tidied"), r"transitions\[0\].target: .* inside cells\[1\].tidied"),
         (
-            put(FAR, "transitions", 1, "goal_region"),
-            r"transitions\[1\].goal_region: leaves cells\[1\].tidied",
+            put([[0.0, 0.0]], "transitions", 1, "path"),
+            r"transitions\[1\].path: .* expected a list of at least 2 points",
         ),
         (
             put([90.0, 90.0], "transitions", 0, "target"),

@@ -54,8 +54,8 @@ def test_a_start_in_a_wall_ends_the_run_at_once(problem):
 
 def test_an_object_outside_its_cell_is_a_violation(problem):
     scenario, plan = problem
-    safe = plan.cells[1].safe - box(3.3, 2.0, 5.0, 6.0)
-    log = simulate(scenario, with_cell(plan, 1, safe=safe), small_maps())
+    tidied = plan.cells[1].tidied - box(3.3, 2.0, 5.0, 6.0)
+    log = simulate(scenario, with_cell(plan, 1, tidied=tidied), small_maps())
     assert not log.reached
     assert "distance of the object to the boundary of cell 1 is -" in log.violation
 

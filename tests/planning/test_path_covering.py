@@ -38,11 +38,11 @@ def test_every_configuration_of_the_new_boxes_is_free(base, quick):
     problem, _ = base
     rng = np.random.default_rng(3)
     for cell in quick.cells:
-        low, high = np.array(cell.safe.bounds).reshape(2, 2)
+        low, high = np.array(cell.tidied.bounds).reshape(2, 2)
         for corner in rng.integers(0, 2, (6, len(cell.lower))):
             angles = np.where(corner == 1, cell.upper, cell.lower)
             inside = rng.uniform(low, high, (60, 2))
-            inside = inside[[cell.safe.buffer(-1e-6).contains(Point(point)) for point in inside]]
+            inside = inside[[cell.tidied.buffer(-1e-6).contains(Point(point)) for point in inside]]
             assert FreePositions(problem.tree, problem.workspace, angles).free(inside).all()
 
 
@@ -62,7 +62,7 @@ def test_fixed_gains_get_boxes_of_their_own(base):
 def test_the_same_channel_gives_the_same_boxes(base, quick):
     again = quickest_plan(*base, ScheduledGains(), gain_set_name="scheduled")
     for first, second in zip(quick.cells, again.cells, strict=True):
-        assert first.safe.wkb == second.safe.wkb
+        assert first.tidied.wkb == second.tidied.wkb
         np.testing.assert_array_equal(first.lower, second.lower)
 
 
@@ -95,7 +95,7 @@ def test_what_cannot_be_proved_is_not_used(base, monkeypatch):
     monkeypatch.setattr(CellMaker, "under_cells", lambda self, expanded: [])
     assert cover_path(base[0], base[1].path, base[1].margin, ScheduledGains()) is None
     plan = quickest_plan(*base, ScheduledGains(), gain_set_name="scheduled")
-    assert [cell.safe.wkb for cell in plan.cells] == [cell.safe.wkb for cell in own.cells]
+    assert [cell.tidied.wkb for cell in plan.cells] == [cell.tidied.wkb for cell in own.cells]
 
 
 def test_a_long_aisle_is_crossed_at_the_governors_speed():

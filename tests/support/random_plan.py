@@ -45,7 +45,7 @@ def random_plan(rng: np.random.Generator, joint_names: tuple[str, ...], cells: i
         low, high = np.minimum(*corners[index : index + 2]), np.maximum(*corners[index : index + 2])
         polygon = box(*(low - half), *(high + half))
         lower, upper = np.array([axis[index] for axis in slices]).T
-        made.append(Cell(lower, upper, polygon, polygon.buffer(-0.25 * half), polygon))
+        made.append(Cell(lower, upper, polygon))
     last = slices[0][-1]
     angle = rng.uniform(last[0] + 2.0 * ANGLE_TOLERANCE, last[1] - 2.0 * ANGLE_TOLERANCE)
     start = np.array([*START_POSE, *[0.0] * n])

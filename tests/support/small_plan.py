@@ -76,7 +76,6 @@ def plan_by_hand(
         goal_pose=goal_pose,
         goal_joints=(None,) * len(joint_names),
         joint_names=joint_names,
-        margin=0.1,
         gain_set="by hand",
     )
 
@@ -98,7 +97,7 @@ def stiffer_and_stiffer(plan: Plan) -> Plan:
 
 def _cell(polygon: Polygon, angle: tuple[float, float], joint: tuple[float, float], n: int) -> Cell:
     lower, upper = np.array([angle[0], *[joint[0]] * n]), np.array([angle[1], *[joint[1]] * n])
-    return Cell(lower, upper, polygon, polygon.buffer(-0.1), polygon)
+    return Cell(lower, upper, polygon)
 
 
 def _transition(
@@ -112,17 +111,16 @@ def _transition(
     cell, last = cells[index], index == len(cells) - 1
     if last:
         target = goal_pose[:2]
-        region = Point(target).buffer(POSITION_TOLERANCE)
         inradius = POSITION_TOLERANCE
         lower, upper = cell.lower.copy(), cell.upper.copy()
         lower[0], upper[0] = goal_pose[2] - ANGLE_TOLERANCE, goal_pose[2] + ANGLE_TOLERANCE
     else:
-        region = cell.safe & cells[index + 1].safe
+        region = cell.tidied & cells[index + 1].tidied
         target = np.array(region.centroid.coords[0])
         inradius = region.exterior.distance(Point(target))
         lower = np.maximum(cell.lower, cells[index + 1].lower)
         upper = np.minimum(cell.upper, cells[index + 1].upper)
-    neck = min(cell.safe.exterior.distance(Point(p)) for p in (position, target))
+    neck = min(cell.tidied.exterior.distance(Point(p)) for p in (position, target))
     gains = transition_gains(
         gain_set,
         clearance=neck,
@@ -135,7 +133,6 @@ def _transition(
     length = float(np.linalg.norm(target - position))
     return Transition(
         target=target,
-        goal_region=region,
         goal_lower=lower,
         goal_upper=upper,
         inradius=inradius,
@@ -144,4 +141,5 @@ def _transition(
         estimated_time=0.6 + length / (3.0 * neck),
         only_angles=False,
         gains=gains,
+        path=np.array([position, target]),
     )

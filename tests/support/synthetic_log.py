@@ -26,7 +26,6 @@ def synthetic_plan(problem: PlanningProblem) -> Plan:
         goal_pose=problem.goal_pose,
         goal_joints=problem.goal_joints,
         joint_names=tuple(joint.name for joint in problem.tree.joints),
-        margin=0.1,
         gain_set="scheduled",
     )
 
@@ -87,7 +86,7 @@ def _cell(point: np.ndarray, angle: float, n: int) -> Cell:
         return Point(point).buffer(half, cap_style="square")
 
     centre = np.concatenate([[angle], np.zeros(n)])
-    return Cell(centre - 0.6, centre + 0.6, square(0.5), square(0.4), square(0.45))
+    return Cell(centre - 0.6, centre + 0.6, square(0.45))
 
 
 def _transition(cell: Cell, target: np.ndarray) -> Transition:
@@ -97,7 +96,6 @@ def _transition(cell: Cell, target: np.ndarray) -> Transition:
     )
     return Transition(
         target=target,
-        goal_region=cell.tidied,
         goal_lower=cell.lower + 0.1,
         goal_upper=cell.upper - 0.1,
         inradius=0.4,
@@ -106,4 +104,5 @@ def _transition(cell: Cell, target: np.ndarray) -> Transition:
         estimated_time=3.0,
         only_angles=False,
         gains=gains,
+        path=np.array([target, target]),
     )

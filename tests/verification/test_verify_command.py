@@ -56,7 +56,7 @@ def test_an_infeasible_scenario_says_where_its_proof_is(planned, tmp_path):
 def test_refused_files_say_what_and_where(planned, tmp_path):
     scenario, file = planned[0]
     document = json.loads(file.read_text())
-    altered = changed(document, ("margin",), document["margin"] + 1e-9)
+    altered = changed(document, ("transitions", 0, "neck"), document["transitions"][0]["neck"] + 1e-9)
     result = invoke("verify", write(altered, tmp_path / "plan.json", signed=False), scenario, "--json")
     assert result.exit_code == 1
     facts = json.loads(result.stdout)

@@ -101,6 +101,7 @@ class Exploration:
     ) -> None:
         self._problem, self._watch = problem, watch
         self._question, self._paused = question, False
+        self.swept, self.pairs = swept, pairs
         self.slices = Slices(problem.tree, problem.settings.slice_overlap)
         self.maker = CellMaker(swept, pairs, workspace)
         self.graph = CellGraph(self.slices)

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 from math import isfinite, sqrt
 
 import numpy as np
-import shapely
-from shapely import LineString
 
 from coop_drake.answers.plan import Plan
 from coop_drake.geometry.boundary import edges_of
-from coop_drake.geometry.passage import PassageFinder
 from coop_drake.laws import TransitionGains, axis_table
 from coop_drake.planning.execution.transport_kernels import cross_cell
 from coop_drake.planning.travel_time import transition_time
@@ -51,7 +46,7 @@ def plan_time(plan: Plan) -> float:
     return sum(transition.estimated_time for transition in plan.transitions)
 
 
-def timed(plan: Plan, paths: Sequence[LineString] | None = None) -> Plan:
+def timed(plan: Plan) -> Plan:
     """Estimate the time of every transition of a plan.
 
     The closed loop is integrated from cell to cell: a point mass behind the governor (14)-(16) with the exact
@@ -61,13 +56,10 @@ def timed(plan: Plan, paths: Sequence[LineString] | None = None) -> Plan:
 
     Args:
         plan: The plan; its present estimates are not read.
-        paths: For each transition the path from where its cell is entered to its target; the widest ones
-            inside the tidied cells if not given.
 
     Returns:
         The plan with estimates; ``transition_time`` where a transition is not left within two minutes.
     """
-    paths = paths if paths is not None else _widest_paths(plan)
     crossings = [
         (
             np.ascontiguousarray(edges_of(cell.tidied)),
@@ -83,11 +75,10 @@ def timed(plan: Plan, paths: Sequence[LineString] | None = None) -> Plan:
         zip(plan.transitions, crossings, strict=True)
     ):
         last = index + 1 == len(crossings)
-        path = shapely.get_coordinates(paths[index])
         next_edges, next_gains, next_table = following[index]
         seconds = cross_cell(
-            state, edges, path, gains, table, transition.inradius, next_edges, next_gains, next_table,
-            last, LONGEST,
+            state, edges, transition.path, gains, table, transition.inradius,
+            next_edges, next_gains, next_table, last, LONGEST,
         )  # fmt: skip
         if not isfinite(seconds):
             speed = speed_per_clearance(transition.gains)
@@ -95,14 +86,6 @@ def timed(plan: Plan, paths: Sequence[LineString] | None = None) -> Plan:
             state = _at_rest(transition.target, 0.5 * (transition.goal_lower + transition.goal_upper))
         transitions.append(replace(transition, estimated_time=seconds))
     return replace(plan, transitions=tuple(transitions))
-
-
-def _widest_paths(plan: Plan) -> list[LineString]:
-    points = [plan.start[:2], *(transition.target for transition in plan.transitions)]
-    return [
-        PassageFinder(cell.tidied).find(entry, target).path
-        for cell, (entry, target) in zip(plan.cells, pairwise(points), strict=True)
-    ]
 
 
 def _at_rest(position: FloatArray, axes: FloatArray) -> FloatArray:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from math import cos, pi, sin
 
 import numpy as np
+import shapely
 from shapely import Point, Polygon
 
 from coop_drake.answers.digest import problem_digest
@@ -89,7 +90,6 @@ def make_plan(
         goal_pose=np.array([*goal, channel.goal_angle]),
         goal_joints=problem.goal_joints,
         joint_names=tuple(joint.name for joint in problem.tree.joints),
-        margin=channel.margin,
         gain_set=gain_set_name,
         problem=problem_digest(problem),
     )
@@ -121,10 +121,9 @@ def with_gains(plan: Plan, gain_set: GainSet, name: str) -> Plan:
 
 @dataclass(frozen=True)
 class _TransitionGeometry:
-    """The positions of one transition: its target, its goal region with its inradius, and its passage."""
+    """The positions of one transition: its target with the room around it, and its passage."""
 
     target: FloatArray
-    region: Polygon
     inradius: float
     passage: Passage
 
@@ -139,7 +138,7 @@ def _route(
     else:
         region = component_at(_disc(target, problem.position_tolerance).intersection(here), Point(target))
     inradius = 0.0 if region.is_empty else BoundaryDistance(region)(target)
-    route = _TransitionGeometry(target, region, inradius, PassageFinder(here).find(entry, target))
+    route = _TransitionGeometry(target, inradius, PassageFinder(here).find(entry, target))
     wanted = NARROWEST
     if len(cells) == 1:
         wanted = min(NARROWEST, GOAL_REGION_FRACTION * problem.position_tolerance)
@@ -151,7 +150,7 @@ def _route(
 
 def _timed(problem: PlanningProblem, plan: Plan, routes: Sequence[_TransitionGeometry]) -> Plan:
     """The plan with estimated times; raises a StallError if one of them is too long."""
-    plan = timed(plan, [route.passage.path for route in routes])
+    plan = timed(plan)
     for index, (route, transition) in enumerate(zip(routes, plan.transitions, strict=True)):
         if transition.estimated_time > problem.settings.max_transition_time:
             raise StallError(_stall(problem, index, route, transition.estimated_time))
@@ -164,7 +163,7 @@ def _transition(
     """A transition without its estimated time."""
     return Transition(
         target=route.target,
-        goal_region=route.region,
+        path=shapely.get_coordinates(route.passage.path),
         goal_lower=goals[0],
         goal_upper=goals[1],
         inradius=route.inradius,
@@ -193,7 +192,7 @@ def _cell(box: FreeBox, entry: FloatArray, target: FloatArray, index: int) -> Ce
         tidied = tidy_cell(box.polygon, (entry, target))
     except GeometryError as error:
         raise StallError(f"cell {index}: {error}") from error
-    return Cell(box.lower, box.upper, box.polygon, box.core, tidied)
+    return Cell(box.lower, box.upper, tidied)
 
 
 def _gains(

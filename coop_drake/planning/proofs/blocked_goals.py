@@ -9,6 +9,7 @@ from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.slices import halves
 from coop_drake.planning.proofs.proof_making import blocked_goal_proof
+from coop_drake.planning.proofs.witnesses import Witnesses
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.questions.relaxation import relaxed
 
@@ -31,21 +32,22 @@ def blocked_goal(problem: PlanningProblem) -> tuple[BlockedGoalProof | None, int
     robots = sorted({joint.robot for joint in problem.tree.joints})
     slices = 0
     for chosen in dict.fromkeys([(), *[(robot,) for robot in robots], tuple(robots)]):
-        boxes, made = _blocked(relaxed(problem, chosen)[0])
+        question = relaxed(problem, chosen)[0]
+        swept = SweptTree(question.tree)
+        pairs = BodyPairs(swept)
+        boxes, made = _blocked(question, CellMaker(swept, pairs, shrunk(question.workspace, 0.0)))
         slices += made
         if boxes:
-            return blocked_goal_proof(chosen, boxes), slices
+            return blocked_goal_proof(chosen, boxes, Witnesses(problem.tree, swept, pairs)), slices
     return None, slices
 
 
-def _blocked(question: PlanningProblem) -> tuple[list[Intervals], int]:
+def _blocked(question: PlanningProblem, maker: CellMaker) -> tuple[list[Intervals], int]:
     """Boxes that cover all values of the free joints, in each of which the team is in collision at the goal.
 
     The free joints' intervals are halved until all are blocked, one is free, or the budget is spent; only in
     the first case boxes are returned. The second result is the number of slices swept.
     """
-    swept = SweptTree(question.tree)
-    maker = CellMaker(swept, BodyPairs(swept), shrunk(question.workspace, 0.0))
     angle = float(question.goal_pose[2])
     joints = [
         (joint.lower, joint.upper) if goal is None else (goal, goal)

@@ -40,27 +40,29 @@ def disc_refuted(problem: PlanningProblem) -> DiscProof | None:
         The proof, or None if no disc is separated from its goal.
     """
     space = FreeSpace.over(problem.workspace)
-    for component, disc in _discs(problem.tree):
+    for piece, component, disc in _discs(problem.tree):
         centre, radius = disc.vertices[0], disc.radius
-        regions = regions_of(space.minus(radius * INSIDE * _DIRECTIONS), over=True)
+        ring = radius * INSIDE * _DIRECTIONS
+        regions = regions_of(space.minus(ring), over=True)
         start = problem.tree.poses(problem.start)[component].apply(disc.vertices)[0]
         goals = _places(problem, component, centre)
         reached = [to_polygon(region.section) for region in regions if region.holds(start)]
         if not any(polygon.intersects(goals) for polygon in reached):
-            found = disc_proof(component, centre, radius, regions, start, goals)
+            found = disc_proof(component, centre, ring, piece, regions, start, goals)
             if found is not None:
                 return found
     return None
 
 
-def _discs(tree: ComponentTree) -> Iterator[tuple[int, ConvexShape]]:
-    """For every convex piece its component and the largest disc inside the piece."""
+def _discs(tree: ComponentTree) -> Iterator[tuple[int, int, ConvexShape]]:
+    """For every convex piece its number, its component and the largest disc inside the piece."""
+    number = -1
     for index, component in enumerate(tree.components):
         for body in component.bodies:
             for shape in body.shapes:
-                disc = inscribed_disc(shape)
+                disc, number = inscribed_disc(shape), number + 1
                 if disc.radius > 0.0:
-                    yield index, disc
+                    yield number, index, disc
 
 
 def _places(problem: PlanningProblem, component: int, centre: FloatArray) -> BaseGeometry:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from math import pi
 from typing import TypeVar
 
 import numpy as np
@@ -16,6 +17,7 @@ from coop_drake.answers.proof import (
     AngleBox,
     BlockedGoalProof,
     DiscProof,
+    InnerSweep,
     OverCell,
     OverSlice,
     SlicesProof,
@@ -25,6 +27,7 @@ from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.slices import Slices
+from coop_drake.planning.proofs.witnesses import LEAST_LOSS, Witnesses
 from coop_drake.tree.pose import FloatArray
 
 Found = TypeVar("Found")
@@ -41,7 +44,11 @@ TOUCHING = 1e-6
 
 
 def slices_proof(
-    question: PlanningProblem, robots: Sequence[int], slices: Slices, regions: Mapping[int, Sequence[Region]]
+    question: PlanningProblem,
+    robots: Sequence[int],
+    slices: Slices,
+    regions: Mapping[int, Sequence[Region]],
+    witnesses: Witnesses,
 ) -> SlicesProof | None:
     """Write an exploration's leaves and over-cells down as a proof.
 
@@ -50,6 +57,7 @@ def slices_proof(
         robots: Indices of these robots in the whole team.
         slices: The subdivision.
         regions: Over-cells of every leaf by its id.
+        witnesses: Makes what shows that all else is blocked.
 
     Returns:
         The proof, or None if it fails because cells almost touch, or because geometry fails.
@@ -61,7 +69,7 @@ def slices_proof(
     starts = set(slices.holding([float(angle) for angle in question.start[2:]]))
     goals = set(slices.holding([float(question.goal_pose[2]), *question.goal_joints]))
 
-    def separated(growth: float) -> dict[int, list[OverCell]] | None:
+    def separated(growth: float) -> list[OverSlice] | None:
         cells = {leaf: _grown(regions[leaf], growth) for leaf in leaves}
         labels = _reached(cells, joined, starts, Point(question.start[:2]))
         goal = Point(question.goal_pose[:2])
@@ -71,19 +79,24 @@ def slices_proof(
             for cell, label in zip(cells[leaf], labels[leaf], strict=True)
         ):
             return None
-        return {leaf: list(map(OverCell, labels[leaf], cells[leaf])) for leaf in leaves}
+        found = []
+        for leaf in leaves:
+            intervals = slices.all[leaf].intervals
+            overlaps = () if cells[leaf] else witnesses.overlaps(intervals)
+            sweeps = () if overlaps else witnesses.inner_sweeps(intervals, growth)
+            labelled = tuple(map(OverCell, labels[leaf], cells[leaf]))
+            found.append(OverSlice(*_ends(intervals), overlaps, sweeps, labelled))
+        return found
 
-    found = _first(separated)
-    if found is None:
-        return None
-    parts = [OverSlice(*_ends(slices.all[leaf].intervals), tuple(found[leaf])) for leaf in leaves]
-    return SlicesProof(tuple(robots), tuple(parts))
+    parts = _first(separated)
+    return None if parts is None else SlicesProof(tuple(robots), tuple(parts))
 
 
 def disc_proof(
     component: int,
     centre: FloatArray,
-    radius: float,
+    ring: FloatArray,
+    piece: int,
     regions: Sequence[Region],
     start: FloatArray,
     goals: BaseGeometry,
@@ -93,7 +106,8 @@ def disc_proof(
     Args:
         component: The component that the disc lies in.
         centre: Its centre in the component's frame, shape (2,) [m].
-        radius: Its radius [m].
+        ring: Vertices of a polygon inside it, relative to its centre, shape (n, 2) [m].
+        piece: Number of the piece that it lies in.
         regions: Over-approximation of the positions in W at which the disc fits.
         start: Where the centre is at the start, shape (2,) [m].
         goals: All places where the centre may be at the goal.
@@ -102,25 +116,34 @@ def disc_proof(
         The proof, or None if it fails because regions almost touch.
     """
 
-    def separated(growth: float) -> list[OverCell] | None:
+    def separated(growth: float) -> OverSlice | None:
         cells = _grown(regions, growth)
         labels = [cell.dwithin(Point(start), TOUCHING) for cell in cells]
         if any(label and cell.dwithin(goals, TOUCHING) for cell, label in zip(cells, labels, strict=True)):
             return None
-        return list(map(OverCell, labels, cells))
+        inside = InnerSweep(piece, (1.0 - LEAST_LOSS) * ring)
+        return OverSlice(*_ends(((-pi, pi),)), (), (inside,), tuple(map(OverCell, labels, cells)))
 
     found = _first(separated)
-    return None if found is None else DiscProof(component, centre, radius, tuple(found))
+    return None if found is None else DiscProof(component, centre, (found,))
 
 
-def blocked_goal_proof(robots: Sequence[int], boxes: Sequence[Intervals]) -> BlockedGoalProof:
+def blocked_goal_proof(
+    robots: Sequence[int], boxes: Sequence[Intervals], witnesses: Witnesses
+) -> BlockedGoalProof:
     """Write boxes of angles at the goal, in all of which the team is in collision, down as a proof.
 
     Args:
         robots: Robots that are kept.
         boxes: Boxes that cover the free joints' limits, with the goal's theta and joints on the other axes.
+        witnesses: Makes what shows that the team is in collision.
     """
-    return BlockedGoalProof(tuple(robots), tuple(AngleBox(*_ends(intervals)) for intervals in sorted(boxes)))
+    parts = []
+    for intervals in sorted(boxes):
+        overlaps = witnesses.overlaps(intervals)
+        sweeps = () if overlaps else witnesses.inner_sweeps(intervals, 0.0)
+        parts.append(AngleBox(*_ends(intervals), overlaps, sweeps))
+    return BlockedGoalProof(tuple(robots), tuple(parts))
 
 
 def _first(separated: Callable[[float], Found | None]) -> Found | None:

@@ -17,6 +17,7 @@ from coop_drake.planning.cells.exploration import Exploration, ExplorationResult
 from coop_drake.planning.proofs.inscribed_disc import disc_refuted
 from coop_drake.planning.proofs.proof_making import slices_proof
 from coop_drake.planning.proofs.relaxation_test import RelaxationTest
+from coop_drake.planning.proofs.witnesses import Witnesses
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.questions.relaxation import relaxed
 
@@ -165,7 +166,8 @@ class Proofs:
         """Write the proof down; return False if that fails, because cells almost touch or geometry fails."""
         question, _ = relaxed(self._problem, chosen)
         exploration = self._exploration(chosen)
-        proof = slices_proof(question, chosen, exploration.slices, exploration.over_leaves())
+        witnesses = Witnesses(self._problem.tree, exploration.swept, exploration.pairs)
+        proof = slices_proof(question, chosen, exploration.slices, exploration.over_leaves(), witnesses)
         if proof is None:
             return False
         reason = f"the over-approximations of {self._words(chosen)} separate start from goal"

@@ -14,6 +14,7 @@ from coop_drake.planning.cells.events import Watch
 from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Verdict
 from coop_drake.planning.cells.printed_algorithms import PaperExploration
 from coop_drake.planning.proofs.proof_making import slices_proof
+from coop_drake.planning.proofs.witnesses import Witnesses
 from coop_drake.planning.questions.margins import marginal_workspace, margins
 from coop_drake.progress import Progress
 
@@ -98,7 +99,9 @@ def _no_channel(
     """The answer of an exploration at margin zero that found no channel."""
     if outcome.verdict is Verdict.INFEASIBLE:
         robots = sorted({joint.robot for joint in problem.tree.joints})
-        proof = slices_proof(problem, robots, exploration.slices, exploration.over_leaves())
+        swept = SweptTree(problem.tree)
+        witnesses = Witnesses(problem.tree, swept, BodyPairs(swept))
+        proof = slices_proof(problem, robots, exploration.slices, exploration.over_leaves(), witnesses)
         if proof is None:
             return NoChannel(False, "a proof of infeasibility was found but cannot be written down")
         reason = f"the over-approximations of {outcome.slices} slices separate start from goal"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 import shapely
@@ -28,6 +29,8 @@ from coop_drake.planning.cells.events import ChannelSearched, Event, SeenCell, S
 from coop_drake.planning.questions.margins import SMALLEST_MARGIN
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import FloatArray, PlanarPose
+
+SliceKind = TypeVar("SliceKind", AngleBox, OverSlice)
 
 USUAL_MARGINS = (SMALLEST_MARGIN, 0.4)
 """Margins that make sense for a team of the usual size, smallest and largest [m]."""
@@ -87,10 +90,7 @@ class Rescaling:
     def plan(self, made: Plan) -> Plan:
         """A plan in the unit, expressed in metres, but for its gains and the digest of its problem."""
         unit, axes = self.unit, self._axis_units(range(len(self.problem.tree.joints)))
-        cells = tuple(
-            Cell(c.lower * axes, c.upper * axes, *(_scaled(p, unit) for p in (c.safe, c.core, c.tidied)))
-            for c in made.cells
-        )
+        cells = tuple(Cell(c.lower * axes, c.upper * axes, _scaled(c.tidied, unit)) for c in made.cells)
         transitions = tuple(
             replace(
                 step,
@@ -100,13 +100,12 @@ class Rescaling:
                 inradius=unit * step.inradius,
                 neck=unit * step.neck,
                 length=unit * step.length,
-                goal_region=_scaled(step.goal_region, unit),
+                path=unit * step.path,
             )
             for step in made.transitions
         )
         return replace(
             made,
-            margin=unit * made.margin,
             start=self.problem.start.copy(),
             goal_pose=np.array([*self.problem.goal_pose[:2], made.goal_pose[2]]),
             goal_joints=self.problem.goal_joints,
@@ -158,19 +157,23 @@ class Rescaling:
 
     def _proof(self, proof: InfeasibilityProof) -> InfeasibilityProof:
         if isinstance(proof, DiscProof):
-            cells = self._cells(proof.cells)
-            return replace(
-                proof, centre=self.unit * proof.centre, radius=self.unit * proof.radius, cells=cells
-            )
+            slices = tuple(self._slice(part, np.ones(1)) for part in proof.slices)
+            return replace(proof, centre=self.unit * proof.centre, slices=slices)
         units = self._robot_units(proof.robots)
         if isinstance(proof, BlockedGoalProof):
-            boxes = [AngleBox(box.lower * units, box.upper * units) for box in proof.slices]
-            return replace(proof, slices=tuple(boxes))
-        slices = tuple(
-            OverSlice(part.lower * units, part.upper * units, self._cells(part.cells))
-            for part in proof.slices
+            return replace(proof, slices=tuple(self._slice(part, units) for part in proof.slices))
+        cover = tuple(self._slice(part, units) for part in proof.slices)
+        return replace(proof, slices=cover)
+
+    def _slice(self, part: SliceKind, units: FloatArray) -> SliceKind:
+        sweeps = tuple(replace(sweep, polygon=self.unit * sweep.polygon) for sweep in part.inner_sweeps)
+        overlaps = tuple(replace(overlap, point=self.unit * overlap.point) for overlap in part.overlaps)
+        moved = replace(
+            part, lower=part.lower * units, upper=part.upper * units, overlaps=overlaps, inner_sweeps=sweeps
         )
-        return replace(proof, slices=slices)
+        if isinstance(moved, OverSlice):
+            return replace(moved, cells=self._cells(moved.cells))
+        return moved
 
     def _cells(self, cells: Sequence[OverCell]) -> tuple[OverCell, ...]:
         return tuple(OverCell(cell.reached, _scaled(cell.polygon, self.unit)) for cell in cells)

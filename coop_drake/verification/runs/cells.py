@@ -1,4 +1,4 @@
-"""Check that every state lay in its cell: the position in the safe set, the axes in their intervals."""
+"""Check that every state lay in its cell: the position in its polygon, the axes in their intervals."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def check_cells(rows: Rows, between: Between) -> tuple[Check, Check]:
         cell, first = plan.cells[k], int(members[0])
         position, axes = rows.z[members, :2], rows.z[members, 2:]
         deviations = between.deviations[members[:-1]]
-        inside = signed_distances(cell.safe, position)
+        inside = signed_distances(cell.tidied, position)
         chords = shapely.linestrings(np.stack((position[:-1], position[1:]), axis=1))
-        left = shapely.distance(chords, cell.safe.boundary) - np.hypot(deviations[:, 0], deviations[:, 1])
+        left = shapely.distance(chords, cell.tidied.boundary) - np.hypot(deviations[:, 0], deviations[:, 1])
         margins = np.minimum(axes - cell.lower, cell.upper - axes)
         inner = np.minimum(margins[1:], margins[:-1]) - deviations[:, 2:]
         for name, at_rows, since, where in (

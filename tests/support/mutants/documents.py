@@ -191,10 +191,10 @@ def json_mutants(document: Document, seed: int) -> Iterator[Mutant]:
 def plan_mutants(document: Document) -> Iterator[Mutant]:
     """Plans that cannot be executed, or that answer another question."""
     for k, cell in enumerate(document["cells"]):
-        far = [[x + 50.0, y] for x, y in cell["safe"]["outer"]]
-        for name in ("core", "tidied"):
-            place = ("cells", k, name)
-            yield _plan(document, "region outside its cell", (*place, "outer"), far, "it is 50 m off", place)
+        far = [[x + 50.0, y] for x, y in cell["tidied"]["outer"]]
+        place = ("cells", k, "tidied")
+        end = ("transitions", k, "target")
+        yield _plan(document, "cell elsewhere", (*place, "outer"), far, "it is 50 m off", end)
         for name in ("lower", "upper"):
             other = cell["upper" if name == "lower" else "lower"]
             place = ("cells", k, name)
@@ -203,9 +203,6 @@ def plan_mutants(document: Document) -> Iterator[Mutant]:
         here: Place = ("transitions", k)
         far = [transition["target"][0] + 50.0, transition["target"][1]]
         yield _plan(document, "target elsewhere", (*here, "target"), far, "it is 50 m off", (*here, "target"))
-        away = [[x, y - 50.0] for x, y in transition["goal_region"]["outer"]]
-        place = (*here, "goal_region")
-        yield _plan(document, "goal region elsewhere", (*place, "outer"), away, "it is 50 m off", place)
         for name, step in (("goal_lower", -9.0), ("goal_upper", 9.0)):
             moved = [value + step for value in transition[name]]
             yield _plan(

@@ -1,0 +1,92 @@
+"""Witnesses for the exact checker: polygons that bodies cover in a whole slice, points where two overlap."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+from shapely import Polygon
+
+from coop_drake.answers.proof import InnerSweep, Overlap
+from coop_drake.geometry.body_pairs import BodyPair, BodyPairs
+from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
+
+LEAST_LOSS = 1e-7
+"""Polygons lose at least this at their corners, far less than what the planner grows cells by [m]."""
+
+LOSS_PER_GROWTH = 0.25
+"""Polygons lose this fraction of what cells are grown by; cells still hold all that is not blocked [-]."""
+
+
+class Witnesses:
+    """Makes witnesses for slices of one question.
+
+    Args:
+        tree: The whole team, whose pieces are numbered in the order of components, bodies and shapes.
+        swept: Sweeps of the pieces that the question keeps.
+        pairs: Pairs of bodies among them.
+    """
+
+    def __init__(self, tree: ComponentTree, swept: SweptTree, pairs: BodyPairs) -> None:
+        kept = {component.name for component in swept.tree.components}
+        names = [c.name for c in tree.components for body in c.bodies for _ in body.shapes]
+        self._numbers = [number for number, name in enumerate(names) if name in kept]
+        self._swept, self._pairs = swept, pairs
+
+    def overlaps(self, intervals: Intervals) -> tuple[Overlap, ...]:
+        """A point that two pieces hold all over a slice; none if no pair is known to overlap."""
+        pair = self._pairs.overlapping(intervals)
+        if pair is None:
+            return ()
+        depth, pieces, point = max(self._common(pair, intervals), key=lambda common: common[0])
+        numbers = tuple(sorted(self._numbers[k] for k in pieces))
+        return (Overlap(numbers, point),) if depth > 0.0 else ()
+
+    def inner_sweeps(self, intervals: Intervals, growth: float) -> tuple[InnerSweep, ...]:
+        """Polygons that pieces cover at every configuration of a slice, without corners that do not matter.
+
+        Args:
+            intervals: The slice.
+            growth: How far the slice's cells reach beyond the positions that these polygons leave free [m].
+        """
+        loss = LEAST_LOSS + LOSS_PER_GROWTH * max(growth, 0.0)
+        rings = [(number, self._swept.under(k, intervals)) for k, number in enumerate(self._numbers)]
+        found = [(number, smaller(ring, loss)) for number, ring in rings if ring is not None]
+        return tuple(InnerSweep(number, ring) for number, ring in found if ring is not None)
+
+    def _common(
+        self, pair: BodyPair, intervals: Intervals
+    ) -> list[tuple[float, tuple[int, int], FloatArray]]:
+        """For pieces of two bodies the area that they share all over a slice, and a point in its middle."""
+        found = []
+        for i in pair.first:
+            for j in pair.second:
+                one = self._swept.under(i, intervals, pair.first_stages)
+                other = self._swept.under(j, intervals, pair.second_stages)
+                if one is not None and other is not None and min(len(one), len(other)) > 2:
+                    shared = shapely.intersection(Polygon(one), Polygon(other))
+                    point = np.array(shared.centroid.coords[0]) if shared.area > 0.0 else np.zeros(2)
+                    found.append((float(shared.area), (i, j), point))
+        return found or [(0.0, (0, 0), np.zeros(2))]
+
+
+def smaller(ring: FloatArray, loss: float) -> FloatArray | None:
+    """A polygon inside a convex one, no further away from any point of it than a loss; None if none is found.
+
+    Half of the loss is used to leave out corners, half to draw the others towards the middle.
+
+    Args:
+        ring: Vertices, shape (n, 2) [m].
+        loss: The largest distance between the polygons [m].
+    """
+    polygon = Polygon(ring)
+    simple = polygon.simplify(0.5 * loss)
+    if not simple.is_valid or not simple.area > 0.0:
+        simple = polygon
+    middle, corners = np.array(simple.centroid.coords[0]), shapely.get_coordinates(simple)[:-1]
+    size = float(np.hypot(*(corners - middle).T).max())
+    if not polygon.area > 0.0 or size <= loss:
+        return None
+    drawn: FloatArray = middle + (1.0 - 0.5 * loss / size) * (corners - middle)
+    return drawn

@@ -1,0 +1,83 @@
+"""Verify a plan or a proof: geometry by the exact checker, the match of question and gains by comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.plan_file import plan_document
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.proof import DiscProof, InfeasibilityProof, SlicesProof
+from coop_drake.answers.proof_file import proof_document
+from coop_drake.checking import RefusedError, check
+from coop_drake.errors import RefusalError
+from coop_drake.laws import GainSet
+from coop_drake.progress import Progress
+from coop_drake.verification.checks import Check, Verified
+from coop_drake.verification.gains import check_gains
+from coop_drake.verification.problem_match import check_problem
+from coop_drake.verification.question import question_of
+
+
+def verify_plan(
+    plan: Plan,
+    problem: PlanningProblem,
+    gain_sets: Mapping[str, GainSet],
+    progress: Progress | None = None,
+) -> Verified:
+    """Check everything that a plan states, but for its estimated times.
+
+    Args:
+        plan: The plan.
+        problem: The problem that it should solve.
+        gain_sets: The scenario's gain sets by name.
+        progress: Called with a phase and the fraction of it that is done.
+
+    Raises:
+        RefusalError: Names the first statement that does not hold.
+    """
+    same = check_problem(plan, problem)
+    exact = _exactly(problem, plan_document(plan), progress)
+    gains = check_gains(plan, gain_sets)
+    return Verified("found", f"plan of {len(plan.cells)} cells", (same, *exact, gains))
+
+
+def verify_proof(
+    proof: InfeasibilityProof, problem: PlanningProblem, progress: Progress | None = None
+) -> Verified:
+    """Check a proof that no plan exists.
+
+    What cannot move from start to goal with some of the robots left out cannot do so with all of them: a
+    proof may keep any of them. It is about the goal pose itself, not about the tolerances around it.
+
+    Args:
+        proof: The proof.
+        problem: The problem that it should refute.
+        progress: Called with a phase and the fraction of it that is done.
+
+    Raises:
+        RefusalError: Names the first statement that does not hold.
+    """
+    checks = _exactly(problem, proof_document(proof, problem), progress)
+    if isinstance(proof, DiscProof):
+        name = problem.tree.components[proof.component].name
+        return Verified("infeasible", f"a disc in {name} cannot get from start to goal", checks)
+    robots = list(proof.robots)
+    team = f"the object with robots {robots}" if robots else "the object alone"
+    what = "cannot get from start to goal" if isinstance(proof, SlicesProof) else "collides at the goal"
+    return Verified("infeasible", f"{team} {what}, by {len(proof.slices)} slices", checks)
+
+
+def _silent(phase: str, share: float) -> None:
+    """Show no progress."""
+
+
+def _exactly(
+    problem: PlanningProblem, answer: Mapping[str, Any], progress: Progress | None
+) -> tuple[Check, ...]:
+    """What the exact checker finds to hold; its refusal as an error of ours."""
+    try:
+        return tuple(Check(*entry) for entry in check(question_of(problem), answer, progress or _silent))
+    except RefusedError as refusal:
+        raise RefusalError(refusal.where, refusal.finding) from refusal

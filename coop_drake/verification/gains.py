@@ -1,0 +1,60 @@
+"""Check the gains that a plan states, by computing them again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from coop_drake.answers.plan import Plan
+from coop_drake.errors import RefusalError
+from coop_drake.laws import GainSet, TransitionGains, transition_gains
+from coop_drake.verification.checks import Check
+
+RELATIVE = 1e-9
+"""Relative difference of figures that are computed twice, in another order of operations [-]."""
+
+SAME_PLACE = 1e-9
+"""Paths shorter than this do not move the position, only angles [m]."""
+
+
+def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
+    """Compute the gains of every transition again; all that is geometry belongs to the exact checker.
+
+    The estimated time comes of a simulation and does not matter for safety: it is the only figure that
+    nothing but the digest of the file protects.
+
+    Args:
+        plan: The plan.
+        gain_sets: The scenario's gain sets by name.
+
+    Raises:
+        RefusalError: Names the transition, the figure and what it should be.
+    """
+    if plan.gain_set not in gain_sets:
+        raise RefusalError("gain_set", f"{plan.gain_set!r} is none of {', '.join(sorted(gain_sets))}")
+    resting = plan.start[2:]
+    for k, transition in enumerate(plan.transitions):
+        where = f"transitions[{k}]"
+        if transition.only_angles != (transition.length <= SAME_PLACE):
+            raise RefusalError(f"{where}.only_angles", f"{transition.only_angles} over {transition.length} m")
+        gains = transition_gains(
+            gain_sets[plan.gain_set],
+            clearance=transition.neck,
+            slice_lower=plan.cells[k].lower,
+            slice_upper=plan.cells[k].upper,
+            goal_lower=transition.goal_lower,
+            goal_upper=transition.goal_upper,
+            resting=resting,
+        )
+        _compare(transition.gains, gains, f"{where}.gains")
+        resting = 0.5 * (transition.goal_lower + transition.goal_upper)
+    return Check("gains are those that the gain set gives for the cells", len(plan.transitions))
+
+
+def _compare(found: TransitionGains, expected: TransitionGains, where: str) -> None:
+    for name, value in vars(expected).items():
+        stated = getattr(found, name)
+        text = isinstance(value, str)
+        if not (stated == value if text else np.allclose(stated, value, rtol=RELATIVE, atol=0.0)):
+            raise RefusalError(f"{where}.{name}", f"is {stated}; the cell gives {value}")
