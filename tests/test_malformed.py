@@ -145,9 +145,9 @@ COUNTS = {
     "hall.geojson": 162,
     "map.yaml": 88,
     "map.pgm": 16,
-    "plan": 483,
+    "plan": 477,
     "proof 0": 138,
-    "proof 1": 117,
+    "proof 1": 116,
     "proof 2": 73,
     "log": 197,
 }

@@ -30,12 +30,23 @@ def verify_command(
         Path | None,
         typer.Option(help="The plan that a log belongs to; plan.json beside the log if not given."),
     ] = None,
+    question: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write here what the scenario asks, for `python -m coop_drake.checking QUESTION FILE`."
+        ),
+    ] = None,
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
     """Check a plan, a proof that there is none, or a run by its log, by code of its own."""
     with reporting(machine=machine, quiet=quiet) as reporter:
-        reporter.code = _verify(certificate, plan, read_task(scenario), reporter)
+        task = read_task(scenario)
+        if question is not None:
+            from coop_drake.verification.question import save_question
+
+            save_question(task.problem, question)
+        reporter.code = _verify(certificate, plan, task, reporter)
 
 
 def _verify(certificate: Path, plan: Path | None, task: Task, reporter: Reporter) -> ExitCode:
@@ -64,6 +75,11 @@ def _verify(certificate: Path, plan: Path | None, task: Task, reporter: Reporter
     )
     reporter.table(task.name, [_row(check) for check in verified.checks])
     reporter.say(f"[bold]valid, {verified.answer}[/]: {escape(verified.subject)}")
+    if certificate.suffix != ".npz":
+        from coop_drake.verification.question import TRUSTED
+
+        reporter.facts["trusted"] = list(TRUSTED)
+        reporter.say(escape("To be trusted: " + "; ".join(TRUSTED)))
     return ExitCode.DONE
 
 

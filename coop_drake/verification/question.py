@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
 from typing import Any
 
 import shapely
 from shapely import Polygon
 
 from coop_drake.answers.problem import PlanningProblem
+from coop_drake.files import write_atomically
 from coop_drake.tree.component_tree import Body, ComponentTree, TreeJoint
 
 TRUSTED = (
-    "the scenario file and the models of object and robots, as Drake parses them (`coop_drake.plant`)",
-    "their shadows on the floor: convex pieces of bodies, joints, pairs that models leave aside",
-    "the question that `verification/question.py` writes down of these; --question FILE shows it",
-    "Python's integers, and the checker's code: `coop_drake/checking`",
+    "how Drake parses the scenario and its models (coop_drake/scenario, coop_drake/plant)",
+    "the convex pieces, joints and pairs of bodies left aside that are read there, and their question "
+    "(coop_drake/verification/question.py; --question FILE writes it)",
+    "Python's integers, and the checker (coop_drake/checking)",
 )
 """What remains to be trusted when the exact checker accepts an answer."""
+
+
+def save_question(problem: PlanningProblem, path: Path | str) -> Path:
+    """Write the question to a file, whole or not at all; return the path."""
+    return write_atomically(path, (json.dumps(question_of(problem), allow_nan=False) + "\n").encode())
 
 
 def question_of(problem: PlanningProblem) -> dict[str, Any]:

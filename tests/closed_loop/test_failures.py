@@ -54,10 +54,11 @@ def test_a_start_in_a_wall_ends_the_run_at_once(problem):
 
 def test_an_object_outside_its_cell_is_a_violation(problem):
     scenario, plan = problem
-    tidied = plan.cells[1].tidied - box(3.3, 2.0, 5.0, 6.0)
-    log = simulate(scenario, with_cell(plan, 1, tidied=tidied), small_maps())
+    x, y = plan.start[:2]
+    tidied = plan.cells[0].tidied - box(x - 0.1, y - 0.1, x + 0.1, y + 0.1)
+    log = simulate(scenario, with_cell(plan, 0, tidied=tidied), small_maps())
     assert not log.reached
-    assert "distance of the object to the boundary of cell 1 is -" in log.violation
+    assert "distance of the object to the boundary of cell 0 is -" in log.violation
 
 
 def test_an_angle_outside_its_slice_is_a_violation(problem):

@@ -168,7 +168,7 @@ def test_a_cut_through_free_space_is_refused():
     with pytest.raises(RefusalError, match="cells may hold the goal and have reached: True"):
         verify_proof(stated, feasible)
     unlabelled = replace(stated, slices=tuple(without_label(part, feasible) for part in stated.slices))
-    with pytest.raises(RefusalError, match="touches|may hold the start and have reached: False"):
+    with pytest.raises(RefusalError, match=r"touches|may hold the start and have reached: False"):
         verify_proof(unlabelled, feasible)
 
 
