@@ -1,0 +1,117 @@
+"""One axis under its law, sampled, delayed and disturbed, without a plant."""
+
+from __future__ import annotations
+
+from math import exp
+
+import numpy as np
+
+from coop_drake.compiled import compiled
+from coop_drake.laws.axis_table import bounds_of, track_row
+from coop_drake.tree.pose import FloatArray
+
+
+@compiled
+def run_axis(
+    row: FloatArray,
+    period: float,
+    delay: int,
+    lag: float,
+    entry: tuple[float, float, float],
+    disturbances: FloatArray,
+    model_factor: float,
+    late: int,
+    motion: FloatArray,
+) -> bool:
+    """Simulate an axis from its entry on and return whether it kept inside its funnel.
+
+    Before the entry, x'' was constant. A command is held over a period, and x'' follows it with a first-order
+    lag; in the middle of every period the funnel is looked at, too.
+
+    Args:
+        row: The axis, a row of an ``axis_table``.
+        period: T [s].
+        delay: Age of a measurement in periods.
+        lag: Time constant of x'' [s].
+        entry: x, x' and x'' at the entry.
+        disturbances: Errors of the measured position and rate, and of the acceleration, of every sample,
+            shape (samples, 3).
+        model_factor: Factor by which accelerations are larger than commanded [-].
+        late: Periods for which the acceleration from before the entry is commanded on.
+        motion: Receives x, x' and x'' at every sample, shape (samples, 3).
+    """
+    n = disturbances.shape[0]
+    x, v, p = entry
+    old = p
+    for k in range(n):
+        motion[k, 0], motion[k, 1], motion[k, 2] = x, v, p
+        lower, upper = bounds_of(row, k * period)[:2]
+        if not lower < x < upper:
+            return False
+        if k < delay:
+            ago = (delay - k) * period
+            seen_x = entry[0] - ago * entry[1] + 0.5 * ago * ago * old
+            seen_v = entry[1] - ago * old
+        else:
+            seen_x, seen_v = motion[k - delay, 0], motion[k - delay, 1]
+        u = track_row(row, k * period, seen_x + disturbances[k, 0], seen_v + disturbances[k, 1])[0]
+        u = model_factor * u + disturbances[k, 2] if k >= late else old
+        for half in range(2):
+            t = 0.5 * period
+            left = exp(-t / lag) if lag > 0.0 else 0.0
+            gap = p - u
+            x += t * v + 0.5 * t * t * u + (lag * t - lag * lag * (1.0 - left)) * gap
+            v += t * u + lag * (1.0 - left) * gap
+            p = u + left * gap
+            lower, upper = bounds_of(row, (k + 0.5 * (1 + half)) * period)[:2]
+            if not lower < x < upper:
+                return False
+    return True
+
+
+@compiled
+def push_along(
+    row: FloatArray, period: float, size: FloatArray, motion: FloatArray, disturbances: FloatArray
+) -> None:
+    """Turn every disturbance so that it accelerates the axis in the direction of its last motion's rate.
+
+    Args:
+        row: The axis.
+        period: T [s].
+        size: Sizes of the three disturbances, shape (3,).
+        motion: The last motion, as ``run_axis`` writes it.
+        disturbances: Receives the disturbances, shape (samples, 3).
+    """
+    for k in range(disturbances.shape[0]):
+        lower, upper, lower_rate, upper_rate, _, _ = bounds_of(row, k * period)
+        share = (motion[k, 0] - lower) / (upper - lower)
+        carried = lower_rate + share * (upper_rate - lower_rate)
+        sign = 1.0 if motion[k, 1] >= carried else -1.0
+        disturbances[k, 0], disturbances[k, 1], disturbances[k, 2] = (
+            -sign * size[0],
+            -sign * size[1],
+            sign * size[2],
+        )
+
+
+def attacks(row: FloatArray, period: float, size: FloatArray, samples: int, seed: int) -> list[FloatArray]:
+    """Return disturbances of the stated sizes that an axis should survive, each of shape (samples, 3).
+
+    Constant ones, random ones, and square waves of several frequencies, whose signs push all one way.
+
+    Args:
+        row: The axis.
+        period: T [s].
+        size: Largest error of position, of rate and of the acceleration, shape (3,).
+        samples: Number of samples.
+        seed: Of the random ones.
+    """
+    generator = np.random.default_rng(seed)
+    push = np.array([-1.0, -1.0, 1.0]) * size
+    times = period * np.arange(samples)
+    waves = [np.ones(samples), -np.ones(samples)]
+    for frequency in (0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 9.0):
+        waves += [np.sign(np.sin(2.0 * np.pi * frequency * times + phase)) for phase in (0.01, 1.6)]
+    pushed = [wave[:, None] * push for wave in waves]
+    noisy = [size * generator.choice([-1.0, 1.0], (samples, 3)) for _ in range(4)]
+    return [*pushed, *noisy]

@@ -1,0 +1,84 @@
+"""A budget: the departures from the ideal team that a plan tolerates, and the sets that follow from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Annotated
+
+from coop_drake.typed_data import EXACT, Limits, NotNegative, Positive, Vector, check_fields
+
+_Exact = Annotated[NotNegative, EXACT]
+
+SCALED = (
+    "delay", "lag", "angle_noise", "rate_noise", "model_error", "acceleration_error", "report_age",
+)  # fmt: skip
+"""Departures that a budget of the same control rate has more or less of."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Bounds of what departs from the ideal team; no departure may be larger, at any time.
+
+    Attributes:
+        control_rate: How often a robot computes its command, which is held in between [Hz].
+        delay: Age of the measurements on which a command rests, rounded up to whole periods [s].
+        lag: Time constant with which accelerations follow their commands [s].
+        angle_noise: Largest error of a measured angle or joint position [rad or m].
+        rate_noise: Largest error of a measured rate of these [rad/s or m/s].
+        model_error: Largest error of an acceleration over its command, as a wrong mass causes [-].
+        acceleration_error: Largest error of the acceleration of an axis besides: what robots that disagree,
+            friction, and the coupling of axes leave [rad/s^2 or m/s^2].
+        report_age: How long a report of readiness may be used after it was made [s].
+    """
+
+    control_rate: Annotated[float, Limits(at_least=1.0, at_most=1e4)] = 200.0
+    delay: NotNegative = 0.0
+    lag: NotNegative = 0.0
+    angle_noise: NotNegative = 0.0
+    rate_noise: NotNegative = 0.0
+    model_error: Annotated[float, Limits(at_least=0.0, below=1.0)] = 0.0
+    acceleration_error: NotNegative = 0.0
+    report_age: NotNegative = 0.0
+
+    def __post_init__(self) -> None:
+        check_fields(self)
+
+    @property
+    def period(self) -> float:
+        """Control period [s]."""
+        return 1.0 / self.control_rate
+
+    def scaled(self, factor: float) -> Budget:
+        """Return the budget with every departure this many times as large, at the same control rate."""
+        return replace(self, **{name: factor * getattr(self, name) for name in SCALED})
+
+    def describe(self) -> str:
+        """All bounds in a line."""
+        return ", ".join(f"{field.name} {getattr(self, field.name):.4g}" for field in fields(self))
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """The sets that follow from a budget in one transition, per axis (theta, q...), arrays of shape (1 + n,).
+
+    Attributes:
+        age_factor: The gains are those of the gain set for this many times the age of its commands [-].
+        entry_lower: Lowest position at the entry [rad or m].
+        entry_upper: Highest position at the entry [rad or m].
+        entry_rate_lower: Lowest rate at the entry [rad/s or m/s].
+        entry_rate_upper: Highest rate at the entry [rad/s or m/s].
+        entry_acceleration: Largest magnitude of the acceleration before the entry [rad/s^2 or m/s^2].
+        distance: Least distance to the funnel's bounds at all times [rad or m].
+        acceleration: Largest magnitude of the acceleration [rad/s^2 or m/s^2].
+        settled: Largest departure from the middle of the goal interval at the end [rad or m].
+    """
+
+    age_factor: Annotated[Positive, EXACT]
+    entry_lower: Vector
+    entry_upper: Vector
+    entry_rate_lower: Vector
+    entry_rate_upper: Vector
+    entry_acceleration: Vector
+    distance: Vector
+    acceleration: Vector
+    settled: Vector

@@ -1,0 +1,79 @@
+"""Slopes of the law of one axis with respect to position and rate, bounded over an interval of positions.
+
+With s, w, k1, k2 and kappa as in ``track_axis``, h = 1 - s tanh(s / 2), and r = (rho_l' du + rho_u' dl) / w,
+the rate with which the funnel carries a point along, the acceleration L(t, x, x') of the law is affine in x':
+
+    dL/dx' = -(k2 + k1 h - w'/w)
+    dL/dx  = -h (k1 k2 + k1') + k2 w'/w - (w'/w)^2 + w''/w
+             - 4 kappa (1 + cosh s)^2 (1 + s tanh(s / 2)) / w^2 - 2 k1 (s + sinh s) (r - x') / w
+"""
+
+from __future__ import annotations
+
+from math import cosh, log, sinh, tanh
+
+from coop_drake.compiled import compiled
+from coop_drake.laws.axis_table import (
+    LOG_GAIN,
+    POSITION_GAIN,
+    RAMP_RATE,
+    RATE_GAIN,
+    SATURATION,
+    bounds_of,
+)
+from coop_drake.laws.ppc import ramped_gain
+from coop_drake.tree.pose import FloatArray
+
+
+@compiled
+def product_bounds(a: float, b: float, c: float, d: float) -> tuple[float, float]:
+    """Return the interval of all products of a number in [a, b] and a number in [c, d]."""
+    return min(a * c, a * d, b * c, b * d), max(a * c, a * d, b * c, b * d)
+
+
+@compiled
+def slope_bounds(
+    row: FloatArray, time: float, position: float, reach: float, rate: float
+) -> tuple[float, float, float, float]:
+    """Return bounds of dL/dx and dL/dx' over an interval of positions, all formulas being monotone in |s|.
+
+    Where the interval leaves the part of the funnel in which distances do not saturate, dL/dx is 0, and the
+    bounds hold that too.
+
+    Args:
+        row: The axis, a row of an ``axis_table``.
+        time: Time since the cell was entered [s].
+        position: Middle of the interval [rad or m].
+        reach: Half of its length [rad or m].
+        rate: x' at which dL/dx is taken; dL/dx' does not depend on it [rad/s or m/s].
+
+    Returns:
+        Lower and upper bound of dL/dx [1/s^2], lower and upper bound of dL/dx' [1/s].
+    """
+    lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration = bounds_of(row, time)
+    k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
+    k2, kappa, saturation = row[RATE_GAIN], row[LOG_GAIN], row[SATURATION]
+    w = upper - lower
+    closing, bending = (upper_rate - lower_rate) / w, (upper_acceleration - lower_acceleration) / w
+    first, last = (position - reach - lower) / w, (position + reach - lower) / w
+    low = min(max(first, saturation), 1.0 - saturation)
+    high = min(max(last, saturation), 1.0 - saturation)
+    s_low, s_high = log(low / (1.0 - low)), log(high / (1.0 - high))
+    far = max(abs(s_low), abs(s_high))
+    near = 0.0 if s_low <= 0.0 <= s_high else min(abs(s_low), abs(s_high))
+    pull_near, pull_far = near * tanh(0.5 * near), far * tanh(0.5 * far)
+    carried_low = lower_rate + low * (upper_rate - lower_rate) - rate
+    carried_high = lower_rate + high * (upper_rate - lower_rate) - rate
+    turned = product_bounds(
+        s_low + sinh(s_low), s_high + sinh(s_high),
+        min(carried_low, carried_high), max(carried_low, carried_high),
+    )  # fmt: skip
+    spring = product_bounds(1.0 - pull_far, 1.0 - pull_near, k1 * k2 + k1_dot, k1 * k2 + k1_dot)
+    log_near = 4.0 * kappa / (w * w) * (1.0 + cosh(near)) ** 2 * (1.0 + pull_near)
+    log_far = 4.0 * kappa / (w * w) * (1.0 + cosh(far)) ** 2 * (1.0 + pull_far)
+    steady = k2 * closing - closing * closing + bending
+    x_lower = steady - spring[1] - log_far - 2.0 * k1 / w * turned[1]
+    x_upper = steady - spring[0] - log_near - 2.0 * k1 / w * turned[0]
+    if first < saturation or last > 1.0 - saturation:
+        x_lower, x_upper = min(x_lower, 0.0), max(x_upper, 0.0)
+    return x_lower, x_upper, closing - k2 - k1 * (1.0 - pull_near), closing - k2 - k1 * (1.0 - pull_far)

@@ -1,0 +1,1 @@
+"""Whether a plan holds under a budget of departures, and gains with which it does."""
