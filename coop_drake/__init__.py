@@ -8,6 +8,6 @@ The names below are imported when they are first used, so that ``import coop_dra
     log = coop_drake.simulate(scenario, answer.plan, maps)
 """
 
-import lazy_loader
+from coop_drake.lazy import lazy_names
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)

@@ -1,5 +1,5 @@
 """What the planner is asked and what it answers, and how both are read and written."""
 
-import lazy_loader
+from coop_drake.lazy import lazy_names
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)

@@ -1,5 +1,5 @@
 """The control laws, each written once as a small compiled function: numbers in, numbers out."""
 
-import lazy_loader
+from coop_drake.lazy import lazy_names
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)

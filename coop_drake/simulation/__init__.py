@@ -1,5 +1,5 @@
 """Run a scenario: the simulation, its log, and the invariants checked while it runs."""
 
-import lazy_loader
+from coop_drake.lazy import lazy_names
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)
