@@ -102,6 +102,14 @@ class PlanningProblem:
         return replace(component, joint=replace(joint, lower=lower, upper=upper))
 
 
+def at_goal(
+    goal_pose: FloatArray, goal_joints: tuple[float | None, ...], free: FloatArray | float
+) -> FloatArray:
+    """Configuration z at the goal, shape (3 + n,); joints without a goal get the values of ``free``."""
+    joints = np.array([np.nan if goal is None else goal for goal in goal_joints], dtype=float)
+    return np.concatenate((goal_pose, np.where(np.isnan(joints), free, joints)))
+
+
 def object_radius(tree: ComponentTree) -> float:
     """Distance of the furthest point of the object, with what is welded to it, from its origin [m]."""
     shapes = [shape for body in tree.components[0].bodies for shape in body.shapes]

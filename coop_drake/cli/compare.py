@@ -12,7 +12,7 @@ from rich.markup import escape
 
 from coop_drake.cli.maps import map_cells
 from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath, out_folder
-from coop_drake.cli.plan import report_no_plan, search_and_write
+from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import simulation_facts
@@ -58,16 +58,15 @@ def compare_command(
 
 
 def _compare(scenario: Path, gains: str | None, out: Path | None, reporter: Reporter) -> ExitCode:
-    from coop_drake.answers import Found
     from coop_drake.files import write_atomically
 
     task = read_task(scenario, gains)
     folder = ResultFolder.of(task.name, out, "compare")
-    result = search_and_write(task, folder, reporter)
-    if not isinstance(result, Found):
-        return report_no_plan(task, result, folder, reporter)
-    maps = map_cells(task, result.plan, reporter)
-    measures = [_measures(task, result.plan, maps, grasps, reporter) for grasps, _ in _PLANTS]
+    plan = plan_of(task, folder, reporter)
+    if plan is None:
+        return reporter.code
+    maps = map_cells(task, plan, reporter)
+    measures = [_measures(task, plan, maps, grasps, reporter) for grasps, _ in _PLANTS]
     compared: dict[str, Any] = {grasps: facts for (grasps, _), facts in zip(_PLANTS, measures, strict=True)}
     write_atomically(folder.path / "compare.json", json.dumps(compared, indent=1).encode() + b"\n")
     reporter.facts.update(compared)

@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from coop_drake.cli.maps import map_cells
 from coop_drake.cli.options import PictureFolder, Quiet, ScenarioPath
-from coop_drake.cli.plan import report_no_plan, search
+from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import read_task
@@ -30,7 +30,6 @@ def diagram_command(
 
 
 def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> ExitCode:
-    from coop_drake.answers import Found
     from coop_drake.diagram import build_closed_loop
     from coop_drake.drawing import save_figure
     from coop_drake.errors import ScenarioError
@@ -42,10 +41,10 @@ def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> E
     if robot >= len(robots):
         raise ScenarioError(str(scenario), "--robot", robot, f"a number from 0 to {len(robots) - 1}")
     # An earlier run's results stay as they are: only the picture is written.
-    result = search(task, reporter)
-    if not isinstance(result, Found):
-        return report_no_plan(task, result, None, reporter)
-    loop = build_closed_loop(task.scenario, result.plan, map_cells(task, result.plan, reporter))
+    plan = plan_of(task, None, reporter)
+    if plan is None:
+        return reporter.code
+    loop = build_closed_loop(task.scenario, plan, map_cells(task, plan, reporter))
     picture = ResultFolder.of(task.name, out).path / "diagram.svg"
     with reporter.stage("drawing"):
         save_figure(block_diagram_figure(loop, robot), picture)

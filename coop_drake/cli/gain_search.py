@@ -8,9 +8,8 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from coop_drake.answers import Found
 from coop_drake.cli.maps import map_cells
-from coop_drake.cli.plan import report_no_plan, search_and_write
+from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import Task, read_task
@@ -69,10 +68,10 @@ def tune(
     start = task.scenario.gain_sets[task.scenario.selected_gains]
     parameters = tunable_parameters(start, request.vary)
     folder = ResultFolder.of(task.name, out, TUNED)
-    result = search_and_write(task, folder, reporter)
-    if not isinstance(result, Found):
-        return report_no_plan(task, result, folder, reporter)
-    runner = TrialRunner(task.scenario, result.plan, map_cells(task, result.plan, reporter))
+    plan = plan_of(task, folder, reporter)
+    if plan is None:
+        return reporter.code
+    runner = TrialRunner(task.scenario, plan, map_cells(task, plan, reporter))
     with reporter.stage("before"):
         before = runner.try_gains(start)
     objective = Objective(weights, limits, before.outcome.values)

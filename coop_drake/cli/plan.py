@@ -1,4 +1,4 @@
-"""The command plan, and what every command does that plans: search, write the answer, report it."""
+"""The command plan, and what every command does that plans: plan, write the answer, report it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from coop_drake.cli.summary import answer_of, planning_facts, summary_rows
 from coop_drake.cli.task import Task, read_task
 
 if TYPE_CHECKING:
-    from coop_drake.answers import Infeasible, PlanningResult, Undecided
+    from coop_drake.answers import Plan, PlanningResult
 
 
 def plan_command(
@@ -25,49 +25,19 @@ def plan_command(
 ) -> None:
     """Plan only: write the plan, or the proof that there is none."""
     with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.answers import Found
-
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out)
-        result = search_and_write(task, folder, reporter)
-        if isinstance(result, Found):
+        if plan_of(task, folder, reporter):
             reporter.table(task.name, summary_rows(reporter.facts))
             reporter.say(f"The plan is in {escape(str(folder.plan))}")
-        else:
-            reporter.code = report_no_plan(task, result, folder, reporter)
 
 
-def report_no_plan(
-    task: Task, result: Infeasible | Undecided, folder: ResultFolder | None, reporter: Reporter
-) -> ExitCode:
-    """Say that there is no plan, or that none is known, and where the proof is if a folder was written."""
-    answer = answer_of(result)
-    reporter.table(task.name, summary_rows(reporter.facts))
-    reporter.say(f"[bold]{answer}[/]: {escape(result.reason)}")
-    if folder is not None and folder.certificate.exists():
-        reporter.say(f"The proof is in {escape(str(folder.certificate))}")
-    reporter.say(f"What blocks, and what would help: coop-drake why {escape(str(task.scenario.path))}")
-    return ExitCode.of(answer)
+def plan_of(task: Task, folder: ResultFolder | None, reporter: Reporter) -> Plan | None:
+    """Plan, and note the facts; without a plan say so, and set the exit code.
 
-
-def search_and_write(task: Task, folder: ResultFolder, reporter: Reporter) -> PlanningResult:
-    """Plan, note the facts, and write the plan with its table of cells, or the proof that there is none."""
-    from coop_drake.answers import Found, Infeasible, save_plan, table_1
-    from coop_drake.answers.proof_file import save_proof
-    from coop_drake.files import write_atomically
-
-    result = search(task, reporter)
-    folder.forget("plan")
-    if isinstance(result, Found):
-        save_plan(result.plan, folder.plan)
-        write_atomically(folder.path / "table_1.md", table_1(result.plan).encode())
-    elif isinstance(result, Infeasible) and result.proof is not None:
-        save_proof(result.proof, task.problem, folder.certificate)
-    return result
-
-
-def search(task: Task, reporter: Reporter) -> PlanningResult:
-    """Plan and note the facts; nothing is written."""
+    The plan with its table of cells, or the proof that there is none, goes to the folder if one is given.
+    """
+    from coop_drake.answers import Found
     from coop_drake.memory import peak_memory_mb
     from coop_drake.planning.planner import plan
 
@@ -75,4 +45,28 @@ def search(task: Task, reporter: Reporter) -> PlanningResult:
     with reporter.stage("planning", "planning", cpu=True) as progress:
         result = plan(task.problem, task.scenario.gain_sets[name], gain_set_name=name, progress=progress)
     reporter.facts.update(planning_facts(result), peak_memory_mb=peak_memory_mb())
-    return result
+    if folder is not None:
+        _write(result, task, folder)
+    if isinstance(result, Found):
+        return result.plan
+    reporter.table(task.name, summary_rows(reporter.facts))
+    reporter.say(f"[bold]{answer_of(result)}[/]: {escape(result.reason)}")
+    if folder is not None and folder.certificate.exists():
+        reporter.say(f"The proof is in {escape(str(folder.certificate))}")
+    reporter.say(f"What blocks, and what would help: coop-drake why {escape(str(task.scenario.path))}")
+    reporter.code = ExitCode.of(answer_of(result))
+    return None
+
+
+def _write(result: PlanningResult, task: Task, folder: ResultFolder) -> None:
+    """Write the plan with its table of cells, or the proof that there is none."""
+    from coop_drake.answers import Found, Infeasible, save_plan, table_1
+    from coop_drake.answers.proof_file import save_proof
+    from coop_drake.files import write_atomically
+
+    folder.forget("plan")
+    if isinstance(result, Found):
+        save_plan(result.plan, folder.plan)
+        write_atomically(folder.path / "table_1.md", table_1(result.plan).encode())
+    elif isinstance(result, Infeasible) and result.proof is not None:
+        save_proof(result.proof, task.problem, folder.certificate)

@@ -19,7 +19,7 @@ from coop_drake.cli.options import (
     ResultsFolder,
     ScenarioPath,
 )
-from coop_drake.cli.plan import report_no_plan, search_and_write
+from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import simulation_facts, summary_rows
@@ -48,17 +48,12 @@ def run_command(
 ) -> None:
     """Plan, map, simulate and record a transport."""
     with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.answers import Found
-
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out)
-        result = search_and_write(task, folder, reporter)
-        if isinstance(result, Found):
+        if plan := plan_of(task, folder, reporter):
             reporter.code = carry_out(
-                task, result.plan, folder, reporter, fresh_maps=fresh_maps, live=live, blocks=blocks
+                task, plan, folder, reporter, fresh_maps=fresh_maps, live=live, blocks=blocks
             )
-        else:
-            reporter.code = report_no_plan(task, result, folder, reporter)
 
 
 def carry_out(

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from coop_drake.answers import PlanningProblem
+from coop_drake.answers.problem import at_goal
 from coop_drake.diagnosis.bracket import Amounts, bracketed
 from coop_drake.diagnosis.contacts import Contact, Overlap, contacts, overlaps
 from coop_drake.diagnosis.findings import BlockedPose
@@ -64,8 +65,7 @@ def _least_collision(problem: PlanningProblem) -> FloatArray:
     """The configuration at the goal with the least collision of those tried; ties go to the first."""
     joints = problem.tree.joints
     free = [joint.index for joint in joints if problem.goal_joints[joint.index] is None]
-    fixed = [0.0 if value is None else value for value in problem.goal_joints]
-    z = np.array([*problem.goal_pose, *fixed])
+    z = at_goal(problem.goal_pose, problem.goal_joints, 0.0)
     if not free:
         return z
     lower, upper = problem.tree.joint_lower[free], problem.tree.joint_upper[free]

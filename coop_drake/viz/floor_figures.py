@@ -14,7 +14,7 @@ from shapely import Polygon
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.drawing.canvas import legend_above, new_figure
 from coop_drake.drawing.colours import INK, SKY, VERMILLION
 from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace, frame_of, team_legend
@@ -53,7 +53,8 @@ def overview_figure(problem: PlanningProblem, plan: Plan | None = None, caption:
         _draw_cells(ax, plan)
     legend_above(ax, handles)
     free = problem.start[3:] if plan is None else _joints_at_end(plan)
-    _draw_ends(ax, problem.tree, problem.start, _at_goal(problem, free))
+    goal = at_goal(problem.goal_pose, problem.goal_joints, free)
+    _draw_ends(ax, problem.tree, problem.start, goal)
     return figure
 
 
@@ -65,7 +66,8 @@ def start_and_goal_figure(workspace: Polygon, tree: ComponentTree, plan: Plan) -
     caption = "Figure 4. Start and goal configuration of the robots and the object."
     figure, ax = _floor_axes(workspace, caption)
     legend_above(ax, team_legend(tree))
-    _draw_ends(ax, tree, plan.start, _at_goal(plan, _joints_at_end(plan)))
+    goal = at_goal(plan.goal_pose, plan.goal_joints, _joints_at_end(plan))
+    _draw_ends(ax, tree, plan.start, goal)
     return figure
 
 
@@ -106,12 +108,6 @@ def _draw_ends(ax: Axes, tree: ComponentTree, start: FloatArray, goal: FloatArra
         ax.annotate(
             label, (z[0], z[1]), xytext=(5, 4), textcoords="offset points", zorder=6, fontweight="bold"
         )
-
-
-def _at_goal(asked: PlanningProblem | Plan, free: FloatArray) -> FloatArray:
-    """Return z = (x, y, theta, q...) at the goal; joints without a goal are those of ``free``, shape (n,)."""
-    joints = [rest if goal is None else goal for goal, rest in zip(asked.goal_joints, free, strict=True)]
-    return np.concatenate([asked.goal_pose, joints])
 
 
 def _joints_at_end(plan: Plan) -> FloatArray:

@@ -21,10 +21,9 @@ DASHES = (0.0, (1.4, 0.9))
 """Dashes of what is not proved, in widths of the line."""
 
 
-def draw_ends(ax: Axes, problem: PlanningProblem, goal_joints: FloatArray) -> None:
-    """Draw the floor, and the team's footprint at the start and at the goal with some joints, shape (n,)."""
+def draw_ends(ax: Axes, problem: PlanningProblem, goal: FloatArray) -> None:
+    """Draw the floor, and the team's footprint at the start and at z at the goal, shape (3 + n,)."""
     draw_workspace(ax, problem.workspace)
-    goal = np.concatenate([problem.goal_pose, goal_joints])
     box = {"boxstyle": "round,pad=0.15", "facecolor": colours.PAPER, "edgecolor": "none", "alpha": 0.8}
     for label, z in (("start", problem.start), ("goal", goal)):
         draw_team(ax, problem.tree, z, colour=colours.INK, alpha=0.12, zorder=5.0)

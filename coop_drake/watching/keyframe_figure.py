@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from coop_drake.answers.problem import at_goal
 from coop_drake.drawing import colours
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.angle_panels import AnglePanel, cut, leaf_colour
@@ -91,7 +92,7 @@ def _legend(frame: Keyframe) -> list[Patch | Line2D]:
 
 
 def _draw_floor(ax: Axes, recording: SearchRecording, frame: Keyframe) -> None:
-    draw_ends(ax, recording.problem, _goal_joints(recording, frame))
+    draw_ends(ax, recording.problem, _goal(recording, frame))
     ax.set_title(_FLOOR, fontsize=10, loc="left")
     if frame.components is not None:
         draw_section(ax, union(region for _, region in frame.components.reached), colours.REACHED, 0.5)
@@ -108,14 +109,13 @@ def _draw_floor(ax: Axes, recording: SearchRecording, frame: Keyframe) -> None:
                 draw_section(ax, cell.region.section, colours.HALVED, 0.0, width=2.0)
 
 
-def _goal_joints(recording: SearchRecording, frame: Keyframe) -> FloatArray:
-    """Return goal values of all joints; free joints as at the end of the path, else as at the start."""
+def _goal(recording: SearchRecording, frame: Keyframe) -> FloatArray:
+    """Return z at the goal; free joints are as at the end of the path, else as at the start."""
     joints = recording.problem.start[3:].copy()
     if frame.path:
         axes = recording.axes_of(frame.state.robots)[1:]
         joints[[axis - 1 for axis in axes]] = frame.path[-1].angles[-1, 1:]
-    fixed = recording.problem.goal_joints
-    return np.array([q if goal is None else goal for q, goal in zip(joints, fixed, strict=True)])
+    return at_goal(recording.problem.goal_pose, recording.problem.goal_joints, joints)
 
 
 def _draw_angles(ax: Axes, recording: SearchRecording, frame: Keyframe, own: int, *, last: bool) -> None:

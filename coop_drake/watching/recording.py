@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from manifold3d import CrossSection, FillRule
 
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.parts import polygon_rings
 from coop_drake.geometry.swept_tree import SweptTree
@@ -69,8 +69,7 @@ class SearchRecording:
 
     def goal_of(self, robots: tuple[int, ...]) -> FloatArray:
         """Return the goal with some robots' joints only, NaN for free ones, shape (2 + axes,) [m, rad]."""
-        joints = [np.nan if goal is None else goal for goal in self.problem.goal_joints]
-        goal = np.array([*self.problem.goal_pose, *joints])
+        goal = at_goal(self.problem.goal_pose, self.problem.goal_joints, np.nan)
         return goal[[0, 1, *[2 + axis for axis in self.axes_of(robots)]]]
 
     @property

@@ -12,7 +12,7 @@ import numpy as np
 from meshcat.geometry import Mesh, MeshBasicMaterial, MeshPhongMaterial, TriangularMeshGeometry
 from shapely import Polygon
 
-from coop_drake.answers.problem import PlanningProblem
+from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.drawing.colours import FLOOR_IN_SPACE, INK, WALL
 from coop_drake.drawing.footprints import team_footprints
 from coop_drake.drawing.solids import TriangleMesh, joined, slab_mesh, tube_mesh, wall_polygons
@@ -110,9 +110,8 @@ def scene_labels(problem: PlanningProblem, scene: SceneCoordinates) -> list[dict
 
 def _ends(problem: PlanningProblem) -> dict[str, FloatArray]:
     """Return z = (x, y, theta, q...) at both ends, free joints of the goal as they start, shape (3 + n,)."""
-    pairs = zip(problem.start[3:], problem.goal_joints, strict=True)
-    joints = [q if goal is None else goal for q, goal in pairs]
-    return {"start": problem.start, "goal": np.array([*problem.goal_pose, *joints])}
+    goal = at_goal(problem.goal_pose, problem.goal_joints, problem.start[3:])
+    return {"start": problem.start, "goal": goal}
 
 
 def _point(scene: SceneCoordinates, z: FloatArray) -> FloatArray:
