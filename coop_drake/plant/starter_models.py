@@ -12,14 +12,15 @@ _LINK_HEIGHT = 0.08
 """Width and height of a link, as in the shipped models [m]."""
 _ARM_HEIGHT = 0.4
 """Height of arms and grasps over the floor, as in the shipped models [m]."""
-_OBJECT_MASS = 1.0
-"""Mass of the object [kg]."""
 _BEND = 1.87
 """Limit of the joints on both sides, as in the shipped models [rad]."""
 
 
-def object_model(length: float, width: float) -> str:
-    """SDF of a box of a length along x and a width along y [m]; every side has a grasp frame, x outwards."""
+def object_model(length: float, width: float, mass: float = 1.0) -> str:
+    """SDF of a box of a length along x, a width along y [m] and a mass [kg].
+
+    Every side has a grasp frame in its middle, x outwards.
+    """
     grasps = (
         (0.5 * length, 0.0, 0.0),
         (-0.5 * length, 0.0, pi),
@@ -31,7 +32,7 @@ def object_model(length: float, width: float) -> str:
         for k, (x, y, yaw) in enumerate(grasps)
     )
     pose, shape = f"0 0 {_ARM_HEIGHT} 0 0 0", _box(length, width, 0.2)
-    body = _link("body", pose, "0 0 0", shape, _OBJECT_MASS, OBJECT_IN_MODELS)
+    body = _link("body", pose, "0 0 0", shape, mass, OBJECT_IN_MODELS)
     return _sdf("object", f"{body}\n{frames}", "The carried object, with a grasp frame on every side.")
 
 
