@@ -95,6 +95,17 @@ class SimulationLog:
     plan_digest: str = ""
     scenario_digest: str = ""
 
+    @property
+    def peak_force_rate(self) -> float:
+        """Largest change of a base's force over an accepted step, over the step's length [N/s].
+
+        In a sampled team forces step; there it is the largest step over the time between samples.
+        """
+        lengths = np.diff(self.times)
+        changes = np.hypot(*np.moveaxis(np.diff(self.base_wrenches[..., :2], axis=0), -1, 0)).max(axis=1)
+        moved = lengths > 0.0
+        return float((changes[moved] / lengths[moved]).max(initial=0.0))
+
     def save(self, path: Path | str) -> None:
         """Write the log as a compressed ``.npz`` file; an interrupted write leaves no file behind.
 

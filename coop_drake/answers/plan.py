@@ -88,6 +88,11 @@ class Plan:
     cells: tuple[Cell, ...]
     transitions: tuple[Transition, ...]
 
+    def governor_row(self, index: int) -> Vector:
+        """Return the governor's gains in a transition, with those from which they start, shape (8,)."""
+        before = self.transitions[max(index - 1, 0)].gains
+        return self.transitions[index].gains.governor_row(before)
+
     def funnel(self, index: int) -> Funnel:
         """Return the funnels of a transition, axes (theta, q...), from cell to goal intervals."""
         from coop_drake.laws.funnels import Funnel  # here, so that reading a plan does not load numba

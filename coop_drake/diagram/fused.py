@@ -97,15 +97,15 @@ def build_team_controller(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) 
     for cell, law in zip(known.cells, laws, strict=True):
         if not isinstance(cell.field, VelocityField):
             raise TypeError("fused blocks need the velocity fields of harmonic maps")
-        cells.append(
-            FusedCell(cell.gains.governor_row, cell.clearance.edges, *cell.field.kernel_arguments, law.table)
-        )
+        cells.append(FusedCell(cell.row, cell.clearance.edges, *cell.field.kernel_arguments, law.table))
     return TeamController(
         cells,
         _stacked(team, knowledge),
         [transition.inradius for transition in known.plan.transitions],
         known.plan.goal_pose[:2],
         known.position_tolerance,
+        start=known.plan.start[2:][np.array(axes)],
+        period=known.period,
         on_bases=known.period is None,
     )
 

@@ -35,9 +35,14 @@ def robot_knowledge(
     _check(plan, maps, team)
     cells = [
         GovernedCell(
-            BoundaryDistance(cell.tidied), _field(field_map, transition.gains.governor_gain), transition.gains
+            BoundaryDistance(cell.tidied),
+            _field(field_map, transition.gains.governor_gain),
+            transition.gains,
+            before.gains,
         )
-        for cell, transition, field_map in zip(plan.cells, plan.transitions, maps, strict=True)
+        for cell, transition, before, field_map in zip(
+            plan.cells, plan.transitions, (plan.transitions[0], *plan.transitions[:-1]), maps, strict=True
+        )
     ]
     factor, deployment, control = 1.0 + scenario.deployment.mass_error, scenario.deployment, scenario.control
     delay = whole_periods(deployment.measurements.delay, deployment.period) if deployment.period else 0

@@ -134,11 +134,17 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
 def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
     plan, cells, inertia, p_LE = knowledge.plan, knowledge.cells, knowledge.object_inertia, knowledge.p_LE
     joints = range(knowledge.joints.start, knowledge.joints.stop)
-    laws = axis_laws(plan, [0, *(1 + i for i in joints)])
+    axes = [0, *(1 + i for i in joints)]
+    laws = axis_laws(plan, axes)
     return {
         "object_estimator": ObjectEstimator(knowledge.robot, p_LE),
         "reference_governor": ReferenceGovernor(cells),
-        "axis_ppc": AxisPpc(laws),
+        "axis_ppc": AxisPpc(
+            laws,
+            start=plan.start[2:][np.array(axes)],
+            period=knowledge.period,
+            offset=knowledge.sample_offset,
+        ),
         "wrench_law": WrenchLaw(
             p_LE,
             p_LLcm=inertia.p_LLcm,

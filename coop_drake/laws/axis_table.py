@@ -10,6 +10,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.laws.funnels import Funnel, axis_bounds
 from coop_drake.laws.gains import TransitionGains
+from coop_drake.laws.hand_over import fading
 from coop_drake.laws.ppc import ramped_gain, track_axis
 from coop_drake.tree.pose import FloatArray
 
@@ -28,13 +29,14 @@ __all__ = [
     "write_row",
 ]
 
-LAW_COLUMNS = 12
+LAW_COLUMNS = 13
 """Columns of a table: slice and goal interval [rad or m], lambda [1/s], 1 where the funnel is quintic and 0
 where it is not, kappa [rad^2/s^2 or m^2/s^2], k1, k2 and mu [1/s], the smallest distance to a bound over the
-funnel's width [-], and the largest V with which the cell may be entered."""
+funnel's width [-], the time T in which the commands of the last cell fade [s], and the largest V with which
+the cell may be entered."""
 
 SLICE_LOWER, SLICE_UPPER, GOAL_LOWER, GOAL_UPPER, DECAY_RATE, QUINTIC = range(6)
-LOG_GAIN, POSITION_GAIN, RATE_GAIN, RAMP_RATE, SATURATION, ENERGY_BOUND = range(6, LAW_COLUMNS)
+LOG_GAIN, POSITION_GAIN, RATE_GAIN, RAMP_RATE, SATURATION, FADING_TIME, ENERGY_BOUND = range(6, LAW_COLUMNS)
 """The columns by name, in this order."""
 
 
@@ -51,7 +53,7 @@ def axis_table(funnel: Funnel, gains: TransitionGains) -> FloatArray:
             row,
             (funnel.slice_lower[i], funnel.slice_upper[i], funnel.goal_lower[i], funnel.goal_upper[i]),
             (funnel.decay_rate[i], gains.log_gain[i], gains.energy_bound[i]),
-            (gains.position_gain, gains.rate_gain, gains.ramp_rate, gains.saturation),
+            (gains.position_gain, gains.rate_gain, gains.ramp_rate, gains.saturation, gains.hand_over_time),
             funnel.shape == "quintic",
         )
     return table
@@ -62,7 +64,7 @@ def write_row(
     row: FloatArray,
     intervals: tuple[float, float, float, float],
     scheduled: tuple[float, float, float],
-    gains: tuple[float, float, float, float],
+    gains: tuple[float, float, float, float, float],
     quintic: bool,
 ) -> None:
     """Write one row of a table.
@@ -71,12 +73,12 @@ def write_row(
         row: Receives the numbers, shape (``LAW_COLUMNS``,).
         intervals: Slice and goal interval [rad or m].
         scheduled: lambda, kappa and the largest V, as ``scheduled_axis`` returns them.
-        gains: k1, k2 and mu [1/s], and the smallest distance to a bound over the width [-].
+        gains: k1, k2 and mu [1/s], the smallest distance to a bound over the width [-], and T [s].
         quintic: Whether the funnel is quintic.
     """
     row[SLICE_LOWER], row[SLICE_UPPER], row[GOAL_LOWER], row[GOAL_UPPER] = intervals
     row[DECAY_RATE], row[LOG_GAIN], row[ENERGY_BOUND] = scheduled
-    row[POSITION_GAIN], row[RATE_GAIN], row[RAMP_RATE], row[SATURATION] = gains
+    row[POSITION_GAIN], row[RATE_GAIN], row[RAMP_RATE], row[SATURATION], row[FADING_TIME] = gains
     row[QUINTIC] = 1.0 if quintic else 0.0
 
 
@@ -122,21 +124,70 @@ def funnel_acceleration(
 
 @compiled
 def track_axes(
-    table: FloatArray, time: float, object_state: FloatArray, robot: FloatArray, acceleration: FloatArray
+    table: FloatArray,
+    time: float,
+    jumps: FloatArray,
+    object_state: FloatArray,
+    robot: FloatArray,
+    acceleration: FloatArray,
 ) -> None:
     """Write the desired accelerations of the object's angle and of one robot's joints.
+
+    Each is that of ``track_row``, plus the jump at the switch times ``fading``. While a jump delta fades,
+    V' <= -kappa k1 s^2 - k2 (x' - v)^2 + |delta| f |x' - v| <= delta^2 f^2 / (4 k2): V grows by at most
+    delta^2 T / (8 k2) in all, so that no axis leaves its funnel whatever the jump.
 
     Args:
         table: The axes (theta, q_k), shape (1 + n, ``LAW_COLUMNS``).
         time: Time since the cell was entered [s].
+        jumps: What ``write_jumps`` gave at the switch, shape (1 + n,) [rad/s^2 or m/s^2].
         object_state: Pose and twist of the object, shape (6,).
         robot: (z_k, z_k'), shape (2 (3 + n),); not read where the robot has no joints.
         acceleration: Receives theta'' and q_k'', shape (1 + n,) [rad/s^2 or m/s^2].
     """
-    n = table.shape[0] - 1
-    acceleration[0] = track_row(table[0], time, object_state[2], object_state[5])[0]
+    n, left = table.shape[0] - 1, fading(time, table[0, FADING_TIME])
+    acceleration[0] = track_row(table[0], time, object_state[2], object_state[5])[0] + left * jumps[0]
     for i in range(n):
-        acceleration[1 + i] = track_row(table[1 + i], time, robot[3 + i], robot[6 + n + i])[0]
+        own = track_row(table[1 + i], time, robot[3 + i], robot[6 + n + i])[0]
+        acceleration[1 + i] = own + left * jumps[1 + i]
+
+
+@compiled
+def write_jumps(
+    table: FloatArray,
+    next_table: FloatArray,
+    time: float,
+    object_state: FloatArray,
+    robot: FloatArray,
+    jumps: FloatArray,
+) -> None:
+    """Write by how much the accelerations of ``track_axes`` would jump if the next cell were entered now.
+
+    Args:
+        table: The axes in the current cell, whose hand-over is over, shape (1 + n, ``LAW_COLUMNS``).
+        next_table: The axes in the next cell.
+        time: Time since the current cell was entered [s].
+        object_state: Pose and twist of the object, shape (6,).
+        robot: (z_k, z_k'), shape (2 (3 + n),); not read where the robot has no joints.
+        jumps: Receives the law of the current cell less that of the next, shape (1 + n,).
+    """
+    none, following = np.zeros(table.shape[0]), np.empty(table.shape[0])
+    track_axes(table, time, none, object_state, robot, jumps)
+    track_axes(next_table, 0.0, none, object_state, robot, following)
+    for i in range(table.shape[0]):
+        jumps[i] -= following[i]
+
+
+def first_jumps(table: FloatArray, start: FloatArray | None) -> FloatArray:
+    """Return the jumps at the beginning, from no acceleration to that of the first cell's law, shape (m,).
+
+    Args:
+        table: The axes in the first cell, shape (m, ``LAW_COLUMNS``).
+        start: Where they rest at the beginning, shape (m,); None for no jumps.
+    """
+    if start is None:
+        return np.zeros(len(table))
+    return np.array([-track_row(row, 0.0, x, 0.0)[0] for row, x in zip(table, start, strict=True)])
 
 
 @compiled

@@ -10,6 +10,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.laws.funnels import CLOSING, axis_bounds
 from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains, TransitionGains
+from coop_drake.laws.hand_over import shortest_hand_over
 from coop_drake.laws.ppc import ramped_gain, track_axis
 from coop_drake.tree.pose import FloatArray
 
@@ -44,6 +45,7 @@ class Schedule(NamedTuple):
         rate_gain: k2 [1/s].
         ramp_rate: mu [1/s].
         saturation: Smallest distance to a funnel bound, over the funnel's width [-].
+        hand_over_time: T, in which the commands of the last cell fade [s].
         energy_factor: A transition is entered below this multiple of the energy at rest ...
         energy_allowance: ... plus this multiple of kappa ...
         entry_energy: ... plus this energy.
@@ -68,6 +70,7 @@ class Schedule(NamedTuple):
     rate_gain: float
     ramp_rate: float
     saturation: float
+    hand_over_time: float
     energy_factor: float
     energy_allowance: float
     entry_energy: float
@@ -89,6 +92,7 @@ def _fixed(gains: FixedGains) -> Schedule:
         max_log_gain=float(gains.log_gain), log_stiffness=inf, log_acceleration=inf,
         position_gain=float(gains.position_gain), rate_gain=float(gains.rate_gain),
         ramp_rate=float(gains.ramp_rate), saturation=float(gains.saturation),
+        hand_over_time=float(gains.hand_over_time),
         energy_factor=float(gains.energy_factor), energy_allowance=float(gains.energy_allowance),
         entry_energy=0.0,
     )  # fmt: skip
@@ -105,8 +109,10 @@ def _by_age(gains: ScheduledGains) -> Schedule:
     stiffness = min(float(gains.max_stiffness), fastest * fastest)
     slowest, quickest = float(gains.min_decay_rate), gains.decay_fraction * rate_gain
     rates = min(slowest, quickest), quickest
+    least = min(float(gains.min_stiffness), stiffness)
+    hand_over = shortest_hand_over(stiffness, least, gains.damping_factor * sqrt(least))
     return Schedule(
-        wall_stiffness=float(gains.wall_stiffness), min_stiffness=min(float(gains.min_stiffness), stiffness),
+        wall_stiffness=float(gains.wall_stiffness), min_stiffness=least,
         max_stiffness=stiffness, damping_factor=float(gains.damping_factor),
         governor_factor=float(gains.governor_factor), smoothing=float(gains.smoothing), quintic=True,
         funnel_acceleration=float(gains.funnel_acceleration), min_angle_rate=rates[0],
@@ -114,6 +120,7 @@ def _by_age(gains: ScheduledGains) -> Schedule:
         max_log_gain=float(gains.max_log_gain), log_stiffness=gains.log_fraction * rate_gain * rate_gain,
         log_acceleration=float(gains.log_acceleration), position_gain=gains.position_fraction * rate_gain,
         rate_gain=rate_gain, ramp_rate=gains.ramp_fraction * rate_gain, saturation=float(gains.saturation),
+        hand_over_time=max(float(gains.hand_over_time), hand_over),
         energy_factor=float(gains.energy_factor), energy_allowance=float(gains.energy_allowance),
         entry_energy=0.5 * gains.entry_rate * gains.entry_rate,
     )  # fmt: skip
@@ -237,6 +244,7 @@ def transition_gains(
         rate_gain=schedule.rate_gain,
         ramp_rate=schedule.ramp_rate,
         saturation=schedule.saturation,
+        hand_over_time=schedule.hand_over_time,
         energy_bound=rows[:, 2].copy(),
     )
 

@@ -46,6 +46,7 @@ class TransitionGains:
             printed [1/s].
         saturation: Smallest distance to a funnel bound with which the law computes, over the funnel's width
             [-]; see ``track_axis``.
+        hand_over_time: T, in which the commands of the last cell fade; 0 for a step, as printed [s].
         energy_bound: Largest PPC energy V accepted when this transition is entered, shape (1 + n,).
     """
 
@@ -60,12 +61,17 @@ class TransitionGains:
     rate_gain: Gain
     ramp_rate: Annotated[NotNegative, EXACT]
     saturation: Annotated[Saturation, EXACT]
+    hand_over_time: Annotated[NotNegative, EXACT]
     energy_bound: AxisGains
 
-    @property
-    def governor_row(self) -> FloatArray:
-        """K, zeta, K_G and c, as compiled code reads them, shape (4,)."""
-        return np.array([self.stiffness, self.damping, self.governor_gain, self.smoothing])
+    def governor_row(self, before: "TransitionGains") -> FloatArray:
+        """Return the governor's gains as compiled code reads them, see ``governed_gains``, shape (8,).
+
+        Args:
+            before: Gains of the cell before; in the first cell its own.
+        """
+        own = self.stiffness, self.damping, self.governor_gain, self.smoothing
+        return np.array([*own, before.stiffness, before.damping, before.governor_gain, self.hand_over_time])
 
     def select(self, axes: NDArray[np.intp]) -> "TransitionGains":
         """Return the same gains for some axes only, for instance those that one robot controls."""
@@ -98,6 +104,7 @@ class FixedGains:
         ramp_rate: mu, the rate at which k1 is ramped in; 0 for k1 at once [1/s].
         saturation: Smallest distance to a funnel bound with which the law computes, over the width [-]. By
             default so small that it only bounds the trial steps of an integrator.
+        hand_over_time: T, in which the commands of the last cell fade; 0 for a step, as printed [s].
         energy_factor: A transition is entered below this multiple of the energy at rest ...
         energy_allowance: ... plus this multiple of kappa.
     """
@@ -114,6 +121,7 @@ class FixedGains:
     rate_gain: Positive = 1.0
     ramp_rate: NotNegative = 0.0
     saturation: Saturation = 1e-7
+    hand_over_time: NotNegative = 0.0
     energy_factor: EnergyFactor = 1.2
     energy_allowance: Positive = 0.5
 
@@ -151,6 +159,8 @@ class ScheduledGains:
             width w, over k2^2 [-].
         log_acceleration: Largest kappa |a s| when a transition is entered at rest [rad/s^2 or m/s^2].
         saturation: Smallest distance to a funnel bound with which the law computes, over the width [-].
+        hand_over_time: T, in which the commands of the last cell fade; longer where K could not fall from its
+            largest to its smallest value as quickly [s].
         energy_factor: A transition is entered below this multiple of the energy at rest ...
         energy_allowance: ... plus this multiple of kappa ...
         entry_rate: ... plus the energy v^2 / 2 of this rate v [rad/s or m/s].
@@ -174,6 +184,7 @@ class ScheduledGains:
     log_fraction: Positive = 0.3
     log_acceleration: Positive = 5.0
     saturation: Saturation = 0.02
+    hand_over_time: Positive = 0.1
     energy_factor: EnergyFactor = 1.2
     energy_allowance: Positive = 0.5
     entry_rate: Positive = 0.02

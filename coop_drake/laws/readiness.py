@@ -83,6 +83,17 @@ def funnel_margin(energy: float, energy_bound: float) -> float:
 
 
 @compiled
+def hand_over_margin(time: float, duration: float) -> float:
+    """Return by how much the last hand-over is over, 1 where it takes no time.
+
+    Args:
+        time: Time since the cell was entered [s].
+        duration: T, in which the commands of the last cell fade [s].
+    """
+    return min(time / duration - 1.0, 1.0) if duration > 0.0 else 1.0
+
+
+@compiled
 def rest_margin(rate: float) -> float:
     """Return 1 - |x'| / ``RATE_TOLERANCE`` of one axis, positive where it counts as at rest."""
     return 1.0 - abs(rate) / RATE_TOLERANCE

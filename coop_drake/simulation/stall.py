@@ -7,6 +7,7 @@ import numpy as np
 from coop_drake.answers.plan import Plan
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.laws.axis_table import ENERGY_BOUND, axis_table, track_row
+from coop_drake.laws.hand_over import governed_gains
 from coop_drake.laws.readiness import (
     clearance_margin,
     funnel_margin,
@@ -77,15 +78,16 @@ def _intervals(plan: Plan, sample: Sample) -> dict[str, float]:
 def _readiness(plan: Plan, sample: Sample) -> dict[str, float]:
     following = sample.cell + 1
     cell, gains = plan.cells[following], plan.transitions[following].gains
+    stiffness = governed_gains(plan.governor_row(following), 0.0)[0]
     margin = cell_margin(
         BoundaryDistance(cell.tidied).edges,
-        gains.stiffness,
+        stiffness,
         np.concatenate([sample.z[:3], sample.rates[:3]]),
         sample.governor_position,
     )
     margins = _intervals(plan, sample)
     margins["the object's position is safe in the next cell (Delta E)"] = clearance_margin(
-        margin, gains.stiffness, plan.transitions[sample.cell].inradius
+        margin, stiffness, plan.transitions[sample.cell].inradius
     )
     table = axis_table(plan.funnel(following), gains)
     for i, name in enumerate(_axes(plan)):

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pydrake.systems.framework import BasicVector, Context
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
-from coop_drake.laws.axis_table import track_axes, write_bounds
+from coop_drake.laws.axis_table import first_jumps, track_axes, write_bounds, write_jumps
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.block import Block
-from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
+from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
+from coop_drake.tree.pose import FloatArray
 
 __all__ = ["AxisPpc"]
 
@@ -21,45 +23,84 @@ class AxisPpc(Block):
     input   ``object_state``         6          pose and twist of L, angle unwrapped                   W
     input   ``robot_state``          2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)         W
     input   ``current_cell``         2          index of the current cell, time of its entry [-, s]
+    input   ``ready``                2          the robot's own report: cell index, margin [-]
     output  ``axis_acceleration``    1 + n      desired angular acceleration of the object [rad/s^2],  W
                                                 of the joints [rad/s^2 or m/s^2]
     output  ``funnels``              2 (1 + n)  lower, then upper funnel bounds now [rad or m]
     ======= ======================== ========== ====================================================== =====
 
-    No state: the funnels depend on the time since the cell was entered. The law is the same for all axes, so
-    one block computes all axes of a robot; ``robot_state`` is not read where the robot has no joints.
+    State: one discrete group (index of a cell, jumps of the accelerations at the switch to it). As long as
+    the robot reports that it is ready, the jumps of a switch now are written there, at the start of every
+    step of the simulator or every ``period``. In the cell they fade, see ``track_axes``.
+
+    The law is the same for all axes, so one block computes all axes of a robot; ``robot_state`` is not read
+    where the robot has no joints, ``ready`` not where there is one cell.
 
     Args:
         laws: One law of the axes (theta, q_k) for each cell of the plan.
+        start: Where the axes rest at the beginning, shape (1 + n,); None for accelerations that are those of
+            the first cell's law from the beginning.
+        period: Time between updates [s], None for every step.
+        offset: Time of the first update where there is a period [s].
 
     Raises:
         ValueError: There is no law, or the laws differ in their number of axes or have none.
     """
 
-    def __init__(self, laws: Sequence[AxisLaw]) -> None:
+    def __init__(
+        self,
+        laws: Sequence[AxisLaw],
+        *,
+        start: FloatArray | None = None,
+        period: float | None = None,
+        offset: float = 0.0,
+    ) -> None:
         super().__init__()
         if not laws or len({law.axes for law in laws}) != 1 or laws[0].axes < 1:
             raise ValueError("AxisPpc needs one law for each cell, all of the same axes, the angle first")
         self._tables = [law.table for law in laws]
         axes = laws[0].axes
+        self._none, self._nothing = np.zeros(axes), EventStatus.DidNothing()
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._robot = self.DeclareVectorInputPort("robot_state", 2 * (2 + axes))
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
-        self.DeclareVectorOutputPort("axis_acceleration", axes, self._write_acceleration)
+        self._ready = self.DeclareVectorInputPort("ready", READY_SIZE)
+        self.DeclareDiscreteState([0.0, *first_jumps(self._tables[0], start)])
+        read = {self.time_ticket(), self.input_port_ticket(self._cell.get_index())}
+        states = {self.input_port_ticket(port.get_index()) for port in (self._object, self._robot)}
+        # The robot's report is not among them: only the update reads it.
         self.DeclareVectorOutputPort(
-            "funnels",
-            2 * axes,
-            self._write_funnels,
-            {self.time_ticket(), self.input_port_ticket(self._cell.get_index())},
+            "axis_acceleration", axes, self._write_acceleration, read | states | {self.xd_ticket()}
         )
+        self.DeclareVectorOutputPort("funnels", 2 * axes, self._write_funnels, read)
+        if len(laws) > 1:
+            self.declare_update(self._remember, period, offset)
+
+    def _states(self, context: Context, axes: int) -> tuple[FloatArray, FloatArray]:
+        object_state = self._object.Eval(context)
+        return object_state, self._robot.Eval(context) if axes > 1 else object_state
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
-        cell, object_state = self._cell.Eval(context), self._object.Eval(context)
-        table, time = self._tables[index_of(cell, len(self._tables))], context.get_time() - cell[1]
-        robot = self._robot.Eval(context) if len(table) > 1 else object_state
-        track_axes(table, time, object_state, robot, output.get_mutable_value())
+        cell = self._cell.Eval(context)
+        index, time = index_of(cell, len(self._tables)), context.get_time() - cell[1]
+        table = self._tables[index]
+        memory = context.get_discrete_state_vector().value()
+        jumps = memory[1:] if memory[0] == index else self._none
+        track_axes(table, time, jumps, *self._states(context, len(table)), output.get_mutable_value())
 
     def _write_funnels(self, context: Context, output: BasicVector) -> None:
         cell = self._cell.Eval(context)
         table = self._tables[index_of(cell, len(self._tables))]
         write_bounds(table, context.get_time() - cell[1], output.get_mutable_value())
+
+    def _remember(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
+        index, margin = self._ready.Eval(context)
+        following = int(index) + 1
+        if not margin >= 0.0 or following >= len(self._tables):
+            return self._nothing
+        time, table = context.get_time() - self._cell.Eval(context)[1], self._tables[following - 1]
+        memory = discrete_state.get_mutable_vector().get_mutable_value()
+        memory[0] = following
+        states = self._states(context, len(table))
+        write_jumps(table, self._tables[following], time, *states, memory[1:])
+        return EventStatus.Succeeded()

@@ -43,6 +43,13 @@ class Block(LeafSystem):
         """As Drake's; the event does not keep the block alive once it is released."""
         super().DeclarePeriodicDiscreteUpdateEvent(period_sec, offset_sec, self._loosely(update))
 
+    def declare_update(self, update: Callable[..., Any], period: float | None, offset: float = 0.0) -> None:
+        """Declare a discrete update in every step, or every ``period`` from ``offset`` on [s]."""
+        if period is None:
+            self.DeclarePerStepDiscreteUpdateEvent(update)
+        else:
+            self.DeclarePeriodicDiscreteUpdateEvent(period_sec=period, offset_sec=offset, update=update)
+
     def release(self) -> None:
         """Drop all references; neither the block nor its Diagram may be used any more."""
         for callback in self._callbacks:

@@ -49,10 +49,7 @@ class CellPlanner(Block):
         # Without these tickets the ready reports, which depend on the cell, would close an algebraic loop.
         self.DeclareVectorOutputPort("current_cell", CURRENT_CELL_SIZE, self._write_cell, {self.xd_ticket()})
         self.DeclareVectorOutputPort("arrived", 1, self._write_arrived)
-        if period is None:
-            self.DeclarePerStepDiscreteUpdateEvent(self._advance)
-        else:
-            self.DeclarePeriodicDiscreteUpdateEvent(period_sec=period, offset_sec=0.0, update=self._advance)
+        self.declare_update(self._advance, period)
 
     def _left_by_all(self, context: Context) -> float:
         """Return the index of the cell that all robots are ready to leave, -1 if some robot is not ready."""

@@ -6,6 +6,7 @@ from coop_drake.compiled import compiled
 from coop_drake.fields.flat_field import velocity_in_field
 from coop_drake.geometry.boundary import signed_distance
 from coop_drake.laws.governor import governed_acceleration, governor_velocity, object_energy_margin
+from coop_drake.laws.hand_over import SMOOTHING, governed_gains
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["accelerate_object", "cell_margin", "govern"]
@@ -29,9 +30,19 @@ def cell_margin(
 
 @compiled
 def accelerate_object(
-    gains: FloatArray, object_state: FloatArray, governor_position: FloatArray, acceleration: FloatArray
+    gains: tuple[float, float, float],
+    object_state: FloatArray,
+    governor_position: FloatArray,
+    acceleration: FloatArray,
 ) -> None:
-    """Write ``governed_acceleration`` of both coordinates, shape (2,) [m/s^2]; arguments as in ``govern``."""
+    """Write ``governed_acceleration`` of both coordinates, shape (2,) [m/s^2].
+
+    Args:
+        gains: K, zeta and K_G now.
+        object_state: Pose and twist of the object, shape (6,).
+        governor_position: p_G, shape (2,) [m].
+        acceleration: Receives them.
+    """
     for i in range(2):
         acceleration[i] = governed_acceleration(
             object_state[i], object_state[3 + i], governor_position[i], gains[0], gains[1]
@@ -40,10 +51,11 @@ def accelerate_object(
 
 @compiled
 def govern(
-    gains: FloatArray,
+    row: FloatArray,
     edges: FloatArray,
     flat: FloatArray,
     field: FloatArray,
+    time: float,
     object_state: FloatArray,
     governor_position: FloatArray,
     command: FloatArray,
@@ -51,10 +63,11 @@ def govern(
     """Write p_G', then the desired acceleration of L's origin, both of (14), and return Delta E of (15).
 
     Args:
-        gains: K, zeta, K_G and c, shape (4,).
+        row: The governor's row, see ``governed_gains``, shape (8,).
         edges: Edges of the governed set, shape (edges, 4) [m].
         flat: The cell's map, as ``VelocityField.kernel_arguments`` has it.
         field: What the velocity field adds to the map.
+        time: Time since the cell was entered [s].
         object_state: Pose and twist of the object, shape (6,).
         governor_position: p_G, shape (2,) [m].
         command: Receives both, shape (4,) [m/s, m/s^2].
@@ -62,11 +75,12 @@ def govern(
     Returns:
         Delta E [m^2/s^2].
     """
+    gains = governed_gains(row, time)
     accelerate_object(gains, object_state, governor_position, command[2:])
     margin = cell_margin(edges, gains[0], object_state, governor_position)
     if margin <= 0.0:  # the map is not evaluated in vain
         command[0], command[1] = 0.0, 0.0
         return margin
     vx, vy = velocity_in_field(flat, field, governor_position[0], governor_position[1])
-    command[0], command[1] = governor_velocity(vx, vy, margin, gains[0], gains[2], gains[3])
+    command[0], command[1] = governor_velocity(vx, vy, margin, gains[0], gains[2], row[SMOOTHING])
     return margin

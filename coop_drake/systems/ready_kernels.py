@@ -8,7 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.readiness import axis_arrival, axis_ready, clearance_margin, position_arrival
+from coop_drake.laws.axis_table import FADING_TIME
+from coop_drake.laws.hand_over import governed_gains
+from coop_drake.laws.readiness import (
+    axis_arrival,
+    axis_ready,
+    clearance_margin,
+    hand_over_margin,
+    position_arrival,
+)
 from coop_drake.systems.governor_kernels import cell_margin
 from coop_drake.tree.pose import FloatArray
 
@@ -22,7 +30,7 @@ class ReadyConditions(NamedTuple):
         table: The axes (theta, own joints) in this cell, shape (1 + n, ``LAW_COLUMNS``).
         next_table: The axes in the next cell; not read in the last cell.
         next_edges: Edges of the next cell, shape (edges, 4) [m]; not read in the last cell.
-        next_stiffness: K of the next cell [1/s^2]; not read in the last cell.
+        next_stiffness: K with which the next cell is entered [1/s^2]; not read in the last cell.
         inradius: R of the transition [m].
         goal: Goal position of the object, shape (2,) [m].
         tolerance: Largest distance to it that counts as arrived [m].
@@ -42,7 +50,7 @@ class ReadyConditions(NamedTuple):
 def ready_conditions(
     tables: Sequence[FloatArray],
     edges: Sequence[FloatArray],
-    stiffness: Sequence[float],
+    governor_rows: Sequence[FloatArray],
     inradii: Sequence[float],
     goal: FloatArray,
     tolerance: float,
@@ -52,7 +60,7 @@ def ready_conditions(
     Args:
         tables: The axes in every cell.
         edges: Edges of every governed set.
-        stiffness: K of every cell [1/s^2].
+        governor_rows: The governor's row of every cell, see ``governed_gains``.
         inradii: R of every transition [m].
         goal: Goal position of the object, shape (2,) [m].
         tolerance: Largest distance to it that counts as arrived [m].
@@ -64,7 +72,7 @@ def ready_conditions(
             tables[i],
             tables[j],
             edges[j],
-            float(stiffness[j]),
+            float(governed_gains(governor_rows[j], 0.0)[0]),
             float(inradii[i]),
             place,
             float(tolerance),
@@ -84,6 +92,7 @@ def robot_ready(
     goal: FloatArray,
     tolerance: float,
     last: bool,
+    time: float,
     object_state: FloatArray,
     robot: FloatArray,
     governor_position: FloatArray,
@@ -96,11 +105,12 @@ def robot_ready(
         table: With the next seven the ``ReadyConditions`` of the current cell.
         next_table: The axes in the next cell.
         next_edges: Edges of the next cell.
-        next_stiffness: K of the next cell.
+        next_stiffness: K with which it is entered.
         inradius: R of the transition.
         goal: Goal position.
         tolerance: Tolerance of the goal position.
         last: Whether this is the last cell.
+        time: Time since the current cell was entered [s].
         object_state: Pose and twist of the object, shape (6,).
         robot: (z_k, z_k'), shape (2 (3 + n),).
         governor_position: p_G as the robot keeps it, shape (2,) [m].
@@ -113,6 +123,7 @@ def robot_ready(
     else:
         energy_margin = cell_margin(next_edges, next_stiffness, object_state, governor_position)
         margin = clearance_margin(energy_margin, next_stiffness, inradius)
+        margin = min(margin, hand_over_margin(time, table[0, FADING_TIME]))
     for i in range(1 + n):
         position, rate = object_state[2], object_state[5]
         if i > 0:

@@ -59,7 +59,7 @@ class ReadyMonitor(Block):
         self._conditions = ready_conditions(
             [law.table for law in laws],
             [cell.clearance.edges for cell in cells],
-            [cell.gains.stiffness for cell in cells],
+            [cell.row for cell in cells],
             inradii,
             goal_position,
             position_tolerance,
@@ -72,13 +72,12 @@ class ReadyMonitor(Block):
         self.DeclareVectorOutputPort("ready", READY_SIZE, self._write_ready)
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
-        index, report = (
-            index_of(self._current.Eval(context), len(self._conditions)),
-            output.get_mutable_value(),
-        )
+        current, report = self._current.Eval(context), output.get_mutable_value()
+        index = index_of(current, len(self._conditions))
         report[0] = index
         report[1] = robot_ready(
             *self._conditions[index],
+            context.get_time() - current[1],
             self._object.Eval(context),
             self._state.Eval(context),
             self._governor.Eval(context),

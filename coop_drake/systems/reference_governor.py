@@ -12,6 +12,7 @@ from coop_drake.fields import VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.laws.governor import governor_velocity
+from coop_drake.laws.hand_over import governed_gains
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 from coop_drake.systems.governor_kernels import accelerate_object, cell_margin, govern
@@ -28,32 +29,42 @@ class GovernedCell:
         clearance: Signed distance to the boundary of the governed set [m].
         field: Velocity field that leads to the cell's target, (2,) -> (2,) [m/s].
         gains: Gains of the transition.
+        before: Gains of the transition before; its own if there is none.
     """
 
     clearance: BoundaryDistance
     field: Callable[[FloatArray], FloatArray]
     gains: TransitionGains
+    before: TransitionGains | None = None
+
+    @cached_property
+    def row(self) -> FloatArray:
+        """The governor's row, see ``governed_gains``, shape (8,)."""
+        return self.gains.governor_row(self.before or self.gains)
 
     @cached_property
     def kernel_arguments(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
         """The arguments of ``govern`` for this cell; None if its field is not that of a harmonic map."""
         if not isinstance(self.field, VelocityField):
             return None
-        return self.gains.governor_row, self.clearance.edges, *self.field.kernel_arguments
+        return self.row, self.clearance.edges, *self.field.kernel_arguments
 
-    def govern(self, object_state: FloatArray, governor_position: FloatArray, command: FloatArray) -> None:
+    def govern(
+        self, time: float, object_state: FloatArray, governor_position: FloatArray, command: FloatArray
+    ) -> None:
         """Write p_G' and the desired acceleration, both of (14), in this cell, with any velocity field.
 
         Args:
+            time: Time since the cell was entered [s].
             object_state: Pose and twist of the object, shape (6,).
             governor_position: p_G, shape (2,) [m].
             command: Receives both, shape (4,) [m/s, m/s^2].
         """
-        gains, edges = self.gains, self.clearance.edges
-        margin = cell_margin(edges, gains.stiffness, object_state, governor_position)
+        gains, edges = governed_gains(self.row, time), self.clearance.edges
+        margin = cell_margin(edges, gains[0], object_state, governor_position)
         vx, vy = (float(part) for part in self.field(governor_position))
-        command[:2] = governor_velocity(vx, vy, margin, gains.stiffness, gains.governor_gain, gains.smoothing)
-        accelerate_object(gains.governor_row, object_state, governor_position, command[2:])
+        command[:2] = governor_velocity(vx, vy, margin, gains[0], gains[2], self.gains.smoothing)
+        accelerate_object(gains, object_state, governor_position, command[2:])
 
 
 class ReferenceGovernor(Block):
@@ -91,17 +102,17 @@ class ReferenceGovernor(Block):
         self.DeclareVectorOutputPort("energy_margin", 1, self._write_margin)
 
     def _write_command(self, context: Context, output: BasicVector) -> None:
-        index = index_of(self._current.Eval(context), len(self._cells))
+        current = self._current.Eval(context)
+        index, time = index_of(current, len(self._cells)), context.get_time() - current[1]
         state, governor = self._object.Eval(context), self._governor.Eval(context)
         arguments, command = self._compiled[index], output.get_mutable_value()
         if arguments is None:
-            self._cells[index].govern(state, governor, command)
+            self._cells[index].govern(time, state, governor, command)
         else:
-            govern(*arguments, state, governor, command)
+            govern(*arguments, time, state, governor, command)
 
     def _write_margin(self, context: Context, output: BasicVector) -> None:
-        cell = self._cells[index_of(self._current.Eval(context), len(self._cells))]
-        state = self._object.Eval(context)
-        output[0] = cell_margin(
-            cell.clearance.edges, cell.gains.stiffness, state, self._governor.Eval(context)
-        )
+        current, state = self._current.Eval(context), self._object.Eval(context)
+        cell = self._cells[index_of(current, len(self._cells))]
+        stiffness = governed_gains(cell.row, context.get_time() - current[1])[0]
+        output[0] = cell_margin(cell.clearance.edges, stiffness, state, self._governor.Eval(context))

@@ -1,12 +1,13 @@
-"""The whole team's controllers in one stateless block."""
+"""The whole team's controllers in one block."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
+from coop_drake.laws.axis_table import first_jumps
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.ready_kernels import ready_conditions
@@ -14,6 +15,7 @@ from coop_drake.systems.team_kernels import (
     FusedCell,
     FusedTeam,
     drive_team,
+    remember_jumps,
     report_readiness,
     telemetry_size,
 )
@@ -25,9 +27,8 @@ __all__ = ["TeamController"]
 class TeamController(Block):
     """Computes what the controllers of all robots compute, from the plant's state, in one call.
 
-    It exists for speed alone, and calls for every robot the functions that the robot's own blocks call. That
-    robots need no state of each other is shown by those blocks; here one block sees everything, with one p_G
-    where the robots keep copies that are equal to the last bit.
+    It exists for speed alone, and calls for every robot the functions that the robot's own blocks call. Here
+    one block sees everything, with one p_G where the robots keep copies that are equal to the last bit.
 
     ======= ====================== ============= ====================================================== =====
     input   ``team_state``         2 (3 + n)     the plant's positions and velocities, its own order
@@ -40,7 +41,9 @@ class TeamController(Block):
     output  ``ready``              2 N           for each robot: index of the current cell, margin [-]
     ======= ====================== ============= ====================================================== =====
 
-    No state. Base wrenches are in the axes of W, or in those of their bases where ``on_bases`` is set.
+    State: one discrete group (index of a cell, jumps of the accelerations of all axes at the switch to it),
+    as that of ``AxisPpc``. Base wrenches are in the axes of W, or in those of their bases where ``on_bases``
+    is set.
 
     Args:
         cells: Every cell of the plan.
@@ -48,6 +51,8 @@ class TeamController(Block):
         inradii: R of every transition [m].
         goal_position: Goal position of the object, shape (2,) [m].
         position_tolerance: Largest distance to it that counts as arrived [m].
+        start: Where the axes of every robot, (theta, q_k), rest at the beginning, shape (N + n,).
+        period: Time between updates of the state [s], None for every step.
         on_bases: In whose axes the wrenches are given.
 
     Raises:
@@ -62,6 +67,8 @@ class TeamController(Block):
         goal_position: FloatArray,
         position_tolerance: float,
         *,
+        start: FloatArray,
+        period: float | None,
         on_bases: bool,
     ) -> None:
         super().__init__()
@@ -73,13 +80,15 @@ class TeamController(Block):
         conditions = ready_conditions(
             [cell.table for cell in cells],
             [cell.edges for cell in cells],
-            [cell.gains[0] for cell in cells],
+            [cell.row for cell in cells],
             inradii,
             goal_position,
             position_tolerance,
         )
         reading = team.places, team.first, team.base_chains, team.yaws
         self._conditions = [(*condition, *reading) for condition in conditions]
+        self._tables, self._reading = [cell.table for cell in cells], reading
+        self._none, self._nothing = np.zeros(len(cells[0].table)), EventStatus.DidNothing()
         robots, joints = len(team.yaws), team.places.shape[1] - 3
         self._state = self.DeclareVectorInputPort("team_state", 2 * (3 + joints))
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
@@ -87,7 +96,10 @@ class TeamController(Block):
         self._command_size, self._telemetry_size = 3 * robots + joints + 2, telemetry_size(robots, joints)
         self.DeclareVectorOutputPort("team_command", self._command_size, self._write_command)
         self.DeclareVectorOutputPort("telemetry", self._telemetry_size, self._write_telemetry)
-        self.DeclareVectorOutputPort("ready", READY_SIZE * robots, self._write_ready)
+        self._ready = self.DeclareVectorOutputPort("ready", READY_SIZE * robots, self._write_ready)
+        self.DeclareDiscreteState([0.0, *first_jumps(cells[0].table, start)])
+        if len(cells) > 1:
+            self.declare_update(self._remember, period)
 
     def _write_command(self, context: Context, output: BasicVector) -> None:
         self._drive(context, output.get_mutable_value(), np.empty(self._telemetry_size))
@@ -97,9 +109,11 @@ class TeamController(Block):
 
     def _drive(self, context: Context, command: FloatArray, telemetry: FloatArray) -> None:
         cell = self._cell.Eval(context)
+        index, memory = index_of(cell, len(self._laws)), context.get_discrete_state_vector().value()
         drive_team(
-            *self._laws[index_of(cell, len(self._laws))],
+            *self._laws[index],
             context.get_time() - cell[1],
+            memory[1:] if memory[0] == index else self._none,
             self._state.Eval(context),
             self._governor.Eval(context),
             self._on_bases,
@@ -108,11 +122,25 @@ class TeamController(Block):
         )
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
-        index = index_of(self._cell.Eval(context), len(self._conditions))
+        cell = self._cell.Eval(context)
+        index = index_of(cell, len(self._conditions))
         report_readiness(
             *self._conditions[index],
             index,
+            context.get_time() - cell[1],
             self._state.Eval(context),
             self._governor.Eval(context),
             output.get_mutable_value(),
         )
+
+    def _remember(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
+        reports, cell = self._ready.Eval(context), self._cell.Eval(context)
+        following = int(cell[0]) + 1
+        if following >= len(self._tables) or not reports[1::2].max() >= 0.0:
+            return self._nothing
+        memory = discrete_state.get_mutable_vector().get_mutable_value()
+        memory[0] = following
+        table, next_table = self._tables[following - 1 : following + 1]
+        time, state = context.get_time() - cell[1], self._state.Eval(context)
+        remember_jumps(table, next_table, *self._reading, time, state, reports, memory[1:])
+        return EventStatus.Succeeded()

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.axis_table import track_axes, write_bounds
+from coop_drake.laws.axis_table import track_axes, write_bounds, write_jumps
 from coop_drake.laws.load_sharing import end_effector_command, rotated
 from coop_drake.laws.robot_dynamics import read_robot, robot_effort
 from coop_drake.systems.governor_kernels import govern
@@ -21,14 +21,14 @@ class FusedCell(NamedTuple):
     """One cell for the whole team.
 
     Attributes:
-        gains: K, zeta, K_G and c, shape (4,).
+        row: The governor's row, see ``governed_gains``, shape (8,).
         edges: Edges of the governed set, shape (edges, 4) [m].
         flat: The cell's map, as ``VelocityField.kernel_arguments`` has it.
         field: What the velocity field adds to the map.
         table: For each robot in turn the axes (theta, q_k), shape (N + n, ``LAW_COLUMNS``).
     """
 
-    gains: FloatArray
+    row: FloatArray
     edges: FloatArray
     flat: FloatArray
     field: FloatArray
@@ -90,15 +90,15 @@ def telemetry_parts(
 
 @compiled
 def drive_team(
-    gains: FloatArray, edges: FloatArray, flat: FloatArray, field: FloatArray, table: FloatArray,
+    row: FloatArray, edges: FloatArray, flat: FloatArray, field: FloatArray, table: FloatArray,
     places: IntArray, first: IntArray, chains: FloatArray, base_chains: FloatArray, yaws: FloatArray,
-    loads: FloatArray, time: float, state: FloatArray, governor_position: FloatArray, on_bases: bool,
-    command: FloatArray, telemetry: FloatArray,
+    loads: FloatArray, time: float, jumps: FloatArray, state: FloatArray, governor_position: FloatArray,
+    on_bases: bool, command: FloatArray, telemetry: FloatArray,
 ) -> None:  # fmt: skip
     """Write what drives the team, and what the robots' blocks would show to the log.
 
     Args:
-        gains: This and the next four arguments are the fields of ``FusedCell``; see there.
+        row: This and the next four arguments are the fields of ``FusedCell``; see there.
         edges: Edges of the governed set.
         flat: The map.
         field: The velocity field.
@@ -110,6 +110,7 @@ def drive_team(
         yaws: Angles of the bases.
         loads: Shares of the load.
         time: Time since the cell was entered [s].
+        jumps: Of all axes of ``table``, what ``write_jumps`` gave at the switch, shape (N + n,).
         state: State of the plant.
         governor_position: p_G, shape (2,) [m].
         on_bases: Whether base wrenches are given in the axes of the bases, not in those of W.
@@ -119,7 +120,7 @@ def drive_team(
     robots, n = yaws.size, places.shape[1] - 3
     acceleration, commands, bases, efforts, bounds, margin = telemetry_parts(telemetry, robots)
     object_state, robot, governed = _object_state(places, state), np.empty(6 + 2 * n), np.empty(4)
-    margin[0] = govern(gains, edges, flat, field, object_state, governor_position, governed)
+    margin[0] = govern(row, edges, flat, field, time, object_state, governor_position, governed)
     acceleration[0], acceleration[1] = governed[2], governed[3]
     axes, effort, own_bounds = np.empty(1 + n), np.empty(3 + n), np.empty(2 + 2 * n)
     for k in range(robots):
@@ -127,7 +128,7 @@ def drive_team(
         m = 1 + stop - start
         rows, chain = table[start + k : stop + k + 1], chains[first[0, k] : first[0, k + 1]]
         _read_robot(k, places, first, base_chains, yaws, state, robot)
-        track_axes(rows, time, object_state, robot, axes)
+        track_axes(rows, time, jumps[start + k : stop + k + 1], object_state, robot, axes)
         end_effector_command(loads[k], object_state, governed[2:], axes, commands[k])
         robot_effort(chain, robot, commands[k], axes, effort)
         write_bounds(rows, time, own_bounds)
@@ -148,8 +149,8 @@ def drive_team(
 def report_readiness(
     table: FloatArray, next_table: FloatArray, next_edges: FloatArray, next_stiffness: float,
     inradius: float, goal: FloatArray, tolerance: float, last: bool, places: IntArray, first: IntArray,
-    base_chains: FloatArray, yaws: FloatArray, index: int, state: FloatArray, governor_position: FloatArray,
-    reports: FloatArray,
+    base_chains: FloatArray, yaws: FloatArray, index: int, time: float, state: FloatArray,
+    governor_position: FloatArray, reports: FloatArray,
 ) -> None:  # fmt: skip
     """Write for each robot the index of the current cell and the margin of ``robot_ready``, shape (2 N,).
 
@@ -158,7 +159,7 @@ def report_readiness(
             are those of ``FusedCell``.
         next_table: The axes in the next cell.
         next_edges: Edges of the next cell.
-        next_stiffness: K of the next cell.
+        next_stiffness: K with which it is entered.
         inradius: R of the transition.
         goal: Goal position.
         tolerance: Tolerance of the goal position.
@@ -168,6 +169,7 @@ def report_readiness(
         base_chains: From the object to bases.
         yaws: Angles of the bases.
         index: Index of the current cell.
+        time: Time since it was entered [s].
         state: State of the plant.
         governor_position: p_G, shape (2,) [m].
         reports: Receives the reports.
@@ -179,8 +181,37 @@ def report_readiness(
         reports[2 * k] = index
         reports[2 * k + 1] = robot_ready(
             table[start:stop], next_table[start:stop], next_edges, next_stiffness, inradius, goal, tolerance,
-            last, object_state, robot, governor_position,
+            last, time, object_state, robot, governor_position,
         )  # fmt: skip
+
+
+@compiled
+def remember_jumps(
+    table: FloatArray, next_table: FloatArray, places: IntArray, first: IntArray, base_chains: FloatArray,
+    yaws: FloatArray, time: float, state: FloatArray, reports: FloatArray, jumps: FloatArray,
+) -> None:  # fmt: skip
+    """Write ``write_jumps`` of every robot that is ready.
+
+    Args:
+        table: The axes of all robots in the current cell.
+        next_table: The axes in the next cell.
+        places: Where z and its rates stand in the plant's state.
+        first: First rows of a ``FusedTeam``.
+        base_chains: From the object to bases.
+        yaws: Angles of the bases.
+        time: Time since the current cell was entered [s].
+        state: State of the plant.
+        reports: What ``report_readiness`` gives.
+        jumps: Receives the jumps of the robots that are ready, shape (N + n,).
+    """
+    object_state, robot = _object_state(places, state), np.empty(2 * places.shape[1])
+    for k in range(yaws.size):
+        if reports[2 * k + 1] >= 0.0:
+            start, stop = first[2, k] + k, first[2, k + 1] + k + 1
+            _read_robot(k, places, first, base_chains, yaws, state, robot)
+            write_jumps(
+                table[start:stop], next_table[start:stop], time, object_state, robot, jumps[start:stop]
+            )
 
 
 @compiled

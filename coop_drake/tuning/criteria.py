@@ -52,6 +52,7 @@ CRITERIA = {
     for criterion in (
         Criterion("time", "duration", "s", lambda log: float(log.times[-1])),
         Criterion("peak_force", "peak base force", "N", lambda log: float(_base_forces(log).max())),
+        Criterion("force_rate", "peak rate of base forces", "N/s", lambda log: log.peak_force_rate),
         Criterion("mean_force", "root mean square base force", "N", _mean_force),
         Criterion(
             "peak_base_torque",

@@ -164,11 +164,11 @@ def test_a_run_starts_at_rest_in_the_first_cell_with_every_governor_on_the_objec
         np.testing.assert_array_equal(governor, loop.plan.start[:2])
 
 
-def test_the_state_is_the_teams_the_governors_and_the_cell(loop):
+def test_the_state_is_the_teams_the_governors_the_cell_and_what_robots_remember_of_switches(loop):
     context = loop.create_context()
     expected = 2 * (3 + len(loop.team.joints)) + 2 * len(loop.controllers)
     assert context.num_continuous_states() == expected
-    assert context.get_discrete_state().num_groups() == 1
+    assert context.get_discrete_state().num_groups() == 1 + len(loop.controllers)
 
 
 def test_robots_agree_on_the_objects_state_and_command(loop):

@@ -69,6 +69,7 @@ def test_select_keeps_the_axes_asked_for():
         rate_gain=8.0,
         ramp_rate=2.0,
         saturation=0.02,
+        hand_over_time=0.1,
         energy_bound=np.array([7.0, 8.0, 9.0]),
     )
     own = gains.select(np.array([0, 2]))

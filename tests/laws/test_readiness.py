@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,6 +25,7 @@ def table_of(intervals, resting):
 
 TABLE, _ = table_of(INTERVALS, [0.4, 0.5])
 NEXT_TABLE, NEXT_GAINS = table_of(NEXT_INTERVALS, [0.9, 0.0])
+ROW = NEXT_GAINS.governor_row(replace(NEXT_GAINS, stiffness=90.0))
 AT_REST = {
     "position": [3.0, 1.0],
     "velocity": [0.0, 0.0],
@@ -36,7 +39,7 @@ def ready(next_clearance=0.3, inradius=0.3, **change):
     state = {**AT_REST, **change}
     edges = square_with_clearance(state["governor_position"], next_clearance)
     conditions = ready_conditions(
-        [TABLE, NEXT_TABLE], [edges, edges], [50.0, NEXT_GAINS.stiffness], [inradius, 0.1], np.zeros(2), 0.01
+        [TABLE, NEXT_TABLE], [edges, edges], [ROW, ROW], [inradius, 0.1], np.zeros(2), 0.01
     )
     return margin_of(conditions[0], **state)
 
@@ -76,12 +79,17 @@ def test_clearance_counts_from_half_the_inradius():
     assert clearance_margin(-floor, 100.0, 0.3) == pytest.approx(-2.0)
 
 
-def test_the_next_cell_is_judged_by_its_own_stiffness():
-    """With K = 100 and d = 0.02 m there is room for 0.17 m/s, whatever the present stiffness."""
+def test_the_next_cell_is_judged_by_the_stiffness_that_it_is_entered_with():
+    """With K = 90 and d = 0.02 m there is room for 0.164 m/s, whatever the cell's own K of 100."""
     assert NEXT_GAINS.stiffness == 100.0
     assert ready(next_clearance=0.02, inradius=0.02) > 0.0
-    assert ready(next_clearance=0.02, inradius=0.02, velocity=[0.18, 0.0]) < 0.0
-    assert ready(next_clearance=0.02, inradius=0.02, velocity=[0.17, 0.0]) > 0.0
+    assert ready(next_clearance=0.02, inradius=0.02, velocity=[0.166, 0.0]) < 0.0
+    assert ready(next_clearance=0.02, inradius=0.02, velocity=[0.162, 0.0]) > 0.0
+
+
+def test_a_robot_is_ready_only_once_the_last_hand_over_is_over():
+    assert ready(time=NEXT_GAINS.hand_over_time) >= 0.0
+    assert ready(time=0.9 * NEXT_GAINS.hand_over_time) < 0.0
 
 
 def test_the_funnel_margin_vanishes_at_the_energy_bound():
@@ -108,7 +116,9 @@ def arrival(**change):
     }
     table, gains = table_of(intervals, [4.5, 0.0])
     edges = square_with_clearance([5.0, 8.0], 0.3)
-    conditions = ready_conditions([table], [edges], [gains.stiffness], [0.3], np.array([5.0, 8.0]), 0.01)
+    conditions = ready_conditions(
+        [table], [edges], [gains.governor_row(gains)], [0.3], np.array([5.0, 8.0]), 0.01
+    )
     return margin_of(conditions[0], **{**ARRIVED, **change})
 
 

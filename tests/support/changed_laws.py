@@ -98,13 +98,13 @@ def estimated(plan: Plan):
     n = len(plan.start) - 2
     state = np.concatenate([plan.start[:2], np.zeros(2), plan.start[:2], plan.start[2:], np.zeros(n)])
     cells = [
-        (edges_of(cell.tidied), transition.gains.governor_row, axis_table(plan.funnel(k), transition.gains))
+        (edges_of(cell.tidied), plan.governor_row(k), axis_table(plan.funnel(k), transition.gains))
         for k, (cell, transition) in enumerate(zip(plan.cells[:2], plan.transitions[:2], strict=True))
     ]
     path = np.array([plan.start[:2], plan.transitions[0].target])
     edges, gains, table = cells[0]
     seconds = cross_cell(
-        state, edges, path, gains, table, plan.transitions[0].inradius, *cells[1], False, 10.0
+        state, np.zeros(n), edges, path, gains, table, plan.transitions[0].inradius, *cells[1], False, 10.0
     )
     return np.array([*state, seconds])
 

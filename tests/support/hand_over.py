@@ -24,7 +24,9 @@ def assert_certified(plan: Plan, log: SimulationLog) -> None:
 def energy_surplus(
     plan: Plan, index: int, position: np.ndarray, velocity: np.ndarray, governor: np.ndarray
 ) -> float:
-    """Delta E of the next cell with its own K, less what holds the object within half the goal's inradius.
+    """Delta E of the next cell, less what holds the object within half the goal's inradius.
+
+    K is that with which the next cell is entered: the old cell's where the hand-over takes time.
 
     Args:
         plan: The plan.
@@ -33,7 +35,8 @@ def energy_surplus(
         velocity: p' (2,) [m/s].
         governor: p_G (2,) [m].
     """
-    cell, stiffness = plan.cells[index + 1].tidied, plan.transitions[index + 1].gains.stiffness
+    cell, gains = plan.cells[index + 1].tidied, plan.transitions[index + 1].gains
+    stiffness = (plan.transitions[index].gains if gains.hand_over_time > 0.0 else gains).stiffness
     distance = cell.exterior.distance(Point(governor)) if cell.contains(Point(governor)) else 0.0
     energy = 0.5 * velocity @ velocity + 0.5 * stiffness * (position - governor) @ (position - governor)
     kept = 0.5 * plan.transitions[index].inradius

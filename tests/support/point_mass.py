@@ -19,6 +19,8 @@ from coop_drake.laws import (
     slowdown_radius,
     tracking_energy,
 )
+from coop_drake.laws.axis_table import first_jumps
+from coop_drake.laws.hand_over import fading, governed_gains
 from coop_drake.systems.ready_kernels import ready_conditions
 from tests.support.readiness import margin_of as margin_of_robot
 
@@ -85,18 +87,20 @@ def carry_out(plan, fields, *, position_tolerance=0.01, step=0.004, time_limit=6
     conditions = ready_conditions(
         [axis_table(plan.funnel(k), transition.gains) for k, transition in enumerate(plan.transitions)],
         [distance.edges for distance in distances],
-        [transition.gains.stiffness for transition in plan.transitions],
+        [plan.governor_row(k) for k in range(len(plan.cells))],
         [transition.inradius for transition in plan.transitions],
         plan.transitions[-1].target,
         position_tolerance,
     )
     seen = {"energy": np.inf, "cell": np.inf, "gap": np.inf, "axis": 0.0, "force": 0.0}
     durations, hand_overs, stuck = [], [], None
+    jumps = first_jumps(axis_table(plan.funnel(0), plan.transitions[0].gains), plan.start[2:])
     for index in range(len(plan.cells)):
         state, elapsed, left = _play(
             plan,
             index,
             state,
+            jumps,
             fields[index],
             distances,
             conditions[index],
@@ -114,7 +118,7 @@ def carry_out(plan, fields, *, position_tolerance=0.01, step=0.004, time_limit=6
     )  # fmt: skip
 
 
-def _play(plan, index, state, field, distances, conditions, seen, limits):
+def _play(plan, index, state, jumps, field, distances, conditions, seen, limits):
     step, time_limit = limits
     transition, cell, distance, funnel = (
         plan.transitions[index],
@@ -122,29 +126,35 @@ def _play(plan, index, state, field, distances, conditions, seen, limits):
         distances[index],
         plan.funnel(index),
     )
-    gains, n = transition.gains, len(cell.lower)
+    gains, n, row = transition.gains, len(cell.lower), plan.governor_row(index)
 
-    def margin_of(z):
-        energy = tracking_energy(*(z[:2] - z[4:6]), *z[2:4], gains.stiffness)
-        return energy_margin(energy, distance(z[4:6]), gains.stiffness)
+    def margin_of(z, t):
+        stiffness = governed_gains(row, t)[0]
+        energy = tracking_energy(*(z[:2] - z[4:6]), *z[2:4], stiffness)
+        return energy_margin(energy, distance(z[4:6]), stiffness)
 
     def rates(z, t):
-        force = governed_acceleration(z[:2], z[2:4], z[4:6], gains.stiffness, gains.damping)
-        governor = governor_velocity(
-            *field(z[4:6]), margin_of(z), gains.stiffness, gains.governor_gain, gains.smoothing
-        )  # fmt: skip
+        stiffness, damping, gain = governed_gains(row, t)
+        force = governed_acceleration(z[:2], z[2:4], z[4:6], stiffness, damping)
+        governor = governor_velocity(*field(z[4:6]), margin_of(z, t), stiffness, gain, gains.smoothing)
         axes = funnel_acceleration(z[6 : 6 + n], z[6 + n :], funnel, t, gains)
+        axes += fading(t, gains.hand_over_time) * jumps
         return np.concatenate([z[2:4], force, governor, z[6 + n :], axes])
 
-    def leaves(z):
-        return margin_of_robot(conditions, z[:2], z[2:4], z[4:6], z[6 : 6 + n], z[6 + n :]) >= 0.0
+    def leaves(z, t):
+        return margin_of_robot(conditions, z[:2], z[2:4], z[4:6], z[6 : 6 + n], z[6 + n :], t) >= 0.0
 
     for k in range(round(time_limit / step)):
-        if leaves(state):
-            return state, k * step, True
         t = k * step
+        if leaves(state, t):
+            if index + 1 < len(plan.cells):
+                own, following = funnel, plan.funnel(index + 1)
+                axes = state[6 : 6 + n], state[6 + n :]
+                jumps[:] = funnel_acceleration(*axes, own, t, gains)
+                jumps -= funnel_acceleration(*axes, following, 0.0, plan.transitions[index + 1].gains)
+            return state, t, True
         k1 = rates(state, t)
-        seen["energy"] = min(seen["energy"], margin_of(state))
+        seen["energy"] = min(seen["energy"], margin_of(state, t))
         seen["cell"] = min(seen["cell"], distance(state[:2]))
         seen["gap"] = min(seen["gap"], *(state[6 : 6 + n] - cell.lower), *(cell.upper - state[6 : 6 + n]))
         seen["axis"] = max(seen["axis"], float(np.abs(k1[6 + n :]).max()))

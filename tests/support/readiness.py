@@ -15,10 +15,10 @@ def states(position, velocity, axes, rates):
     return object_state, np.array([0.0, 0.0, 0.0, *axes[1:], 0.0, 0.0, 0.0, *rates[1:]], dtype=float)
 
 
-def margin_of(conditions, position, velocity, governor_position, axes, rates):
-    """Return ``robot_ready`` of a robot whose conditions are given."""
+def margin_of(conditions, position, velocity, governor_position, axes, rates, time=10.0):
+    """Return ``robot_ready`` of a robot whose conditions are given, ``time`` [s] after the cell's entry."""
     governor = np.array(governor_position, dtype=float)
-    return robot_ready(*conditions, *states(position, velocity, axes, rates), governor)
+    return robot_ready(*conditions, time, *states(position, velocity, axes, rates), governor)
 
 
 def square_with_clearance(point, clearance):

@@ -92,7 +92,7 @@ def _cell(point: np.ndarray, angle: float, n: int) -> Cell:
 def _transition(cell: Cell, target: np.ndarray) -> Transition:
     ones = np.ones(len(cell.lower))
     gains = TransitionGains(
-        50.0, 7.0, 5.0, 1e-3, "quintic", 4.0 * ones, 0.1 * ones, 1.0, 8.0, 2.0, 0.02, 0.1 * ones
+        50.0, 7.0, 5.0, 1e-3, "quintic", 4.0 * ones, 0.1 * ones, 1.0, 8.0, 2.0, 0.02, 0.1, 0.1 * ones
     )
     return Transition(
         target=target,

@@ -89,10 +89,10 @@ def test_a_block_without_state_has_none_and_any_other_says_which(blocks, name):
         assert re.search(r"^ *State: ", type(block).__doc__, re.MULTILINE)
 
 
-def test_only_the_cell_planner_and_what_models_failures_remember_anything_but_a_predictor(blocks):
+def test_only_switches_jumps_a_predictor_and_what_models_failures_are_remembered(blocks):
     remembering = {name for name in BLOCKS if any(map(len, state_of(blocks[name][0].CreateDefaultContext())))}
     failures = {"Interruption", "LossyMeasurement", "MessageChannel"}
-    assert remembering == {"CellPlanner", "StatePredictor"} | failures
+    assert remembering == {"CellPlanner", "AxisPpc", "TeamController", "StatePredictor"} | failures
 
 
 @pytest.mark.parametrize("name", BLOCKS)

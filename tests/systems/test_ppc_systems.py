@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from pydrake.systems.analysis import Simulator
 
 from coop_drake.laws import funnel_bounds, prescribed_acceleration
 from coop_drake.laws.ppc import ramped_gain
@@ -41,7 +42,7 @@ def law_by_hand(axes, position, rate, cell, time):
 
 def test_ports(ppc):
     assert port_sizes(ppc) == (
-        {"object_state": 6, "robot_state": 10, "current_cell": 2},
+        {"object_state": 6, "robot_state": 10, "current_cell": 2, "ready": 2},
         {"axis_acceleration": 3, "funnels": 6},
     )
 
@@ -61,6 +62,35 @@ def test_a_robot_without_joints_tracks_the_angle_alone():
     assert port_sizes(system)[1] == {"axis_acceleration": 1, "funnels": 2}
     acceleration, _ = law_by_hand([0], [0.37], [0.4], 1, 0.6)
     np.testing.assert_allclose(evaluate(system, inputs, "axis_acceleration", 2.6), acceleration, rtol=1e-12)
+
+
+def test_a_robot_that_is_ready_enters_the_next_cell_without_a_step():
+    """One step of a simulator, then the switch; a robot that is not ready remembers nothing."""
+    for margin, steps in ((0.5, False), (-0.5, True)):
+        system = AxisPpc(axis_laws(PLAN, AXES))
+        simulator = Simulator(system)
+        context = simulator.get_mutable_context()
+        for name, value in {**INPUTS, "current_cell": [0, 0.0], "ready": [0.0, margin]}.items():
+            system.GetInputPort(name).FixValue(context, value)
+        context.SetTime(0.6)
+        simulator.Initialize()
+        simulator.AdvanceTo(0.6 + 1e-9)
+        port = system.GetOutputPort("axis_acceleration")
+        before = port.Eval(context)
+        system.GetInputPort("current_cell").FixValue(context, [1, context.get_time()])
+        assert (np.abs(port.Eval(context) - before).max() > 0.01) == steps
+
+
+def test_from_rest_accelerations_begin_at_zero():
+    start = np.array([0.2, 0.1, -0.05])
+    system = AxisPpc(axis_laws(PLAN, AXES), start=start)
+    inputs = {
+        "object_state": [0.0, 0.0, start[0], 0.0, 0.0, 0.0],
+        "robot_state": [0.0, 0.0, 0.0, *start[1:], *[0.0] * 5],
+        "current_cell": [0, 0.0],
+    }
+    np.testing.assert_allclose(evaluate(system, inputs, "axis_acceleration", 0.0), 0.0, atol=1e-12)
+    assert np.abs(evaluate(system, inputs, "axis_acceleration", 0.05)).max() > 1e-3
 
 
 def test_inputs_are_required(ppc):

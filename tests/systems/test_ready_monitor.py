@@ -36,7 +36,7 @@ def conditions(cells):
     return ready_conditions(
         [law.table for law in axis_laws(PLAN, AXES)],
         [cell.clearance.edges for cell in cells],
-        [cell.gains.stiffness for cell in cells],
+        [cell.row for cell in cells],
         [transition.inradius for transition in PLAN.transitions],
         PLAN.goal_pose[:2],
         POSITION_TOLERANCE,
@@ -61,7 +61,7 @@ def test_the_report_is_the_law_with_the_next_cells_energy(monitor, cells, index)
         conditions(cells)[index], [3.8, 3.5], [0.1, 0.0], INPUTS["governor_position"], [0.3, 0.1, 0.12],
         [0.05, 0.0, 0.0],
     )  # fmt: skip
-    np.testing.assert_array_equal(evaluate(monitor, inputs, "ready"), [index, expected])
+    np.testing.assert_array_equal(evaluate(monitor, inputs, "ready", 10.0), [index, expected])
 
 
 def test_ready_at_rest_on_the_target(monitor):
@@ -73,13 +73,14 @@ def test_ready_at_rest_on_the_target(monitor):
         "governor_position": target,
         "robot_state": [0.0, 0.0, 0.0, *middle[1:], *[0.0] * 5],
     }
-    assert evaluate(monitor, inputs, "ready")[1] > 0.0
+    assert evaluate(monitor, inputs, "ready", 10.0)[1] > 0.0
     assert (
-        evaluate(monitor, {**inputs, "object_state": [*target, middle[0], 9.0, 0.0, 0.0]}, "ready")[1] < 0.0
+        evaluate(monitor, {**inputs, "object_state": [*target, middle[0], 9.0, 0.0, 0.0]}, "ready", 10.0)[1]
+        < 0.0
     )
-    assert evaluate(monitor, {**inputs, "governor_position": [2.5, 2.5]}, "ready")[1] < 0.0
+    assert evaluate(monitor, {**inputs, "governor_position": [2.5, 2.5]}, "ready", 10.0)[1] < 0.0
     moved = [0.0, 0.0, 0.0, middle[1] + 0.3, middle[2], *[0.0] * 5]
-    assert evaluate(monitor, {**inputs, "robot_state": moved}, "ready")[1] < 0.0
+    assert evaluate(monitor, {**inputs, "robot_state": moved}, "ready", 10.0)[1] < 0.0
 
 
 def test_in_the_last_cell_it_reports_arrival(monitor, cells):
@@ -95,7 +96,7 @@ def test_in_the_last_cell_it_reports_arrival(monitor, cells):
         [GOAL_POSE[2] + 0.001, 0.3, 0.28], [0.003, 0.001, 0.002],
     )  # fmt: skip
     assert expected > 0.0
-    np.testing.assert_array_equal(evaluate(monitor, inputs, "ready"), [2.0, expected])
+    np.testing.assert_array_equal(evaluate(monitor, inputs, "ready", 10.0), [2.0, expected])
 
 
 def test_inputs_are_required(monitor):

@@ -10,6 +10,7 @@ import numpy as np
 from coop_drake.answers.plan import Plan
 from coop_drake.geometry.boundary import edges_of
 from coop_drake.laws import TransitionGains, axis_table
+from coop_drake.laws.axis_table import first_jumps
 from coop_drake.planning.execution.transport_kernels import cross_cell
 from coop_drake.planning.travel_time import transition_time
 from coop_drake.tree.pose import FloatArray
@@ -63,11 +64,12 @@ def timed(plan: Plan) -> Plan:
     crossings = [
         (
             np.ascontiguousarray(edges_of(cell.tidied)),
-            transition.gains.governor_row,
+            plan.governor_row(index),
             axis_table(plan.funnel(index), transition.gains),
         )
         for index, (cell, transition) in enumerate(zip(plan.cells, plan.transitions, strict=True))
     ]
+    jumps = first_jumps(crossings[0][2], plan.start[2:])
     following = [*crossings[1:], crossings[-1]]
     state = _at_rest(plan.start[:2], plan.start[2:])
     transitions = []
@@ -77,13 +79,14 @@ def timed(plan: Plan) -> Plan:
         last = index + 1 == len(crossings)
         next_edges, next_gains, next_table = following[index]
         seconds = cross_cell(
-            state, edges, transition.path, gains, table, transition.inradius,
+            state, jumps, edges, transition.path, gains, table, transition.inradius,
             next_edges, next_gains, next_table, last, LONGEST,
         )  # fmt: skip
         if not isfinite(seconds):
             speed = speed_per_clearance(transition.gains)
             seconds = LONGEST + transition_time(transition.length, transition.neck, speed)
             state = _at_rest(transition.target, 0.5 * (transition.goal_lower + transition.goal_upper))
+            jumps[:] = 0.0
         transitions.append(replace(transition, estimated_time=seconds))
     return replace(plan, transitions=tuple(transitions))
 

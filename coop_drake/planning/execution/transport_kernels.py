@@ -13,7 +13,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import signed_distance
 from coop_drake.geometry.distances import nearest_fraction
-from coop_drake.laws.axis_table import LOG_GAIN, SATURATION, bounds_of, track_row
+from coop_drake.laws.axis_table import FADING_TIME, LOG_GAIN, SATURATION, bounds_of, track_row
 from coop_drake.laws.governor import (
     ATTRACTION_RATE,
     FIELD_SPEED,
@@ -23,7 +23,14 @@ from coop_drake.laws.governor import (
     slowdown_radius,
     tracking_energy,
 )
-from coop_drake.laws.readiness import axis_arrival, axis_ready, clearance_margin, position_arrival
+from coop_drake.laws.hand_over import SMOOTHING, STIFFNESS, fading, governed_gains
+from coop_drake.laws.readiness import (
+    axis_arrival,
+    axis_ready,
+    clearance_margin,
+    hand_over_margin,
+    position_arrival,
+)
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["PERIOD", "axis_frequency", "cross_cell"]
@@ -91,43 +98,59 @@ def _rates(
     time: float,
     edges: FloatArray,
     path: FloatArray,
-    gains: FloatArray,
+    row: FloatArray,
     table: FloatArray,
+    jumps: FloatArray,
     result: FloatArray,
 ) -> None:
     """Write the rates of (p, p', p_G, axes, axis rates); arguments as in ``cross_cell``."""
-    stiffness = gains[0]
+    stiffness, damping, gain = governed_gains(row, time)
     margin, clearance = _margin(state, edges, stiffness)
     for i in range(2):
         result[i] = state[2 + i]
-        result[2 + i] = governed_acceleration(state[i], state[2 + i], state[4 + i], stiffness, gains[1])
+        result[2 + i] = governed_acceleration(state[i], state[2 + i], state[4 + i], stiffness, damping)
     result[4], result[5] = 0.0, 0.0
     if margin > 0.0:
         ahead = max(LOOKAHEAD * clearance, SHORTEST_LOOKAHEAD)
-        vx, vy = _steer(path, state[4], state[5], ahead, slowdown_radius(FIELD_SPEED, gains[2]))
-        result[4], result[5] = governor_velocity(vx, vy, margin, stiffness, gains[2], gains[3])
+        vx, vy = _steer(path, state[4], state[5], ahead, slowdown_radius(FIELD_SPEED, gain))
+        result[4], result[5] = governor_velocity(vx, vy, margin, stiffness, gain, row[SMOOTHING])
     m = table.shape[0]
+    left = fading(time, table[0, FADING_TIME])
     for i in range(m):
         x, rate = state[6 + i], state[6 + m + i]
-        result[6 + i], result[6 + m + i] = rate, track_row(table[i], time, x, rate)[0]
+        result[6 + i], result[6 + m + i] = rate, track_row(table[i], time, x, rate)[0] + left * jumps[i]
 
 
 @compiled
 def _ready(
     state: FloatArray,
+    time: float,
     table: FloatArray,
     inradius: float,
     next_edges: FloatArray,
-    next_gains: FloatArray,
+    next_stiffness: float,
     next_table: FloatArray,
 ) -> bool:
     """Return whether all robots are ready for the next cell."""
+    if hand_over_margin(time, table[0, FADING_TIME]) < 0.0:
+        return False
     m = table.shape[0]
     for i in range(m):
         if axis_ready(table[i], next_table[i], state[6 + i], state[6 + m + i]) < 0.0:
             return False
-    margin, _ = _margin(state, next_edges, next_gains[0])
-    return bool(clearance_margin(margin, next_gains[0], inradius) >= 0.0)
+    margin, _ = _margin(state, next_edges, next_stiffness)
+    return bool(clearance_margin(margin, next_stiffness, inradius) >= 0.0)
+
+
+@compiled
+def _write_jumps(
+    state: FloatArray, time: float, table: FloatArray, next_table: FloatArray, jumps: FloatArray
+) -> None:
+    """Write by how much the accelerations of all axes jump at a switch now, shape (m,)."""
+    m = table.shape[0]
+    for i in range(m):
+        x, rate = state[6 + i], state[6 + m + i]
+        jumps[i] = track_row(table[i], time, x, rate)[0] - track_row(next_table[i], 0.0, x, rate)[0]
 
 
 @compiled
@@ -159,9 +182,9 @@ def axis_frequency(row: FloatArray, time: float, position: float, saturation: fl
 
 
 @compiled
-def _steps(state: FloatArray, time: float, gains: FloatArray, table: FloatArray) -> int:
+def _steps(state: FloatArray, time: float, row: FloatArray, table: FloatArray) -> int:
     """Return the number of integration steps until the next check, enough for the fastest motion now."""
-    fastest = max(sqrt(gains[0]), ATTRACTION_RATE)
+    fastest = max(sqrt(row[STIFFNESS]), ATTRACTION_RATE)
     for i in range(table.shape[0]):
         fastest = max(fastest, axis_frequency(table[i], time, state[6 + i], table[i, SATURATION]))
     return int(min(max(np.ceil(PERIOD * fastest / RADIANS_PER_STEP), FEWEST_STEPS), MOST_STEPS))
@@ -170,13 +193,14 @@ def _steps(state: FloatArray, time: float, gains: FloatArray, table: FloatArray)
 @compiled
 def cross_cell(
     state: FloatArray,
+    jumps: FloatArray,
     edges: FloatArray,
     path: FloatArray,
-    gains: FloatArray,
+    row: FloatArray,
     table: FloatArray,
     inradius: float,
     next_edges: FloatArray,
-    next_gains: FloatArray,
+    next_row: FloatArray,
     next_table: FloatArray,
     last: bool,
     time_limit: float,
@@ -185,13 +209,15 @@ def cross_cell(
 
     Args:
         state: (p, p', p_G, axes, axis rates), shape (6 + 2 m,) [m, m/s, rad]; changed in place.
+        jumps: Jumps of the accelerations of all axes at the switch to this cell, shape (m,); those of the
+            switch to the next one are written there.
         edges: Edges of Q, shape (e, 4) [m].
         path: Path to the target, shape (k, 2) [m].
-        gains: K, zeta, K_G and c, shape (4,).
+        row: The governor's row, see ``governed_gains``, shape (8,).
         table: The axes in this cell, shape (m, ``LAW_COLUMNS``).
         inradius: R, in the last cell the tolerance of the goal's position [m].
         next_edges: Edges of the next cell.
-        next_gains: ``gains`` of the next cell.
+        next_row: ``row`` of the next cell.
         next_table: ``table`` of the next cell.
         last: Whether the object shall come to rest here; the next cell's data are then not read.
         time_limit: Longest time [s].
@@ -201,21 +227,22 @@ def cross_cell(
     """
     n = state.size
     k1, k2, k3, k4 = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    time = 0.0
+    time, next_stiffness = 0.0, governed_gains(next_row, 0.0)[0]
     while time <= time_limit:
         if last:
             if _arrived(state, table, path[-1], inradius):
                 return time
-        elif _ready(state, table, inradius, next_edges, next_gains, next_table):
+        elif _ready(state, time, table, inradius, next_edges, next_stiffness, next_table):
+            _write_jumps(state, time, table, next_table, jumps)
             return time
-        steps = _steps(state, time, gains, table)
+        steps = _steps(state, time, row, table)
         h = PERIOD / steps
         for k in range(steps):
             t = time + k * h
-            _rates(state, t, edges, path, gains, table, k1)
-            _rates(state + 0.5 * h * k1, t + 0.5 * h, edges, path, gains, table, k2)
-            _rates(state + 0.5 * h * k2, t + 0.5 * h, edges, path, gains, table, k3)
-            _rates(state + h * k3, t + h, edges, path, gains, table, k4)
+            _rates(state, t, edges, path, row, table, jumps, k1)
+            _rates(state + 0.5 * h * k1, t + 0.5 * h, edges, path, row, table, jumps, k2)
+            _rates(state + 0.5 * h * k2, t + 0.5 * h, edges, path, row, table, jumps, k3)
+            _rates(state + h * k3, t + h, edges, path, row, table, jumps, k4)
             state += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
         time += PERIOD
     return np.inf

@@ -198,7 +198,8 @@ def cross_box(
         ends = lower[a], upper[a], goal_intervals[0, a], goal_intervals[1, a]
         scheduled = scheduled_axis(schedule, a > 0, ends[0], ends[1], ends[2], ends[3], axis_rest[a])
         gains_of_axes = (
-            schedule.position_gain, schedule.rate_gain, schedule.ramp_rate, schedule.saturation
+            schedule.position_gain, schedule.rate_gain, schedule.ramp_rate, schedule.saturation,
+            schedule.hand_over_time,
         )  # fmt: skip
         write_row(table[a], ends, scheduled, gains_of_axes, schedule.quintic)
     time = 0.0
@@ -206,7 +207,9 @@ def cross_box(
         if tolerance > 0.0:
             if _arrived(state, arc_lengths[-1], table, tolerance):
                 return time
-        elif _may_leave(state, arc_lengths[-1], clearances[-1], gains[0], table, schedule):
+        elif time >= schedule.hand_over_time and _may_leave(
+            state, arc_lengths[-1], clearances[-1], gains[0], table, schedule
+        ):
             return time
         for _ in range(2):
             _advance_position(state, 0.5 * PERIOD, arc_lengths, clearances, gains, schedule.smoothing)

@@ -38,7 +38,15 @@ _POSITIVE = [
     "neck",
     "radius",
 ]
-_NOT_NEGATIVE = ["margin", "length", "estimated_time", "smoothing", "ramp_rate", "component"]
+_NOT_NEGATIVE = [
+    "margin",
+    "length",
+    "estimated_time",
+    "smoothing",
+    "ramp_rate",
+    "hand_over_time",
+    "component",
+]
 
 
 def document_mutants(document: Document, every: int = 1) -> Iterator[Mutant]:

@@ -1,0 +1,125 @@
+"""Hand-overs: gains and accelerations move smoothly, and both energies keep their bounds meanwhile."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from coop_drake.laws import FixedGains, Funnel, ScheduledGains, axis_table, energy_margin, transition_gains
+from coop_drake.laws.axis_table import track_axes, track_row, write_jumps
+from coop_drake.laws.gain_schedule import schedule_of
+from coop_drake.laws.governor import governed_acceleration, tracking_energy
+from coop_drake.laws.hand_over import STEEPEST, fading, governed_gains, shortest_hand_over
+
+AXES = {
+    "slice_lower": np.array([0.0]),
+    "slice_upper": np.array([1.0]),
+    "goal_lower": np.array([0.7]),
+    "goal_upper": np.array([0.95]),
+}
+
+
+def gains_of(clearance, gain_set=None, resting=0.3):
+    return transition_gains(
+        gain_set or ScheduledGains(), clearance=clearance, resting=np.array([resting]), **AXES
+    )
+
+
+def table_of(gains):
+    return axis_table(Funnel(**AXES, decay_rate=gains.decay_rate, shape=gains.funnel), gains)
+
+
+def test_fading_falls_from_one_to_zero_and_nowhere_faster_than_it_says():
+    assert (fading(0.0, 0.2), fading(0.2, 0.2), fading(0.3, 0.2), fading(0.0, 0.0)) == (1.0, 0.0, 0.0, 0.0)
+    values = np.array([fading(t, 0.2) for t in np.linspace(0.0, 0.2, 2001)])
+    assert np.all(np.diff(values) <= 0.0)
+    assert -np.diff(values).min() / 1e-4 * 0.2 == pytest.approx(STEEPEST, rel=1e-5)
+
+
+def test_gains_of_the_governor_go_from_those_of_the_last_cell_to_their_own():
+    narrow, wide = gains_of(0.01), gains_of(2.0)
+    row, T = wide.governor_row(narrow), wide.hand_over_time
+    assert governed_gains(row, 0.0) == pytest.approx((narrow.stiffness, narrow.damping, narrow.governor_gain))
+    assert governed_gains(row, T) == (wide.stiffness, wide.damping, wide.governor_gain)
+    between = [governed_gains(row, t)[0] for t in np.linspace(0.0, T, 50)]
+    assert np.all(np.diff(between) < 0.0)
+    assert governed_gains(wide.governor_row(wide), 0.3 * T)[0] == pytest.approx(wide.stiffness)
+
+
+def test_the_paper_s_gains_step():
+    paper = gains_of(0.1, FixedGains())
+    assert paper.hand_over_time == 0.0
+    assert governed_gains(paper.governor_row(gains_of(0.01)), 0.0) == (50.0, 5.0, 5.0)
+
+
+@pytest.mark.parametrize("age", [0.0125, 0.03, 0.1])
+def test_a_hand_over_takes_long_enough_for_the_largest_fall_of_k(age):
+    rule = schedule_of(ScheduledGains(command_age=age, hand_over_time=1e-3))
+    most, least = rule.max_stiffness, rule.min_stiffness
+    damping = rule.damping_factor * np.sqrt(least)
+    assert rule.hand_over_time == max(1e-3, shortest_hand_over(most, least, damping))
+
+
+def worst_margin(duration, heading, share):
+    """Smallest Delta E, over K d^2 / 2, of an object that starts with none while p_G stands still."""
+    clearance, narrow, wide = 0.2, gains_of(0.01), gains_of(2.0)
+    row = wide.governor_row(narrow)
+    row[7] = duration
+    start = governed_gains(row, 0.0)[0]
+    position = np.sqrt(share) * clearance * np.array([1.0, 0.0])
+    velocity = np.sqrt((1.0 - share) * start) * clearance * np.array([np.cos(heading), np.sin(heading)])
+
+    def flow(t, z):
+        stiffness, damping, _ = governed_gains(row, t)
+        return np.array([*z[2:], *governed_acceleration(z[:2], z[2:], np.zeros(2), stiffness, damping)])
+
+    times = np.linspace(0.0, duration, 200)
+    run = solve_ivp(flow, (0.0, duration), [*position, *velocity], t_eval=times, rtol=1e-9, atol=1e-12)
+    margins = []
+    for t, z in zip(run.t, run.y.T, strict=True):
+        stiffness = governed_gains(row, t)[0]
+        margin = energy_margin(tracking_energy(*z, stiffness), clearance, stiffness)
+        margins.append(margin / (0.5 * stiffness * clearance**2))
+    return min(margins)
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(st.floats(-np.pi, np.pi), st.floats(0.0, 1.0))
+def test_delta_e_stays_while_k_falls(heading, share):
+    """At the start the whole of what the clearance allows is used, by distance and by speed."""
+    narrow, wide = gains_of(0.01), gains_of(2.0)
+    assert worst_margin(wide.hand_over_time, heading, share) >= -1e-7
+    assert wide.hand_over_time >= shortest_hand_over(narrow.stiffness, wide.stiffness, wide.damping)
+
+
+def test_delta_e_would_not_stay_if_k_fell_at_once():
+    assert worst_margin(1e-3, 0.0, 0.0) < -0.5
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(st.floats(0.05, 0.95), st.floats(-0.2, 0.2), st.floats(-40.0, 40.0))
+def test_an_axis_stays_in_its_funnel_whatever_the_jump(start, speed, jump):
+    """V grows by at most jump^2 T / (8 k2) while the jump fades."""
+    gains = gains_of(0.1)
+    table, jumps, out = table_of(gains), np.array([jump]), np.empty(1)
+
+    def flow(t, z):
+        track_axes(table, t, jumps, np.array([0.0, 0.0, z[0], 0.0, 0.0, z[1]]), z, out)
+        return np.array([z[1], out[0]])
+
+    T = gains.hand_over_time
+    run = solve_ivp(flow, (0.0, T), [start, speed], rtol=1e-8, atol=1e-10, max_step=0.01 * T)
+    energies = [track_row(table[0], t, *z)[1] for t, z in zip(run.t, run.y.T, strict=True)]
+    assert max(energies) <= energies[0] + jump**2 * T / (8.0 * gains.rate_gain) + 1e-6
+    assert 0.0 < run.y[0].min() <= run.y[0].max() < 1.0
+
+
+def test_with_its_jump_the_next_law_begins_where_the_last_one_ends():
+    table, next_table = table_of(gains_of(0.1)), table_of(gains_of(0.1, ScheduledGains(command_age=0.03)))
+    state, jumps, before, after = np.array([0.0, 0.0, 0.8, 0.0, 0.0, 0.1]), *np.empty((3, 1))
+    write_jumps(table, next_table, 0.4, state, state, jumps)
+    track_axes(table, 0.4, np.zeros(1), state, state, before)
+    track_axes(next_table, 0.0, jumps, state, state, after)
+    assert after == pytest.approx(before, rel=1e-14)
+    assert abs(jumps[0]) > 0.1
