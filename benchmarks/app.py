@@ -13,6 +13,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from benchmarks.commands import bench_commands
 from benchmarks.contents import TOPICS, WHOLE, show_contents
+from benchmarks.departures import departure_tasks
 from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.ledger import Ledger, LedgerError
 from benchmarks.mapping import mapping_tasks
@@ -100,6 +101,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *(_command_task(scenario) for scenario in _COMMANDED),
         *mapping_tasks(),
         *simulating_tasks(),
+        *departure_tasks(),
     ]
 
 

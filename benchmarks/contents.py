@@ -17,10 +17,11 @@ TOPICS = {
     "command": "whole commands in processes of their own",
     "mapping": "harmonic maps: accuracy, speed, how both grow",
     "simulating": "the closed loop beside the bare plant; memory of repeated runs",
+    "departures": "transports of teams that are not ideal, mild and harsh; with predictor and observer",
 }
 """What every topic is about."""
 
-WHOLE = "about twelve minutes on two cores, most of it for the planner"
+WHOLE = "about twenty-five minutes on two cores, most of it for the planner"
 """How long everything takes."""
 
 

@@ -12,7 +12,7 @@ list.
 """
 
 from dataclasses import dataclass, field
-from math import ceil
+from math import ceil, sqrt
 from typing import Annotated, Literal
 
 from coop_drake.scenario.presets import Preset, with_preset
@@ -31,6 +31,9 @@ ControlRate = Annotated[float, Limits(at_least=1.0, at_most=1e4)]
 
 RelativeError = Annotated[float, Limits(at_least=-0.9, at_most=10.0)]
 """A relative error [-]; at -1 a model would be massless, and a measured rate always zero."""
+
+_ALMOST_ALL = 0.99
+"""Largest probability of losses for which gains are scheduled [-]; where all is lost no gain would help."""
 
 ALL_ROBOTS = "*"
 """Name that stands for all robots without an entry of their own."""
@@ -233,9 +236,21 @@ class Deployment:
         return 0.0 if period is None else ceil(self.measurements.delay / period - 1e-9) * period
 
     @property
+    def held_age(self) -> float:
+        """How much older measurements are where some are lost or late: mean and two standard deviations [s].
+
+        With the probability p that a measurement is not there in time, the one in use is k periods older with
+        the probability (1 - p) p^k. Late ones are at most as much older as they are late.
+        """
+        m, period = self.measurements, self.period or 0.0
+        missing = min(m.loss + (1.0 - m.loss) * m.late, _ALMOST_ALL)
+        age = period * (missing + 2.0 * sqrt(missing)) / (1.0 - missing)
+        return age if m.loss > 0.0 else min(age, max(m.late_by, period))
+
+    @property
     def command_age(self) -> float:
-        """Mean age of the measurements on which an effort rests: delay, half a period and lag [s]."""
-        return self.whole_delay + 0.5 * (self.period or 0.0) + self.actuators.lag
+        """Age of the measurements on which an effort rests: delay, losses, half a period and lag [s]."""
+        return self.whole_delay + self.held_age + 0.5 * (self.period or 0.0) + self.actuators.lag
 
     @property
     def period(self) -> float | None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from coop_drake.errors import ScenarioError
@@ -58,3 +59,24 @@ def test_a_scenario_with_a_preset_is_written_and_read_back(tmp_path):
 def test_what_is_wrong_is_refused_with_its_key(tmp_path, deployment, message):
     with pytest.raises(ScenarioError, match=message):
         loaded(tmp_path, deployment)
+
+
+@pytest.mark.parametrize(
+    ("measurements", "periods"),
+    [
+        ("{}", 0.0),
+        ("{loss: 0.5}", 1.0 + 2.0 * 2.0**0.5),
+        ("{late: 0.5, late_by: 1}", 1.0 + 2.0 * 2.0**0.5),
+        ("{late: 1, late_by: 0.03}", 6.0),
+        ("{loss: 0.2, late: 0.375, late_by: 0.01}", 1.0 + 2.0 * 2.0**0.5),
+    ],
+)
+def test_gains_count_how_much_older_measurements_get_by_losses(tmp_path, measurements, periods):
+    """Mean and two standard deviations of the number of missing ones, drawn from their distribution."""
+    read = loaded(tmp_path, f"{{control_rate: 200, measurements: {measurements}}}").deployment
+    assert read.held_age == pytest.approx(0.005 * periods)
+    assert read.command_age == pytest.approx(0.005 * (periods + 0.5))
+    missing = read.measurements.loss + (1.0 - read.measurements.loss) * read.measurements.late
+    if missing < 1.0:
+        drawn = np.random.default_rng(0).geometric(1.0 - missing, 200_000) - 1
+        assert periods == pytest.approx(drawn.mean() + 2.0 * drawn.std(), abs=0.02)

@@ -1,0 +1,177 @@
+"""Transports of teams that are not ideal, mild and harsh, and what predictor and observer buy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from benchmarks.rows import Row
+from benchmarks.tasks import Task
+from coop_drake import (
+    Found,
+    HarmonicMap,
+    Plan,
+    Scenario,
+    SimulationLog,
+    build_maps,
+    load_scenario,
+    plan,
+    simulate,
+)
+from coop_drake.errors import PlanError
+from coop_drake.scenario import Control, Deployment
+from coop_drake.typed_data import convert_class
+
+TEAMS = ("base", "tight")
+
+_RATE = {"control_rate": 200.0}
+_NOISE = {"position_noise": 0.001, "angle_noise": 0.0005, "rate_noise": 0.01}
+
+
+class Case(NamedTuple):
+    """Sections ``deployment`` with which a transport arrives, and with which it does not.
+
+    Attributes:
+        mild: As a scenario file has it; a control rate of 200 Hz is added where none is given.
+        harsh: None where nothing of the kind failed.
+    """
+
+    mild: dict[str, Any]
+    harsh: dict[str, Any] | None = None
+
+
+def _measured(**values: object) -> dict[str, Any]:
+    return {"measurements": values}
+
+
+def _first(**values: object) -> dict[str, Any]:
+    return {"robots": {"robot_0": values}}
+
+
+def _pushed(force: float) -> dict[str, Any]:
+    return {"pushes": [{"body": "object", "force": [force, 0.0], "time": 3.0, "duration": 2.0}]}
+
+
+CASES: Mapping[str, Case] = {
+    "nothing": Case({"control_rate": None}),
+    "sampling": Case({}, {"control_rate": 15.0}),
+    "limits": Case({"actuators": {"base_force": 150.0}}, {"actuators": {"base_force": 10.0}}),
+    "lag": Case({"actuators": {"lag": 0.02}}, {"actuators": {"lag": 0.2}}),
+    "model error": Case({"mass_error": 0.3}, {"mass_error": -0.9}),
+    "noise": Case(_measured(**_NOISE), _measured(**{name: 20.0 * size for name, size in _NOISE.items()})),
+    "delay": Case(_measured(delay=0.02), _measured(delay=0.2)),
+    "lost measurements": Case(_measured(loss=0.3), _measured(loss=0.8)),
+    "late measurements": Case(_measured(late=0.5, late_by=0.02), _measured(late=0.8, late_by=0.5)),
+    "lost reports": Case({"messages": {"loss": 0.7}}, {"messages": {"loss": 1.0}}),
+    "late reports": Case({"messages": {"delay": 0.2}}, {"messages": {"delay": 10.0}}),
+    "repeated reports": Case({"messages": {"repeat": 1.0, "delay": 0.05}}),
+    "biased pose, one robot": Case(_first(pose_bias={"x": 0.005}), _first(pose_bias={"x": 0.02})),
+    "biased pose, all": Case(
+        {"robots": {"*": {"pose_bias": {"x": 0.005}}}}, {"robots": {"*": {"pose_bias": {"x": 0.02}}}}
+    ),
+    "odometry": Case(_first(odometry_scale=0.05), _first(odometry_scale=0.5)),
+    "late samples": Case(_first(sample_offset=0.0049)),
+    "clock": Case(_first(clock_error=0.02), _first(clock_error=0.1)),
+    "late switches": Case(_first(switch_delay=0.01), _first(switch_delay=0.1)),
+    "silence": Case(
+        _first(silence={"begin": 3.0, "duration": 2.0}), _first(silence={"begin": 3.0, "duration": None})
+    ),
+    "silence, motors held": Case(
+        _first(silence={"begin": 3.0, "duration": 0.02, "motors": "held"}),
+        _first(silence={"begin": 3.0, "duration": 1.0, "motors": "held"}),
+    ),
+    "silence, motors limp": Case(
+        _first(silence={"begin": 3.0, "duration": 0.02, "motors": "limp"}),
+        _first(silence={"begin": 3.0, "duration": 1.0, "motors": "limp"}),
+    ),
+    "Coulomb friction": Case({"floor": {"coulomb_friction": 10.0}}, {"floor": {"coulomb_friction": 50.0}}),
+    "viscous friction": Case({"floor": {"viscous_friction": 20.0}}, {"floor": {"viscous_friction": 300.0}}),
+    "slope": Case({"floor": {"slope": 0.01745}}, {"floor": {"slope": 0.1}}),
+    "push": Case(_pushed(20.0), _pushed(100.0)),
+}
+"""Every departure."""
+
+OBSERVED: Mapping[str, dict[str, Any]] = {
+    "Coulomb friction of 50 N": {"floor": {"coulomb_friction": 50.0}},
+    "slope of 1 degree": {"floor": {"slope": 0.01745}},
+    "slope of 0.1 rad": {"floor": {"slope": 0.1}},
+    "push of 50 N for 2 s": _pushed(50.0),
+    "preset mobile_base": {"preset": "mobile_base"},
+}
+"""What an observer may buy something against."""
+
+PREDICTED: Mapping[str, dict[str, Any]] = {
+    **{f"delay of {1e3 * delay:g} ms": _measured(delay=delay) for delay in (0.01, 0.02, 0.05)},
+    "preset mobile_base": {"preset": "mobile_base"},
+    "preset mobile_base, 20 ms": {"preset": "mobile_base", **_measured(delay=0.02)},
+}
+"""What a predictor may buy something against."""
+
+
+def departure_tasks() -> list[Task]:
+    """Every departure, and the additions to the controllers, for each team."""
+    tasks = []
+    for team in TEAMS:
+        tasks.append(Task(f"departures/{team}", partial(_case_rows, team), alone=True))
+        tasks.append(Task(f"departures/{team}_additions", partial(_added_rows, team), alone=True))
+    return tasks
+
+
+def deployment_of(data: Mapping[str, Any]) -> Deployment:
+    """Return a deployment from data as in a scenario file, at 200 Hz unless it says otherwise."""
+    own = {} if "preset" in data else _RATE
+    return convert_class(Deployment.completed({**own, **data}, "deployment"), Deployment)
+
+
+def departing(team: str, deployment: Deployment, control: Control) -> SimulationLog:
+    """Plan a shipped transport with a deployment and additions to the controllers, and simulate it."""
+    scenario = replace(load_scenario(team), deployment=deployment, control=control)
+    return simulate(scenario, *_planned(team, scenario.command_age, scenario))
+
+
+_PLANS: dict[tuple[str, float], tuple[Plan, Sequence[HarmonicMap]]] = {}
+
+
+def _planned(team: str, age: float, scenario: Scenario) -> tuple[Plan, Sequence[HarmonicMap]]:
+    """Return plan and maps; of a deployment, they depend on the age of commands alone."""
+    if (team, age) not in _PLANS:
+        result = plan(scenario)
+        if not isinstance(result, Found):
+            raise PlanError(f"{scenario.path}: no plan to measure departures on: {result.reason}")
+        _PLANS[team, age] = result.plan, build_maps(result.plan)
+    return _PLANS[team, age]
+
+
+def _case_rows(team: str, _: Sequence[Row]) -> list[Row]:
+    rows = []
+    for name, case in CASES.items():
+        for figure, data in (("mild", case.mild), ("harsh", case.harsh)):
+            if data is not None:
+                rows.extend(_rows(f"departures/{team}/{name}/{figure}", team, data, Control()))
+    return rows
+
+
+def _added_rows(team: str, _: Sequence[Row]) -> list[Row]:
+    rows = []
+    for cases, added in ((OBSERVED, Control(observer=True)), (PREDICTED, Control(predictor=True))):
+        what = "observer" if added.observer else "predictor"
+        for name, data in cases.items():
+            for figure, control in (("without", Control()), ("with", added)):
+                where = f"departures/{team}_additions/{what}: {name}/{figure}"
+                rows.extend(_rows(where, team, data, control))
+    return rows
+
+
+def _rows(name: str, team: str, data: Mapping[str, Any], control: Control) -> list[Row]:
+    """Return time, and where the team arrived smallest funnel margin and largest force; else how it ended."""
+    log = departing(team, deployment_of(data), control)
+    rows = [Row(name, float(log.times[-1]), "s", "" if log.reached else log.violation)]
+    if log.reached:
+        force = float(np.abs(log.base_wrenches[:, :, :2]).max())
+        rows.append(Row(f"{name}_margin", 1e3 * float(log.funnel_margin.min()), "mrad or mm"))
+        rows.append(Row(f"{name}_force", force, "N"))
+    return rows
