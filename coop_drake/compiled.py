@@ -81,8 +81,14 @@ class Kernel:
             bound = inspect.signature(self._function).bind(*arguments, **named)
             bound.apply_defaults()
             arguments = bound.args
-        version = self._versions.get(tuple(map(_kind, arguments)))
-        return (version or self._version(arguments))(*arguments)
+        # As in `_kind`, written out because this runs a hundred thousand times in a simulation.
+        kinds = tuple([
+            (a.dtype, a.ndim, a.flags.num & _ARRAY_FLAGS)
+            if a.__class__ is _Array else _SCALARS.get(a.__class__) or _kind(a)
+            for a in arguments
+        ])  # fmt: skip
+        version = self._versions.get(kinds)
+        return (version or self._version(arguments, kinds))(*arguments)
 
     def __reduce__(self) -> str:
         """Pickle by name, as a function is."""
@@ -104,9 +110,8 @@ class Kernel:
         """Digest of all that the machine code depends on."""
         return kernel_stamp(self._function, self._names)
 
-    def _version(self, arguments: tuple[Any, ...]) -> Callable[..., Any]:
-        """Load or compile the version for the types of some arguments."""
-        kinds = tuple(map(_kind, arguments))
+    def _version(self, arguments: tuple[Any, ...], kinds: tuple[object, ...]) -> Callable[..., Any]:
+        """Load or compile the version for some arguments of these kinds."""
         words = [_words(kind) for kind in kinds]
         if None in words:  # Numba knows more types; none of them is kept here.
             return lambda *arguments: self._numba.call(arguments)
@@ -139,6 +144,8 @@ class Kernel:
 _ARRAY_FLAGS = 0x1 | 0x2 | 0x100 | 0x400
 """Bits of numpy's flags that machine code depends on: C order, Fortran order, aligned, writable."""
 
+_Array = np.ndarray
+
 _SCALARS = {float: "float", np.float64: "float", int: "int", np.int64: "int", bool: "bool", np.bool_: "bool"}
 
 _SEEN_MOST = 32
@@ -148,12 +155,11 @@ _seen: dict[int, tuple[object, object]] = {}
 """Tuples by their identity, each with its kind; arrays in them keep their types."""
 
 
-def _kind(value: object) -> object:
+def _kind(value: Any) -> object:
     """What numba's type of a value depends on, as something that can be compared and hashed."""
-    cls = type(value)
-    if cls is np.ndarray:
-        array = cast("np.ndarray[Any, Any]", value)
-        return array.dtype, array.ndim, array.flags.num & _ARRAY_FLAGS
+    cls = value.__class__
+    if cls is _Array:
+        return value.dtype, value.ndim, value.flags.num & _ARRAY_FLAGS
     if (scalar := _SCALARS.get(cls)) is not None:
         return scalar
     if isinstance(value, tuple):

@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from coop_drake import simulation
 from coop_drake.answers import load_plan
 from coop_drake.answers.log import SimulationLog
-from coop_drake.cli import app, run
+from coop_drake.cli import app, run, simulate
 from coop_drake.cli.reporter import Reporter
 from coop_drake.errors import PlanError
 from coop_drake.viz import LiveView
@@ -126,7 +126,8 @@ def drawn(monkeypatch):
         def wait(self):
             pass
 
-    monkeypatch.setattr(run, "FigureProcesses", NoFigures)
+    for module in (run, simulate):
+        monkeypatch.setattr(module, "FigureProcesses", NoFigures)
     return runs
 
 

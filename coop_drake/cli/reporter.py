@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from enum import IntEnum
 from functools import partial
-from time import perf_counter, process_time
+from time import perf_counter, thread_time
 from typing import Any
 
 import typer
@@ -85,12 +85,12 @@ class Reporter:
             name: What is shown.
             facts: Name under which the seconds of the stage are noted, even if it fails. Seconds that pass
                 while kernels are loaded or compiled are noted as ``loading``: they depend on the cache.
-            cpu: Whether the seconds of the processor are noted, too.
+            cpu: Whether the seconds of the processor in this thread are noted, too.
 
         Yields:
             The callback that moves the bar.
         """
-        wall, processor = perf_counter(), process_time()
+        wall, processor = perf_counter(), thread_time()
         with (
             self._bar(name) as advance,
             kernel_clock(partial(self._compiling, advance)) as kernels,
@@ -102,7 +102,7 @@ class Reporter:
                     self._add("loading_cpu_seconds", kernels.cpu_seconds)
                     self._add(f"{facts}_wall_seconds", perf_counter() - wall - kernels.wall_seconds)
                     if cpu:
-                        self._add(f"{facts}_cpu_seconds", process_time() - processor - kernels.cpu_seconds)
+                        self._add(f"{facts}_cpu_seconds", thread_time() - processor - kernels.cpu_seconds)
 
     def _add(self, fact: str, seconds: float) -> None:
         self.facts[fact] = round(self.facts.get(fact, 0.0) + seconds, 4)

@@ -20,6 +20,7 @@ from coop_drake.cli.options import (
     ScenarioPath,
 )
 from coop_drake.cli.plan import plan_of
+from coop_drake.cli.preparing import preparing
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import simulation_facts, summary_rows
@@ -50,10 +51,13 @@ def run_command(
     with reporting(machine=machine, quiet=quiet) as reporter:
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out)
-        if plan := plan_of(task, folder, reporter):
-            reporter.code = carry_out(
-                task, plan, folder, reporter, fresh_maps=fresh_maps, live=live, blocks=blocks
-            )
+        with FigureProcesses() as figures:
+            with preparing(task.scenario):
+                plan = plan_of(task, folder, reporter)
+            if plan:
+                reporter.code = carry_out(
+                    task, plan, folder, reporter, figures, fresh_maps=fresh_maps, live=live, blocks=blocks
+                )
 
 
 def carry_out(
@@ -61,6 +65,7 @@ def carry_out(
     plan: Plan,
     folder: ResultFolder,
     reporter: Reporter,
+    figures: FigureProcesses,
     *,
     fresh_maps: bool,
     live: bool,
@@ -72,15 +77,14 @@ def carry_out(
     """
     maps = map_cells(task, plan, reporter, fresh=fresh_maps)
     observer = _open_live_view(task, plan, reporter) if live else None
-    with FigureProcesses() as figures:  # They import matplotlib while this process simulates.
-        log = _simulate(task, plan, maps, folder, reporter, blocks, observer)
-        from coop_drake.viz import write_recording  # after the run, which needs no Meshcat
+    log = _simulate(task, plan, maps, folder, reporter, blocks, observer)
+    from coop_drake.viz import write_recording  # after the run, which needs no Meshcat
 
-        figures.draw(task.problem.workspace, task.problem.tree, plan, log, folder.path)
-        with reporter.stage("recording", "recording") as progress:  # here, while other processes draw
-            write_recording(task.scenario, plan, log, folder.recording, progress=progress)
-        with reporter.stage("drawing", "drawing"):
-            figures.wait()
+    figures.draw(task.problem.workspace, task.problem.tree, plan, log, folder.path)
+    with reporter.stage("recording", "recording") as progress:  # here, while other processes draw
+        write_recording(task.scenario, plan, log, folder.recording, progress=progress)
+    with reporter.stage("drawing", "drawing"):
+        figures.wait()
     reporter.table(task.name, summary_rows(reporter.facts))
     reporter.say(
         f"Results are in {escape(str(folder.path))}; open {escape(str(folder.recording))} in a browser"

@@ -13,6 +13,7 @@ from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.run import carry_out
 from coop_drake.cli.summary import plan_facts
 from coop_drake.cli.task import Task, read_task
+from coop_drake.viz.figure_processes import FigureProcesses
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
@@ -42,9 +43,10 @@ def simulate_command(
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out)
         found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)
-        reporter.code = carry_out(
-            task, found, folder, reporter, fresh_maps=fresh_maps, live=live, blocks=blocks
-        )
+        with FigureProcesses() as figures:
+            reporter.code = carry_out(
+                task, found, folder, reporter, figures, fresh_maps=fresh_maps, live=live, blocks=blocks
+            )
 
 
 def read_plan(task: Task, path: Path, reporter: Reporter, *, new_gains: bool = False) -> Plan:

@@ -1,42 +1,46 @@
-"""Processes that draw the figures of a run: they import matplotlib while the run is simulated."""
+"""A process that draws the figures of a run: it imports matplotlib while the run is planned and simulated."""
 
 from __future__ import annotations
 
 import os
 import pickle
+import signal
 import subprocess
 import sys
+import traceback
+from collections.abc import Iterator
+from contextlib import suppress
 from types import TracebackType
 from typing import Any
 
 _MOST = 2
-"""More processes draw no sooner: each imports matplotlib, which takes as long as four figures."""
+"""Number of processes that draw; more draw no sooner beside the one that writes the recording."""
 
 
 class FigureProcesses:
-    """Processes that start when the block begins, and end with it.
+    """A process that starts when the block begins and ends with it; it draws in two processes.
 
-    They have sessions of their own, so that Ctrl-C reaches only the command, which ends them.
+    It has a session of its own, so that Ctrl-C reaches only the command, which ends it.
     """
 
     def __enter__(self) -> FigureProcesses:
-        self._processes = [
-            subprocess.Popen(
-                [sys.executable, "-P", "-m", "coop_drake.viz.figure_processes"],
-                stdin=subprocess.PIPE,
-                env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},  # They find what this one finds.
-                start_new_session=True,
-            )
-            for _ in range(min(_MOST, os.cpu_count() or 1))
-        ]
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "coop_drake.viz.figure_processes"],
+            stdin=subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},  # It finds what this one finds.
+            start_new_session=True,
+        )
         return self
 
     def draw(self, *arguments: Any) -> None:
-        """Begin to draw, with the arguments of `coop_drake.viz.write_figures`; each process draws a part."""
-        for part, process in enumerate(self._processes):
-            assert process.stdin is not None
-            with process.stdin as pipe:
-                pickle.dump((arguments, {"part": part, "parts": len(self._processes)}), pipe)
+        """Begin to draw.
+
+        Args:
+            arguments: Those of `coop_drake.viz.write_figures`.
+        """
+        assert self._process.stdin is not None
+        with self._process.stdin as pipe:
+            pickle.dump(arguments, pipe)
 
     def wait(self) -> None:
         """Wait until all figures are written.
@@ -44,27 +48,49 @@ class FigureProcesses:
         Raises:
             RuntimeError: They could not be drawn; the process has said why on standard error.
         """
-        for process in self._processes:
-            if code := process.wait():
-                raise RuntimeError(f"a process that draws figures ended with code {code}")
+        if code := self._process.wait():
+            raise RuntimeError(f"a process that draws figures ended with code {code}")
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for process in self._processes:
-            process.kill()
-            process.wait()
-            if process.stdin is not None:
-                process.stdin.close()
+        with suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+        if self._process.stdin is not None:
+            self._process.stdin.close()
 
 
 def main() -> None:
     """Draw the figures that standard input asks for; nothing where it ends before it asks."""
-    from coop_drake.viz.figures import write_figures
+    from coop_drake.viz.figures import figure_names, write_figures
 
-    if request := sys.stdin.buffer.read():
-        arguments, options = pickle.loads(request)
-        write_figures(*arguments, **options)
+    request = sys.stdin.buffer.read()
+    if not request:
+        return
+    arguments = pickle.loads(request)
+    waiting, numbers = os.pipe()
+    os.write(
+        numbers, bytes(reversed(range(len(figure_names(*arguments[:-1])))))
+    )  # The summary takes longest.
+    os.close(numbers)
+    other = os.fork() if (os.cpu_count() or 1) >= _MOST else None
+    failed = False
+    try:
+        write_figures(*arguments, numbers=_taken(waiting))
+    except Exception:
+        traceback.print_exc()
+        failed = True
+    if other:
+        failed |= os.waitpid(other, 0)[1] != 0
+    sys.stderr.flush()
+    os._exit(int(failed))
+
+
+def _taken(waiting: int) -> Iterator[int]:
+    """Numbers that no other process has taken from a pipe."""
+    while number := os.read(waiting, 1):
+        yield number[0]
 
 
 if __name__ == "__main__":

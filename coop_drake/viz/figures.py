@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -23,22 +23,26 @@ def write_figures(
     log: SimulationLog,
     directory: Path,
     *,
-    part: int = 0,
-    parts: int = 1,
+    numbers: Iterable[int] | None = None,
 ) -> list[Path]:
     """Write figures 4 to 13 of the paper and a summary of the margins as PNG; return the files written.
 
     Figures 10 and 11 show one robot each; those of further robots are called Figure 11, too. Where several
-    processes write them, each writes one ``part`` of so many ``parts``.
+    processes write them, each gets the ``numbers`` of those that it shall write, counted from 0.
     """
-    written = []
+    written, known = [], list(_figures(workspace, tree, plan, log))
     with house_style():
-        for name, draw in list(_figures(workspace, tree, plan, log))[part::parts]:
+        for name, draw in known if numbers is None else (known[number] for number in numbers):
             figure = draw()
             if figure is not None:
                 written.append(directory / f"{name}.png")
                 save_figure(figure, written[-1])
     return written
+
+
+def figure_names(workspace: Polygon, tree: ComponentTree, plan: Plan, log: SimulationLog) -> list[str]:
+    """Names of the figures that `write_figures` writes, in its order."""
+    return [name for name, _ in _figures(workspace, tree, plan, log)]
 
 
 def _figures(

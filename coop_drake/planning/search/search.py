@@ -12,7 +12,7 @@ A sampled path is then moved away from the walls and covered again at the larges
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import process_time
+from time import thread_time
 
 from shapely.errors import ShapelyError
 
@@ -127,7 +127,7 @@ class _Search:
     def __init__(
         self, problem: PlanningProblem, progress: Progress | None, watch: Watch | None, unit: float
     ) -> None:
-        self._began, self._unit = process_time(), unit
+        self._began, self._unit = thread_time(), unit
         self._first_plan: float | None = None
         self._problem, self._progress = problem, progress
         self._samples = SampledSearch(problem)
@@ -165,7 +165,7 @@ class _Search:
             if refutation is not None:
                 return NoChannel(True, refutation.reason, refutation.proof)
             if verdict is Verdict.FOUND:
-                self._first_plan = process_time() - self._began
+                self._first_plan = thread_time() - self._began
                 return explored_channel(self._problem, self._proofs.boxes())
             found = self._sampled(ATTEMPTS_PER_ROUND)
             if found is None and (verdict is Verdict.RESOLUTION or self._proofs.slices >= budget):
@@ -180,7 +180,7 @@ class _Search:
         for _ in range(attempts):
             found = self._samples.attempt(report)
             if found is not None:
-                self._first_plan = process_time() - self._began
+                self._first_plan = thread_time() - self._began
                 return found
             if self._samples.object_blocked == ENOUGH_BLOCKED_ATTEMPTS:
                 return None
@@ -194,7 +194,7 @@ class _Search:
             return None
         found = self._samples.narrow_attempt(self._phase("sampling narrow passages"))
         if found is not None:
-            self._first_plan = process_time() - self._began
+            self._first_plan = thread_time() - self._began
         return found
 
     def _explored(self, slices: int, robots: int | None = None, *, untested: bool = True) -> Verdict:
