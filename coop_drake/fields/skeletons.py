@@ -24,7 +24,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+import scipy  # It imports its parts when they are first used: maps from the cache need none.
 
 from coop_drake.fields.double_layer import DoubleLayer, block, mark_near
 from coop_drake.tree.pose import FloatArray, IntArray

@@ -18,7 +18,7 @@ LEAST_CLEARANCE = 0.002
 SAMPLED_CLEARANCE = 0.015
 """Clearance that other candidates are sampled with [m]: wider ones are faster."""
 
-CANDIDATES, CHOICES, SAMPLES, SEED = 3, 3, 2_500, 1
+CANDIDATES, CHOICES, SAMPLES, SEED = 2, 3, 2_500, 1
 """Number of other candidates, of paths of the object that each is chosen from, and of samples for every
 subsystem; the seed of the samples."""
 
