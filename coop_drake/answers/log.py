@@ -44,6 +44,9 @@ class SimulationLog:
         base_wrenches: Actuation of every base at Bk, shape (T, N, 3) [N, N m].
         joint_torques: Actuation of every joint, shape (T, n) [N m or N].
         ready_margins: Margin that every robot reports; ready where not negative, shape (T, N) [-].
+        held: 1 where the team is held at rest inside its cell, else 0, shape (T,) [-].
+        clock_lag: By how much the funnels' clock lags behind the time since the cell was entered, shape
+            (T,) [s].
         workspace_clearance: Smallest distance of any body to any wall, shape (T,) [m].
         body_clearance: Smallest distance between bodies that must not touch, shape (T,) [m].
         cell_clearance: Signed distance of p_WL to the boundary of the cell's safe set, shape (T,) [m].
@@ -81,6 +84,8 @@ class SimulationLog:
     base_wrenches: FloatArray
     joint_torques: FloatArray
     ready_margins: FloatArray
+    held: FloatArray
+    clock_lag: FloatArray
     workspace_clearance: FloatArray
     body_clearance: FloatArray
     cell_clearance: FloatArray

@@ -11,13 +11,14 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import DeployedController, deploy
 from coop_drake.diagram.fused import FusedControllers, add_fused_controllers
+from coop_drake.diagram.hold import add_supervisor
 from coop_drake.diagram.knowledge import robot_knowledge
 from coop_drake.diagram.robot_controller import Replacements, build_robot_controller
 from coop_drake.diagram.station import TransportStation, build_driven_station, build_station
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import TeamPlant, set_configuration
 from coop_drake.scenario import Scenario
-from coop_drake.systems import Block, CellPlanner
+from coop_drake.systems import Block, CellPlanner, HoldSupervisor
 
 Blocks = Literal["named", "fused"]
 """How the controllers are built: a block for each law of each robot, or one block for them all."""
@@ -33,6 +34,7 @@ class ClosedLoop:
         cell_planner: The supervisor.
         controllers: One sub-Diagram for each robot, as the others see it.
         deployed: Controllers with sensors, actuators and radio, empty where the team is ideal.
+        supervisor: What holds the team, None where a scenario has no holds.
         fused: The block that drives the team in the fused mode, which has no controllers of single robots.
         plan: The plan that they follow.
     """
@@ -42,6 +44,7 @@ class ClosedLoop:
     cell_planner: CellPlanner
     controllers: tuple[Diagram, ...]
     deployed: tuple[DeployedController, ...]
+    supervisor: HoldSupervisor | None
     fused: FusedControllers | None
     plan: Plan
 
@@ -88,7 +91,7 @@ def build_closed_loop(
     blocks: Blocks = "named",
     replacements: Replacements | None = None,
 ) -> ClosedLoop:
-    """Build the closed loop; only ready reports cross between robots.
+    """Build the closed loop; only ready reports, and requests for a hold if any, cross between robots.
 
     Args:
         scenario: The scenario.
@@ -114,9 +117,13 @@ def build_closed_loop(
     planner = builder.AddNamedSystem(
         "cell_planner", CellPlanner(len(team.robots), len(plan.cells), period=scenario.deployment.period)
     )
+    hold, supervisor = scenario.control.hold, None
+    if hold is not None:
+        heard = len(team.robots) if blocks == "named" else 0
+        supervisor = add_supervisor(builder, hold, planner, heard, scenario.deployment.period)
     if blocks == "fused":
-        controllers = add_fused_controllers(builder, scenario, station, planner, knowledge)
-        return ClosedLoop(builder.Build(), station, planner, (), (), controllers, plan)
+        controllers = add_fused_controllers(builder, scenario, station, planner, supervisor, knowledge)
+        return ClosedLoop(builder.Build(), station, planner, (), (), supervisor, controllers, plan)
     built, deployed = [], []
     for k, known in enumerate(knowledge):
         controller = build_robot_controller(known, replacements)
@@ -125,8 +132,15 @@ def build_closed_loop(
             controller = deployed[-1].diagram
         builder.AddNamedSystem(f"robot_{k}_controller", controller)
         _connect(builder, station.diagram, planner, controller, k)
+        if supervisor is not None:
+            builder.Connect(supervisor.GetOutputPort("hold"), controller.GetInputPort("hold"))
+            builder.Connect(
+                controller.GetOutputPort("hold_request"), supervisor.GetInputPort(f"robot_{k}_request")
+            )
         built.append(controller)
-    return ClosedLoop(builder.Build(), station, planner, tuple(built), tuple(deployed), None, plan)
+    return ClosedLoop(
+        builder.Build(), station, planner, tuple(built), tuple(deployed), supervisor, None, plan
+    )
 
 
 def _connect(

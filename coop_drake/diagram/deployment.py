@@ -73,7 +73,12 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int, name: str) -
     wrapping.hear(controller.GetInputPort("current_cell"))
     builder.ExportOutput(wrapping.actuate(controller.GetOutputPort("robot_effort")), "robot_effort")
     builder.ExportOutput(wrapping.send(controller.GetOutputPort("ready")), "ready")
-    for output in TELEMETRY:
+    held = controller.HasOutputPort("hold_request")
+    if held:
+        builder.ExportInput(controller.GetInputPort("hold"), "hold")
+        request = wrapping.send(controller.GetOutputPort("hold_request"), "requests", 3)
+        builder.ExportOutput(request, "hold_request")
+    for output in (*TELEMETRY, *(["clock"] if held else [])):
         builder.ExportOutput(controller.GetOutputPort(output), output)
     return DeployedController(
         builder.Build(),

@@ -21,8 +21,17 @@ from coop_drake.diagram.station import TransportStation
 from coop_drake.errors import ScenarioError
 from coop_drake.fields import VelocityField
 from coop_drake.plant import TeamPlant, base_chain, robot_chain
-from coop_drake.scenario import Control, Deployment, Scenario
-from coop_drake.systems import READY_SIZE, CellPlanner, FusedCell, FusedTeam, TeamController, axis_laws
+from coop_drake.scenario import Control, Deployment, Hold, Scenario
+from coop_drake.systems import (
+    READY_SIZE,
+    CellPlanner,
+    FunnelClock,
+    FusedCell,
+    FusedTeam,
+    HoldSupervisor,
+    TeamController,
+    axis_laws,
+)
 
 __all__ = ["FusedControllers", "add_fused_controllers", "build_team_controller"]
 
@@ -34,11 +43,13 @@ class FusedControllers:
     Attributes:
         driver: The block that computes all controllers.
         governor: The integrator of p_G.
+        clock: The funnels' clock, None where a scenario has no holds.
         efforts: The held effort of each robot in a sampled loop; empty in continuous time.
     """
 
     driver: TeamController
     governor: Integrator | DiscreteTimeIntegrator
+    clock: FunnelClock | None
     efforts: tuple[OutputPort, ...]
 
 
@@ -47,6 +58,7 @@ def add_fused_controllers(
     scenario: Scenario,
     station: TransportStation,
     planner: CellPlanner,
+    supervisor: HoldSupervisor | None,
     knowledge: Sequence[RobotKnowledge],
 ) -> FusedControllers:
     """Add the block that drives a team and the integrator of p_G, and connect them.
@@ -55,7 +67,8 @@ def add_fused_controllers(
         builder: Holds station and planner.
         scenario: The scenario.
         station: Built for the fused mode.
-        planner: The supervisor.
+        planner: The cell planner.
+        supervisor: What holds the team, None where a scenario has no holds.
         knowledge: What every robot knows before the run.
 
     Raises:
@@ -74,13 +87,29 @@ def add_fused_controllers(
     builder.Connect(governor.get_output_port(), driver.GetInputPort("governor_position"))
     builder.Connect(station.diagram.GetOutputPort("team_state"), driver.GetInputPort("team_state"))
     builder.Connect(planner.GetOutputPort("current_cell"), driver.GetInputPort("current_cell"))
+    clock = None if supervisor is None else _add_clock(builder, supervisor, planner, driver, period)
     _report(builder, scenario.deployment, planner, driver, robots)
     if period is not None:
-        return FusedControllers(driver, governor, _hold(builder, station, parts, period))
+        return FusedControllers(driver, governor, clock, _hold(builder, station, parts, period))
     builder.Connect(parts.get_output_port(0), station.diagram.GetInputPort("base_forces"))
     if team.joints:
         builder.Connect(parts.get_output_port(1), station.diagram.GetInputPort("joint_torques"))
-    return FusedControllers(driver, governor, ())
+    return FusedControllers(driver, governor, clock, ())
+
+
+def _add_clock(
+    builder: DiagramBuilder,
+    supervisor: HoldSupervisor,
+    planner: CellPlanner,
+    driver: TeamController,
+    period: float | None,
+) -> FunnelClock:
+    """Add the clock that all robots would have."""
+    clock = builder.AddNamedSystem("funnel_clock", FunnelClock(period))
+    builder.Connect(supervisor.GetOutputPort("hold"), clock.GetInputPort("hold"))
+    builder.Connect(planner.GetOutputPort("current_cell"), clock.GetInputPort("current_cell"))
+    builder.Connect(clock.GetOutputPort("clock"), driver.GetInputPort("clock"))
+    return clock
 
 
 def build_team_controller(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> TeamController:
@@ -178,6 +207,11 @@ def _split(
     return [split.get_output_port(next(ports)) if size else None for size in sizes]
 
 
+def _told_only(hold: Hold | None) -> Hold | None:
+    """Return the same hold as one that only the scenario asks for."""
+    return None if hold is None else Hold(hold.at, hold.duration)
+
+
 def _check(scenario: Scenario, knowledge: Sequence[RobotKnowledge]) -> None:
     deployment = scenario.deployment
     allowed = Deployment(
@@ -191,15 +225,18 @@ def _check(scenario: Scenario, knowledge: Sequence[RobotKnowledge]) -> None:
         refused = "plant.grasps", scenario.plant.grasps
     elif deployment != allowed:
         refused = "deployment", deployment
-    elif scenario.control != Control():
+    elif scenario.control != Control(hold=scenario.control.hold):
         refused = "control", scenario.control
+    elif scenario.control.hold not in (None, _told_only(scenario.control.hold)):
+        refused = "control.hold", scenario.control.hold
     elif any(robot.robot.has_springs for robot in knowledge):
         refused = "directives", "a robot with springs"
     if refused is not None:
         raise ScenarioError(
             str(scenario.path),
             *refused,
-            "an ideal plant without springs, no predictor or observer, of deployment only control_rate, "
+            "an ideal plant without springs, no predictor or observer, holds only at times that the scenario "
+            "states, of deployment only control_rate, "
             "mass_error, messages and seed: "
             "fused blocks support only these; use `--blocks named` for the rest",
         )

@@ -59,6 +59,7 @@ def robot_knowledge(
             period=deployment.period,
             sample_offset=deployment.of_robot(robot.name).sample_offset,
             predicted_periods=delay if control.predictor else 0,
+            hold=control.hold,
             observer_gains=observer_gains(scenario.command_age) if control.observer else None,
         )
         for robot in team.robots

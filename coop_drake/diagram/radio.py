@@ -9,8 +9,8 @@ from coop_drake.scenario import Deployment, Messages
 from coop_drake.systems import MessageChannel, clear_channel
 
 
-def build_radio(deployment: Deployment, robot: int) -> MessageChannel | LinearSystem:
-    """Build the channel of a robot's reports in a sampled team."""
+def build_radio(deployment: Deployment, robot: int, use: int = 0) -> MessageChannel | LinearSystem:
+    """Build the channel of a robot's reports in a sampled team, or of its requests, whose use is 3."""
     messages, period = deployment.messages, deployment.period or 0.0
     if messages == Messages():
         return clear_channel(period)
@@ -19,7 +19,7 @@ def build_radio(deployment: Deployment, robot: int) -> MessageChannel | LinearSy
         delay=messages.delay,
         loss=messages.loss,
         repeat=messages.repeat,
-        seed=seed_of(deployment, robot),
+        seed=seed_of(deployment, robot, use),
     )
 
 

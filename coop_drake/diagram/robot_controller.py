@@ -11,10 +11,14 @@ from pydrake.systems.primitives import Demultiplexer, DiscreteTimeIntegrator, In
 
 from coop_drake.answers.plan import Plan
 from coop_drake.plant import ObjectInertia, RobotPlant
+from coop_drake.scenario import Hold
 from coop_drake.systems import (
+    AxisLaw,
     AxisPpc,
     DisturbanceObserver,
+    FunnelClock,
     GovernedCell,
+    HoldMonitor,
     ObjectEstimator,
     ReadyMonitor,
     ReferenceGovernor,
@@ -25,7 +29,7 @@ from coop_drake.systems import (
 )
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
-__all__ = ["TELEMETRY", "Replacements", "RobotKnowledge", "build_robot_controller"]
+__all__ = ["HELD", "TELEMETRY", "Replacements", "RobotKnowledge", "build_robot_controller"]
 
 TELEMETRY = (
     "object_state",
@@ -36,6 +40,9 @@ TELEMETRY = (
     "hand_command",
 )
 """Outputs of blocks that are exported for the log and for users."""
+
+HELD = ("hold_request", "clock")
+"""Outputs of a robot whose team may be held."""
 
 
 @dataclass(frozen=True)
@@ -54,6 +61,7 @@ class RobotKnowledge:
         period: Time between two computations [s]; None for continuous time.
         sample_offset: Time of the first computation [s].
         predicted_periods: Age of its measurements that it predicts over, in control periods; 0 for none.
+        hold: When the team is held, None for never.
         observer_gains: Gain and leak of its disturbance observer [1/s]; None for no observer.
     """
 
@@ -69,6 +77,7 @@ class RobotKnowledge:
     sample_offset: float = 0.0
     predicted_periods: int = 0
     observer_gains: tuple[float, float] | None = None
+    hold: Hold | None = None
 
     @property
     def p_LE(self) -> FloatArray:
@@ -96,6 +105,8 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
     input   ``current_cell``      2           (index, entry time), from the cell planner
     output  ``robot_effort``      3 + n       its base wrench and joint torques
     output  ``ready``             2           (index, margin), for the cell planner
+    input   ``hold``              1           whether the team is held, only where a scenario has holds
+    output  ``hold_request``      2           to the hold supervisor, only where a scenario has holds
     output  see ``TELEMETRY``                 for the log and for users, not for other robots
     ======= ===================== =========== ==========================================================
 
@@ -126,7 +137,8 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
         at_rest = np.zeros(rate.size())
         outputs["observed_rates"] = _integrated(builder, knowledge, "observer_state", rate, at_rest)
     _connect_by_name(builder, blocks, outputs)
-    for name in ("robot_effort", "ready", *TELEMETRY):
+    held = HELD if knowledge.hold is not None else ()
+    for name in ("robot_effort", "ready", *TELEMETRY, *held):
         builder.ExportOutput(outputs[name], name)
     return builder.Build()
 
@@ -161,11 +173,11 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
             plan.goal_pose[:2],
             knowledge.position_tolerance,
         ),
-        **_additions(knowledge),
+        **_additions(knowledge, laws),
     }
 
 
-def _additions(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
+def _additions(knowledge: RobotKnowledge, laws: Sequence[AxisLaw]) -> dict[str, LeafSystem]:
     """Return the blocks that a scenario's section ``control`` adds."""
     added: dict[str, LeafSystem] = {}
     if knowledge.predicted_periods and knowledge.period is not None:
@@ -176,6 +188,10 @@ def _additions(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
             knowledge.period,
             offset=knowledge.sample_offset,
         )
+    if knowledge.hold is not None:
+        period, offset = knowledge.period, knowledge.sample_offset
+        added["funnel_clock"] = FunnelClock(period, offset)
+        added["hold_monitor"] = HoldMonitor(laws, knowledge.hold.energy, period=period, offset=offset)
     if knowledge.observer_gains is not None:
         joints = knowledge.joints.stop - knowledge.joints.start
         added["disturbance_observer"] = DisturbanceObserver(joints, *knowledge.observer_gains)
@@ -231,6 +247,8 @@ def _connect_by_name(
             name = renamed.get(port.get_name(), port.get_name())
             if name in outputs:
                 builder.Connect(outputs[name], port)
+            elif name == "clock":  # a team that is never held has none
+                continue
             elif name in outside:
                 builder.ConnectInput(name, port)
             else:

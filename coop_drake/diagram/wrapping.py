@@ -92,17 +92,24 @@ class Wrapping:
             blocks.append(("lagged_effort", Gain(_KILO, size)))
         return self._append(effort, blocks)
 
-    def send(self, ready: OutputPort) -> OutputPort:
-        """Return the reports of a robot as the cell planner receives them."""
+    def send(self, message: OutputPort, name: str = "reports", use: int = 0) -> OutputPort:
+        """Return the reports of a robot as the cell planner receives them, or its requests likewise.
+
+        Args:
+            message: The port that sends.
+            name: What the messages are called in the names of blocks.
+            use: Of the seed of what is lost, see ``seed_of``.
+        """
         period, silence, offset = self._deployment.period, self._own.silence, self._own.sample_offset
         if period is None:
-            return ready
+            return message
         blocks: list[tuple[str, LeafSystem]] = []
         if silence is not None:
-            blocks.append(("reports", self._interruption(ready.size(), silence, held=True)))
+            blocks.append((name, self._interruption(message.size(), silence, held=True)))
         if offset:
-            blocks.append(("reports_of_samples", ZeroOrderHold(period, ready.size(), offset)))
-        return self._append(ready, [*blocks, ("radio", build_radio(self._deployment, self._robot))])
+            blocks.append((f"{name}_of_samples", ZeroOrderHold(period, message.size(), offset)))
+        radio = build_radio(self._deployment, self._robot, use)
+        return self._append(message, [*blocks, ("radio" if use == 0 else f"{name}_radio", radio)])
 
     def _append(self, port: OutputPort, blocks: Iterable[tuple[str, LeafSystem]]) -> OutputPort:
         """Add blocks one after the other behind an output, and return the last one's output."""

@@ -1,4 +1,4 @@
-from .axis_table import axis_table, funnel_acceleration
+from .axis_table import funnel_acceleration
 from .funnels import Funnel, FunnelBounds, funnel_bounds
 from .gain_schedule import transition_gains
 from .gains import FixedGains, GainSet, ScheduledGains, TransitionGains
@@ -21,7 +21,6 @@ __all__ = [
     "ScheduledGains",
     "TransitionGains",
     "acceleration_at",
-    "axis_table",
     "clearance_margin",
     "energy_margin",
     "funnel_acceleration",

@@ -11,6 +11,7 @@ from coop_drake.compiled import compiled
 from coop_drake.laws.funnels import Funnel, axis_bounds
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.laws.hand_over import fading
+from coop_drake.laws.hold import slowed_bounds
 from coop_drake.laws.ppc import ramped_gain, track_axis
 from coop_drake.tree.pose import FloatArray
 
@@ -24,6 +25,7 @@ __all__ = [
     "bounds_of",
     "funnel_acceleration",
     "track_axes",
+    "track_paced_row",
     "track_row",
     "write_bounds",
     "write_row",
@@ -101,9 +103,26 @@ def track_row(row: FloatArray, time: float, position: float, rate: float) -> tup
         position: x [rad or m].
         rate: x' [rad/s or m/s].
     """
+    return track_paced_row(row, time, 1.0, 0.0, position, rate)
+
+
+@compiled
+def track_paced_row(
+    row: FloatArray, time: float, pace: float, pace_rate: float, position: float, rate: float
+) -> tuple[float, float]:
+    """Return ``track_axis`` of one axis whose funnel moves by a clock that may slow down, see ``laws.hold``.
+
+    Args:
+        row: The axis, shape (``LAW_COLUMNS``,).
+        time: tau, the clock's time since the cell was entered [s].
+        pace: tau' [-].
+        pace_rate: tau'' [1/s].
+        position: x [rad or m].
+        rate: x' [rad/s or m/s].
+    """
     k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
-    gains = row[LOG_GAIN], k1, k1_dot, row[RATE_GAIN], row[SATURATION]
-    return track_axis(position, rate, bounds_of(row, time), gains)
+    gains = row[LOG_GAIN], k1, k1_dot * pace, row[RATE_GAIN], row[SATURATION]
+    return track_axis(position, rate, slowed_bounds(bounds_of(row, time), pace, pace_rate), gains)
 
 
 def funnel_acceleration(
@@ -126,6 +145,7 @@ def funnel_acceleration(
 def track_axes(
     table: FloatArray,
     time: float,
+    clock: FloatArray,
     jumps: FloatArray,
     object_state: FloatArray,
     robot: FloatArray,
@@ -140,15 +160,19 @@ def track_axes(
     Args:
         table: The axes (theta, q_k), shape (1 + n, ``LAW_COLUMNS``).
         time: Time since the cell was entered [s].
+        clock: The funnels' clock: its lag [s], its pace [-] and the derivative of the pace [1/s], shape (3,).
         jumps: What ``write_jumps`` gave at the switch, shape (1 + n,) [rad/s^2 or m/s^2].
         object_state: Pose and twist of the object, shape (6,).
         robot: (z_k, z_k'), shape (2 (3 + n),); not read where the robot has no joints.
         acceleration: Receives theta'' and q_k'', shape (1 + n,) [rad/s^2 or m/s^2].
     """
     n, left = table.shape[0] - 1, fading(time, table[0, FADING_TIME])
-    acceleration[0] = track_row(table[0], time, object_state[2], object_state[5])[0] + left * jumps[0]
+    tau, pace, pace_rate = time - clock[0], clock[1], clock[2]
+    own = track_paced_row(table[0], tau, pace, pace_rate, object_state[2], object_state[5])[0]
+    acceleration[0] = own + left * jumps[0]
     for i in range(n):
-        own = track_row(table[1 + i], time, robot[3 + i], robot[6 + n + i])[0]
+        x, v = robot[3 + i], robot[6 + n + i]
+        own = track_paced_row(table[1 + i], tau, pace, pace_rate, x, v)[0]
         acceleration[1 + i] = own + left * jumps[1 + i]
 
 
@@ -157,6 +181,7 @@ def write_jumps(
     table: FloatArray,
     next_table: FloatArray,
     time: float,
+    clock: FloatArray,
     object_state: FloatArray,
     robot: FloatArray,
     jumps: FloatArray,
@@ -167,13 +192,14 @@ def write_jumps(
         table: The axes in the current cell, whose hand-over is over, shape (1 + n, ``LAW_COLUMNS``).
         next_table: The axes in the next cell.
         time: Time since the current cell was entered [s].
+        clock: The funnels' clock, as in ``track_axes``, shape (3,).
         object_state: Pose and twist of the object, shape (6,).
         robot: (z_k, z_k'), shape (2 (3 + n),); not read where the robot has no joints.
         jumps: Receives the law of the current cell less that of the next, shape (1 + n,).
     """
     none, following = np.zeros(table.shape[0]), np.empty(table.shape[0])
-    track_axes(table, time, none, object_state, robot, jumps)
-    track_axes(next_table, 0.0, none, object_state, robot, following)
+    track_axes(table, time, clock, none, object_state, robot, jumps)
+    track_axes(next_table, clock[0], clock, none, object_state, robot, following)
     for i in range(table.shape[0]):
         jumps[i] -= following[i]
 

@@ -3,7 +3,7 @@ from .configuration import base_poses, get_configuration, get_rates, set_configu
 from .planar_chain import BaseChain, base_chain, robot_chain
 from .problem import planning_problem
 from .robot import RobotPlant, build_robot_plant
-from .run_setup import run_setup
+from .run_masses import run_setup
 from .separate_team import SeparateTeam, build_separate_team
 from .team import ObjectInertia, RobotModel, TeamPlant, build_team_plant
 

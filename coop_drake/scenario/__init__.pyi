@@ -1,5 +1,5 @@
 from .assembly import Assembly, RobotAssembly, assemble
-from .control import Control
+from .control import Control, Hold
 from .deployment import (
     ActuatorLimits,
     Deployment,
@@ -36,6 +36,7 @@ __all__ = [
     "Floor",
     "Gains",
     "Goal",
+    "Hold",
     "MapSettings",
     "Measurements",
     "Messages",

@@ -23,6 +23,11 @@ def validate(scenario: Scenario) -> None:
         raise ScenarioError(file, "gains.selected", scenario.gains.selected, f"a gain set, one of {known}")
     robots = [robot.name for robot in assemble(scenario).robots]
     check_deployment(scenario, robots)
+    hold = scenario.control.hold
+    if hold is not None and hold.silence is not None and scenario.deployment.control_rate is None:
+        raise ScenarioError(
+            file, "control.hold.silence", hold.silence, "null without deployment.control_rate"
+        )
     for section in ("fixed_joints", "load_shares"):
         for name in getattr(scenario, section):
             if name not in robots:

@@ -51,6 +51,8 @@ class Recorder:
             base_wrenches=self._samples("base_wrenches"),
             joint_torques=self._samples("joint_torques"),
             ready_margins=self._samples("ready_margins"),
+            held=self._samples("held"),
+            clock_lag=self._samples("clock_lag"),
             workspace_clearance=self._margins("workspace_clearance"),
             body_clearance=self._margins("body_clearance"),
             cell_clearance=self._margins("cell_clearance"),

@@ -17,6 +17,7 @@ from coop_drake.laws.readiness import (
 )
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems.governor_kernels import cell_margin
+from coop_drake.systems.hold_supervisor import ASKED, SILENT, TOLD
 
 __all__ = ["blocking_margin", "narrowest_funnel", "patience"]
 
@@ -40,12 +41,22 @@ def blocking_margin(plan: Plan, sample: Sample, position_tolerance: float) -> st
         sample: The present instant.
         position_tolerance: How close to the goal counts as arrived [m].
     """
+    if sample.held:
+        return f"the hold ends: {_causes_of(sample)}"
     last = sample.cell == len(plan.cells) - 1
     margins = _arrival(plan, sample, position_tolerance) if last else _readiness(plan, sample)
     if min(margins.values()) >= 0.0:
         return "the cell planner receives the robots' reports; all robots are ready"
     name = min(margins, key=lambda key: margins[key])
     return f"{name} (margin {margins[name]:.3g})"
+
+
+def _causes_of(sample: Sample) -> str:
+    """Return why the team is held, as a phrase."""
+    words = {TOLD: "it is told so", ASKED: "asks for it", SILENT: "is not heard"}
+    names = ["", *(f"robot {k} " for k in range(len(sample.causes) - 1))]
+    found = [name + words[cause] for name, cause in zip(names, sample.causes, strict=True) if cause]
+    return ", ".join(found)
 
 
 def narrowest_funnel(plan: Plan, sample: Sample) -> str:

@@ -42,6 +42,9 @@ class Sample:
         joint_torques: Shape (n,).
         acceleration_error: Largest component over all robots' commands.
         ready_margins: As every robot reports it, shape (N,).
+        held: Whether the team is held, 1 or 0.
+        clock_lag: Lag of the funnels' clock since the cell was entered.
+        causes: Why the team is held, as the hold supervisor shows it; empty where it cannot be.
         arrived: Whether all robots report arrival.
     """
 
@@ -65,6 +68,9 @@ class Sample:
     joint_torques: FloatArray
     acceleration_error: float
     ready_margins: FloatArray
+    held: float
+    clock_lag: float
+    causes: FloatArray
     arrived: bool
 
 
@@ -112,6 +118,9 @@ class Telemetry:
             joint_torques=values[at.joint_torques],
             acceleration_error=largest_difference(values[at.accelerations], values[at.realised][None, :3]),
             ready_margins=values[at.ready_margins],
+            held=float(values[at.causes].any()),
+            clock_lag=float(values[at.clock_lag].sum()),
+            causes=values[at.causes],
             arrived=bool(arrived),
         )
 
@@ -155,6 +164,8 @@ class _Places(NamedTuple):
     accelerations: Any
     realised: Any
     ready_margins: Any
+    clock_lag: Any
+    causes: Any
 
 
 def _instant(loop: ClosedLoop, ports: _PortRow) -> Any:
@@ -167,6 +178,11 @@ def _realised(loop: ClosedLoop, ports: _PortRow) -> Any:
     return ports.add(loop.station.diagram, "generalized_acceleration")[loop.team.velocity_index]
 
 
+def _causes(loop: ClosedLoop, ports: _PortRow) -> Any:
+    """Add the causes of holds, none where a scenario has no holds."""
+    return [] if loop.supervisor is None else ports.add(loop.supervisor, "causes")
+
+
 def _named_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
     """Add all outputs that are read from a loop of named blocks."""
     robots = loop.team.robots
@@ -174,6 +190,7 @@ def _named_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
     efforts = [ports.add(controller, "robot_effort") for controller in loop.controllers]
     logged = [name for name in TELEMETRY if name != "object_state"]
     of = {name: [ports.add(law, name) for law in loop.bare_controllers] for name in ("ready", *logged)}
+    clock = [] if loop.supervisor is None else ports.add(loop.bare_controllers[0], "clock")
     # Every robot has bounds for the angle; they are equal, and the first robot's are taken.
     bounds = [np.split(funnels, 2) for funnels in of["funnels"]]
     return _Places(
@@ -189,6 +206,8 @@ def _named_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
         accelerations=np.array(of["object_acceleration"]),
         realised=_realised(loop, ports),
         ready_margins=np.array([margin for _, margin in of["ready"]]),
+        clock_lag=np.array(clock[:1], dtype=np.intp),
+        causes=np.array(_causes(loop, ports), dtype=np.intp),
     )
 
 
@@ -200,6 +219,7 @@ def _fused_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
     acceleration, commands, bases, efforts, bounds, margin = (
         part.astype(np.intp) for part in telemetry_parts(added, robots)
     )
+    clock = [] if fused.clock is None else ports.add(fused.clock, "clock")
     wrenches, torques = efforts[: 3 * robots].reshape(robots, 3), efforts[3 * robots :]
     if fused.efforts:
         held = [ports.add(port.get_system(), port.get_name()) for port in fused.efforts]
@@ -218,6 +238,8 @@ def _fused_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
         accelerations=acceleration[None],
         realised=_realised(loop, ports),
         ready_margins=ports.add(fused.driver, "ready")[1::2],
+        clock_lag=np.array(clock[:1], dtype=np.intp),
+        causes=np.array(_causes(loop, ports), dtype=np.intp),
     )
 
 

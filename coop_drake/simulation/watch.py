@@ -62,7 +62,7 @@ class Watch:
             self.violation = margins.violation
         elif sample.arrived and at_goal(self._loop.plan, sample, self._tolerance):
             self.reached = True
-        elif sample.time - sample.entry > patience(self._loop.plan, sample.cell):
+        elif sample.time - sample.entry - sample.clock_lag > patience(self._loop.plan, sample.cell):
             self.give_up("stalled")
         if not self.ended:
             return None

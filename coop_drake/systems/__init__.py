@@ -7,6 +7,9 @@ from coop_drake.systems.cell_planner import CellPlanner
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
 from coop_drake.systems.disturbance_observer import DisturbanceObserver
 from coop_drake.systems.floor_friction import FloorFriction
+from coop_drake.systems.funnel_clock import CLOCK_SIZE, FunnelClock
+from coop_drake.systems.hold_monitor import REQUEST_SIZE, HoldMonitor
+from coop_drake.systems.hold_supervisor import HoldSupervisor
 from coop_drake.systems.interruption import Interruption
 from coop_drake.systems.lossy_measurement import LossyMeasurement
 from coop_drake.systems.message_channel import MessageChannel, clear_channel, whole_periods
@@ -22,17 +25,22 @@ from coop_drake.systems.team_kernels import FusedCell, FusedTeam
 from coop_drake.systems.wrench_law import WrenchLaw
 
 __all__ = [
+    "CLOCK_SIZE",
     "CURRENT_CELL_SIZE",
     "READY_SIZE",
+    "REQUEST_SIZE",
     "AxisLaw",
     "AxisPpc",
     "Block",
     "CellPlanner",
     "DisturbanceObserver",
     "FloorFriction",
+    "FunnelClock",
     "FusedCell",
     "FusedTeam",
     "GovernedCell",
+    "HoldMonitor",
+    "HoldSupervisor",
     "Interruption",
     "LossyMeasurement",
     "MessageChannel",

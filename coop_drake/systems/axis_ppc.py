@@ -11,6 +11,7 @@ from coop_drake.laws.axis_table import first_jumps, track_axes, write_bounds, wr
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
+from coop_drake.systems.funnel_clock import CLOCK_SIZE, clock_of
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["AxisPpc"]
@@ -24,6 +25,8 @@ class AxisPpc(Block):
     input   ``robot_state``          2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)         W
     input   ``current_cell``         2          index of the current cell, time of its entry [-, s]
     input   ``ready``                2          the robot's own report: cell index, margin [-]
+    input   ``clock``                3          the funnels' clock: its lag since then [s], its pace [-] and
+                                                the derivative of the pace [1/s]; may be left out
     output  ``axis_acceleration``    1 + n      desired angular acceleration of the object [rad/s^2],  W
                                                 of the joints [rad/s^2 or m/s^2]
     output  ``funnels``              2 (1 + n)  lower, then upper funnel bounds now [rad or m]
@@ -65,8 +68,10 @@ class AxisPpc(Block):
         self._robot = self.DeclareVectorInputPort("robot_state", 2 * (2 + axes))
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self._ready = self.DeclareVectorInputPort("ready", READY_SIZE)
+        self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE)
         self.DeclareDiscreteState([0.0, *first_jumps(self._tables[0], start)])
-        read = {self.time_ticket(), self.input_port_ticket(self._cell.get_index())}
+        timed = {self.input_port_ticket(port.get_index()) for port in (self._cell, self._clock)}
+        read = {self.time_ticket()} | timed
         states = {self.input_port_ticket(port.get_index()) for port in (self._object, self._robot)}
         # The robot's report is not among them: only the update reads it.
         self.DeclareVectorOutputPort(
@@ -81,17 +86,18 @@ class AxisPpc(Block):
         return object_state, self._robot.Eval(context) if axes > 1 else object_state
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
-        cell = self._cell.Eval(context)
+        cell, clock = self._cell.Eval(context), clock_of(self._clock, context)
         index, time = index_of(cell, len(self._tables)), context.get_time() - cell[1]
         table = self._tables[index]
         memory = context.get_discrete_state_vector().value()
         jumps = memory[1:] if memory[0] == index else self._none
-        track_axes(table, time, jumps, *self._states(context, len(table)), output.get_mutable_value())
+        track_axes(table, time, clock, jumps, *self._states(context, len(table)), output.get_mutable_value())
 
     def _write_funnels(self, context: Context, output: BasicVector) -> None:
         cell = self._cell.Eval(context)
         table = self._tables[index_of(cell, len(self._tables))]
-        write_bounds(table, context.get_time() - cell[1], output.get_mutable_value())
+        lag = clock_of(self._clock, context)[0]
+        write_bounds(table, context.get_time() - cell[1] - lag, output.get_mutable_value())
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         index, margin = self._ready.Eval(context)
@@ -101,6 +107,6 @@ class AxisPpc(Block):
         time, table = context.get_time() - self._cell.Eval(context)[1], self._tables[following - 1]
         memory = discrete_state.get_mutable_vector().get_mutable_value()
         memory[0] = following
-        states = self._states(context, len(table))
-        write_jumps(table, self._tables[following], time, *states, memory[1:])
+        states, clock = self._states(context, len(table)), clock_of(self._clock, context)
+        write_jumps(table, self._tables[following], time, clock, *states, memory[1:])
         return EventStatus.Succeeded()

@@ -19,6 +19,7 @@ class CellPlanner(Block):
 
     ======= =================== ==== =================================================================
     input   ``robot_<k>_ready`` 2    cell index that the report of robot k is about, its margin [-]
+    input   ``paused``          1    1 while the cell must not be left, else 0 [-]; may be left out
     output  ``current_cell``    2    index of the current cell, time at which it was entered [-, s]
     output  ``arrived``         1    1 when all robots are ready to leave the last cell, else 0 [-]
     ======= =================== ==== =================================================================
@@ -45,6 +46,7 @@ class CellPlanner(Block):
         self._ready = tuple(
             self.DeclareVectorInputPort(f"robot_{k}_ready", READY_SIZE) for k in range(robots)
         )
+        self._paused = self.DeclareVectorInputPort("paused", 1)
         self.DeclareDiscreteState([0.0, 0.0])
         # Without these tickets the ready reports, which depend on the cell, would close an algebraic loop.
         self.DeclareVectorOutputPort("current_cell", CURRENT_CELL_SIZE, self._write_cell, {self.xd_ticket()})
@@ -64,7 +66,8 @@ class CellPlanner(Block):
 
     def _advance(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         cell = self._left_by_all(context)
-        if 0.0 <= cell < self._cells - 1 and cell == context.get_discrete_state_vector().value()[0]:
+        leaves = 0.0 <= cell < self._cells - 1 and cell == context.get_discrete_state_vector().value()[0]
+        if leaves and not (self._paused.HasValue(context) and self._paused.Eval(context)[0] > 0.0):
             discrete_state.get_mutable_vector().SetFromVector([cell + 1.0, context.get_time()])
             return EventStatus.Succeeded()
         # "Did nothing" keeps the cached values that depend on the state valid.

@@ -15,6 +15,7 @@ from coop_drake.laws.governor import governor_velocity
 from coop_drake.laws.hand_over import governed_gains
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
+from coop_drake.systems.funnel_clock import CLOCK_SIZE, clock_of
 from coop_drake.systems.governor_kernels import accelerate_object, cell_margin, govern
 from coop_drake.tree.pose import FloatArray
 
@@ -74,13 +75,15 @@ class ReferenceGovernor(Block):
     input   ``object_state``            6    pose and twist of L                                    W
     input   ``governor_position``       2    p_G, kept by an integrator outside [m]                 W
     input   ``current_cell``            2    index of the current cell, time of its entry [-, s]
+    input   ``clock``                   3    the funnels' clock: its lag [s], its pace [-] and the
+                                             derivative of the pace [1/s]; may be left out
     output  ``governor_command``        4    rate of p_G [m/s], desired acceleration of L's origin  W
                                              [m/s^2]
     output  ``energy_margin``           1    Delta E [m^2/s^2]
     ======= =========================== ==== ====================================================== =====
 
-    No state: an integrator outside keeps p_G. One output holds both parts of (14), because evaluating two
-    outputs takes twice as long.
+    No state: an integrator outside keeps p_G; its rate is that of (14) times the pace. One output holds both
+    parts of (14), because evaluating two outputs takes twice as long.
 
     Args:
         cells: One entry for each cell of the plan.
@@ -98,6 +101,7 @@ class ReferenceGovernor(Block):
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
+        self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE)
         self.DeclareVectorOutputPort("governor_command", 4, self._write_command)
         self.DeclareVectorOutputPort("energy_margin", 1, self._write_margin)
 
@@ -110,6 +114,7 @@ class ReferenceGovernor(Block):
             self._cells[index].govern(time, state, governor, command)
         else:
             govern(*arguments, time, state, governor, command)
+        command[:2] *= clock_of(self._clock, context)[1]
 
     def _write_margin(self, context: Context, output: BasicVector) -> None:
         current, state = self._current.Eval(context), self._object.Eval(context)

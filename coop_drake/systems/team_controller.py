@@ -10,6 +10,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Even
 from coop_drake.laws.axis_table import first_jumps
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
+from coop_drake.systems.funnel_clock import CLOCK_SIZE, clock_of
 from coop_drake.systems.ready_kernels import ready_conditions
 from coop_drake.systems.team_kernels import (
     FusedCell,
@@ -34,6 +35,7 @@ class TeamController(Block):
     input   ``team_state``         2 (3 + n)     the plant's positions and velocities, its own order
     input   ``governor_position``  2             p_G [m]                                                W
     input   ``current_cell``       2             index of the current cell, time of its entry [-, s]
+    input   ``clock``              3             as that of ``AxisPpc``; may be left out
     output  ``team_command``       3 N + n + 2   wrench on every base at Bk [N, N m], all joint torques W, or
                                                  [N m or N], p_G' [m/s]                                 Bk
     output  ``telemetry``          6 + 12 N + 3n what the robots' blocks show to the log, see           W
@@ -42,8 +44,7 @@ class TeamController(Block):
     ======= ====================== ============= ====================================================== =====
 
     State: one discrete group (index of a cell, jumps of the accelerations of all axes at the switch to it),
-    as that of ``AxisPpc``. Base wrenches are in the axes of W, or in those of their bases where ``on_bases``
-    is set.
+    as that of ``AxisPpc``. Base wrenches are in the axes of W, or where ``on_bases`` is set of their bases.
 
     Args:
         cells: Every cell of the plan.
@@ -73,26 +74,20 @@ class TeamController(Block):
     ) -> None:
         super().__init__()
         if not cells or len(cells) != len(inradii):
-            raise ValueError(
-                f"TeamController needs one inradius for each cell, not {len(inradii)} for {len(cells)}"
-            )
+            found = f"{len(inradii)} for {len(cells)}"
+            raise ValueError(f"TeamController needs one inradius for each cell, not {found}")
         self._on_bases, self._laws = on_bases, [(*cell, *team) for cell in cells]
-        conditions = ready_conditions(
-            [cell.table for cell in cells],
-            [cell.edges for cell in cells],
-            [cell.row for cell in cells],
-            inradii,
-            goal_position,
-            position_tolerance,
-        )
+        self._tables, edges, rows = zip(*((cell.table, cell.edges, cell.row) for cell in cells), strict=True)
+        conditions = ready_conditions(self._tables, edges, rows, inradii, goal_position, position_tolerance)
         reading = team.places, team.first, team.base_chains, team.yaws
         self._conditions = [(*condition, *reading) for condition in conditions]
-        self._tables, self._reading = [cell.table for cell in cells], reading
+        self._reading = reading
         self._none, self._nothing = np.zeros(len(cells[0].table)), EventStatus.DidNothing()
         robots, joints = len(team.yaws), team.places.shape[1] - 3
         self._state = self.DeclareVectorInputPort("team_state", 2 * (3 + joints))
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
+        self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE)
         self._command_size, self._telemetry_size = 3 * robots + joints + 2, telemetry_size(robots, joints)
         self.DeclareVectorOutputPort("team_command", self._command_size, self._write_command)
         self.DeclareVectorOutputPort("telemetry", self._telemetry_size, self._write_telemetry)
@@ -113,6 +108,7 @@ class TeamController(Block):
         drive_team(
             *self._laws[index],
             context.get_time() - cell[1],
+            clock_of(self._clock, context),
             memory[1:] if memory[0] == index else self._none,
             self._state.Eval(context),
             self._governor.Eval(context),
@@ -142,5 +138,6 @@ class TeamController(Block):
         memory[0] = following
         table, next_table = self._tables[following - 1 : following + 1]
         time, state = context.get_time() - cell[1], self._state.Eval(context)
-        remember_jumps(table, next_table, *self._reading, time, state, reports, memory[1:])
+        clock = clock_of(self._clock, context)
+        remember_jumps(table, next_table, *self._reading, time, clock, state, reports, memory[1:])
         return EventStatus.Succeeded()

@@ -92,7 +92,8 @@ def telemetry_parts(
 def drive_team(
     row: FloatArray, edges: FloatArray, flat: FloatArray, field: FloatArray, table: FloatArray,
     places: IntArray, first: IntArray, chains: FloatArray, base_chains: FloatArray, yaws: FloatArray,
-    loads: FloatArray, time: float, jumps: FloatArray, state: FloatArray, governor_position: FloatArray,
+    loads: FloatArray, time: float, clock: FloatArray, jumps: FloatArray, state: FloatArray,
+    governor_position: FloatArray,
     on_bases: bool, command: FloatArray, telemetry: FloatArray,
 ) -> None:  # fmt: skip
     """Write what drives the team, and what the robots' blocks would show to the log.
@@ -110,6 +111,7 @@ def drive_team(
         yaws: Angles of the bases.
         loads: Shares of the load.
         time: Time since the cell was entered [s].
+        clock: The funnels' clock: its lag [s], its pace [-] and the derivative of the pace [1/s], shape (3,).
         jumps: Of all axes of ``table``, what ``write_jumps`` gave at the switch, shape (N + n,).
         state: State of the plant.
         governor_position: p_G, shape (2,) [m].
@@ -128,17 +130,17 @@ def drive_team(
         m = 1 + stop - start
         rows, chain = table[start + k : stop + k + 1], chains[first[0, k] : first[0, k + 1]]
         _read_robot(k, places, first, base_chains, yaws, state, robot)
-        track_axes(rows, time, jumps[start + k : stop + k + 1], object_state, robot, axes)
+        track_axes(rows, time, clock, jumps[start + k : stop + k + 1], object_state, robot, axes)
         end_effector_command(loads[k], object_state, governed[2:], axes, commands[k])
         robot_effort(chain, robot, commands[k], axes, effort)
-        write_bounds(rows, time, own_bounds)
+        write_bounds(rows, time - clock[0], own_bounds)
         acceleration[2], bounds[0], bounds[1 + n] = axes[0], own_bounds[0], own_bounds[m]
         for i in range(3):
             bases[k, i], efforts[3 * k + i] = robot[i], effort[i]
         for i in range(stop - start):
             efforts[3 * robots + start + i] = effort[3 + i]
             bounds[1 + start + i], bounds[2 + n + start + i] = own_bounds[1 + i], own_bounds[m + 1 + i]
-    command[: efforts.size], command[efforts.size :] = efforts, governed[:2]
+    command[: efforts.size], command[efforts.size :] = efforts, clock[1] * governed[:2]
     if on_bases:
         for k in range(robots):
             c, s, at = np.cos(bases[k, 2]), np.sin(bases[k, 2]), 3 * k
@@ -188,7 +190,8 @@ def report_readiness(
 @compiled
 def remember_jumps(
     table: FloatArray, next_table: FloatArray, places: IntArray, first: IntArray, base_chains: FloatArray,
-    yaws: FloatArray, time: float, state: FloatArray, reports: FloatArray, jumps: FloatArray,
+    yaws: FloatArray, time: float, clock: FloatArray, state: FloatArray, reports: FloatArray,
+    jumps: FloatArray,
 ) -> None:  # fmt: skip
     """Write ``write_jumps`` of every robot that is ready.
 
@@ -200,6 +203,7 @@ def remember_jumps(
         base_chains: From the object to bases.
         yaws: Angles of the bases.
         time: Time since the current cell was entered [s].
+        clock: The funnels' clock, as in ``drive_team``.
         state: State of the plant.
         reports: What ``report_readiness`` gives.
         jumps: Receives the jumps of the robots that are ready, shape (N + n,).
@@ -210,7 +214,7 @@ def remember_jumps(
             start, stop = first[2, k] + k, first[2, k + 1] + k + 1
             _read_robot(k, places, first, base_chains, yaws, state, robot)
             write_jumps(
-                table[start:stop], next_table[start:stop], time, object_state, robot, jumps[start:stop]
+                table[start:stop], next_table[start:stop], time, clock, object_state, robot, jumps[start:stop]
             )
 
 

@@ -14,7 +14,8 @@ SHAPES = {
     "governor_position": (2,), "governor_spread": (), "ready_margins": (ROBOTS,),
     "funnel_lower": (1 + JOINTS,), "funnel_upper": (1 + JOINTS,), "energy_margin": (), "object_wrench": (3,),
     "commanded_wrenches": (ROBOTS, 3), "measured_wrenches": (ROBOTS, 3), "base_wrenches": (ROBOTS, 3),
-    "joint_torques": (JOINTS,), "workspace_clearance": (), "body_clearance": (), "cell_clearance": (),
+    "joint_torques": (JOINTS,), "held": (), "clock_lag": (),
+    "workspace_clearance": (), "body_clearance": (), "cell_clearance": (),
     "funnel_margin": (), "slice_margin": (), "acceleration_error": (), "wrench_error": (),
     "grasp_error": (),
 }  # fmt: skip

@@ -85,7 +85,9 @@ def assert_alike(named, fused):
     expected, found = vars(named.telemetry.read()), vars(fused.telemetry.read())
     for name, value in expected.items():
         if name not in ROUNDED:
-            scale = max(1.0, float(np.abs(value).max()), efforts if name == "measured_wrenches" else 0.0)
+            scale = max(
+                1.0, float(np.abs(value).max(initial=0.0)), efforts if name == "measured_wrenches" else 0.0
+            )
             np.testing.assert_allclose(found[name], value, rtol=0.0, atol=1e-10 * scale, err_msg=name)
 
 

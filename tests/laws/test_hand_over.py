@@ -6,11 +6,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from coop_drake.laws import FixedGains, Funnel, ScheduledGains, axis_table, energy_margin, transition_gains
-from coop_drake.laws.axis_table import track_axes, track_row, write_jumps
+from coop_drake.laws import FixedGains, Funnel, ScheduledGains, energy_margin, transition_gains
+from coop_drake.laws.axis_table import axis_table, track_axes, track_row, write_jumps
 from coop_drake.laws.gain_schedule import schedule_of
 from coop_drake.laws.governor import governed_acceleration, tracking_energy
 from coop_drake.laws.hand_over import STEEPEST, fading, governed_gains, shortest_hand_over
+
+ON_TIME = np.array([0.0, 1.0, 0.0])
 
 AXES = {
     "slice_lower": np.array([0.0]),
@@ -105,7 +107,7 @@ def test_an_axis_stays_in_its_funnel_whatever_the_jump(start, speed, jump):
     table, jumps, out = table_of(gains), np.array([jump]), np.empty(1)
 
     def flow(t, z):
-        track_axes(table, t, jumps, np.array([0.0, 0.0, z[0], 0.0, 0.0, z[1]]), z, out)
+        track_axes(table, t, ON_TIME, jumps, np.array([0.0, 0.0, z[0], 0.0, 0.0, z[1]]), z, out)
         return np.array([z[1], out[0]])
 
     T = gains.hand_over_time
@@ -118,8 +120,8 @@ def test_an_axis_stays_in_its_funnel_whatever_the_jump(start, speed, jump):
 def test_with_its_jump_the_next_law_begins_where_the_last_one_ends():
     table, next_table = table_of(gains_of(0.1)), table_of(gains_of(0.1, ScheduledGains(command_age=0.03)))
     state, jumps, before, after = np.array([0.0, 0.0, 0.8, 0.0, 0.0, 0.1]), *np.empty((3, 1))
-    write_jumps(table, next_table, 0.4, state, state, jumps)
-    track_axes(table, 0.4, np.zeros(1), state, state, before)
-    track_axes(next_table, 0.0, jumps, state, state, after)
+    write_jumps(table, next_table, 0.4, ON_TIME, state, state, jumps)
+    track_axes(table, 0.4, ON_TIME, np.zeros(1), state, state, before)
+    track_axes(next_table, 0.0, ON_TIME, jumps, state, state, after)
     assert after == pytest.approx(before, rel=1e-14)
     assert abs(jumps[0]) > 0.1

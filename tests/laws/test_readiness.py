@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coop_drake.laws import Funnel, ScheduledGains, axis_table, transition_gains
+from coop_drake.laws import Funnel, ScheduledGains, transition_gains
+from coop_drake.laws.axis_table import axis_table
 from coop_drake.laws.readiness import clearance_margin, funnel_margin, interval_margin
 from coop_drake.systems.ready_kernels import ready_conditions
 from tests.support.readiness import margin_of, square_with_clearance

@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coop_drake.laws import Funnel, TransitionGains, axis_table
-from coop_drake.laws.axis_table import bounds_of, track_row
+from coop_drake.laws import Funnel, TransitionGains
+from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
 from coop_drake.laws.slopes import slope_bounds
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from benchmarks.sampled_axis import attacks, push_along, run_axis
 from coop_drake.answers.budget import Budget
-from coop_drake.laws import Funnel, ScheduledGains, axis_table, transition_gains
-from coop_drake.laws.axis_table import bounds_of, track_row
+from coop_drake.laws import Funnel, ScheduledGains, transition_gains
+from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
 from coop_drake.planning.budget.axis_sets import Entry, axis_sets, conditions_of
 from coop_drake.planning.budget.axis_tube import DISTANCE, V_REACH, X_REACH, V, X
 from coop_drake.planning.budget.law_fit import fit_law

@@ -31,6 +31,9 @@ GOOD = Sample(
     joint_torques=np.zeros(2),
     acceleration_error=1e-12,
     ready_margins=np.zeros(2),
+    held=0.0,
+    clock_lag=0.0,
+    causes=np.zeros(0),
     arrived=False,
 )
 

@@ -13,7 +13,8 @@ import numpy as np
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram import build_closed_loop
 from coop_drake.geometry.boundary import edges_of
-from coop_drake.laws import ScheduledGains, axis_table
+from coop_drake.laws import ScheduledGains
+from coop_drake.laws.axis_table import axis_table
 from coop_drake.laws.gain_schedule import schedule_of
 from coop_drake.planning.execution.transport_kernels import cross_cell
 from coop_drake.planning.improvement.box_crossing import cross_box

@@ -17,6 +17,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.laws import funnel_bounds, total_wrench
 from coop_drake.laws.axis_table import axis_table
+from coop_drake.laws.hand_over import governed_gains
 from coop_drake.plant import base_poses, build_team_plant, planning_problem, set_configuration
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import Invariants, TeamClearance
@@ -43,7 +44,8 @@ class RunOracle:
         self.grasps = np.array([[robot.X_LE.x, robot.X_LE.y] for robot in self.team.robots])
         self.invariants = Invariants(TeamClearance(self.problem.workspace, self.problem.tree), plan)
         self.edges = [BoundaryDistance(cell.tidied).edges for cell in plan.cells]
-        self.stiffness = [transition.gains.stiffness for transition in plan.transitions]
+        gains = [transition.gains for transition in plan.transitions]
+        self.rows = [own.governor_row(before) for own, before in zip(gains, [gains[0], *gains], strict=False)]
         self.tables = [axis_table(plan.funnel(k), t.gains) for k, t in enumerate(plan.transitions)]
 
     def false_at(self, log: SimulationLog, row: int) -> list[str]:
@@ -90,9 +92,11 @@ class RunOracle:
         k, z = int(log.cell_index[i]), np.concatenate([log.object_pose[i], log.joints[i]])
         rates = np.concatenate([log.object_twist[i], log.joint_rates[i]])
         margins = self.invariants.check(_sample(log, i, z, rates))
-        bounds = funnel_bounds(self.plan.funnel(k), log.times[i] - log.transition_start[i])
+        time = log.times[i] - log.transition_start[i]
+        bounds = funnel_bounds(self.plan.funnel(k), time - log.clock_lag[i])
         state = np.concatenate([z[:3], rates[:3]])
-        energy = cell_margin(self.edges[k], self.stiffness[k], state, log.governor_position[i])
+        stiffness = governed_gains(self.rows[k], time)[0]
+        energy = cell_margin(self.edges[k], stiffness, state, log.governor_position[i])
         wrong = {
             f"{name} is the measured one": _differs(getattr(log, name)[i], getattr(margins, name))
             for name in (
@@ -110,9 +114,10 @@ class RunOracle:
             "the lower funnel bounds are the plan's": _differs(log.funnel_lower[i], bounds.lower),
             "the upper funnel bounds are the plan's": _differs(log.funnel_upper[i], bounds.upper),
             "Delta E is that of the state": _differs(log.energy_margin[i], energy),
+            "the team is never held": _differs([log.held[i], log.clock_lag[i]], 0.0),
             "all robots have one p_G": _differs(log.governor_spread[i], 0.0),
             "reports are those of the state": _differs(
-                log.ready_margins[i], self._reports(k, z, rates, log.governor_position[i])
+                log.ready_margins[i], self._reports(k, time, z, rates, log.governor_position[i])
             ),
             "grasps are rigid": _differs(log.grasp_error[i], 0.0),
             "the object's wrench is the sum of the shares": _differs(log.object_wrench[i], wrench),
@@ -139,17 +144,19 @@ class RunOracle:
         }
         return [name for name, wrong in ends.items() if wrong]
 
-    def _reports(self, k: int, z: np.ndarray, rates: np.ndarray, governor: np.ndarray) -> list[float]:
+    def _reports(
+        self, k: int, time: float, z: np.ndarray, rates: np.ndarray, governor: np.ndarray
+    ) -> list[float]:
         reports, state = [], np.concatenate([z[:3], rates[:3]])
         for robot in self.team.robots:
             axes = [0, *range(1 + robot.q_slice.start, 1 + robot.q_slice.stop)]
             conditions = ready_conditions(
-                [table[axes] for table in self.tables], self.edges, self.stiffness,
+                [table[axes] for table in self.tables], self.edges, self.rows,
                 [transition.inradius for transition in self.plan.transitions], self.plan.goal_pose[:2],
                 self.problem.position_tolerance,
             )  # fmt: skip
             own = np.concatenate([np.zeros(3), z[3:][robot.q_slice], np.zeros(3), rates[3:][robot.q_slice]])
-            reports.append(robot_ready(*conditions[k], state, own, governor))
+            reports.append(robot_ready(*conditions[k], time, state, own, governor))
         return reports
 
     def _bases_differ(self, stated: np.ndarray, z: np.ndarray) -> bool:
@@ -183,6 +190,7 @@ def _sample(log: SimulationLog, i: int, z: np.ndarray, rates: np.ndarray) -> Sam
         entry=log.transition_start[i],
         z=z,
         rates=rates,
+        causes=np.zeros(0),
         arrived=False,
         **arrays,
     )

@@ -23,7 +23,7 @@ def advance(planner, context, until):
 
 def test_ports():
     inputs, outputs = port_sizes(CellPlanner(3, 5))
-    assert inputs == {"robot_0_ready": 2, "robot_1_ready": 2, "robot_2_ready": 2}
+    assert inputs == {"robot_0_ready": 2, "robot_1_ready": 2, "robot_2_ready": 2, "paused": 1}
     assert outputs == {"current_cell": 2, "arrived": 1}
 
 

@@ -13,6 +13,7 @@ from coop_drake.scenario import (
     Control,
     Deployment,
     Floor,
+    Hold,
     Measurements,
     Messages,
     PlantSettings,
@@ -50,7 +51,7 @@ def blocks():
     scenario, plan = small_problem("base")
     found = {}
     for blocks, changes in (
-        ("named", {"deployment": EVERYTHING, "control": Control(predictor=True, observer=True)}),
+        ("named", {"deployment": EVERYTHING, "control": Control(predictor=True, observer=True, hold=Hold())}),
         ("named", {"plant": PlantSettings(grasps="constraints")}),
         ("fused", {}),
     ):
@@ -89,10 +90,12 @@ def test_a_block_without_state_has_none_and_any_other_says_which(blocks, name):
         assert re.search(r"^ *State: ", type(block).__doc__, re.MULTILINE)
 
 
-def test_only_switches_jumps_a_predictor_and_what_models_failures_are_remembered(blocks):
+def test_only_switches_jumps_holds_a_predictor_and_what_models_failures_are_remembered(blocks):
     remembering = {name for name in BLOCKS if any(map(len, state_of(blocks[name][0].CreateDefaultContext())))}
     failures = {"Interruption", "LossyMeasurement", "MessageChannel"}
-    assert remembering == {"CellPlanner", "AxisPpc", "TeamController", "StatePredictor"} | failures
+    holds = {"FunnelClock", "HoldMonitor", "HoldSupervisor"}
+    laws = {"CellPlanner", "AxisPpc", "TeamController", "StatePredictor"}
+    assert remembering == laws | holds | failures
 
 
 @pytest.mark.parametrize("name", BLOCKS)

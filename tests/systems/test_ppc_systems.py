@@ -42,7 +42,7 @@ def law_by_hand(axes, position, rate, cell, time):
 
 def test_ports(ppc):
     assert port_sizes(ppc) == (
-        {"object_state": 6, "robot_state": 10, "current_cell": 2, "ready": 2},
+        {"object_state": 6, "robot_state": 10, "current_cell": 2, "ready": 2, "clock": 3},
         {"axis_acceleration": 3, "funnels": 6},
     )
 

@@ -37,7 +37,7 @@ def expected_margin(cell, inputs):
 
 def test_ports(cells):
     inputs, outputs = port_sizes(ReferenceGovernor(cells))
-    assert inputs == {"object_state": 6, "governor_position": 2, "current_cell": 2}
+    assert inputs == {"object_state": 6, "governor_position": 2, "current_cell": 2, "clock": 3}
     assert outputs == {"governor_command": 4, "energy_margin": 1}
 
 

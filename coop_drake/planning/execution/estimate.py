@@ -9,8 +9,8 @@ import numpy as np
 
 from coop_drake.answers.plan import Plan
 from coop_drake.geometry.boundary import edges_of
-from coop_drake.laws import TransitionGains, axis_table
-from coop_drake.laws.axis_table import first_jumps
+from coop_drake.laws import TransitionGains
+from coop_drake.laws.axis_table import axis_table, first_jumps
 from coop_drake.planning.execution.transport_kernels import cross_cell
 from coop_drake.planning.travel_time import transition_time
 from coop_drake.tree.pose import FloatArray

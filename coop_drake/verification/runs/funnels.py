@@ -1,6 +1,7 @@
 """Check the funnels of a run by a formula of the checker's own, and how much energy the axes had in them.
 
-The bounds of an axis are rho_G + (rho_0 - rho_G) f(t), t being the time since the cell was entered. The
+The bounds of an axis are rho_G + (rho_0 - rho_G) f(t), t being the time since the cell was entered
+less the clock's lag. The
 energy of an axis, (41) and (48), is V = kappa s^2 / 2 + (x' - v)^2 / 2 with s = ln((x - rho_l) / (rho_u - x))
 and v = (rho_l' (rho_u - x) + rho_u' (x - rho_l) - k1 s (x - rho_l)(rho_u - x)) / (rho_u - rho_l).
 """
@@ -8,7 +9,7 @@ and v = (rho_l' (rho_u - x) + rho_u' (x - rho_l) - k1 s (x - rho_l)(rho_u - x)) 
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import sqrt
+from math import e, sqrt
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from coop_drake.laws.gains import FunnelShape
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.between import Between
+from coop_drake.verification.runs.holds import RATE
 from coop_drake.verification.runs.rows import Rows
 
 ROUNDING = 1e-8
@@ -26,7 +28,8 @@ CLOSED = 5.0
 """lambda t at which a quintic funnel is closed [-]."""
 
 
-def _quintic(x: FloatArray) -> FloatArray:
+def quintic(x: FloatArray) -> FloatArray:
+    """Factor of a quintic funnel as a function of lambda t."""
     u = np.minimum(x / CLOSED, 1.0)
     left: FloatArray = 1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
     return left
@@ -34,9 +37,9 @@ def _quintic(x: FloatArray) -> FloatArray:
 
 SHAPES: dict[FunnelShape, tuple[Callable[[FloatArray], FloatArray], float, float]] = {
     "exponential": (lambda x: np.exp(-x), 1.0, 1.0),
-    "quintic": (_quintic, 0.0, 10.0 / sqrt(3.0) / CLOSED**2),
+    "quintic": (quintic, 1.875 / CLOSED, 10.0 / sqrt(3.0) / CLOSED**2),
 }
-"""For every shape f as a function of lambda t, then -f' at 0 and the largest |f''| over lambda t."""
+"""For every shape f as a function of lambda t, then the largest |f'| and |f''| over lambda t."""
 
 
 def bounds_at(plan: Plan, cell: int, times: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -59,11 +62,13 @@ def check_funnels(rows: Rows, between: Between) -> tuple[Check, Check]:
     lower, upper = np.empty_like(axes), np.empty_like(axes)
     least = np.inf
     for members, k in reversed(rows.motions):  # the row of an entry is stated for the cell that is left
-        times = log.times[members] - log.times[members[0]]
+        lag = np.concatenate(([0.0], log.clock_lag[members[1:]]))
+        times = log.times[members] - log.times[members[0]] - lag
         lower[members], upper[members] = bounds_at(plan, k, times)
         margins = np.minimum(axes[members] - lower[members], upper[members] - axes[members])
         inner = np.minimum(margins[1:], margins[:-1]) - between.deviations[members[:-1], 2:]
-        inner -= 0.125 * (rows.steps[members[:-1]] ** 2)[:, None] * _largest_acceleration(plan, k)
+        accelerations = _largest_acceleration(plan, k, held=bool(log.held.any()))
+        inner -= 0.125 * (rows.steps[members[:-1]] ** 2)[:, None] * accelerations
         first, where = int(members[0]), f"outside the funnel of cell {k}"
         rows.require(margins > 0.0, "angle, joints", f"lies {where}", first=first)
         since = f"may have been {where} since the row before: the log is too sparse"
@@ -102,7 +107,7 @@ def entry_energies(plan: Plan, cell: int, axes: FloatArray, rates: FloatArray) -
     """
     entered, transition = plan.cells[cell], plan.transitions[cell]
     gains = transition.gains
-    rate = -gains.decay_rate * SHAPES[gains.funnel][1]
+    rate = -gains.decay_rate if gains.funnel == "exponential" else 0.0 * gains.decay_rate
     width = entered.upper - entered.lower
     near = gains.saturation * width
     below, above = (np.clip(d, near, width - near) for d in (axes - entered.lower, entered.upper - axes))
@@ -114,10 +119,15 @@ def entry_energies(plan: Plan, cell: int, axes: FloatArray, rates: FloatArray) -
     return energies
 
 
-def _largest_acceleration(plan: Plan, cell: int) -> FloatArray:
-    """Largest acceleration of a bound of every axis in one cell, shape (1 + n,) [rad/s^2 or m/s^2]."""
+def _largest_acceleration(plan: Plan, cell: int, *, held: bool) -> FloatArray:
+    """Largest acceleration of a bound of every axis in one cell, shape (1 + n,) [rad/s^2 or m/s^2].
+
+    Where the team may be held, the clock's pace changes by at most its rate over e, which adds to it.
+    """
     entered, transition = plan.cells[cell], plan.transitions[cell]
     gains = transition.gains
     moved = np.maximum(transition.goal_lower - entered.lower, entered.upper - transition.goal_upper)
-    largest: FloatArray = SHAPES[gains.funnel][2] * gains.decay_rate**2 * np.maximum(moved, 0.0)
-    return largest
+    rate, fastest, acceleration = gains.decay_rate, *SHAPES[gains.funnel][1:]
+    largest = acceleration * rate**2 + (RATE / e * fastest * rate if held else 0.0)
+    bounds: FloatArray = largest * np.maximum(moved, 0.0)
+    return bounds

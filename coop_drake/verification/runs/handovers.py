@@ -8,14 +8,15 @@ from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.funnels import entry_energies
+from coop_drake.verification.runs.holds import paused
 from coop_drake.verification.runs.rows import Rows
 
 
 def check_handovers(rows: Rows, *, exact: bool) -> tuple[Check, Check]:
     """Check order and times of the cells, and the reports with which each was left.
 
-    An ideal team leaves a cell in the first row in which all robots are ready. Otherwise reports travel, and
-    every robot must have reported to be ready at some time in the cell.
+    An ideal team leaves a cell in the first row in which all robots are ready, unless it is held. Otherwise
+    reports travel, and every robot must have reported to be ready at some time in the cell.
 
     Args:
         rows: The log.
@@ -35,7 +36,8 @@ def check_handovers(rows: Rows, *, exact: bool) -> tuple[Check, Check]:
     if exact:
         leaves = np.diff(log.cell_index, append=len(plan.cells)) > 0
         rows.require(ready.all(axis=1) | ~leaves, "cell_index", "is left although a robot is not ready")
-        rows.require(~ready.all(axis=1) | leaves, "cell_index", "is kept although all robots are ready")
+        kept = leaves | paused(rows) | ~ready.all(axis=1)
+        rows.require(kept, "cell_index", "is kept although all robots are ready")
     for k in range(len(plan.cells)):
         members = np.flatnonzero(log.cell_index == k)
         for robot in np.flatnonzero(~ready[members].any(axis=0)):

@@ -1,9 +1,11 @@
 """Delta E and the ready reports of an ideal team, computed again from the states.
 
 A robot is ready to leave a cell when each axis that it knows lies in its goal interval without a tenth at
-both ends and has an energy small enough for the next funnel, and when the object would provably stay in the
-next cell: Delta E = K d |d| / 2 - (|p'|^2 + K |p - p_G|^2) / 2 is at least (K / 2) (R / 2)^2. In the last
-cell it is ready when object and axes are at their goals and at rest.
+both ends and has an energy small enough for the next funnel, when the object would provably stay in the next
+cell: Delta E = K d |d| / 2 - (|p'|^2 + K |p - p_G|^2) / 2 is at least (K / 2) (R / 2)^2, and when the gains
+have reached those of the cell, in which K goes from K_0 to K_1 within T as K_1 (K_0 / K_1)^f, f being the
+factor of a quintic funnel that closes at T. In the last cell it is ready when object and axes are at their
+goals and at rest.
 """
 
 from __future__ import annotations
@@ -11,11 +13,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.cells import signed_distances
-from coop_drake.verification.runs.funnels import entry_energies
+from coop_drake.verification.runs.funnels import CLOSED, entry_energies, quintic
 from coop_drake.verification.runs.rows import Rows
 
 GOAL_SHARE = 0.8
@@ -47,7 +50,9 @@ def check_energy_margin(rows: Rows) -> Check:
     margins, speeds = np.empty(len(log.times)), np.abs(log.object_twist[:, :2]).sum(axis=1)
     for k in range(len(rows.plan.cells)):
         members = log.cell_index == k
-        margins[members] = _energy_margin(rows, members, k)
+        margins[members] = _energy_margin(
+            rows, members, k, log.times[members] - log.transition_start[members]
+        )
     rows.require_same("energy_margin", margins, SAME + STEP * speeds)
     rows.require(log.energy_margin >= 0.0, "energy_margin", "is {:.3g}, negative", log.energy_margin)
     rows.require_same("governor_spread", np.zeros(len(log.times)), SAME)
@@ -84,9 +89,13 @@ def _leaving(rows: Rows, members: NDArray[np.bool_], cell: int) -> tuple[FloatAr
     following, axes = plan.transitions[cell + 1].gains, rows.z[members, 2:]
     energy = entry_energies(plan, cell + 1, axes, rows.rates[members, 2:])
     settled = (following.energy_bound - energy) / np.maximum(energy, following.energy_bound)
-    margin = _energy_margin(rows, members, cell + 1)
-    floor = 0.5 * following.stiffness * (0.5 * plan.transitions[cell].inradius) ** 2
+    at_entry = np.zeros(int(members.sum()))
+    margin = _energy_margin(rows, members, cell + 1, at_entry)
+    floor = 0.5 * _stiffness(plan, cell + 1, at_entry) * (0.5 * plan.transitions[cell].inradius) ** 2
     of_object = (margin - floor) / np.maximum(np.abs(margin), floor)
+    duration, time = plan.transitions[cell].gains.hand_over_time, log.times - log.transition_start
+    if duration > 0.0:
+        of_object = np.minimum(of_object, np.minimum(time[members] / duration - 1.0, 1.0))
     change = 2.0 * STEP * np.abs(log.object_twist[members, :2]).sum(axis=1) / floor
     return of_object, np.minimum(_inside_goal(rows, members, cell), settled), change
 
@@ -109,9 +118,20 @@ def _inside_goal(rows: Rows, members: NDArray[np.bool_], cell: int) -> FloatArra
     return inside
 
 
-def _energy_margin(rows: Rows, members: NDArray[np.bool_], cell: int) -> FloatArray:
-    """Delta E of some rows in a cell [m^2/s^2], from velocities rounded as the robots round them."""
-    log, stiffness = rows.log, rows.plan.transitions[cell].gains.stiffness
+def _stiffness(plan: Plan, cell: int, times: FloatArray) -> FloatArray:
+    """K at some times since a cell was entered, shape (m,) [1/s^2]."""
+    gains, before = (plan.transitions[k].gains for k in (cell, max(cell - 1, 0)))
+    left = quintic(CLOSED * times / gains.hand_over_time) if gains.hand_over_time > 0.0 else 0.0 * times
+    stiffness: FloatArray = gains.stiffness * (before.stiffness / gains.stiffness) ** left
+    return stiffness
+
+
+def _energy_margin(rows: Rows, members: NDArray[np.bool_], cell: int, times: FloatArray) -> FloatArray:
+    """Delta E of some rows in a cell [m^2/s^2], at some times since its entry, (m,).
+
+    Velocities are rounded as the robots round them.
+    """
+    log, stiffness = rows.log, _stiffness(rows.plan, cell, times)
     reference = log.governor_position[members]
     clearance = signed_distances(rows.plan.cells[cell].tidied, reference)
     velocity = np.rint(log.object_twist[members, :2] / STEP) * STEP

@@ -29,6 +29,7 @@ from coop_drake.verification.runs.ends import check_arrival, check_start
 from coop_drake.verification.runs.funnels import check_funnels, check_stated_funnels
 from coop_drake.verification.runs.grasps import check_grasps, check_wrenches
 from coop_drake.verification.runs.handovers import check_handovers
+from coop_drake.verification.runs.holds import check_clock
 from coop_drake.verification.runs.mechanics import check_mechanics
 from coop_drake.verification.runs.readiness import check_energy_margin, check_reports
 from coop_drake.verification.runs.rows import Rows, check_complete
@@ -62,6 +63,7 @@ def verify_log(
     checks.append(check_start(rows))
     between = Between.of(rows)
     checks += [check_motion(rows, between), *check_cells(rows, between), check_stated_funnels(rows)]
+    checks.append(check_clock(rows))
     if setup.one_clock:
         checks += check_funnels(rows, between)
     if setup.exact:

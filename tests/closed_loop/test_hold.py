@@ -1,0 +1,131 @@
+"""A team that is held comes to rest inside its cell, wherever it is, and goes on when the cause is gone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+
+from coop_drake.diagram import build_closed_loop
+from coop_drake.planning.planner import plan as plan_problem
+from coop_drake.plant import planning_problem, read_component_tree
+from coop_drake.scenario import Control, Deployment, Hold, RobotDepartures, Silence, load_scenario
+from coop_drake.simulation import Invariants, TeamClearance, build_maps, configure_simulator, simulate
+from coop_drake.simulation.telemetry import Telemetry
+from tests.support.run_checks import verified_run
+from tests.support.small_loop import small_maps, small_problem
+
+MOMENTS = 100
+REST_TIME = 1.6
+"""Within this time after it was told so a team of base rests [s]."""
+
+REST_DISTANCE = 0.55
+"""And the object moves no further than this meanwhile [m]."""
+
+SPEED, RATE = 0.01, 0.02
+"""What counts as rest [m/s, rad/s]."""
+
+
+@pytest.fixture(scope="module")
+def base():
+    """The loop of base, fused, that can be told to hold, and its contexts at random moments of a run."""
+    scenario = replace(load_scenario("base"), control=Control(hold=Hold()))
+    problem = planning_problem(scenario)
+    plan = plan_problem(problem, scenario.gain_sets["scheduled"], gain_set_name="scheduled").plan
+    loop = build_closed_loop(scenario, plan, build_maps(plan), blocks="fused")
+    clearance = TeamClearance(scenario.workspace.polygon, read_component_tree(loop.team.as_tree))
+    simulator = Simulator(loop.diagram, loop.create_context())
+    configure_simulator(simulator, scenario)
+    simulator.Initialize()
+    duration = sum(transition.estimated_time for transition in plan.transitions)
+    contexts = []
+    for time in np.sort(np.random.default_rng(5).uniform(0.0, 0.95 * duration, MOMENTS)):
+        simulator.AdvanceTo(time)
+        contexts.append(simulator.get_context().Clone())
+    return scenario, loop, Invariants(clearance, plan), contexts
+
+
+def carried_on(scenario, loop, invariants, context, order, until):
+    """Samples of a run that goes on with an order, each checked, until a time or the arrival."""
+    source = loop.diagram.GetSubsystemByName("hold_order")
+    source.get_mutable_source_value(source.GetMyMutableContextFromRoot(context)).SetFromVector([order])
+    telemetry, samples = Telemetry(loop, context), []
+
+    def watch(_):
+        samples.append(telemetry.read())
+        violation = invariants.check(samples[-1]).violation
+        assert violation == "", violation
+
+    simulator, begin = Simulator(loop.diagram, context), context.get_time()
+    configure_simulator(simulator, scenario)
+    context.SetTime(begin)  # the configuration begins at zero
+    simulator.set_monitor(watch)
+    simulator.Initialize()
+    while simulator.get_context().get_time() < until and not samples[-1].arrived:
+        simulator.AdvanceTo(min(simulator.get_context().get_time() + 0.5, until))
+    return samples
+
+
+def test_at_random_moments_the_team_rests_without_contact_in_time(base):
+    scenario, loop, invariants, contexts = base
+    cells = set()
+    for context in contexts:
+        until = context.get_time() + REST_TIME
+        samples = carried_on(scenario, loop, invariants, context.Clone(), 1.0, until)
+        rates = np.abs(samples[-1].rates)
+        assert np.hypot(*rates[:2]) < SPEED
+        assert rates[2:].max() < RATE
+        assert np.hypot(*(samples[-1].z - samples[0].z)[:2]) <= REST_DISTANCE
+        assert samples[-1].cell == samples[1].cell
+        cells.add(samples[-1].cell)
+    assert len(cells) > 20
+
+
+@pytest.mark.parametrize("number", [9, 45, 83])
+def test_it_arrives_when_it_is_released(base, number):
+    scenario, loop, invariants, contexts = base
+    context = contexts[number].Clone()
+    carried_on(scenario, loop, invariants, context, 1.0, context.get_time() + REST_TIME)
+    assert carried_on(scenario, loop, invariants, context, 0.0, 60.0)[-1].arrived
+
+
+def held_scenario(hold, deployment=None):
+    scenario, plan = small_problem("base")
+    return replace(scenario, control=Control(hold=hold), deployment=deployment or Deployment()), plan
+
+
+@pytest.mark.parametrize("blocks", ["named", "fused"])
+def test_a_scheduled_hold_costs_its_time_and_no_more(blocks):
+    scenario, plan = held_scenario(Hold(at=(0.2, 0.9), duration=1.5))
+    log = simulate(scenario, plan, small_maps(), blocks=blocks)
+    free = simulate(replace(scenario, control=Control()), plan, small_maps(), blocks="fused")
+    assert (log.reached, log.violation) == (True, "")
+    told = 2.2  # from 0.2 s to 2.4 s: the second begins in the first
+    assert told <= log.times[-1] - free.times[-1] <= told + 2.0
+    assert log.held.max() == 1.0
+    assert log.acceleration_error.max() < 1e-12
+    assert verified_run(scenario, plan, log).answer == "arrived"
+
+
+def test_a_silent_robot_holds_the_team_until_it_is_heard_again():
+    silent = RobotDepartures(silence=Silence(begin=0.5, duration=2.0))
+    deployment = Deployment(control_rate=200.0, robots={"robot_1": silent})
+    scenario, plan = held_scenario(Hold(silence=0.1), deployment)
+    log = simulate(scenario, plan, small_maps())
+    assert (log.reached, log.violation) == (True, "")
+    held = log.times[log.held > 0.0]
+    assert 0.6 <= held[0] <= 0.65
+    assert 2.45 <= held[-1] <= 2.55
+    at_rest = (log.times > 0.6 + REST_TIME) & (log.times < 2.5)
+    assert np.abs(log.object_twist[at_rest]).max() < RATE
+    assert verified_run(scenario, plan, log).answer == "arrived"
+
+
+def test_a_team_that_is_never_released_says_why_it_waits():
+    silent = RobotDepartures(silence=Silence(begin=0.3))
+    deployment = Deployment(control_rate=200.0, robots={"robot_0": silent})
+    scenario, plan = held_scenario(Hold(silence=0.1), deployment)
+    simulator = replace(scenario.simulator, max_time=2.0)
+    log = simulate(replace(scenario, simulator=simulator), plan, small_maps())
+    assert not log.reached
+    assert "it waits until the hold ends: robot 0 is not heard" in log.violation
