@@ -10,7 +10,7 @@ from typing import Any
 
 from coop_drake.checking.found import check_plan
 from coop_drake.checking.infeasible import check_proof
-from coop_drake.checking.numbers import RefusedError, allow
+from coop_drake.checking.plane import RefusedError, work
 from coop_drake.checking.team import Question
 
 FORMATS = {("coop_drake plan", 3): check_plan, ("coop_drake proof of infeasibility", 2): check_proof}
@@ -36,13 +36,13 @@ def check(
     Raises:
         RefusedError: A statement does not hold or is not shown, or a document is not as the format says.
     """
-    allow(WORK)
+    work[0] = WORK
     try:
         found = FORMATS[answer["format"], answer["version"]](Question(question), answer, progress)
         return [(statement, count) for statement, count in found if count > 0]
     except (LookupError, TypeError, ValueError, AttributeError) as error:
         raise RefusedError(
-            "document", f"is not as the format says: {type(error).__name__}: {error}"
+            "document", f"is not as the format says: {type(error).__name__}: {str(error)[:200]}"
         ) from error
 
 

@@ -5,8 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from coop_drake.checking.numbers import ONE, RefusedError
-from coop_drake.checking.planar import FULL, Edge, Point, Region, box_of, boxes_apart, hull, stretch, within
+from coop_drake.checking.plane import (
+    FULL,
+    ONE,
+    Edge,
+    Point,
+    Region,
+    box_of,
+    boxes_apart,
+    demand,
+    hull,
+    stretch,
+    within,
+)  # fmt: skip
 
 
 class OpenSet(NamedTuple):
@@ -20,17 +31,15 @@ class OpenSet(NamedTuple):
     def edges(self) -> list[Edge]:
         """The edges that its boundary consists of."""
         if self.region is None:
-            return [(self.ring[k - 1], self.ring[k]) for k in range(len(self.ring))]
+            return list(zip([self.ring[-1], *self.ring], self.ring, strict=False))
         u, v = self.shift
         return [((px - u, py - v), (qx - u, qy - v)) for (px, py), (qx, qy) in self.region.edges]
 
-    def stretches(self, edge: Sequence[Point]) -> list[tuple[int, int]]:
+    def stretches(self, edge: Edge) -> list[Point]:
         """Stretches of a segment that lie in it, rounded inwards."""
-        return (
-            stretch(edge, self.ring)
-            if self.region is None
-            else self.region.stretches(edge, self.shift, odd=self.odd)
-        )
+        if self.region is None:
+            return stretch(edge, self.ring)
+        return self.region.stretches(edge, self.shift, odd=self.odd)
 
 
 def blocked(floor: Region, ring: list[Point]) -> list[OpenSet]:
@@ -40,8 +49,7 @@ def blocked(floor: Region, ring: list[Point]) -> list[OpenSet]:
     in the interior of the Minkowski sum of e and -K.
     """
     shift = sum(x for x, _ in ring) // len(ring), sum(y for _, y in ring) // len(ring)
-    if not within([shift], ring, 0):
-        raise RefusedError("inner_sweeps", "have a polygon that has almost no area")
+    demand(within([shift], ring, 0), "inner_sweeps", "have a polygon that has almost no area")
     sums = [hull((ex - x, ey - y) for ex, ey in edge for x, y in ring) for edge in floor.edges]
     return [OpenSet([], floor, shift, odd=False), *map(OpenSet, sums)]
 
@@ -53,6 +61,7 @@ def check_cover(cells: Sequence[Region], forbidden: Sequence[OpenSet], where: st
     closed as well, thus the whole plane. All cells belong to these sets; a forbidden one does as soon as it
     covers a part of a boundary.
     """
+    demand(len(cells) + len(forbidden) > 0, where, "has neither cells nor inner sweeps")
     sets = [*[OpenSet([], cell) for cell in cells], *forbidden]
     taken = set(range(max(len(cells), 1)))
     boxes = [box_of(s.ring) if s.region is None else s.region.box if s.odd else None for s in sets]
@@ -65,9 +74,8 @@ def check_cover(cells: Sequence[Region], forbidden: Sequence[OpenSet], where: st
         chosen = _chosen(sets, first, edge) or _chosen(
             sets, [*first, *[k for k in near if k not in taken]], edge
         )
-        if not chosen:
-            x, y = (f"{c / ONE:.6f}" for c in edge[0])
-            raise RefusedError(where, f"no cell covers all of an edge at ({x}, {y}), which may be free")
+        x, y = edge[0]
+        demand(bool(chosen), where, f"no cell covers ({x / ONE:.6f}, {y / ONE:.6f}), which may be free")
         left += [edge for k in chosen - taken for edge in sets[k].edges()]
         taken |= chosen
     return count

@@ -7,8 +7,19 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
-from coop_drake.checking.numbers import ONE, TURN, RefusedError, norm, number, numbers
-from coop_drake.checking.planar import Point, Region, apart, box_of, boxes_apart, hull
+from coop_drake.checking.plane import (
+    ONE,
+    TURN,
+    Point,
+    Region,
+    apart,
+    box_of,
+    boxes_apart,
+    demand,
+    hull,
+    norm,
+    numbers,
+)
 from coop_drake.checking.team import Interval, Open, Piece, Question, Step, bisect, swept
 
 ROUNDING = 10**9
@@ -20,17 +31,17 @@ NARROWEST = ONE // 10**9
 
 def check_plan(question: Question, answer: Any, progress: Any) -> list[tuple[str, int]]:
     """Check a plan; returns the statements that hold and how often each was checked."""
-    axes, cells, transitions = 1 + len(question.limits), answer["cells"], answer["transitions"]
+    cells, transitions, axes = answer["cells"], answer["transitions"], 1 + len(question.limits)
     boxes = [intervals(cell, "", axes) for cell in cells]
     regions = [Region(cell["tidied"]) for cell in cells]
     entry, count = (question.start[0], question.start[1]), len(cells)
-    start = [(value, value) for value in question.start[2:]]
     demand(0 < count == len(transitions), "transitions", "are not as many as the cells")
-    demand(holds(boxes[0], start), "cells[0]", "does not hold the start's angles")
+    started = holds(boxes[0], [(value, value) for value in question.start[2:]])
+    demand(started, "cells[0]", "does not hold the start's angles")
     for k, transition in enumerate(transitions):
         demand(holds(question.limits, boxes[k][1:]), f"cells[{k}]", "leaves the limits of a joint")
-        here = slice(k, k + 2)
-        entry = _check_transition(transition, f"transitions[{k}]", entry, boxes[here], regions[here])
+        here, where = slice(k, k + 2), f"transitions[{k}]"
+        entry = _check_transition(transition, where, entry, boxes[here], regions[here])
     _check_goal(question, transitions[-1], entry)
     for k in range(count):
         _check_free(question, boxes[k], regions[k], f"cells[{k}]")
@@ -43,12 +54,6 @@ def check_plan(question: Question, answer: Any, progress: Any) -> list[tuple[str
         ("no piece meets a wall at any configuration of any cell", count * len(question.pieces)),
         ("no two pieces of a pair meet at any configuration of any cell", count * len(question.pairs)),
     ]
-
-
-def demand(fulfilled: bool, where: str, finding: str) -> None:
-    """Refuse what is not fulfilled."""
-    if not fulfilled:
-        raise RefusedError(where, finding)
 
 
 def intervals(value: Any, prefix: str, axes: int, least: int = 1) -> list[Interval]:
@@ -70,18 +75,17 @@ def _check_transition(
     """Check that a transition leads from its entry to a target in its cell and the next; returns it."""
     goals = intervals(value, "goal_", len(boxes[0]), NARROWEST)
     demand(all(holds(box, goals) for box in boxes), f"{where}.goal_lower", "leaves the cell or the next one")
-    radius, neck, length = (number(value[key]) for key in ("inradius", "neck", "length"))
-    demand(min(radius, neck) > 0, where, "states a neck or an inradius that is not positive")
+    radius, neck, length = numbers([value["inradius"], value["neck"], value["length"]], 3)
     path = [(x, y) for x, y in (numbers(point, 2) for point in value["path"])]
-    x, y = numbers(value["target"], 2)
-    joined = len(path) > 1 and path[0] == entry and path[-1] == (x, y)
+    (x, y), parts = numbers(value["target"], 2), list(pairwise(path))
+    joined = len(parts) > 0 and path[0] == entry and path[-1] == (x, y)
     demand(joined, f"{where}.path", "does not lead from the entry to the target")
-    kept, clear = (max(stated - stated // ROUNDING - 1, 0) for stated in (radius, neck))
-    inside = all(region.holds([(x, y)], kept) for region in regions)
-    demand(inside, f"{where}.inradius", "is more than the target's distance from the boundary of a cell")
-    inside = all(regions[0].holds(hull(part), clear) for part in pairwise(path))
-    demand(inside, f"{where}.neck", "is more than the path's distance from the boundary of the cell")
-    off = length - sum(norm([(b[0] - a[0], b[1] - a[1])]) for a, b in pairwise(path))
+    kept, clear = (stated - stated // ROUNDING - 1 for stated in (radius, neck))
+    inside = kept >= 0 and all(region.holds([(x, y)], kept) for region in regions)
+    demand(inside, f"{where}.inradius", "is not positive, or more than the target's distance from a boundary")
+    inside = clear >= 0 and all(regions[0].holds(hull(part), clear) for part in parts)
+    demand(inside, f"{where}.neck", "is not positive, or more than the path's distance from the boundary")
+    off = length - sum(norm([(b[0] - a[0], b[1] - a[1])]) for a, b in parts)
     demand(abs(off) <= (length + ONE) // ROUNDING, f"{where}.length", "is not that of the path")
     return x, y
 
@@ -89,9 +93,9 @@ def _check_transition(
 def _check_goal(question: Question, value: Any, target: Point) -> None:
     """Check that the last transition ends at the goal, within the tolerances."""
     where, goals = "transitions[-1]", intervals(value, "goal_", len(question.goal_box))
-    turns = (goals[0][0] + goals[0][1] - 2 * question.goal[2] + TURN) // (2 * TURN)
     demand(target == (question.goal[0], question.goal[1]), f"{where}.target", "is not the goal's position")
-    demand(number(value["inradius"]) <= question.room, f"{where}.inradius", "is more than the tolerance")
+    demand(numbers([value["inradius"]], 1)[0] <= question.room, where, "has an inradius beyond the tolerance")
+    turns = (goals[0][0] + goals[0][1] - 2 * question.goal[2] + TURN) // (2 * TURN)
     for axis, (goal, (aim, _), room) in enumerate(zip(goals, question.goal_box, question.rooms, strict=True)):
         if room is not None:
             middle, off = (aim, 0) if axis else (aim + turns * TURN, abs(turns))  # A turn is wrong by a unit.
@@ -135,9 +139,7 @@ def _walls_met(
 
 def _pair_met(pieces: list[Piece], chains: list[list[Step]], part: list[Interval], tested: list[int]) -> Open:
     """Whether enclosures of two pieces may meet in the frame of their common component."""
-    (one, e1, spread), (other, e2, more) = (
-        swept(piece.vertices, chain, part) for piece, chain in zip(pieces, chains, strict=True)
-    )
+    (one, e1, spread), (other, e2, more) = map(swept, [p.vertices for p in pieces], chains, [part, part])
     gap = pieces[0].radius + pieces[1].radius + e1 + e2
     clear = boxes_apart(box_of(one), box_of(other), gap) or apart(one, other, gap)
     return [] if clear else tested, spread | more

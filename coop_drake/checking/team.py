@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from coop_drake.checking.numbers import (
+from coop_drake.checking.plane import (
     BITS,
     ONE,
     TURN,
-    RefusedError,
+    Point,
+    Region,
+    demand,
+    hull,
     index,
     norm,
-    number,
     numbers,
     spend,
     turn,
-)
-from coop_drake.checking.planar import Point, Region, hull
+)  # fmt: skip
 
 Interval = tuple[int, int]
 Open = tuple[list[int], dict[int, int]]
@@ -27,7 +28,7 @@ COPIES = 4
 
 
 class Step(NamedTuple):
-    """A turn by sign * value + angle, a displacement by value * slide, or one by ``offset``.
+    """A turn by sign * value + angle, or a displacement by value * slide + offset.
 
     The value is that of ``axis`` among (theta, q...); -1 if none is needed.
     """
@@ -38,11 +39,6 @@ class Step(NamedTuple):
     slide: Point = (0, 0)
     offset: Point = (0, 0)
 
-    def backwards(self) -> Step:
-        """The inverse motion."""
-        (u, v), (x, y) = self.slide, self.offset
-        return Step(self.axis, -self.sign, -self.angle, (-u, -v), (-x, -y))
-
 
 class Piece(NamedTuple):
     """A convex piece of a body: the hull of vertices in its component's frame, grown by a radius."""
@@ -51,6 +47,11 @@ class Piece(NamedTuple):
     component: int
     vertices: list[Point]
     radius: int
+
+
+def backwards(steps: Sequence[Step]) -> list[Step]:
+    """The inverse of a motion."""
+    return [Step(a, -s, -t, (-u, -v), (-x, -y)) for a, s, t, (u, v), (x, y) in reversed(steps)]
 
 
 def swept(points: Sequence[Point], steps: Sequence[Step], box: Sequence[Any]) -> tuple[list[Point], int, Any]:
@@ -80,7 +81,7 @@ def swept(points: Sequence[Point], steps: Sequence[Step], box: Sequence[Any]) ->
             ends = {(sx * value // ONE + ox, sy * value // ONE + oy) for value in (low, high)}
             reach, error = norm([(sx, sy)]), error + 2
             points = [(x + u, y + v) for x, y in points for u, v in ends]
-        spread[axis] = spread.get(axis, 0) + (reach * (high - low) >> BITS)
+        spread[axis] = spread.get(axis, 0) + reach * (high - low)
         spend(len(points))
         points = hull(points)
     return list(points), error, spread
@@ -94,42 +95,35 @@ def bisect(box: Sequence[Any], all_: list[int], test: Callable[..., Open], where
         tested, spread = test(part, tested)
         if tested:
             axis = max(spread, key=lambda axis: (axis >= 0) * spread[axis], default=-1)
-            if axis < 0 or part[axis][1] - part[axis][0] < 2:
-                raise RefusedError(where, finding)
+            demand(axis >= 0 and part[axis][1] - part[axis][0] > 1, where, finding)
             (low, high), parts = part[axis], [part.copy(), part.copy()]
             parts[0][axis], parts[1][axis] = (low, (low + high) // 2), ((low + high) // 2, high)
             left += [(half, tested) for half in parts]
 
 
 class Question:
-    """What is asked.
-
-    Args:
-        value: The document; the page on certificates in the documentation says what its entries mean.
-    """
+    """What is asked; the page on certificates in the documentation says what the document's entries mean."""
 
     def __init__(self, value: Any) -> None:
-        if (value["format"], value["version"]) != ("coop_drake question", 1):
-            raise RefusedError("question", "is no 'coop_drake question' of version 1")
+        asked = (value["format"], value["version"]) == ("coop_drake question", 1)
+        demand(asked, "question", "is no 'coop_drake question' of version 1")
         self.floor = Region(value["floor"])
-        self.parents, self.motions = list[int](), list[list[Step]]()
-        self.joints, self.pieces = dict[int, tuple[int, Interval]](), list[Piece]()
+        self.parents, self.motions, self.pieces = list[int](), list[list[Step]](), list[Piece]()
+        joints = dict[int, tuple[int, Interval]]()
         for component in value["components"]:
-            self._add(component)
-        joints = [self.joints[k] for k in range(len(self.joints))]
-        self.robots, self.limits = [robot for robot, _ in joints], [limits for _, limits in joints]
+            self._add(component, joints)
+        self.robots = [joints[k][0] for k in range(len(joints))]
+        self.limits = [joints[k][1] for k in range(len(joints))]
         self.start, self.goal = numbers(value["start"], 3 + len(joints)), numbers(value["goal_pose"], 3)
-        goals = [None if goal is None else number(goal) for goal in value["goal_joints"]]
-        ends = zip(goals, self.limits, strict=True)
-        self.goal_box = [
-            (self.goal[2],) * 2,
-            *[limits if goal is None else (goal,) * 2 for goal, limits in ends],
-        ]
-        self.room, angle, joint = (
-            number(value[f"{what}_tolerance"]) for what in ("position", "angle", "joint")
-        )
+        tolerances = [value[f"{what}_tolerance"] for what in ("position", "angle", "joint")]
+        self.room, angle, joint = numbers(tolerances, 3)
+        goals = [None if goal is None else numbers([goal], 1)[0] for goal in value["goal_joints"]]
+        ends = [both if goal is None else (goal, goal) for goal, both in zip(goals, self.limits, strict=True)]
+        self.goal_box = [(self.goal[2], self.goal[2]), *ends]
         self.rooms = [angle, *[None if goal is None else joint for goal in goals]]
-        self.pairs = self._pairs(value["left_aside"])
+        aside = {frozenset((one, other)) for one, other, _ in value["left_aside"]}
+        pairs = [(i, j) for j in range(len(self.pieces)) for i in range(j)]
+        self.pairs = [(i, j) for i, j in pairs if self._must_be_apart(self.pieces[i], self.pieces[j], aside)]
 
     def steps(self, component: int, ancestor: int = -1) -> list[Step]:
         """Motions from a component's frame to an ancestor's; for -1 to p_WL = 0, in directions of W."""
@@ -146,44 +140,28 @@ class Question:
             first, second = sorted((first, self.parents[second]))
         return first
 
-    def _add(self, component: Any) -> None:
+    @staticmethod
+    def _must_be_apart(one: Piece, other: Piece, aside: set[frozenset[str]]) -> bool:
+        return one.component != other.component and frozenset((one.body, other.body)) not in aside
+
+    def _add(self, component: Any, joints: dict[int, tuple[int, Interval]]) -> None:
         """Read a component; its joint moves it by X_PJ @ Rot(sign * q), or X_PJ @ Trans(direction * q)."""
         joint, place = component["joint"], len(self.parents)
         self.parents.append(index(component["parent"], place) if place else -1)
-        if place == 0:
-            self.motions.append([Step(0, 1)])
-        else:
+        motion = [Step(0, 1)]
+        if place:
             axis, (x, y, angle) = 1 + index(joint["index"], 1000), numbers(joint["frame"], 3)
-            if joint["kind"] == "prismatic":
-                slide = numbers(joint["direction"], 2)
-                move = Step(axis, slide=(slide[0], slide[1]))
-            else:
-                move = Step(axis, {("revolute", 1): 1, ("revolute", -1): -1}[joint["kind"], joint["sign"]])
-            self.motions.append([move, Step(angle=angle), Step(offset=(x, y))])
-            if axis - 1 in self.joints:
-                raise RefusedError("joint", "has the index of another one")
-            self.joints[axis - 1] = joint["robot"], (number(joint["lower"]), number(joint["upper"]))
+            kinds = {("prismatic", None): 0, ("revolute", 1): 1, ("revolute", -1): -1}
+            slides = joint["kind"] == "prismatic"
+            u, v = numbers(joint["direction"], 2) if slides else (0, 0)
+            sign = kinds[joint["kind"], None if slides else joint["sign"]]
+            motion = [Step(axis, sign, slide=(u, v)), Step(angle=angle), Step(offset=(x, y))]
+            low, high = numbers([joint["lower"], joint["upper"]], 2)
+            joints[axis - 1] = joint["robot"], (low, high)
+        self.motions.append(motion)
         for body in component["bodies"]:
             for shape in body["shapes"]:
-                vertices = hull((x, y) for x, y in (numbers(corner, 2) for corner in shape["vertices"]))
-                if not vertices or number(shape["radius"]) < 0:
-                    raise RefusedError("shapes", "has no vertices or a negative radius")
-                self.pieces.append(Piece(body["name"], place, vertices, number(shape["radius"])))
-
-    def _pairs(self, aside: Any) -> list[tuple[int, int]]:
-        """Pairs of pieces that must not meet: those of different components whose bodies are not left aside.
-
-        Bodies that are left aside because of a joint must belong to a component and its parent.
-        """
-        for one, other, reason in aside:
-            owners = [{p.component for p in self.pieces if p.body == name} for name in (one, other)]
-            joined = all(a == self.parents[b] or b == self.parents[a] for a in owners[0] for b in owners[1])
-            if reason not in ("joint", "model") or (reason == "joint" and not joined):
-                raise RefusedError(
-                    "left_aside", f"{one} and {other} share no joint, or the reason is unknown"
-                )
-        names = {frozenset((one, other)) for one, other, _ in aside}
-        pairs = [(i, j) for j in range(len(self.pieces)) for i in range(j)]
-        ends = [(self.pieces[i], self.pieces[j]) for i, j in pairs]
-        apart = [a.component != b.component and frozenset((a.body, b.body)) not in names for a, b in ends]
-        return [pair for pair, needed in zip(pairs, apart, strict=True) if needed]
+                vertices = [(x, y) for x, y in (numbers(corner, 2) for corner in shape["vertices"])]
+                (radius,) = numbers([shape["radius"]], 1)
+                demand(len(vertices) > 0 and radius >= 0, "shapes", "have no vertices or a negative radius")
+                self.pieces.append(Piece(body["name"], place, hull(vertices), radius))

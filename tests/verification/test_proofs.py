@@ -183,7 +183,7 @@ def without_label(part, problem):
 @pytest.mark.parametrize(
     ("kind", "way", "value", "message"),
     [
-        (SlicesProof, ("robots",), [0], r"numbers: .* is no list of 2"),
+        (SlicesProof, ("robots",), [0], r"numbers: .* are not 2"),
         (SlicesProof, ("robots",), [0.5], r"robots\[0\]: 0.5 is not allowed; expected a whole number"),
         (SlicesProof, ("kind",), "guess", r"kind: 'guess' is not allowed"),
         (
@@ -193,7 +193,7 @@ def without_label(part, problem):
             r"format: 'song' is not allowed; expected 'coop_drake plan'",
         ),
         (SlicesProof, ("slices", 0, "lower", 0), 9.0, r"slices\[0\].upper\[0\]: .* 9.0 or more"),
-        (DiscProof, ("component",), 7, r"index: 7 is none from 0 to"),
+        (DiscProof, ("component",), 7, r"index: 7 is none below 2"),
         (DiscProof, ("component",), 1, r"name a piece of another component"),
         (DiscProof, ("centre", 1), 0.01, r"inner_sweeps: may leave the inside of"),
         (

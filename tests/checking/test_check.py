@@ -1,0 +1,218 @@
+"""The exact checker: the documentation's example, alterations, hostile documents, an empty Python."""
+
+import json
+import re
+import subprocess
+import sys
+from copy import deepcopy
+from pathlib import Path
+
+import pytest
+
+from coop_drake.checking import RefusedError, check
+
+ROOT = Path(__file__).parents[2]
+QUESTION, PROOF = map(
+    json.loads,
+    re.findall(
+        r"```json\n(.*?)```", (ROOT / "docs" / "certificates.md").read_text(encoding="utf-8"), re.DOTALL
+    ),
+)
+
+
+def altered(document, value, *way):
+    document = deepcopy(document)
+    place = document
+    for step in way[:-1]:
+        place = place[step]
+    place[way[-1]] = value
+    return document
+
+
+def rectangle(x0, y0, x1, y1):
+    return {"outer": [[x0, y0], [x1, y0], [x1, y1], [x0, y1]], "holes": []}
+
+
+def refused(question, answer):
+    with pytest.raises(RefusedError) as caught:
+        check(question, answer)
+    return str(caught.value)
+
+
+def test_the_proof_on_paper_holds_with_all_the_edges_that_paper_lists():
+    counts = dict(check(QUESTION, PROOF))
+    assert [count for name, count in counts.items() if name.startswith("edges")] == [48]
+
+
+CELL = ("slices", 0, "cells", 0, "polygon")
+
+
+@pytest.mark.parametrize(
+    ("answer", "finding"),
+    [
+        (altered(PROOF, rectangle(0.3, 0.2, 3.8, 1.8), *CELL), "no cell covers"),
+        (altered(PROOF, rectangle(0.2, 0.2, 3.69, 1.8), *CELL), "no cell covers"),
+        (altered(PROOF, rectangle(0.2, 0.2, 5.2, 1.8), *CELL), "touches"),
+        (altered(PROOF, False, "slices", 0, "cells", 0, "reached"), "cells may hold the start"),
+        (altered(PROOF, True, "slices", 0, "cells", 1, "reached"), "cells may hold the goal"),
+        (altered(PROOF, [], "slices", 0, "cells"), "no cell covers"),
+        (altered(PROOF, [], "slices", 0, "inner_sweeps"), "no cell covers"),
+        (altered(PROOF, [3.1], "slices", 0, "upper"), "whole turn"),
+        (altered(PROOF, [], "slices"), "slices: are none"),
+        (
+            altered(
+                PROOF, [[-0.36, -0.36], [0.36, -0.36], [0, 0.3]], "slices", 0, "inner_sweeps", 0, "polygon"
+            ),
+            "leave",
+        ),
+        (
+            altered(PROOF, [{"pieces": [0, 0], "point": [0, 0]}], "slices", 0, "overlaps"),
+            "pieces that may meet",
+        ),
+    ],
+)
+def test_what_does_not_hold_is_refused(answer, finding):
+    assert finding in refused(QUESTION, answer)
+
+
+@pytest.mark.parametrize("gap", [1e-6, 1e-9, 1e-12, 1e-15])
+def test_two_cells_with_a_gap_of_a_hair_between_them_do_not_cover_it(gap):
+    """A cut through a way that is free, with cells on either side that do not touch."""
+    wide = altered(QUESTION, [], "floor", "holes")
+    cells = [
+        {"reached": True, "polygon": rectangle(0.2, 0.2, 4.0, 1.8)},
+        {"reached": False, "polygon": rectangle(4.0 + gap, 0.2, 7.8, 1.8)},
+    ]
+    assert "no cell covers" in refused(wide, altered(PROOF, cells, "slices", 0, "cells"))
+
+
+def test_a_pillar_as_thin_as_a_hair_blocks_and_a_gap_of_the_disc_does_not():
+    thin = altered(QUESTION, [[[4, 0.5], [4 + 1e-12, 0.5], [4 + 1e-12, 1.5], [4, 1.5]]], "floor", "holes")
+    cells = [
+        {"reached": True, "polygon": rectangle(0.2, 0.2, 3.8, 1.8)},
+        {"reached": False, "polygon": rectangle(4.2, 0.2, 7.8, 1.8)},
+    ]
+    assert check(thin, altered(PROOF, cells, "slices", 0, "cells"))
+    low = altered(QUESTION, [[[4, 1.01], [5, 1.01], [5, 1.5], [4, 1.5]]], "floor", "holes")
+    assert "no cell covers" in refused(low, PROOF)
+
+
+TEAM = {
+    **QUESTION,
+    "floor": rectangle(0, 0, 8, 8),
+    "components": [
+        {
+            "parent": None, "joint": None,
+            "bodies": [{"name": "object", "shapes": [{"vertices": [[0, 0]], "radius": 0.3}]}],
+        },
+        {
+            "parent": 0,
+            "joint": {
+                "kind": "prismatic", "index": 0, "robot": 0, "frame": [0.5, 0, 0], "direction": [1, 0],
+                "lower": -1.0, "upper": 1.0,
+            },
+            "bodies": [{"name": "base", "shapes": [{"vertices": [[0, 0]], "radius": 0.2}]}],
+        },
+    ],
+    "start": [2, 4, 0, 0.5], "goal_pose": [3, 4, 6.283185307179586], "goal_joints": [0.5],
+}  # fmt: skip
+
+
+def plan(lower=0.2, upper=0.6):
+    path = [[2, 4], [3, 4]]
+    return {
+        "format": "coop_drake plan", "version": 3,
+        "cells": [{"lower": [-0.1, lower], "upper": [0.1, upper], "tidied": rectangle(1.5, 3.5, 4, 4.5)}],
+        "transitions": [{
+            "target": [3, 4], "goal_lower": [-0.01, 0.49], "goal_upper": [0.01, 0.51], "path": path,
+            "neck": 0.5, "length": 1.0, "inradius": 0.01,
+        }],
+    }  # fmt: skip
+
+
+def test_a_plan_with_a_prismatic_joint_holds_and_its_goal_is_met_modulo_a_turn():
+    assert check(TEAM, plan())
+    assert "object may touch base" in refused(TEAM, plan(lower=-0.01))
+    assert "limits" in refused(TEAM, plan(upper=1.01))
+    aside = altered(TEAM, [["object", "base", "joint"]], "left_aside")
+    assert check(aside, plan(lower=-0.01))
+
+
+@pytest.mark.parametrize(
+    ("value", "way", "finding"),
+    [
+        (0.6, ("neck",), "neck"),
+        (1.1, ("length",), "length"),
+        (0.011, ("inradius",), "inradius"),
+        ([[2, 4], [2.5, 5], [3, 4]], ("path",), "neck"),
+        ([[2, 4]], ("path",), "path"),
+        ([3, 4.001], ("target",), "path"),
+        ([0.01, 0.49 + 1e-12], ("goal_upper",), "upper"),
+        ([0.01, 0.53], ("goal_upper",), "tolerance on axis 1"),
+        ([0.03, 0.51], ("goal_upper",), "tolerance on axis 0"),
+    ],
+)
+def test_figures_of_a_plan_that_are_not_true_are_refused(value, way, finding):
+    assert finding in refused(TEAM, altered(plan(), value, "transitions", 0, *way))
+
+
+def test_a_cell_that_reaches_to_a_wall_or_beyond_is_refused():
+    for x in (0.29, -3.0):
+        assert "wall" in refused(TEAM, altered(plan(), rectangle(x, 3.5, 4, 4.5), "cells", 0, "tidied"))
+
+
+def test_a_goal_is_blocked_where_pieces_overlap_or_a_wall_is_met():
+    question = altered(TEAM, [None], "goal_joints")
+    question["components"][1]["joint"].update(lower=-0.6, upper=-0.4)
+    box = {"lower": [0.0, -0.6], "upper": [0.0, -0.4], "inner_sweeps": [], "overlaps": []}
+    blocked = {**PROOF, "kind": "blocked goal", "robots": [0], "slices": [box]}
+    assert "may be free" in refused(question, blocked)
+    overlap = altered(blocked, [{"pieces": [0, 1], "point": [0.0, 0.0]}], "slices", 0, "overlaps")
+    assert check(question, overlap)
+    far = altered(blocked, [{"pieces": [0, 1], "point": [0.25, 0.0]}], "slices", 0, "overlaps")
+    assert "may leave the inside" in refused(question, far)
+    short = altered(overlap, [0.0, -0.5], "slices", 0, "upper")
+    assert "do not tile" in refused(question, short)
+
+
+HUGE = [[k * 1e-3, (k % 7) * 1e-3] for k in range(300_000)]
+DEEP = json.loads("[" * 900 + "]" * 900)
+
+
+@pytest.mark.parametrize(
+    "value",
+    [float("nan"), float("inf"), 1e25, 10**400, True, None, "1", DEEP, {}, [], HUGE],
+    ids=["nan", "inf", "1e25", "10^400", "true", "null", "text", "deep", "mapping", "list", "long"],
+)
+@pytest.mark.parametrize(
+    "way",
+    [
+        ("slices",), ("kind",), ("slices", 0), ("slices", 0, "lower"), ("slices", 0, "upper", 0),
+        ("slices", 0, "cells"), ("slices", 0, "cells", 0, "polygon", "outer"), ("slices", 0, "inner_sweeps"),
+        ("slices", 0, "inner_sweeps", 0, "piece"), ("slices", 0, "inner_sweeps", 0, "polygon", 1, 0),
+        ("slices", 0, "overlaps"), ("format",), ("version",),
+    ],
+    ids=lambda way: ".".join(map(str, way)),
+)  # fmt: skip
+def test_hostile_values_are_refused(way, value):
+    if way == ("slices", 0, "overlaps") and value in ([], {}):
+        return
+    assert len(refused(QUESTION, altered(PROOF, value, *way))) < 400
+
+
+def test_it_runs_in_an_empty_python_on_two_files(tmp_path):
+    (tmp_path / "question.json").write_text(json.dumps(QUESTION))
+    (tmp_path / "answer.json").write_text(json.dumps(PROOF))
+    (tmp_path / "deep.json").write_text("[" * 100_000)
+    start = f"import runpy, sys; sys.path.insert(0, {str(ROOT)!r}); sys.argv[1:] = "
+    run = "; runpy.run_module('coop_drake.checking', run_name='__main__')"
+    for files, code in ((["question.json", "answer.json"], 0), (["answer.json"], 2), (["deep.json"], 2)):
+        paths = [str(tmp_path / name) for name in files]
+        done = subprocess.run(
+            [sys.executable, "-I", "-S", "-c", f"{start}{paths}{run}"],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == code, done.stderr
+        assert "Traceback" not in done.stderr

@@ -1,0 +1,147 @@
+"""Exact plane geometry against the geometry that it must agree with: shapely, and rational arithmetic."""
+
+from fractions import Fraction
+from itertools import pairwise
+from math import cos, sin
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import LineString, MultiPoint, Point, Polygon
+
+from coop_drake.checking import plane
+from coop_drake.checking.plane import (
+    BITS,
+    FULL,
+    ONE,
+    TURN,
+    Region,
+    apart,
+    hull,
+    numbers,
+    stretch,
+    turn,
+    within,
+)
+
+PLACE = st.tuples(st.integers(-9, 9), st.integers(-9, 9))
+PLACES = st.lists(PLACE, min_size=1, max_size=7)
+SEGMENT = st.lists(PLACE, min_size=2, max_size=2, unique=True)
+
+
+@pytest.fixture(autouse=True)
+def enough_work():
+    plane.work[0] = 10**9
+
+
+def region(*rings):
+    made = Region({"outer": [[0, 0], [1, 0], [0, 1]], "holes": []})
+    made.rings = [list(ring) for ring in rings]
+    made.edges = [(r[k - 1], r[k]) for r in made.rings for k in range(len(r)) if r[k - 1] != r[k]]
+    made.boxes = [plane.box_of(edge) for edge in made.edges]
+    made.box = plane.box_of([point for ring in made.rings for point in ring])
+    return made
+
+
+@given(st.floats(-1e3, 1e3))
+def test_sines_and_cosines_are_right_to_a_unit(angle):
+    exact = numbers([angle], 1)[0]
+    c, s = turn(exact)
+    assert abs(c / ONE - cos(angle)) < 1e-13 > abs(s / ONE - sin(angle))
+    assert abs(c * c + s * s - ONE * ONE) <= 4 * ONE
+    c2, s2 = turn(2 * exact)
+    assert abs(c2 * ONE - (c * c - s * s)) <= 8 * ONE
+    assert abs(s2 * ONE - 2 * c * s) <= 8 * ONE
+    c3, s3 = turn(exact + TURN)
+    assert max(abs(c3 - c), abs(s3 - s)) <= 4
+
+
+def test_a_turn_is_two_pi():
+    tau = Fraction("6.283185307179586476925286766559005768394338798750")
+    assert 0 <= tau - Fraction(TURN, ONE) < Fraction(1, ONE)
+
+
+@given(st.floats(-1e6, 1e6))
+def test_numbers_are_doubles_to_a_multiple_of_a_unit(value):
+    (exact,) = numbers([value], 1)
+    assert abs(Fraction(exact, 1 << BITS) - Fraction(value)) <= Fraction(1, 2 << BITS)
+
+
+@given(PLACES, PLACES, st.integers(0, 4))
+@settings(deadline=None)
+def test_sets_are_apart_exactly_if_their_distance_is_larger(first, second, gap):
+    distance = MultiPoint(first).convex_hull.distance(MultiPoint(second).convex_hull)
+    if abs(distance - gap) > 1e-9 or gap == 0:
+        expected = distance > gap
+        assert apart(hull(first), hull(second), gap) == expected == apart(hull(second), hull(first), gap)
+
+
+@given(PLACES, PLACES, st.integers(-3, 2))
+@settings(deadline=None)
+def test_points_are_within_a_set_by_more_than_a_depth(points, corners, depth):
+    """A point outside may be refused though it is nearer by less than a unit, here a hundredth."""
+    points, corners = ([(100 * x, 100 * y) for x, y in places] for places in (points, corners))
+    polygon, depth, expected = MultiPoint(corners).convex_hull, 100 * depth, True
+    for point in map(Point, points):
+        away = polygon.boundary.distance(point) if isinstance(polygon, Polygon) else polygon.distance(point)
+        inside = away if isinstance(polygon, Polygon) and polygon.contains(point) else -away
+        if abs(inside - depth) < 2.0:
+            return
+        expected = expected and inside > depth
+    assert within(points, hull(corners), depth) == expected
+
+
+@given(SEGMENT, st.lists(PLACE, min_size=3, max_size=7))
+@settings(deadline=None)
+def test_the_stretch_in_a_convex_polygon_is_all_of_its_interior(edge, corners):
+    ring = hull(corners)
+    if len(ring) < 3:
+        assert stretch(edge, ring) == []
+        return
+    inside = LineString(edge).intersection(Polygon(ring)).length
+    inside = 0.0 if LineString(edge).relate_pattern(Polygon(ring), "F********") else inside
+    found = sum(high - low for low, high in stretch(edge, ring)) / FULL * LineString(edge).length
+    assert found == pytest.approx(inside, abs=1e-9)
+
+
+@given(SEGMENT, st.lists(PLACE, min_size=3, max_size=6), st.lists(PLACE, min_size=3, max_size=5))
+@settings(deadline=None, max_examples=200)
+def test_stretches_in_a_region_hold_all_points_of_their_parity_that_are_on_no_edge(edge, outer, hole):
+    made = region(outer, hole)
+    if not made.edges:
+        return
+    inside, outside = (made.stretches(edge, (0, 0), odd=odd) for odd in (True, False))
+    assert covered(inside + outside) >= FULL - 100
+    for odd, stretches in ((True, inside), (False, outside)):
+        for low, high in stretches:
+            for place in {low, (low + high) // 2, high}:
+                x, y = (a * FULL + (b - a) * place for a, b in zip(*edge, strict=True))
+                assert made.odd(x, y, FULL) == odd
+                assert all(off_edge((x, y), side) for side in made.edges)
+
+
+def covered(stretches):
+    return sum(high - low for low, high in stretches) + collinear_allowance(stretches)
+
+
+def collinear_allowance(stretches):
+    """What lies between stretches: single places, or edges on the segment's own line."""
+    ends = sorted(stretches)
+    gaps = [b[0] - a[1] for a, b in pairwise(ends)]
+    return sum(gaps) + (ends[0][0] + FULL - ends[-1][1] if ends else FULL)
+
+
+def off_edge(point, edge):
+    (px, py), (qx, qy) = ((x * FULL, y * FULL) for x, y in edge)
+    across = (qx - px) * (point[1] - py) - (qy - py) * (point[0] - px)
+    along = (qx - px) * (point[0] - px) + (qy - py) * (point[1] - py)
+    return across != 0 or not 0 <= along <= (qx - px) ** 2 + (qy - py) ** 2
+
+
+@given(st.lists(PLACE, min_size=3, max_size=5), st.lists(PLACE, min_size=3, max_size=5))
+@settings(deadline=None)
+def test_regions_touch_if_they_share_a_point(first, second):
+    one, other = region(first), region(second)
+    polygons = Polygon(first), Polygon(second)
+    if one.edges and other.edges and all(polygon.is_valid for polygon in polygons):
+        assert one.touches(other) == polygons[0].intersects(polygons[1]) == other.touches(one)
