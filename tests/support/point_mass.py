@@ -11,7 +11,6 @@ from shapely import Point
 from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry import BoundaryDistance
 from coop_drake.laws import (
-    axis_table,
     energy_margin,
     funnel_acceleration,
     governed_acceleration,
@@ -19,7 +18,7 @@ from coop_drake.laws import (
     slowdown_radius,
     tracking_energy,
 )
-from coop_drake.laws.axis_table import first_jumps
+from coop_drake.laws.axis_table import axis_table, first_jumps
 from coop_drake.laws.hand_over import fading, governed_gains
 from coop_drake.systems.ready_kernels import ready_conditions
 from tests.support.readiness import margin_of as margin_of_robot
