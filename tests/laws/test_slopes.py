@@ -14,7 +14,7 @@ def row(shape="quintic", saturation=0.02):
     gains = TransitionGains(
         stiffness=50.0, damping=5.0, governor_gain=5.0, smoothing=0.0, funnel=shape, decay_rate=3.0 * one,
         log_gain=0.05 * one, position_gain=11.0, rate_gain=28.0, ramp_rate=8.0, saturation=saturation,
-        energy_bound=one,
+        hand_over_time=0.0, energy_bound=one,
     )  # fmt: skip
     return axis_table(funnel, gains)[0]
 
