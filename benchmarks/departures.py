@@ -38,10 +38,13 @@ class Case(NamedTuple):
     Attributes:
         mild: As a scenario file has it; a control rate of 200 Hz is added where none is given.
         harsh: None where nothing of the kind failed.
+        known: Whether gains are scheduled for the age of commands of the harsh one; teams that know of their
+            lag or delay are only slow.
     """
 
     mild: dict[str, Any]
     harsh: dict[str, Any] | None = None
+    known: bool = True
 
 
 def _measured(**values: object) -> dict[str, Any]:
@@ -60,10 +63,10 @@ CASES: Mapping[str, Case] = {
     "nothing": Case({"control_rate": None}),
     "sampling": Case({}, {"control_rate": 15.0}),
     "limits": Case({"actuators": {"base_force": 150.0}}, {"actuators": {"base_force": 10.0}}),
-    "lag": Case({"actuators": {"lag": 0.02}}, {"actuators": {"lag": 0.2}}),
+    "lag": Case({"actuators": {"lag": 0.02}}, {"actuators": {"lag": 0.05}}, known=False),
     "model error": Case({"mass_error": 0.3}, {"mass_error": -0.9}),
     "noise": Case(_measured(**_NOISE), _measured(**{name: 20.0 * size for name, size in _NOISE.items()})),
-    "delay": Case(_measured(delay=0.02), _measured(delay=0.2)),
+    "delay": Case(_measured(delay=0.02), _measured(delay=0.05), known=False),
     "lost measurements": Case(_measured(loss=0.3), _measured(loss=0.8)),
     "late measurements": Case(_measured(late=0.5, late_by=0.02), _measured(late=0.8, late_by=0.5)),
     "lost reports": Case({"messages": {"loss": 0.7}}, {"messages": {"loss": 1.0}}),
@@ -127,10 +130,19 @@ def deployment_of(data: Mapping[str, Any]) -> Deployment:
     return convert_class(Deployment.completed({**own, **data}, "deployment"), Deployment)
 
 
-def departing(team: str, deployment: Deployment, control: Control) -> SimulationLog:
-    """Plan a shipped transport with a deployment and additions to the controllers, and simulate it."""
-    scenario = replace(load_scenario(team), deployment=deployment, control=control)
-    return simulate(scenario, *_planned(team, scenario.command_age, scenario))
+def departing(team: str, deployment: Deployment, control: Control, *, known: bool = True) -> SimulationLog:
+    """Plan a shipped transport with a deployment and additions to the controllers, and simulate it.
+
+    Args:
+        team: Name of the shipped scenario.
+        deployment: The departures.
+        control: The additions.
+        known: Whether the plan is made for this deployment, otherwise for the ideal team.
+    """
+    ideal = load_scenario(team)
+    scenario = replace(ideal, deployment=deployment, control=control)
+    planned = scenario if known else ideal
+    return simulate(scenario, *_planned(team, planned.command_age, planned))
 
 
 _PLANS: dict[tuple[str, float], tuple[Plan, Sequence[HarmonicMap]]] = {}
@@ -149,9 +161,10 @@ def _planned(team: str, age: float, scenario: Scenario) -> tuple[Plan, Sequence[
 def _case_rows(team: str, _: Sequence[Row]) -> list[Row]:
     rows = []
     for name, case in CASES.items():
-        for figure, data in (("mild", case.mild), ("harsh", case.harsh)):
-            if data is not None:
-                rows.extend(_rows(f"departures/{team}/{name}/{figure}", team, data, Control()))
+        rows.extend(_rows(f"departures/{team}/{name}/mild", team, case.mild, Control()))
+        if case.harsh is not None:
+            harsh = f"departures/{team}/{name}/harsh"
+            rows.extend(_rows(harsh, team, case.harsh, Control(), known=case.known))
     return rows
 
 
@@ -166,9 +179,11 @@ def _added_rows(team: str, _: Sequence[Row]) -> list[Row]:
     return rows
 
 
-def _rows(name: str, team: str, data: Mapping[str, Any], control: Control) -> list[Row]:
+def _rows(
+    name: str, team: str, data: Mapping[str, Any], control: Control, *, known: bool = True
+) -> list[Row]:
     """Return time, and where the team arrived smallest funnel margin and largest force; else how it ended."""
-    log = departing(team, deployment_of(data), control)
+    log = departing(team, deployment_of(data), control, known=known)
     rows = [Row(name, float(log.times[-1]), "s", "" if log.reached else log.violation)]
     if log.reached:
         force = float(np.abs(log.base_wrenches[:, :, :2]).max())

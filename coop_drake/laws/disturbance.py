@@ -5,12 +5,12 @@ from __future__ import annotations
 from coop_drake.compiled import compiled
 from coop_drake.tree.pose import FloatArray
 
-PHASE = 0.1
-"""The observer's gain times the age of commands [rad]: the age turns the observer's loop by as much, a
-third of the phase that scheduled gains leave to the age."""
+PHASE = 0.15
+"""The observer's gain times the age of commands [rad]: the age turns the observer's loop by as much, less
+than half of the phase that scheduled gains leave to the age."""
 
-FASTEST = 10.0
-"""Largest gain of the observer [1/s]: noise of 0.01/s in a rate makes 0.1/s^2 in its estimate."""
+FASTEST = 20.0
+"""Largest gain of the observer [1/s]: noise of 0.01/s in a rate makes 0.2/s^2 in its estimate."""
 
 LEAK = 0.2
 """Leak over gain [-]: one sixth of a constant disturbance stays. Without a leak, estimates of different

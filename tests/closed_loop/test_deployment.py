@@ -53,7 +53,7 @@ MILD = {
     "lost reports": Deployment(control_rate=RATE, messages=Messages(loss=0.7)),
     "late reports": Deployment(control_rate=RATE, messages=Messages(delay=0.2)),
     "repeated reports": Deployment(control_rate=RATE, messages=Messages(repeat=1.0, delay=0.05)),
-    "lost measurements": at_200_hz(measurements=Measurements(loss=0.3)),
+    "lost measurements": at_200_hz(measurements=Measurements(loss=0.1)),
     "late measurements": at_200_hz(measurements=Measurements(late=0.3, late_by=0.02)),
     "a biased pose in one robot": in_one(pose_bias=PoseBias(x=0.005)),
     "a biased pose in all": at_200_hz(robots={"*": RobotDepartures(pose_bias=PoseBias(x=0.005))}),
