@@ -15,6 +15,7 @@ from coop_drake.checking.plane import (
     boxes_apart,
     demand,
     hull,
+    spend,
     stretch,
     within,
 )  # fmt: skip
@@ -49,6 +50,7 @@ def blocked(floor: Region, ring: list[Point]) -> list[OpenSet]:
     in the interior of the Minkowski sum of e and -K.
     """
     shift = sum(x for x, _ in ring) // len(ring), sum(y for _, y in ring) // len(ring)
+    spend(300 * len(floor.edges))
     demand(within([shift], ring, 0), "inner_sweeps", "have a polygon that has almost no area")
     sums = [hull((ex - x, ey - y) for ex, ey in edge for x, y in ring) for edge in floor.edges]
     return [OpenSet([], floor, shift, odd=False), *map(OpenSet, sums)]
@@ -69,6 +71,7 @@ def check_cover(cells: Sequence[Region], forbidden: Sequence[OpenSet], where: st
     while left:
         edge, count = left.pop(), count + 1
         box = box_of(edge)
+        spend(len(sets))
         near = [k for k, its in enumerate(boxes) if its is None or not boxes_apart(its, box, 0)]
         first = [k for k in near if k in taken]
         chosen = _chosen(sets, first, edge) or _chosen(

@@ -48,6 +48,7 @@ def spend(steps: int) -> None:
 def numbers(values: Any, count: int) -> list[int]:
     """Read so many numbers: each stands for a double, and denotes the multiple of 2^-80 nearest to it."""
     found = []
+    spend(200 * count)
     demand(isinstance(values, list) and len(values) == count, "numbers", f"{values!r:.40} are not {count}")
     for value in values:
         fits = type(value) in (int, float) and -(2**20) <= value <= 2**20
@@ -168,7 +169,6 @@ class Region:
     def __init__(self, value: Any) -> None:
         self.rings: list[list[Point]] = []
         for ring in (value["outer"], *value["holes"]):
-            spend(500 * len(ring))
             self.rings.append([(x, y) for x, y in (numbers(corner, 2) for corner in ring)])
         pairs = [pair for ring in self.rings for pair in zip([ring[-1], *ring], ring, strict=False)]
         self.edges = [(p, q) for p, q in pairs if p != q]
