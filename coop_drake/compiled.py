@@ -124,9 +124,8 @@ class Kernel:
         from coop_drake.machine_code import load_machine_code, platform_stamp, write_machine_code
 
         function = self._function
-        stamp = hashlib.sha256(
-            "\n".join((self.stamp, repr(self._options), platform_stamp())).encode()
-        ).hexdigest()
+        reassociate = str(bool(self._options["fastmath"]))
+        stamp = hashlib.sha256("\n".join((self.stamp, reassociate, platform_stamp())).encode()).hexdigest()
         ending = hashlib.sha256(words.encode()).hexdigest()[:16]
         source = Path(function.__code__.co_filename)
         name = f"{source.stem}.{function.__qualname__}.{sys.implementation.cache_tag}.{ending}.kernel"
