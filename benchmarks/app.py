@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from benchmarks.adversaries.trial import adversary_tasks
 from benchmarks.commands import bench_commands
 from benchmarks.contents import TOPICS, WHOLE, show_contents
 from benchmarks.departures import departure_tasks
@@ -102,6 +103,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *mapping_tasks(),
         *simulating_tasks(),
         *departure_tasks(),
+        *adversary_tasks(),
     ]
 
 

@@ -18,10 +18,11 @@ TOPICS = {
     "mapping": "harmonic maps: accuracy, speed, how both grow",
     "simulating": "the closed loop beside the bare plant; memory of repeated runs",
     "departures": "transports of teams that are not ideal, mild and harsh; with predictor and observer",
+    "adversaries": "altered plans and proofs beside the exact checker; how long it checks random answers",
 }
 """What every topic is about."""
 
-WHOLE = "about twenty-five minutes on two cores, most of it for the planner"
+WHOLE = "about forty minutes on two cores, most of it for the planner and the adversaries"
 """How long everything takes."""
 
 

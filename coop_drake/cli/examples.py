@@ -67,7 +67,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "bench": (
         ("bench", "what there is to measure"),
         ("bench planner --only base --seeds 3", "a part of it"),
-        ("bench all", "everything, in about twenty-five minutes"),
+        ("bench all", "everything, in about forty minutes"),
     ),
 }
 """For each command its examples, without the program's name, and what each does."""

@@ -1,0 +1,245 @@
+"""Alterations of proofs, and of the questions that they answer."""
+
+from __future__ import annotations
+
+from math import tau
+
+import numpy as np
+import shapely
+from shapely import affinity
+
+from benchmarks.adversaries.alterations import Alteration, Altered, chosen, copied, having, region_of, step
+from benchmarks.adversaries.collisions import Document, polygon_of
+from benchmarks.adversaries.plans import other_floor, other_team
+from benchmarks.adversaries.witnesses import overlap_forged, sweep_added, sweep_altered, sweep_dropped
+
+__all__ = ["PROOF_ALTERATIONS"]
+
+Random = np.random.Generator
+
+
+def flipped(question: Document, answer: Document, random: Random) -> Altered | None:
+    """A cell, or all cells of a slice, have the other label."""
+    question, answer = copied(question, answer)
+    k = having(answer, "cells", random)
+    if k is None:
+        return None
+    cells = answer["slices"][k]["cells"]
+    for cell in [cells[chosen(cells, random)]] if random.random() < 0.7 else cells:
+        cell["reached"] = not cell["reached"]
+    return Altered(question, answer, cells=())
+
+
+def relabelled(question: Document, answer: Document, random: Random) -> Altered | None:
+    """All cells have one label, or all the other."""
+    question, answer = copied(question, answer)
+    if having(answer, "cells", random) is None:
+        return None
+    kind = int(random.integers(3))
+    for part in answer["slices"]:
+        for cell in part["cells"]:
+            cell["reached"] = not cell["reached"] if kind == 2 else bool(kind)
+    return Altered(question, answer, cells=())
+
+
+def cell_dropped(question: Document, answer: Document, random: Random) -> Altered | None:
+    """A cell is left out."""
+    question, answer = copied(question, answer)
+    k = having(answer, "cells", random)
+    if k is None:
+        return None
+    cells = answer["slices"][k]["cells"]
+    del cells[chosen(cells, random)]
+    return Altered(question, answer, cells=(k,))
+
+
+def cell_reshaped(question: Document, answer: Document, random: Random) -> Altered | None:
+    """A cell is smaller or larger all around, or one of its corners lies elsewhere."""
+    question, answer = copied(question, answer)
+    k = having(answer, "cells", random)
+    if k is None:
+        return None
+    cells = answer["slices"][k]["cells"]
+    cell = cells[chosen(cells, random)]
+    if random.random() < 0.5:
+        by = step(random, 1e-6, 0.3) * float(random.choice([-1.0, 1.0]))
+        region = region_of(polygon_of(cell["polygon"]).buffer(by, join_style="mitre"))
+        if region is None:
+            return None
+        cell["polygon"] = region
+    else:
+        corner = cell["polygon"]["outer"][chosen(cell["polygon"]["outer"], random)]
+        turn, by = random.uniform(0.0, tau), step(random)
+        corner[0], corner[1] = corner[0] + by * float(np.cos(turn)), corner[1] + by * float(np.sin(turn))
+    return Altered(question, answer, cells=(k,))
+
+
+def cell_cut(question: Document, answer: Document, random: Random) -> Altered | None:
+    """A cell is cut by a slanted slit, as thin as rounding or wider; one half may get the other label."""
+    question, answer = copied(question, answer)
+    k = having(answer, "cells", random)
+    if k is None:
+        return None
+    cells = answer["slices"][k]["cells"]
+    cell = cells.pop(chosen(cells, random))
+    whole = polygon_of(cell["polygon"])
+    (x, y), turn = whole.representative_point().coords[0], random.uniform(0.0, tau)
+    along = 100.0 * np.array([np.cos(turn), np.sin(turn)])
+    middle, gap = np.array([x, y]), step(random, 1e-16, 1e-2)
+    line = shapely.LineString([middle - along, middle + along])
+    halves = [line.buffer(50.0 * side, single_sided=True) for side in (-1.0, 1.0)]
+    halves[1] = affinity.translate(halves[1], -gap * along[1] / 100.0, gap * along[0] / 100.0)
+    flips = random.random() < 0.7
+    for half, label in zip(halves, (cell["reached"], cell["reached"] != flips), strict=True):
+        regions = [region_of(part) for part in shapely.get_parts(whole.intersection(half))]
+        cells += [{"reached": bool(label), "polygon": region} for region in regions if region is not None]
+    return Altered(question, answer, cells=(k,))
+
+
+def cell_doubled(question: Document, answer: Document, random: Random) -> Altered | None:
+    """A cell occurs twice, its rings written otherwise, and the cells in another order."""
+    question, answer = copied(question, answer)
+    k = having(answer, "cells", random)
+    if k is None:
+        return None
+    cells = answer["slices"][k]["cells"]
+    copy = copied(cells[chosen(cells, random)], {})[0]
+    copy["polygon"]["outer"].reverse()
+    cells.insert(0, copy)
+    answer["slices"][k]["cells"] = [cells[i] for i in random.permutation(len(cells))]
+    return Altered(question, answer, true=True)
+
+
+def slice_dropped(question: Document, answer: Document, random: Random) -> Altered:
+    """A slice is left out, occurs twice, or stands in the place of another."""
+    question, answer = copied(question, answer)
+    slices = answer["slices"]
+    k, kind = chosen(slices, random), int(random.integers(3))
+    if kind == 0 or len(slices) == 1:
+        del slices[k]
+    elif kind == 1:
+        slices.append(slices[k])
+    else:
+        slices[k] = slices[k - 1]
+    return Altered(question, answer, cells=())
+
+
+def slice_moved(question: Document, answer: Document, random: Random) -> Altered:
+    """An end of a slice lies elsewhere, by one unit in the last place or more."""
+    question, answer = copied(question, answer)
+    part = answer["slices"][chosen(answer["slices"], random)]
+    end = ("lower", "upper")[int(random.integers(2))]
+    axis = chosen(part[end], random)
+    value = part[end][axis]
+    by = step(random, 1e-9) * float(random.choice([-1.0, 1.0]))
+    part[end][axis] = float(np.nextafter(value, np.inf)) if random.random() < 0.3 else value + by
+    return Altered(question, answer, cells=())
+
+
+def slice_exchanged(question: Document, answer: Document, random: Random) -> Altered | None:
+    """Two slices change all that they hold, but not their intervals."""
+    question, answer = copied(question, answer)
+    i, j = (chosen(answer["slices"], random) for _ in range(2))
+    if i == j:
+        return None
+    one, other = answer["slices"][i], answer["slices"][j]
+    for key in one.keys() - {"lower", "upper"}:
+        one[key], other[key] = other[key], one[key]
+    return Altered(question, answer, cells=(i, j))
+
+
+def slice_halved(question: Document, answer: Document, random: Random) -> Altered | None:
+    """A slice is halved; both halves hold what it held. Slices stand in another order."""
+    question, answer = copied(question, answer)
+    slices = answer["slices"]
+    k = chosen(slices, random)
+    half = copied(slices[k], {})[0]
+    axis = chosen(half["lower"], random)
+    middle = 0.5 * (half["lower"][axis] + half["upper"][axis])
+    if answer["kind"] == "disc" or not half["lower"][axis] < middle < half["upper"][axis]:
+        return None
+    half["lower"][axis] = slices[k]["upper"][axis] = middle
+    slices.append(half)
+    answer["slices"] = [slices[i] for i in random.permutation(len(slices))]
+    return Altered(question, answer, true=True)
+
+
+def other_subject(question: Document, answer: Document, random: Random) -> Altered:
+    """The proof is about other robots, another component, another centre, or of another kind."""
+    question, answer = copied(question, answer)
+    robots = sorted({c["joint"]["robot"] for c in question["components"] if c["joint"]})
+    if answer["kind"] == "disc" and random.random() < 0.7:
+        if random.random() < 0.5:
+            answer["component"] = int(random.integers(len(question["components"]) + 1))
+        else:
+            answer["centre"] = (np.array(answer["centre"]) + random.uniform(-0.3, 0.3, 2)).tolist()
+    elif answer["kind"] != "disc" and random.random() < 0.5:
+        answer["robots"] = [robot for robot in [*robots, len(robots)] if random.random() < 0.5]
+    else:
+        answer["kind"] = str(random.choice(["slices", "disc", "blocked goal"]))
+        answer = {"robots": [], "component": 0, "centre": [0.0, 0.0], **answer}
+    return Altered(question, answer)
+
+
+def other_ends(question: Document, answer: Document, random: Random) -> Altered:
+    """Start and goal change places, lie elsewhere, or a joint moves further."""
+    question, answer = copied(question, answer)
+    joints = [component["joint"] for component in question["components"] if component["joint"]]
+    kind = int(random.integers(3))
+    if kind == 0 or not joints:
+        start = question["start"][:3]
+        question["start"][:3], question["goal_pose"] = question["goal_pose"], start
+    elif kind == 1:
+        for key in ("start", "goal_pose"):
+            question[key][:2] = (np.array(question[key][:2]) + random.uniform(-2.0, 2.0, 2)).tolist()
+    else:
+        joints[chosen(joints, random)]["upper"] += step(random, 1e-9, 1.0)
+    return Altered(question, answer)
+
+
+def thinner(question: Document, answer: Document, random: Random) -> Altered:
+    """Every piece is smaller, or a pillar of the floor is gone."""
+    question, answer = copied(question, answer)
+    if question["floor"]["holes"] and random.random() < 0.3:
+        question["floor"]["holes"].pop()
+        return Altered(question, answer)
+    factor = random.uniform(0.3, 0.99)
+    for component in question["components"]:
+        for body in component["bodies"]:
+            for shape in body["shapes"]:
+                shape["vertices"] = (factor * np.array(shape["vertices"])).tolist()
+                shape["radius"] *= factor
+    return Altered(question, answer)
+
+
+def turned(question: Document, answer: Document, random: Random) -> Altered:
+    """Start and goal have angles that are whole turns away."""
+    question, answer = copied(question, answer)
+    question["start"][2] += tau * int(random.integers(-3, 4))
+    question["goal_pose"][2] += tau * int(random.integers(-3, 4))
+    return Altered(question, answer, true=True)
+
+
+PROOF_ALTERATIONS: dict[str, Alteration] = {
+    "labels turned": flipped,
+    "labels made one": relabelled,
+    "cell left out": cell_dropped,
+    "cell reshaped": cell_reshaped,
+    "cell cut": cell_cut,
+    "cell twice": cell_doubled,
+    "slice left out": slice_dropped,
+    "slice moved": slice_moved,
+    "slices exchanged": slice_exchanged,
+    "slice halved": slice_halved,
+    "polygon altered": sweep_altered,
+    "polygon left out": sweep_dropped,
+    "polygon added": sweep_added,
+    "overlap forged": overlap_forged,
+    "another subject": other_subject,
+    "other ends": other_ends,
+    "another floor": other_floor,
+    "another team": other_team,
+    "thinner bodies": thinner,
+    "whole turns away": turned,
+}
+"""Every kind of alteration by name."""

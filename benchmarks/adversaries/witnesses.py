@@ -1,0 +1,72 @@
+"""Alterations of what a proof shows collisions with: polygons inside pieces, points inside two of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.adversaries.alterations import Altered, chosen, copied, having, step
+from benchmarks.adversaries.collisions import Document
+
+__all__ = ["overlap_forged", "sweep_added", "sweep_altered", "sweep_dropped"]
+
+Random = np.random.Generator
+
+
+def sweep_altered(question: Document, answer: Document, random: Random) -> Altered | None:
+    """A polygon is larger, moved, another piece's, or in another slice."""
+    question, answer = copied(question, answer)
+    k = having(answer, "inner_sweeps", random)
+    if k is None:
+        return None
+    sweeps = answer["slices"][k]["inner_sweeps"]
+    sweep, kind = sweeps[chosen(sweeps, random)], int(random.integers(4))
+    ring = np.array(sweep["polygon"])
+    if kind == 0:
+        ring = ring.mean(axis=0) + (1.0 + step(random, 1e-3, 3.0)) * (ring - ring.mean(axis=0))
+    elif kind == 1:
+        ring = ring + step(random, 1e-4) * random.uniform(-1.0, 1.0, 2)
+    elif kind == 2:
+        count = sum(len(body["shapes"]) for c in question["components"] for body in c["bodies"])
+        sweep["piece"] = int(random.integers(count + 1))
+    else:
+        m = chosen(answer["slices"], random)
+        answer["slices"][m]["inner_sweeps"].append(sweep)
+        k = m
+    sweep["polygon"] = ring.tolist()
+    return Altered(question, answer, cells=(k,))
+
+
+def sweep_dropped(question: Document, answer: Document, random: Random) -> Altered | None:
+    """A polygon, or all polygons of a slice, are left out."""
+    question, answer = copied(question, answer)
+    k = having(answer, "inner_sweeps", random)
+    if k is None:
+        return None
+    sweeps = answer["slices"][k]["inner_sweeps"]
+    del sweeps[chosen(sweeps, random) if random.random() < 0.7 else slice(None)]
+    return Altered(question, answer, cells=(k,))
+
+
+def sweep_added(question: Document, answer: Document, random: Random) -> Altered | None:
+    """A slice has a smaller copy of one of its polygons as well."""
+    question, answer = copied(question, answer)
+    k = having(answer, "inner_sweeps", random)
+    if k is None:
+        return None
+    sweeps = answer["slices"][k]["inner_sweeps"]
+    sweep = dict(sweeps[chosen(sweeps, random)])
+    ring = np.array(sweep["polygon"])
+    sweep["polygon"] = (ring.mean(axis=0) + random.uniform(0.3, 0.9) * (ring - ring.mean(axis=0))).tolist()
+    sweeps.append(sweep)
+    return Altered(question, answer, true=True)
+
+
+def overlap_forged(question: Document, answer: Document, random: Random) -> Altered:
+    """A slice is said to hold an overlap of two pieces, at the origin, at a corner or anywhere."""
+    question, answer = copied(question, answer)
+    k = chosen(answer["slices"], random)
+    pieces = [shape for c in question["components"] for body in c["bodies"] for shape in body["shapes"]]
+    pair = sorted(int(random.integers(len(pieces))) for _ in range(2))
+    point = pieces[pair[0]]["vertices"][0] if random.random() < 0.5 else random.uniform(-1, 1, 2).tolist()
+    answer["slices"][k]["overlaps"].append({"pieces": pair, "point": point})
+    return Altered(question, answer, cells=(k,))
