@@ -9,7 +9,7 @@ from pydrake.systems.analysis import Simulator
 from coop_drake.diagram import build_closed_loop
 from coop_drake.planning.planner import plan as plan_problem
 from coop_drake.plant import planning_problem, read_component_tree
-from coop_drake.scenario import Control, Deployment, Hold, RobotDepartures, Silence, load_scenario
+from coop_drake.scenario import Control, Deployment, Hold, Push, RobotDepartures, Silence, load_scenario
 from coop_drake.simulation import Invariants, TeamClearance, build_maps, configure_simulator, simulate
 from coop_drake.simulation.telemetry import Telemetry
 from tests.support.run_checks import verified_run
@@ -118,6 +118,17 @@ def test_a_silent_robot_holds_the_team_until_it_is_heard_again():
     assert 2.45 <= held[-1] <= 2.55
     at_rest = (log.times > 0.6 + REST_TIME) & (log.times < 2.5)
     assert np.abs(log.object_twist[at_rest]).max() < RATE
+    assert verified_run(scenario, plan, log).answer == "arrived"
+
+
+def test_a_robot_that_is_pushed_asks_for_a_hold_until_it_has_recovered():
+    push = Push("robot_0", (220.0, 0.0), time=0.5, duration=0.5)
+    scenario, plan = held_scenario(Hold(energy=3.0), Deployment(control_rate=200.0, pushes=(push,)))
+    log = simulate(scenario, plan, small_maps())
+    assert (log.reached, log.violation) == (True, "")
+    held = log.times[log.held > 0.0]
+    assert 0.5 < held[0] < 0.6
+    assert held[-1] < 2.0
     assert verified_run(scenario, plan, log).answer == "arrived"
 
 
