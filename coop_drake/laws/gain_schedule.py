@@ -33,6 +33,7 @@ class Schedule(NamedTuple):
         smoothing: c of the governor's root [m].
         quintic: Whether funnels are quintic.
         funnel_acceleration: Largest acceleration of a funnel bound [rad/s^2 or m/s^2].
+        goal_acceleration: The same over the goal interval's width [1/s^2].
         min_angle_rate: Smallest lambda of the object's angle [1/s].
         max_angle_rate: Largest lambda of the object's angle [1/s].
         min_joint_rate: Smallest lambda of a joint [1/s].
@@ -59,6 +60,7 @@ class Schedule(NamedTuple):
     smoothing: float
     quintic: bool
     funnel_acceleration: float
+    goal_acceleration: float
     min_angle_rate: float
     max_angle_rate: float
     min_joint_rate: float
@@ -88,6 +90,7 @@ def _fixed(gains: FixedGains) -> Schedule:
         wall_stiffness=0.0, min_stiffness=stiffness, max_stiffness=stiffness,
         damping_factor=gains.damping / root, governor_factor=gains.governor_gain / root,
         smoothing=float(gains.smoothing), quintic=gains.funnel == "quintic", funnel_acceleration=0.0,
+        goal_acceleration=inf,
         min_angle_rate=angle, max_angle_rate=angle, min_joint_rate=joint, max_joint_rate=joint,
         max_log_gain=float(gains.log_gain), log_stiffness=inf, log_acceleration=inf,
         position_gain=float(gains.position_gain), rate_gain=float(gains.rate_gain),
@@ -115,7 +118,9 @@ def _by_age(gains: ScheduledGains) -> Schedule:
         wall_stiffness=float(gains.wall_stiffness), min_stiffness=least,
         max_stiffness=stiffness, damping_factor=float(gains.damping_factor),
         governor_factor=float(gains.governor_factor), smoothing=float(gains.smoothing), quintic=True,
-        funnel_acceleration=float(gains.funnel_acceleration), min_angle_rate=rates[0],
+        funnel_acceleration=float(gains.funnel_acceleration),
+        goal_acceleration=gains.goal_acceleration * rate_gain * rate_gain,
+        min_angle_rate=rates[0],
         max_angle_rate=rates[1], min_joint_rate=rates[0], max_joint_rate=rates[1],
         max_log_gain=float(gains.max_log_gain), log_stiffness=gains.log_fraction * rate_gain * rate_gain,
         log_acceleration=float(gains.log_acceleration), position_gain=gains.position_fraction * rate_gain,
@@ -156,8 +161,9 @@ def scheduled_axis(
 ) -> tuple[float, float, float]:
     """Return lambda, kappa and the energy bound of one axis.
 
-    lambda = clamp(sqrt(``funnel_acceleration`` / (``PEAK`` shrink))), shrink being the distance that the
-    faster bound moves: the largest acceleration of a quintic bound is ``PEAK`` lambda^2 shrink. kappa is the
+    lambda = clamp(sqrt(A / (``PEAK`` shrink))), shrink being the distance that the faster bound moves: the
+    largest acceleration of a quintic bound is ``PEAK`` lambda^2 shrink. A is ``funnel_acceleration``, or less
+    where the goal interval is narrow: an error of the model by a part of A must not fill it. kappa is the
     largest gain, up to ``max_log_gain``, with which the log term kappa |a s| at rest stays below
     ``log_acceleration`` and its stiffness in the middle of the goal interval below ``log_stiffness``; a and s
     are those of ``track_axis`` in ``ppc.py``. The bound on V is ``energy_factor`` times the energy at rest,
@@ -179,9 +185,10 @@ def scheduled_axis(
     if is_joint:
         slowest, fastest = schedule.min_joint_rate, schedule.max_joint_rate
     shrink, rate = max(goal_lower - slice_lower, slice_upper - goal_upper), fastest
-    if PEAK * shrink * fastest * fastest > schedule.funnel_acceleration:
-        rate = max(sqrt(schedule.funnel_acceleration / (PEAK * shrink)), slowest)
     width, goal_width = slice_upper - slice_lower, goal_upper - goal_lower
+    acceleration = min(schedule.funnel_acceleration, schedule.goal_acceleration * goal_width)
+    if PEAK * shrink * fastest * fastest > acceleration:
+        rate = max(sqrt(acceleration / (PEAK * shrink)), slowest)
     near = schedule.saturation * width
     inside = min(max(resting, slice_lower + near), slice_upper - near)
     dl, du = inside - slice_lower, slice_upper - inside

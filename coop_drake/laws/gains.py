@@ -11,7 +11,7 @@ from coop_drake.typed_data import EXACT, DataError, Limits, NotNegative, Positiv
 
 FunnelShape = Literal["exponential", "quintic"]
 
-IDEAL_AGE = 0.0125
+IDEAL_AGE = 0.015
 """Smallest age for which gains are scheduled [s]. An ideal team could take larger gains: on the shipped
 scenarios they make the transport no quicker, and its forces larger."""
 
@@ -138,7 +138,7 @@ class ScheduledGains:
     fraction of 1 / tau, and all others by the rate gain k2.
 
     Attributes:
-        command_age: tau [s]; null for that of the scenario's ``deployment``, or for 12.5 ms if that is
+        command_age: tau [s]; null for that of the scenario's ``deployment``, or for 15 ms if that is
             less.
         age_phase: k2 times tau, the phase by which the age turns the rate loop [rad].
         max_rate_gain: Largest k2 [1/s].
@@ -152,6 +152,8 @@ class ScheduledGains:
         smoothing: c of the governor's root [m].
         funnel_acceleration: Largest acceleration of a funnel bound, for which lambda is chosen [rad/s^2 or
             m/s^2].
+        goal_acceleration: The same over k2^2 and the goal interval's width: what an error of the model lets
+            a narrow interval bear [-].
         min_decay_rate: Smallest lambda [1/s].
         decay_fraction: Largest lambda over k2 [-].
         max_log_gain: Largest kappa [rad^2/s^2 or m^2/s^2].
@@ -167,7 +169,7 @@ class ScheduledGains:
     """
 
     command_age: Positive | None = None
-    age_phase: Positive = 0.35
+    age_phase: Positive = 0.4
     max_rate_gain: Positive = 60.0
     position_fraction: Positive = 0.4
     ramp_fraction: Positive = 0.3
@@ -178,6 +180,7 @@ class ScheduledGains:
     governor_factor: Positive = 1.2
     smoothing: NotNegative = 0.001
     funnel_acceleration: Positive = 12.0
+    goal_acceleration: Positive = 0.6
     min_decay_rate: Positive = 1.5
     decay_fraction: Positive = 0.5
     max_log_gain: Positive = 0.1

@@ -31,12 +31,12 @@ def test_stiffness_follows_the_clearance_between_its_bounds(clearance, stiffness
 
 @pytest.mark.parametrize("age", [0.005, 0.0125, 0.03, 0.2])
 def test_gains_follow_the_age_of_what_a_command_rests_on(age):
-    """k2 is 0.35 over the age, all others are fractions of it, and K is at most the square of 0.35 / age."""
+    """k2 is 0.4 over the age, all others are fractions of it, and K is at most the square of 0.4 / age."""
     gains = schedule(ScheduledGains(command_age=age), clearance=0.01, resting=np.array([0.5, 0.0]))
-    k2 = min(60.0, 0.35 / age)
+    k2 = min(60.0, 0.4 / age)
     assert gains.rate_gain == pytest.approx(k2)
     assert (gains.position_gain, gains.ramp_rate) == pytest.approx((0.4 * k2, 0.3 * k2))
-    assert gains.stiffness == pytest.approx(min(150.0, (0.35 / age) ** 2))
+    assert gains.stiffness == pytest.approx(min(150.0, (0.4 / age) ** 2))
     assert gains.log_gain[0] == pytest.approx(min(0.1, 0.3 * (0.2 * k2) ** 2 / 16.0))
     assert np.all(gains.decay_rate <= 0.5 * k2 * (1.0 + 1e-12))
 
@@ -52,7 +52,10 @@ def test_walls_that_close_far_close_slowly():
     )
     # The largest acceleration of a bound is 10 / (25 sqrt(3)) lambda^2 shrink; without shrink it is k2 / 2.
     aimed = np.sqrt(12.0 * 2.5 * np.sqrt(3.0) / np.array([9.0, 0.8, 1.9]))
-    assert gains.decay_rate == pytest.approx([*aimed, 14.0])
+    assert gains.decay_rate == pytest.approx([*aimed, 0.2 / 0.015])
+    narrow = {"goal_lower": np.array([0.98, -1.0])}
+    least = schedule(ScheduledGains(goal_acceleration=0.1), **narrow).decay_rate[0]
+    assert least == pytest.approx(np.sqrt(0.1 * (0.4 / 0.015) ** 2 * 0.02 * 2.5 * np.sqrt(3.0) / 0.98))
     slow = schedule(ScheduledGains(funnel_acceleration=0.1))
     assert slow.decay_rate[0] == 1.5
 
@@ -116,7 +119,7 @@ def test_rest_on_or_outside_the_border_gives_finite_gains_that_lead_back(gain_se
 
 def test_a_goal_as_wide_as_the_slice_is_allowed():
     gains = schedule(ScheduledGains(), goal_lower=SLICE["slice_lower"], goal_upper=SLICE["slice_upper"])
-    assert gains.decay_rate == pytest.approx([14.0, 14.0])
+    assert gains.decay_rate == pytest.approx([0.2 / 0.015] * 2)
 
 
 @pytest.mark.parametrize(

@@ -71,11 +71,14 @@ def test_neither_name_nor_file_is_refused():
         (Deployment(), None),
         (Deployment(control_rate=1000.0), None),
         (Deployment(control_rate=200.0, measurements=Measurements(delay=0.012)), 0.0175),
-        (Deployment(control_rate=100.0, actuators=ActuatorLimits(lag=0.01)), 0.015),
+        (Deployment(control_rate=100.0, actuators=ActuatorLimits(lag=0.02)), 0.025),
         (Deployment(actuators=ActuatorLimits(lag=0.02)), 0.02),
     ],
 )
 def test_rules_without_an_age_of_their_own_get_that_of_the_deployment(deployment, age):
-    """Delays are rounded up to whole periods; a team below 12.5 ms keeps the gains of an ideal one."""
+    """Delays are rounded up to whole periods; a team below 15 ms keeps the gains of an ideal one."""
     scenario = replace(load_scenario(SCENARIO), deployment=deployment)
-    assert scenario.gain_sets == {"scheduled": ScheduledGains(command_age=age), "table_2": FixedGains()}
+    scheduled = scenario.gain_sets["scheduled"]
+    assert scheduled.command_age == (age if age is None else pytest.approx(age))
+    assert replace(scheduled, command_age=None) == ScheduledGains()
+    assert scenario.gain_sets["table_2"] == FixedGains()

@@ -21,7 +21,7 @@ def random_gains(rng: np.random.Generator) -> GainSet:
         wall_stiffness=20.0 * factor[0],
         damping_factor=1.4 * factor[1],
         governor_factor=1.2 * factor[2],
-        age_phase=0.35 * factor[3],
+        age_phase=0.4 * factor[3],
     )
 
 

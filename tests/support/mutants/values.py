@@ -21,6 +21,7 @@ _GAINS = [
     "damping_factor",
     "governor_factor",
     "funnel_acceleration",
+    "goal_acceleration",
     "min_decay_rate",
     "decay_fraction",
     "max_log_gain",
