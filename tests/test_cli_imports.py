@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 import subprocess
 import sys
+from pathlib import Path
 
+import coop_drake
 from tests.support.scenarios import write_scenario
 
 CALLED = """
 import sys
+from pathlib import Path
 from coop_drake.cli import app
 code = app(sys.argv[1:], standalone_mode=False)
 print(code, *sorted({name.partition(".")[0] for name in sys.modules}))
@@ -51,3 +55,10 @@ def test_the_whole_package_is_imported_without_numpy():
     ).stdout
     assert "coop_drake.lazy" in modules.split()
     assert HEAVY.isdisjoint(modules.split())
+
+
+def test_no_package_lists_a_name_that_one_of_its_modules_has():
+    for stub in Path(coop_drake.__file__).parent.rglob("__init__.pyi"):
+        imports = [node for node in ast.parse(stub.read_text()).body if isinstance(node, ast.ImportFrom)]
+        names = {alias.name for node in imports for alias in node.names}
+        assert names.isdisjoint(node.module for node in imports), stub
