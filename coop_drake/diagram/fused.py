@@ -33,8 +33,6 @@ from coop_drake.systems import (
     axis_laws,
 )
 
-__all__ = ["FusedControllers", "add_fused_controllers", "build_team_controller"]
-
 
 @dataclass(frozen=True)
 class FusedControllers:

@@ -15,8 +15,6 @@ from coop_drake.plant import RobotPlant, TeamPlant, build_robot_plant
 from coop_drake.scenario import Scenario
 from coop_drake.systems import GovernedCell, whole_periods
 
-__all__ = ["robot_knowledge"]
-
 
 def robot_knowledge(
     scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], team: TeamPlant

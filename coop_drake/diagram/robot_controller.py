@@ -29,8 +29,6 @@ from coop_drake.systems import (
 )
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
-__all__ = ["HELD", "TELEMETRY", "Replacements", "RobotKnowledge", "build_robot_controller"]
-
 TELEMETRY = (
     "object_state",
     "governor_position",

@@ -19,8 +19,6 @@ from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems.governor_kernels import cell_margin
 from coop_drake.systems.hold_supervisor import ASKED, SILENT, TOLD
 
-__all__ = ["blocking_margin", "narrowest_funnel", "patience"]
-
 PATIENCE_FACTOR = 10.0
 """A transition may take this many times its estimated time [-]: estimates are within a factor of two."""
 

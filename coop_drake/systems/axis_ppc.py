@@ -14,8 +14,6 @@ from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index
 from coop_drake.systems.funnel_clock import CLOCK_SIZE, clock_of
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["AxisPpc"]
-
 
 class AxisPpc(Block):
     """Keeps the object's angle and every joint of one robot in their funnels: (17)-(20) and (35)-(39).

@@ -8,8 +8,6 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem
 
-__all__ = ["Block"]
-
 
 class Block(LeafSystem):
     """A LeafSystem whose memory can be freed.

@@ -7,8 +7,6 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues, Even
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
 
-__all__ = ["CellPlanner"]
-
 
 class CellPlanner(Block):
     """Advances to the next cell of the plan when all robots are ready to leave the current one.

@@ -13,8 +13,6 @@ from coop_drake.systems.ready_kernels import ready_conditions, robot_ready
 from coop_drake.systems.reference_governor import GovernedCell
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["ReadyMonitor"]
-
 
 class ReadyMonitor(Block):
     """Reports whether object and own joints may enter the next cell; in the last cell, whether they arrived.

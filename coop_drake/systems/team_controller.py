@@ -22,8 +22,6 @@ from coop_drake.systems.team_kernels import (
 )
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["TeamController"]
-
 
 class TeamController(Block):
     """Computes what the controllers of all robots compute, from the plant's state, in one call.

@@ -16,8 +16,6 @@ from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.exact import verify_plan, verify_proof
 from coop_drake.verification.problem_match import check_digest
 
-__all__ = ["verify_file"]
-
 
 def verify_file(
     path: Path | str,

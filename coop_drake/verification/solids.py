@@ -11,8 +11,6 @@ import numpy as np
 from coop_drake.tree.component_tree import ComponentTree, TreeJoint
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
-__all__ = ["Solid", "Stage", "colliding_pairs", "component_stages", "team_solids"]
-
 
 @dataclass(frozen=True)
 class Stage:

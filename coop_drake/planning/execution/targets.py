@@ -16,8 +16,6 @@ from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.travel_time import transition_time
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["choose_targets"]
-
 LARGEST_PARTS = 3
 """Of an overlap in several parts only this many are considered, those with the largest inscribed disc."""
 

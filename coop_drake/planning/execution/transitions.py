@@ -27,8 +27,6 @@ from coop_drake.planning.travel_time import travel_time
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["make_plan", "reschedule", "with_gains"]
-
 NARROWEST = 1e-3
 """Necks and goal regions with less clearance are refused, because the governor would need minutes there [m].
 """

@@ -32,8 +32,6 @@ from coop_drake.tree.pose import FloatArray
 
 Found = TypeVar("Found")
 
-__all__ = ["blocked_goal_proof", "disc_proof", "slices_proof"]
-
 GROWTHS = (1e-3, 1e-4, 1e-5, 0.0, -5e-7)
 """Cells are grown by the first of these that keeps start and goal apart [m]: the more they are grown, the
 faster the check. The last one takes back half of the tolerance by which the planner grows cells, for cells

@@ -18,8 +18,6 @@ from coop_drake.planning.proofs.witnesses import Witnesses
 from coop_drake.planning.questions.margins import marginal_workspace, margins
 from coop_drake.progress import Progress
 
-__all__ = ["search_by_cells"]
-
 MARGIN_BUDGET_DIVISOR = 8
 """An exploration at a margin may make this fraction of the slices, one in eight: most of them fail, and a
 plan at margin zero exists already."""
