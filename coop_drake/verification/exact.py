@@ -77,7 +77,14 @@ def _exactly(
     problem: PlanningProblem, answer: Mapping[str, Any], progress: Progress | None
 ) -> tuple[Check, ...]:
     """What the exact checker finds to hold; its refusal as an error of ours."""
+    question = question_of(problem)
+    aside = [reason for _, _, reason in question["left_aside"]]
+    name = (
+        f"pairs of bodies that may overlap, by the question: {aside.count('joint')} that a joint connects, "
+        f"{aside.count('model')} that their model leaves aside"
+    )
     try:
-        return tuple(Check(*entry) for entry in check(question_of(problem), answer, progress or _silent))
+        checks = tuple(Check(*entry) for entry in check(question, answer, progress or _silent))
+        return (*checks, Check(name, len(aside))) if aside else checks
     except RefusedError as refusal:
         raise RefusalError(refusal.where, refusal.finding) from refusal
