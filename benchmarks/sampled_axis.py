@@ -7,7 +7,8 @@ from math import exp
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.axis_table import bounds_of, track_row
+from coop_drake.laws.axis_table import FADING_TIME, bounds_of, track_row
+from coop_drake.laws.hand_over import fading
 from coop_drake.tree.pose import FloatArray
 
 
@@ -37,12 +38,13 @@ def run_axis(
         disturbances: Errors of the measured position and rate, and of the acceleration, of every sample,
             shape (samples, 3).
         model_factor: Factor by which accelerations are larger than commanded [-].
-        late: Periods for which the acceleration from before the entry is commanded on.
+        late: Periods for which the acceleration from before the entry is commanded on, until the robot hears
+            of the switch; from then on the jump of the command fades.
         motion: Receives x, x' and x'' at every sample, shape (samples, 3).
     """
     n = disturbances.shape[0]
     x, v, p = entry
-    old = p
+    old, jump = p, 0.0
     for k in range(n):
         motion[k, 0], motion[k, 1], motion[k, 2] = x, v, p
         lower, upper = bounds_of(row, k * period)[:2]
@@ -54,7 +56,10 @@ def run_axis(
             seen_v = entry[1] - ago * old
         else:
             seen_x, seen_v = motion[k - delay, 0], motion[k - delay, 1]
-        u = track_row(row, k * period, seen_x + disturbances[k, 0], seen_v + disturbances[k, 1])[0]
+        seen_x, seen_v = seen_x + disturbances[k, 0], seen_v + disturbances[k, 1]
+        if k == late:
+            jump = old / model_factor - track_row(row, 0.0, seen_x, seen_v)[0]
+        u = track_row(row, k * period, seen_x, seen_v)[0] + fading(k * period, row[FADING_TIME]) * jump
         u = model_factor * u + disturbances[k, 2] if k >= late else old
         for half in range(2):
             t = 0.5 * period

@@ -67,10 +67,13 @@ class Tolerance:
         entry_upper: Highest position at the entry [rad or m].
         entry_rate_lower: Lowest rate at the entry [rad/s or m/s].
         entry_rate_upper: Highest rate at the entry [rad/s or m/s].
-        entry_acceleration: Largest magnitude of the acceleration before the entry [rad/s^2 or m/s^2].
+        entry_acceleration: Largest magnitude of acceleration and command at the entry [rad/s^2 or m/s^2].
+        entry_history: Largest magnitude of the acceleration in the time before the entry of which
+            measurements still speak [rad/s^2 or m/s^2].
         distance: Least distance to the funnel's bounds at all times [rad or m].
         acceleration: Largest magnitude of the acceleration [rad/s^2 or m/s^2].
         settled: Largest departure from the middle of the goal interval at the end [rad or m].
+        entry_parts: Into how many parts the positions at the entry are cut, so that these bounds follow [-].
     """
 
     age_factor: Annotated[Positive, EXACT]
@@ -79,6 +82,8 @@ class Tolerance:
     entry_rate_lower: Vector
     entry_rate_upper: Vector
     entry_acceleration: Vector
+    entry_history: Vector
     distance: Vector
     acceleration: Vector
     settled: Vector
+    entry_parts: tuple[Annotated[int, Limits(at_least=1, at_most=64)], ...]

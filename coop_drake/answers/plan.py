@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
+from coop_drake.answers.budget import Budget, Tolerance
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.answers.region import Points, Region
 from coop_drake.answers.search_report import SearchReport
@@ -50,6 +51,7 @@ class Transition:
         only_angles: True where the position is already at the target and only angles move.
         gains: Gains of the governor and of the funnels.
         path: Such a path from where the cell is entered to the target, shape (k, 2) [m].
+        tolerance: What follows from the plan's budget; null in a plan without one.
     """
 
     target: Vector
@@ -62,6 +64,7 @@ class Transition:
     only_angles: bool
     gains: TransitionGains
     path: Points
+    tolerance: Tolerance | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +80,8 @@ class Plan:
         goal_joints: Goal of each joint, None where free.
         cells: From the start's cell to the goal's.
         transitions: One for each cell, in the same order.
+        budget: Departures from the ideal team under which every axis provably stays in its funnel; null if
+            none were asked for.
     """
 
     problem: str = ""
@@ -87,6 +92,7 @@ class Plan:
     goal_joints: tuple[Number | None, ...]
     cells: tuple[Cell, ...]
     transitions: tuple[Transition, ...]
+    budget: Budget | None = None
 
     def governor_row(self, index: int) -> Vector:
         """Return the governor's gains in a transition, with those from which they start, shape (8,)."""

@@ -69,7 +69,8 @@ def read_plan(document: Document) -> Plan:
         document.check_intervals(f"cells[{k}].", axes)
         document.check_intervals(f"transitions[{k}].goal_", axes)
         document.check_length(f"transitions[{k}].target", 2)
-        for name, gain in document.entry(f"transitions[{k}].gains").items():
-            if isinstance(gain, list):
-                document.check_length(f"transitions[{k}].gains.{name}", axes)
+        for part in ("gains", "tolerance"):
+            for name, value in (document.entry(f"transitions[{k}]").get(part) or {}).items():
+                if isinstance(value, list):
+                    document.check_length(f"transitions[{k}].{part}.{name}", axes)
     return plan

@@ -77,6 +77,15 @@ GainsName = Annotated[
         autocompletion=complete_gains,
     ),
 ]
+BudgetName = Annotated[
+    str | None,
+    typer.Option(
+        "--budget",
+        metavar="FILE|deployment",
+        help="Departures from the ideal team that the plan shall provably tolerate: a file, or those of the "
+        "scenario.",
+    ),
+]
 ResultsFolder = Annotated[Path | None, out_folder("Where results go; out/<scenario> by default.")]
 PictureFolder = Annotated[Path | None, out_folder("Where the picture goes; out/<scenario> by default.")]
 Machine = Annotated[

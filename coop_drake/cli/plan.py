@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from coop_drake.cli.options import GainsName, Machine, Quiet, ResultsFolder, ScenarioPath
+from coop_drake.cli.options import BudgetName, GainsName, Machine, Quiet, ResultsFolder, ScenarioPath
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import answer_of, planning_facts, summary_rows
@@ -14,12 +14,14 @@ from coop_drake.cli.task import Task, read_task
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan, PlanningResult
+    from coop_drake.answers.budget import Budget
 
 
 def plan_command(
     scenario: ScenarioPath,
     out: ResultsFolder = None,
     gains: GainsName = None,
+    budget: BudgetName = None,
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
@@ -27,12 +29,29 @@ def plan_command(
     with reporting(machine=machine, quiet=quiet) as reporter:
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out)
-        if plan_of(task, folder, reporter):
+        if plan_of(task, folder, reporter, _budget(budget, task)):
             reporter.table(task.name, summary_rows(reporter.facts))
             reporter.say(f"The plan is in {escape(str(folder.plan))}")
 
 
-def plan_of(task: Task, folder: ResultFolder | None, reporter: Reporter) -> Plan | None:
+def _budget(choice: str | None, task: Task) -> Budget | None:
+    """The departures that a plan shall tolerate; refused for gains that no budget can be shown for."""
+    if choice is None:
+        return None
+    from coop_drake.errors import ScenarioError
+    from coop_drake.laws import ScheduledGains
+    from coop_drake.scenario.budget_file import read_budget
+
+    name = task.scenario.selected_gains
+    if not isinstance(task.scenario.gain_sets[name], ScheduledGains):
+        allowed = "a gain set of scheduled gains: the funnels of others never close, so that no budget holds"
+        raise ScenarioError(str(task.scenario.path), "gains.selected", name, allowed)
+    return read_budget(choice, task.scenario)
+
+
+def plan_of(
+    task: Task, folder: ResultFolder | None, reporter: Reporter, budget: Budget | None = None
+) -> Plan | None:
     """Plan, and note the facts; without a plan say so, and set the exit code.
 
     The plan with its table of cells, or the proof that there is none, goes to the folder if one is given.
@@ -43,7 +62,8 @@ def plan_of(task: Task, folder: ResultFolder | None, reporter: Reporter) -> Plan
 
     name = task.scenario.selected_gains
     with reporter.stage("planning", "planning", cpu=True) as progress:
-        result = plan(task.problem, task.scenario.gain_sets[name], gain_set_name=name, progress=progress)
+        gain_set = task.scenario.gain_sets[name]
+        result = plan(task.problem, gain_set, gain_set_name=name, budget=budget, progress=progress)
     reporter.facts.update(planning_facts(result), peak_memory_mb=peak_memory_mb())
     if folder is not None:
         _write(result, task, folder)

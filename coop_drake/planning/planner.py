@@ -6,12 +6,14 @@ from dataclasses import replace
 
 from shapely.errors import ShapelyError
 
-from coop_drake.answers.plan import Found, Infeasible, PlanningResult, Undecided
+from coop_drake.answers.budget import Budget
+from coop_drake.answers.plan import Found, Infeasible, Plan, PlanningResult, Undecided
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PlanError, StallError
-from coop_drake.laws import GainSet
-from coop_drake.planning.boxes.channel import NoChannel
+from coop_drake.laws import GainSet, ScheduledGains
+from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
+from coop_drake.planning.budget.tolerant import BeyondBudget, tolerant_plan
 from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.planning.search.search import find_path
 from coop_drake.progress import Progress
@@ -21,7 +23,12 @@ FINER_ATTEMPTS = 2
 
 
 def plan(
-    problem: PlanningProblem, gain_set: GainSet, *, gain_set_name: str, progress: Progress | None = None
+    problem: PlanningProblem,
+    gain_set: GainSet,
+    *,
+    gain_set_name: str,
+    budget: Budget | None = None,
+    progress: Progress | None = None,
 ) -> PlanningResult:
     """Find a plan, or prove that none exists.
 
@@ -33,6 +40,7 @@ def plan(
         problem: What is asked.
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
+        budget: Departures from the ideal team that the plan shall tolerate; needs scheduled gains.
         progress: Called with a phase and the fraction of it that is done.
 
     Returns:
@@ -47,15 +55,32 @@ def plan(
                 return Infeasible(answer.reason, report, answer.proof)
             return Undecided(stall or answer.reason, report)
         try:
-            made = quickest_plan(question, answer, gain_set, gain_set_name=gain_set_name, progress=progress)
+            made = _made(question, answer, gain_set, gain_set_name, budget, progress)
         except (GeometryError, PlanError, StallError, ShapelyError) as error:
             stall = f"a free path exists, but a plan along it cannot be executed: {error}"
             if answer.margin == 0.0:
                 break
             question = replace(question, settings=replace(question.settings, margin=0.5 * answer.margin))
         else:
+            if isinstance(made, BeyondBudget):
+                return Undecided(made.describe(), report)
             return Found(made, report)
     return Undecided(stall, report)
+
+
+def _made(
+    problem: PlanningProblem,
+    found: Channel | CoveredPath,
+    gain_set: GainSet,
+    name: str,
+    budget: Budget | None,
+    progress: Progress | None,
+) -> Plan | BeyondBudget:
+    if budget is None:
+        return quickest_plan(problem, found, gain_set, gain_set_name=name, progress=progress)
+    if not isinstance(gain_set, ScheduledGains):
+        raise ValueError(f"a budget needs scheduled gains; the gain set {name!r} is fixed")
+    return tolerant_plan(problem, found, gain_set, gain_set_name=name, budget=budget, progress=progress)
 
 
 def _added(before: SearchReport, latest: SearchReport) -> SearchReport:

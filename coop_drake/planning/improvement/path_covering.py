@@ -62,7 +62,7 @@ class PathCovering:
 
 
 def cover_path(
-    problem: PlanningProblem, path: FloatArray, margin: float, gain_set: GainSet
+    problem: PlanningProblem, path: FloatArray, margin: float, gain_set: GainSet, least_overlap: float = 0.0
 ) -> PathCovering | None:
     """Cover a path with boxes such that the transport is fast: few boxes, and narrow ones in narrow passages.
 
@@ -74,6 +74,7 @@ def cover_path(
         path: Free configurations from start to goal, theta unwrapped, shape (m, 3 + n) [m, rad].
         margin: The margin that the path keeps [m].
         gain_set: Gains, fixed or to be scheduled.
+        least_overlap: Least overlap of consecutive boxes in every angle and joint [rad or m].
 
     Returns:
         The boxes, or None if no sequence of such boxes was found.
@@ -86,7 +87,8 @@ def cover_path(
     goals = np.array(final_intervals(problem, angle))
     # At a small margin some levels are equal; each is tried once.
     for least_clearance, pads in dict.fromkeys(
-        (max(fraction * margin, LEAST_CLEARANCE), pads) for fraction, pads in LEVELS
+        (max(fraction * margin, LEAST_CLEARANCE), _wide(pads, 0.5 * least_overlap))
+        for fraction, pads in LEVELS
     ):
         points = _waypoints(boxes, grid, path, least_clearance, pads[0])
         if points is None:
@@ -102,6 +104,11 @@ def cover_path(
             targets = (*(points[j, :2] for j in ends[:-1]), problem.goal_pose[:2])
             return PathCovering(Channel(tuple(free), CORE_FRACTION * least_clearance, angle), targets)
     return None
+
+
+def _wide(pads: tuple[float, ...], least: float) -> tuple[float, ...]:
+    """Return the paddings that are wide enough, in place of narrower ones once and twice the least."""
+    return tuple(sorted({pad for pad in (*pads, least, 2.0 * least) if pad >= max(least, pads[0])}))
 
 
 def _waypoints(

@@ -27,6 +27,7 @@ def quickest_plan(
     gain_set: GainSet,
     *,
     gain_set_name: str,
+    least_overlap: float = 0.0,
     progress: Progress | None = None,
 ) -> Plan:
     """Make a plan along the path of a search's result, with other boxes if these can be found.
@@ -41,6 +42,7 @@ def quickest_plan(
         found: The channel that a search found, or a path that boxes cover.
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
+        least_overlap: Least overlap of consecutive boxes in every angle and joint [rad or m].
         progress: Called with a phase and the fraction of it that is done.
 
     Raises:
@@ -50,10 +52,17 @@ def quickest_plan(
     """
     unit = usual_unit(problem.tree)
     if unit == 1.0:
-        return _quickest(problem, found, gain_set, gain_set_name, progress)
+        return _quickest(problem, found, gain_set, gain_set_name, least_overlap, progress)
     scale = Rescaling(problem, unit)
     try:
-        made = _quickest(scale.question(), scale.usual(found), scale.gains(gain_set), gain_set_name, progress)
+        made = _quickest(
+            scale.question(),
+            scale.usual(found),
+            scale.gains(gain_set),
+            gain_set_name,
+            least_overlap,
+            progress,
+        )
     except (GeometryError, PlanError, StallError) as error:
         raise StallError(f"{error} (these lengths are to be multiplied by {unit:g})") from error
     plan = with_gains(scale.plan(made), gain_set, gain_set_name)
@@ -65,6 +74,7 @@ def _quickest(
     found: Channel | CoveredPath,
     gain_set: GainSet,
     gain_set_name: str,
+    least_overlap: float,
     progress: Progress | None,
 ) -> Plan:
     if isinstance(found, Channel):
@@ -73,7 +83,7 @@ def _quickest(
     path = found.path if found.path is not None else path_through(problem, found)
     if progress is not None:
         progress("choosing boxes", 0.0)
-    better = cover_path(problem, path, found.margin, gain_set)
+    better = cover_path(problem, path, found.margin, gain_set, least_overlap)
     if better is not None:
         try:
             return make_plan(

@@ -1,0 +1,168 @@
+"""Check that a plan tolerates its budget: every stated set follows from those before it.
+
+By induction over the transitions: from the stated entry set of each, no disturbance within the budget takes
+an axis nearer to its funnel's bounds than stated, or accelerates it more; it ends settled as stated, where it
+counts as arrived; and the states in which the next cell can then be entered lie in the stated set of that.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+
+from coop_drake.answers.budget import Budget, Tolerance
+from coop_drake.answers.plan import Plan
+from coop_drake.errors import RefusalError
+from coop_drake.tree.pose import FloatArray
+from coop_drake.verification.budgets.axis_law import Axes
+from coop_drake.verification.budgets.entering import entering
+from coop_drake.verification.budgets.staying import staying
+from coop_drake.verification.budgets.tubes import Disturbed, tubes
+from coop_drake.verification.checks import Check
+
+MODEL_PARTS = 3
+"""Parts into which the range of the model's error is cut [-]."""
+
+ROUNDING = 1e-9
+"""Differences that rounding explains, relative and absolute [rad or m, s]."""
+
+EROSION = 0.1
+"""Fraction of a goal interval at each end in which an axis does not count as arrived [-]."""
+
+
+def check_budget(plan: Plan) -> Check | None:
+    """Check what a plan states about its budget; None for a plan without one.
+
+    Raises:
+        RefusalError: Names the transition, the entry and the axis.
+    """
+    if plan.budget is None:
+        for k, transition in enumerate(plan.transitions):
+            if transition.tolerance is not None:
+                raise RefusalError(f"transitions[{k}].tolerance", "is stated, but the plan has no budget")
+        return None
+    smallest, count, entry = np.inf, 0, None
+    for k, transition in enumerate(plan.transitions):
+        stated, where = transition.tolerance, f"transitions[{k}]"
+        if stated is None:
+            raise RefusalError(f"{where}.tolerance", "is missing, but the plan has a budget")
+        if transition.gains.funnel != "quintic":
+            raise RefusalError(
+                f"{where}.gains.funnel", f"{transition.gains.funnel}: such a funnel never closes"
+            )
+        found = entry if entry is not None else _start(plan)
+        _check_entry(stated, found, f"{where}.tolerance")
+        entry = _check_transition(plan, k, stated, f"{where}.tolerance")
+        smallest, count = min(smallest, float(stated.distance.min())), count + stated.distance.size
+    return Check(
+        "axes stay in their funnels under the budget", count, smallest, "rad or m to a funnel's bound"
+    )
+
+
+def _start(plan: Plan) -> FloatArray:
+    """Return the set of the start: at rest."""
+    rest = np.zeros_like(plan.start[2:])
+    return np.array([plan.start[2:], plan.start[2:], rest, rest, rest, rest])
+
+
+_ENTRY = (
+    "entry_lower", "entry_upper", "entry_rate_lower", "entry_rate_upper", "entry_acceleration",
+    "entry_history",
+)  # fmt: skip
+
+
+def _check_entry(stated: Tolerance, found: FloatArray, where: str) -> None:
+    for name, value in zip(_ENTRY, found, strict=True):
+        least = name in ("entry_lower", "entry_rate_lower")
+        _require(getattr(stated, name), value, least, f"{where}.{name}")
+
+
+def _require(stated: FloatArray, found: FloatArray, least: bool, where: str) -> None:
+    """Refuse a stated bound that the found values exceed; ``least`` says that it is a lower one."""
+    room = ROUNDING * (1.0 + np.abs(found))
+    good = stated <= found + room if least else stated >= found - room
+    if not good.all():
+        axis = int(np.argmin(good))
+        raise RefusalError(
+            f"{where}[{axis}]", f"is {stated[axis]:.6g}; the budget gives {'down' if least else 'up'} to "
+            f"{found[axis]:.6g}",
+        )  # fmt: skip
+
+
+def _axes(plan: Plan, k: int) -> Axes:
+    cell, transition = plan.cells[k], plan.transitions[k]
+    gains, same = transition.gains, np.ones_like(cell.lower)
+    goal = np.array([transition.goal_lower, transition.goal_upper])
+    single = (gains.position_gain, gains.rate_gain, gains.ramp_rate, gains.saturation)
+    singles = (value * same for value in (*single, gains.hand_over_time))
+    return Axes(np.array([cell.lower, cell.upper]), goal, gains.decay_rate, gains.log_gain, *singles)
+
+
+def _check_transition(plan: Plan, k: int, stated: Tolerance, where: str) -> FloatArray | None:
+    """Check one transition; return in which states the next one can begin, None after the last one."""
+    budget, axes = plan.budget, _axes(plan, k)
+    assert budget is not None  # checked by the caller
+    members, disturbed, middle, reach, before = _parts(axes, stated, budget)
+    T, delay = budget.period, disturbed.delay
+    closed = np.maximum(5.0 / axes.decay, np.where(axes.mu > 0.0, 7.0 / np.maximum(axes.mu, 1e-9), 0.0))
+    samples = np.ceil(np.maximum(closed, axes.fading) / T).astype(int) + delay + 1
+    made = tubes(disturbed, int(samples.max()), middle, reach, before)
+    box = _ends(made, samples[members], delay, disturbed.axes)
+    kept = staying(disturbed, (samples[members] - 1) * T, box)
+    distance, fastest = kept[0].copy(), kept[1].copy()
+    for i, n in enumerate(samples[members]):
+        distance[i] = min(distance[i], made[:n, 5, i].min())
+        fastest[i] = max(fastest[i], made[:n, 4, i].max())
+    names = range(axes.k1.size)
+    worst = np.array([distance[members == axis].min() for axis in names])
+    for name, found, least in (
+        ("distance", worst, True),
+        ("acceleration", _largest(fastest, members), False),
+        ("settled", _largest(kept[4], members), False),
+    ):
+        _require(getattr(stated, name), found, least, f"{where}.{name}")
+    half = (0.5 - EROSION) * (axes.goal[1] - axes.goal[0])
+    if not (stated.distance > 0.0).all() or not (stated.settled + budget.angle_noise < half).all():
+        raise RefusalError(where, "an axis may leave its funnel, or never count as arrived")
+    if k + 1 == len(plan.transitions):
+        return None
+    return entering(plan, k, made, samples[members], members, kept, stated)
+
+
+def _parts(
+    axes: Axes, stated: Tolerance, budget: Budget
+) -> tuple[FloatArray, Disturbed, FloatArray, FloatArray, FloatArray]:
+    """Return every part of every axis' entry set with every part of the model's range, and whose it is."""
+    pieces = MODEL_PARTS if budget.model_error > 0.0 else 1
+    members, middles, reaches, factors = [], [], [], []
+    for axis, parts in enumerate(stated.entry_parts):
+        ends = np.linspace(stated.entry_lower[axis], stated.entry_upper[axis], parts + 1)
+        rates = stated.entry_rate_lower[axis], stated.entry_rate_upper[axis]
+        for low, high in pairwise(ends):
+            for piece in range(pieces):
+                members.append(axis)
+                middles.append((0.5 * (low + high), 0.5 * (rates[0] + rates[1])))
+                reaches.append((0.5 * (high - low), 0.5 * (rates[1] - rates[0])))
+                factors.append(1.0 + budget.model_error * ((2 * piece + 1) / pieces - 1.0))
+    of = np.array(members)
+    before = np.array([stated.entry_acceleration[of], stated.entry_history[of]])
+    error = np.full(of.size, budget.model_error / pieces)
+    disturbed = Disturbed(axes[of], budget, np.array(factors), error)
+    return of, disturbed, np.array(middles).T, np.array(reaches).T, before
+
+
+def _ends(made: FloatArray, samples: FloatArray, delay: int, axes: Axes) -> FloatArray:
+    """Return the departures from the goal intervals' middles at the tubes' last samples, shape (3, b)."""
+    box = np.empty((3, samples.size))
+    middle = 0.5 * (axes.goal[0] + axes.goal[1])
+    for i, n in enumerate(samples):
+        last = made[n - 1 - delay : n, :, i]
+        box[0, i] = (np.abs(last[:, 0] - middle[i]) + last[:, 1]).max()
+        box[1, i] = (np.abs(last[:, 2]) + last[:, 3]).max()
+        box[2, i] = last[:, 4].max()
+    return box
+
+
+def _largest(values: FloatArray, members: FloatArray) -> FloatArray:
+    return np.array([values[members == axis].max() for axis in range(int(members.max()) + 1)])

@@ -1,0 +1,174 @@
+"""A plan with a budget is accepted by code of its own, and refused with any statement altered."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from coop_drake.answers import load_plan, save_plan
+from coop_drake.cli import app
+from coop_drake.errors import RefusalError
+from coop_drake.laws.axis_table import bounds_of, track_row
+from coop_drake.verification.budgets import check_budget
+from coop_drake.verification.budgets.axis_law import Axes, fit
+from tests.planning.test_axis_tube import axis
+from tests.support.scenarios import write_scenario
+
+BUDGET = """
+control_rate: 200
+delay: 0.005
+lag: 0.002
+angle_noise: 0.0004
+rate_noise: 0.008
+model_error: 0.06
+acceleration_error: 0.05
+report_age: 0.01
+"""
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("budget")
+    goal = {"object": {"x": 4.5, "y": 2.0, "theta": 3.0}}
+    write_scenario(folder / "room.scenario.yaml", goal=goal)
+    (folder / "budget.yaml").write_text(BUDGET)
+    result = invoke(
+        "plan", folder / "room.scenario.yaml", "--budget", folder / "budget.yaml", "--out", folder
+    )
+    assert result.exit_code == 0, result.output
+    return folder
+
+
+@pytest.fixture(scope="module")
+def plan(folder):
+    return load_plan(folder / "plan.json")
+
+
+def test_the_plan_is_accepted(folder, plan):
+    assert plan.budget is not None
+    assert len(plan.transitions) > 1
+    assert check_budget(plan).count == len(plan.transitions) * (1 + len(plan.joint_names))
+    result = invoke("verify", folder / "plan.json", folder / "room.scenario.yaml", "--json")
+    assert result.exit_code == 0, result.output
+    assert "axes stay in their funnels under the budget" in result.stdout
+
+
+def test_the_law_is_written_twice_and_is_the_same():
+    row, generator = axis(), np.random.default_rng(2)
+    one = Axes(*(np.array(value) for value in ([[row[0]], [row[1]]], [[row[2]], [row[3]]])),
+               *(np.array([row[i]]) for i in (4, 6, 7, 8, 9, 10, 11)))  # fmt: skip
+    for time in (0.0, 0.2, 0.9, 3.0):
+        lower, upper = bounds_of(row, time)[:2]
+        for x, v in generator.uniform([lower - 0.01, -1.0], [upper + 0.01, 1.0], (20, 2)):
+            mine = fit(one, time, np.array([x]), np.array([1e-6]), np.array([v]))
+            assert mine[0][0] == pytest.approx(track_row(row, time, x, v)[0], rel=1e-9, abs=1e-9)
+
+
+DEPARTURES = {
+    "delay": 0.03, "lag": 0.02, "angle_noise": 0.004, "rate_noise": 0.05, "model_error": 0.4,
+    "acceleration_error": 1.0, "report_age": 0.2, "control_rate": 60.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", DEPARTURES)
+def test_a_larger_budget_is_refused(plan, name):
+    altered = replace(plan, budget=replace(plan.budget, **{name: DEPARTURES[name]}))
+    with pytest.raises(RefusalError) as refusal:
+        check_budget(altered)
+    assert "tolerance" in refusal.value.where
+
+
+def with_transition(plan, k, **changes):
+    transitions = list(plan.transitions)
+    transitions[k] = replace(transitions[k], **changes)
+    return replace(plan, transitions=tuple(transitions))
+
+
+ALTERED = {
+    "entry_lower": 1.002, "entry_upper": -1.002, "entry_rate_lower": 0.9, "entry_rate_upper": 0.9,
+    "entry_acceleration": 0.9, "entry_history": 0.9, "distance": 1.05, "acceleration": 0.95, "settled": 0.95,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ALTERED)
+def test_an_altered_statement_is_refused(plan, name):
+    number, k = 1, len(plan.transitions) - 1
+    stated = plan.transitions[k].tolerance
+    values = getattr(stated, name).copy()
+    if name in ("entry_lower", "entry_upper"):
+        width = stated.entry_upper[number] - stated.entry_lower[number]
+        values[number] += width * 0.1 * np.sign(ALTERED[name])
+    else:
+        values[number] *= ALTERED[name]
+    altered = with_transition(plan, k, tolerance=replace(stated, **{name: values}))
+    with pytest.raises(RefusalError) as refusal:
+        check_budget(altered)
+    assert f"transitions[{k}].tolerance.{name}[{number}]" in refusal.value.where
+
+
+GAINS = {"position_gain": 0.3, "rate_gain": 2.5, "ramp_rate": 0.2, "saturation": 8.0}
+
+
+@pytest.mark.parametrize("name", GAINS)
+def test_other_gains_are_refused(plan, name):
+    gains = plan.transitions[0].gains
+    altered = with_transition(plan, 0, gains=replace(gains, **{name: GAINS[name] * getattr(gains, name)}))
+    with pytest.raises(RefusalError, match="tolerance"):
+        check_budget(altered)
+
+
+def test_a_larger_energy_of_entry_is_refused(plan):
+    gains = plan.transitions[-1].gains
+    altered = with_transition(
+        plan, len(plan.transitions) - 1, gains=replace(gains, energy_bound=3.0 * gains.energy_bound)
+    )
+    with pytest.raises(RefusalError, match="entry"):
+        check_budget(altered)
+
+
+def test_a_budget_without_sets_and_sets_without_a_budget_are_refused(plan):
+    with pytest.raises(RefusalError, match="has no budget"):
+        check_budget(replace(plan, budget=None))
+    with pytest.raises(RefusalError, match="is missing"):
+        check_budget(with_transition(plan, 0, tolerance=None))
+
+
+def test_a_file_keeps_all_of_it(plan, tmp_path):
+    again = load_plan(save_plan(plan, tmp_path / "plan.json"))
+    assert again.budget == plan.budget
+    assert np.array_equal(again.transitions[0].tolerance.distance, plan.transitions[0].tolerance.distance)
+
+
+def test_a_budget_that_is_too_large_is_answered_with_one_that_holds(folder, tmp_path):
+    (tmp_path / "budget.yaml").write_text("{delay: 0.05, rate_noise: 0.3, angle_noise: 0.02}")
+    scenario = folder / "room.scenario.yaml"
+    result = invoke("plan", scenario, "--budget", tmp_path / "budget.yaml", "--out", tmp_path)
+    assert result.exit_code == 4, result.output
+    said = " ".join(result.output.split())
+    assert "not with this budget" in said
+    assert "with this one: control_rate 200, delay" in said
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [("{delay: -1}", "delay"), ("{dealy: 1}", "dealy"), ("{model_error: 1.5}", "model_error")],
+)
+def test_bad_budgets_are_bad_input(folder, tmp_path, text, key):
+    (tmp_path / "budget.yaml").write_text(text)
+    result = invoke("plan", folder / "room.scenario.yaml", "--budget", tmp_path / "budget.yaml")
+    assert result.exit_code == 2
+    assert key in result.output
+    assert invoke("plan", folder / "room.scenario.yaml", "--budget", tmp_path / "none.yaml").exit_code == 2
+
+
+def test_budgets_need_a_control_rate_and_scheduled_gains(folder):
+    scenario = folder / "room.scenario.yaml"
+    ideal = invoke("plan", scenario, "--budget", "deployment")
+    assert (ideal.exit_code, "control_rate" in ideal.output) == (2, True)
+    fixed = invoke("plan", scenario, "--budget", folder / "budget.yaml", "--gains", "table_2")
+    assert (fixed.exit_code, "scheduled gains" in " ".join(fixed.output.split())) == (2, True)
