@@ -7,9 +7,11 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from coop_drake.diagram import build_closed_loop
+from coop_drake.errors import ScenarioError
 from coop_drake.planning.planner import plan as plan_problem
 from coop_drake.plant import planning_problem, read_component_tree
 from coop_drake.scenario import Control, Deployment, Hold, Push, RobotDepartures, Silence, load_scenario
+from coop_drake.scenario.validation import validate
 from coop_drake.simulation import Invariants, TeamClearance, build_maps, configure_simulator, simulate
 from coop_drake.simulation.telemetry import Telemetry
 from tests.support.run_checks import verified_run
@@ -140,3 +142,16 @@ def test_a_team_that_is_never_released_says_why_it_waits():
     log = simulate(replace(scenario, simulator=simulator), plan, small_maps())
     assert not log.reached
     assert "it waits until the hold ends: robot 0 is not heard" in log.violation
+
+
+def test_a_hold_after_silence_needs_a_control_rate():
+    scenario, _ = held_scenario(Hold(silence=0.1))
+    with pytest.raises(ScenarioError, match=r"control\.hold\.silence: 0\.1 is not allowed"):
+        validate(scenario)
+
+
+@pytest.mark.parametrize("hold", [Hold(energy=2.0), Hold(silence=0.1)])
+def test_fused_blocks_hear_no_robot(hold):
+    scenario, plan = held_scenario(hold, Deployment(control_rate=200.0))
+    with pytest.raises(ScenarioError, match=r"control\.hold"):
+        build_closed_loop(scenario, plan, small_maps(), blocks="fused")
