@@ -70,15 +70,15 @@ CASES: Mapping[str, Case] = {
     "lost measurements": Case(_measured(loss=0.3), _measured(loss=0.8)),
     "late measurements": Case(_measured(late=0.5, late_by=0.02), _measured(late=0.8, late_by=0.5)),
     "lost reports": Case({"messages": {"loss": 0.7}}, {"messages": {"loss": 1.0}}),
-    "late reports": Case({"messages": {"delay": 0.2}}, {"messages": {"delay": 10.0}}),
+    "late reports": Case({"messages": {"delay": 0.2}}),
     "repeated reports": Case({"messages": {"repeat": 1.0, "delay": 0.05}}),
     "biased pose, one robot": Case(_first(pose_bias={"x": 0.005}), _first(pose_bias={"x": 0.02})),
     "biased pose, all": Case(
         {"robots": {"*": {"pose_bias": {"x": 0.005}}}}, {"robots": {"*": {"pose_bias": {"x": 0.02}}}}
     ),
-    "odometry": Case(_first(odometry_scale=0.05), _first(odometry_scale=0.5)),
+    "odometry": Case(_first(odometry_scale=0.05), _first(odometry_scale=1.0)),
     "late samples": Case(_first(sample_offset=0.0049)),
-    "clock": Case(_first(clock_error=0.02), _first(clock_error=0.1)),
+    "clock": Case(_first(clock_error=0.01), _first(clock_error=0.1)),
     "late switches": Case(_first(switch_delay=0.01), _first(switch_delay=0.1)),
     "silence": Case(
         _first(silence={"begin": 3.0, "duration": 2.0}), _first(silence={"begin": 3.0, "duration": None})
@@ -93,8 +93,8 @@ CASES: Mapping[str, Case] = {
     ),
     "Coulomb friction": Case({"floor": {"coulomb_friction": 10.0}}, {"floor": {"coulomb_friction": 50.0}}),
     "viscous friction": Case({"floor": {"viscous_friction": 20.0}}, {"floor": {"viscous_friction": 300.0}}),
-    "slope": Case({"floor": {"slope": 0.01745}}, {"floor": {"slope": 0.1}}),
-    "push": Case(_pushed(20.0), _pushed(100.0)),
+    "slope": Case({"floor": {"slope": 0.01745}}, {"floor": {"slope": 0.2}}),
+    "push": Case(_pushed(20.0), _pushed(300.0)),
 }
 """Every departure."""
 
