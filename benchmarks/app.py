@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from benchmarks.adversaries.trial import adversary_tasks
+from benchmarks.breaking import breaking_tasks
 from benchmarks.commands import bench_commands
 from benchmarks.contents import TOPICS, WHOLE, show_contents
 from benchmarks.departures import departure_tasks
@@ -99,6 +100,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *growth_tasks(effort.limit),
         *contradiction_tasks(),
         *starting_tasks(),
+        *breaking_tasks(),
         *(_command_task(scenario) for scenario in _COMMANDED),
         *mapping_tasks(),
         *simulating_tasks(),

@@ -18,6 +18,7 @@ TOPICS = {
     "mapping": "harmonic maps: accuracy, speed, how both grow",
     "simulating": "the closed loop beside the bare plant; memory of repeated runs",
     "departures": "transports of teams that are not ideal, mild and harsh; with predictor and observer",
+    "breaking": "departures that an axis bears, by a search for the worst, beside those that are certified",
     "adversaries": "altered plans and proofs beside the exact checker; how long it checks random answers",
 }
 """What every topic is about."""

@@ -1,0 +1,89 @@
+"""How much of each departure an axis bears: found by searching for the worst, beside what is certified."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import ceil
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.rows import Row
+from benchmarks.sampled_axis import attacks, push_along, run_axis
+from benchmarks.tasks import Task
+from coop_drake.answers import Found
+from coop_drake.answers.budget import Budget
+from coop_drake.laws.axis_table import axis_table
+from coop_drake.planning.budget.axis_sets import Entry, axis_sets, conditions_of
+from coop_drake.tree.pose import FloatArray
+
+_LARGEST = {
+    "delay": 0.1, "lag": 0.1, "angle_noise": 0.1, "rate_noise": 3.0, "model_error": 0.95,
+    "acceleration_error": 60.0,
+}  # fmt: skip
+"""Departures beyond these are not tried, in the units of ``Budget``."""
+
+_HALVINGS = 9
+_SEARCHES = 3
+"""Times that a disturbance is turned to push along the motion that it caused [-]."""
+
+_TRANSITIONS = (0, 3, 12)
+"""Transitions of base whose axes are tried."""
+
+
+def breaking_tasks() -> list[Task]:
+    """All axes are tried together."""
+    return [Task("breaking/base", lambda rows: _rows())]
+
+
+def _rows() -> list[Row]:
+    from coop_drake.cli.task import read_task
+    from coop_drake.planning.planner import plan
+    from coop_drake.shipped import scenario_file
+
+    task = read_task(scenario_file(Path("base")))
+    answer = plan(task.problem, task.scenario.gain_sets["scheduled"], gain_set_name="scheduled")
+    assert isinstance(answer, Found)  # base has a plan
+    found = answer.plan
+    rows = []
+    for k in _TRANSITIONS:
+        table, transition = axis_table(found.funnel(k), found.transitions[k].gains), found.transitions[k - 1]
+        rest = found.start[2:] if k == 0 else 0.5 * (transition.goal_lower + transition.goal_upper)
+        for axis, row in enumerate(table):
+            label = f"breaking/base/transition_{k}_axis_{axis}"
+            rows += [_row(f"{label}/{name}", row, float(rest[axis]), name) for name in _LARGEST]
+    return rows
+
+
+def _row(label: str, row: FloatArray, rest: float, name: str) -> Row:
+    def certified(budget: Budget) -> bool:
+        return axis_sets(row, conditions_of(budget), Entry(rest, rest), 1).distance > 0.0
+
+    measured = _largest(name, lambda budget: _survives(row, rest, budget))
+    return Row(label, measured, "as budget", "certified", _largest(name, certified))
+
+
+def _largest(name: str, holds: Callable[[Budget], bool]) -> float:
+    low, high = 0.0, _LARGEST[name]
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(replace(Budget(), **{name: middle})) else (low, middle)
+    return low
+
+
+def _survives(row: FloatArray, rest: float, budget: Budget) -> bool:
+    size = np.array([budget.angle_noise, budget.rate_noise, budget.acceleration_error])
+    samples, delay = ceil(2.0 / budget.period), ceil(budget.delay / budget.period - 1e-6)
+    motion = np.zeros((samples, 3))
+    for disturbances in attacks(row, budget.period, size, samples, 0):
+        for sign in (-1.0, 1.0):
+            for _ in range(_SEARCHES):
+                factor = 1.0 + sign * budget.model_error
+                start = (rest, 0.0, 0.0)
+                if not run_axis(
+                    row, budget.period, delay, budget.lag, start, disturbances, factor, 1, motion
+                ):
+                    return False
+                push_along(row, budget.period, size, motion, disturbances)
+    return True
