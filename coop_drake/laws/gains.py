@@ -180,7 +180,7 @@ class ScheduledGains:
     governor_factor: Positive = 1.2
     smoothing: NotNegative = 0.001
     funnel_acceleration: Positive = 12.0
-    goal_acceleration: Positive = 0.6
+    goal_acceleration: Positive = 0.3
     min_decay_rate: Positive = 1.5
     decay_fraction: Positive = 0.5
     max_log_gain: Positive = 0.1
