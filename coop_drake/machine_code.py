@@ -12,6 +12,7 @@ import builtins
 import ctypes
 import os
 import pickle
+import re
 import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -33,6 +34,10 @@ _MATHEMATICS = {"acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cei
 _MATHEMATICS |= {"expm1", "fabs", "floor", "fmod", "log", "log10", "log1p", "pow", "round", "sin", "sinh"}
 _MATHEMATICS |= {"sqrt", "tan", "tanh", "trunc"}
 """Functions that machine code calls by their names in C; numba binds them to those of its first library."""
+
+_TESTED = (0, 61), (0, 68)
+"""Oldest and newest minor version of numba whose machine code this file was tested with. That of other
+versions is loaded by numba: its layout in memory is no promise of numba's."""
 
 _DAMAGE = (OSError, ImportError, AttributeError, TypeError, ValueError, LookupError, EOFError, RuntimeError)
 """What a file that is damaged, or of other versions, can raise."""
@@ -58,14 +63,26 @@ class MachineCode(NamedTuple):
 @cache
 def platform_stamp() -> str:
     """Say for what machine code is compiled: processor, versions, and what numba's settings change."""
-    spec = find_spec("numba")
-    origin = Path(spec.origin) if spec is not None and spec.origin is not None else Path(os.devnull)
-    status = origin.with_name("_version.py").stat()
+    version = _version_of_numba()
+    status = version.stat()
     settings = {k: v for k, v in os.environ.items() if k.startswith("NUMBA_") and k != "NUMBA_CACHE_DIR"}
     processor = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
     return repr(
-        (sys.version, processor, str(origin), status.st_size, status.st_mtime_ns, sorted(settings.items()))
+        (sys.version, processor, str(version), status.st_size, status.st_mtime_ns, sorted(settings.items()))
     )
+
+
+def _version_of_numba() -> Path:
+    """The file that states numba's version; numba itself is not imported."""
+    spec = find_spec("numba")
+    return Path(spec.origin if spec is not None and spec.origin else os.devnull).with_name("_version.py")
+
+
+@cache
+def _is_tested() -> bool:
+    """Whether the version of numba is one of those that this file was tested with."""
+    found = re.search(r'"version": "(\d+)\.(\d+)', _version_of_numba().read_text())
+    return found is not None and _TESTED[0] <= (int(found[1]), int(found[2])) <= _TESTED[1]
 
 
 def write_machine_code(path: Path, stamp: str, payload: Sequence[Any]) -> None:
@@ -76,6 +93,8 @@ def write_machine_code(path: Path, stamp: str, payload: Sequence[Any]) -> None:
         stamp: Digest of all that the machine code depends on.
         payload: What numba's ``CompileResult._reduce`` returns.
     """
+    if not _is_tested():
+        return
     (_, kind, (code, _)), description, own, *_, to_run_again, others = payload
     if kind != "object" or to_run_again:
         return
@@ -88,6 +107,8 @@ def write_machine_code(path: Path, stamp: str, payload: Sequence[Any]) -> None:
 
 def load_machine_code(path: Path, stamp: str, name: str) -> Callable[..., Any] | None:
     """Load a function of its file; None if there is none with this stamp."""
+    if not _is_tested():
+        return None
     try:
         found = MachineCode(*pickle.loads(path.read_bytes()))
         return _loaded(found, name) if found.stamp == stamp else None

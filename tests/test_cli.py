@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +18,7 @@ from coop_drake.cli import app, run, simulate
 from coop_drake.cli.reporter import Reporter
 from coop_drake.errors import PlanError
 from coop_drake.viz import LiveView
+from tests.support.no_figures import NoFigures
 from tests.support.scenarios import MODELS, ROOM, write_scenario
 
 PLAN_KEYS = {
@@ -114,21 +114,10 @@ def test_people_see_bars_and_a_table_and_quiet_shows_nothing(room, tmp_path):
 @pytest.fixture
 def drawn(monkeypatch):
     """Runs of which figures were to be drawn; drawing itself is slow, and looked at after the first run."""
-    runs = []
-
-    class NoFigures(nullcontext):
-        def __enter__(self):
-            return self
-
-        def draw(self, *asked):
-            runs.append(asked)
-
-        def wait(self):
-            pass
-
+    NoFigures.asked.clear()
     for module in (run, simulate):
         monkeypatch.setattr(module, "FigureProcesses", NoFigures)
-    return runs
+    return NoFigures.asked
 
 
 def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_path, drawn):

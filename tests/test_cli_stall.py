@@ -11,8 +11,9 @@ from typer.testing import CliRunner
 
 from coop_drake.answers import load_plan, save_plan
 from coop_drake.answers.log import SimulationLog
-from coop_drake.cli import app, run
+from coop_drake.cli import app, simulate
 from coop_drake.simulation import stall
+from tests.support.no_figures import NoFigures
 from tests.support.scenarios import write_scenario
 
 
@@ -35,7 +36,7 @@ def planned(tmp_path_factory):
 def impatient(monkeypatch):
     monkeypatch.setattr(stall, "PATIENCE_FACTOR", 1.0)
     monkeypatch.setattr(stall, "PATIENCE_ALLOWANCE", 0.5)
-    monkeypatch.setattr(run, "_draw", lambda *_: None)
+    monkeypatch.setattr(simulate, "FigureProcesses", NoFigures)
 
 
 def assert_stalled(result, out, complaint):

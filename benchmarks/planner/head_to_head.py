@@ -146,7 +146,7 @@ def _our_task(case: Case, effort: Effort) -> Task:
             *memory,
             Row(f"{name}/slices", cold.slices, "slices"),
             Row(f"{name}/cells", cold.cells, "cells"),
-            Row(f"{name}/narrowest neck", 1e3 * cold.neck_m, "mm"),
+            Row(f"{name}/narrowest passage", 1e3 * cold.neck_m, "mm"),
             Row(f"{name}/transport", cold.transport_seconds, "s"),
         ]
 

@@ -111,7 +111,7 @@ def stage_rows(name: str, problem: PlanningProblem, limit: float) -> list[Row]:
         if planned.answer == "found":
             rows += [
                 Row(f"{what}/transport", planned.transport_seconds, "s"),
-                Row(f"{what}/narrowest neck", 1e3 * planned.neck_m, "mm"),
+                Row(f"{what}/narrowest passage", 1e3 * planned.neck_m, "mm"),
                 Row(f"{what}/cells", planned.cells, "cells"),
                 Row(f"{what}/cpu_seconds", planned.cpu_seconds, "s"),
             ]

@@ -121,7 +121,7 @@ class Question:
         ends = [both if goal is None else (goal, goal) for goal, both in zip(goals, self.limits, strict=True)]
         self.goal_box = [(self.goal[2], self.goal[2]), *ends]
         self.rooms = [angle, *[None if goal is None else joint for goal in goals]]
-        aside = {frozenset((one, other)) for one, other, _ in value["left_aside"]}
+        aside = {self._left_aside(*entry) for entry in value["left_aside"]}
         pairs = [(i, j) for j in range(len(self.pieces)) for i in range(j)]
         self.pairs = [(i, j) for i, j in pairs if self._must_be_apart(self.pieces[i], self.pieces[j], aside)]
 
@@ -139,6 +139,14 @@ class Question:
         while first != second:  # Parents stand before children.
             first, second = sorted((first, self.parents[second]))
         return first
+
+    def _left_aside(self, one: str, other: str, reason: str) -> frozenset[str]:
+        """Names of two bodies that need not be apart; where the reason is a joint, it must join them."""
+        owner = {piece.body: piece.component for piece in self.pieces}
+        first, second = sorted((owner.get(one, -1), owner.get(other, -1)))
+        joined = 0 <= first == self.parents[second] or first < 0  # a body without pieces meets nothing
+        demand(reason != "joint" or joined, "left_aside", f"{one} and {other} share no joint")
+        return frozenset((one, other))
 
     @staticmethod
     def _must_be_apart(one: Piece, other: Piece, aside: set[frozenset[str]]) -> bool:

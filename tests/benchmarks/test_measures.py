@@ -30,7 +30,13 @@ def test_a_plan_is_found_without_any_one_stage(variant):
 def test_stages_are_rows_of_every_variant():
     rows = stage_rows("planner/stages/easy", EASY, limit=120)
     assert {row.item for row in rows} == set(STAGES)
-    assert {row.figure for row in rows} == {"answer", "transport", "margin", "cells", "cpu_seconds"}
+    assert {row.figure for row in rows} == {
+        "answer",
+        "transport",
+        "narrowest passage",
+        "cells",
+        "cpu_seconds",
+    }
 
 
 def test_growth_is_told_in_rows():

@@ -76,7 +76,7 @@ HARSH = {
         Deployment(control_rate=RATE, actuators=ActuatorLimits(base_force=10.0)),
         "to its funnel is",
     ),
-    "lag": (Deployment(actuators=ActuatorLimits(lag=0.05)), "to its funnel is"),
+    "lag": (Deployment(actuators=ActuatorLimits(lag=0.1)), "to its funnel is"),
     "noise": (Deployment(control_rate=RATE, measurements=Measurements(0.02, 0.01, 0.02)), "to its funnel is"),
     "delay": (Deployment(control_rate=RATE, measurements=Measurements(delay=0.1)), "to its funnel is"),
     "model error": (Deployment(mass_error=-0.98), "distance of object angle to its funnel is -"),

@@ -21,7 +21,7 @@ MOMENTS = 100
 REST_TIME = 1.6
 """Within this time after it was told so a team of base rests [s]."""
 
-REST_DISTANCE = 0.55
+REST_DISTANCE = 0.65
 """And the object moves no further than this meanwhile [m]."""
 
 SPEED, RATE = 0.01, 0.02

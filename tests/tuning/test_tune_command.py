@@ -59,7 +59,7 @@ def test_ctrl_c_leaves_the_best_so_far(room, tmp_path, monkeypatch):
     [
         (("--criterion", "speed"), "expected one of time"),
         (("--limit", "time<16"), "expected such as"),
-        (("--vary", "funnel"), "expected one of wall_stiffness"),
+        (("--vary", "funnel"), "expected one of age_phase"),
         (("--gains", "fast"), "or a file with a gain set"),
     ],
 )

@@ -58,7 +58,7 @@ def test_the_plan_of_the_base_case_is_verified(tmp_path):
 
 def test_no_number_can_be_altered_be_it_by_a_bit(document, tmp_path):
     places = number_places(document)[::2]
-    assert len(places) > 100
+    assert len(places) > 70
     nudges = (lambda x: float(np.nextafter(x, np.inf)), lambda x: 1.001 * x + 1e-3, lambda x: -x - 1.0)
     for number, way in enumerate(places):
         value = nudges[number % 3](entry_at(document, way))

@@ -198,10 +198,12 @@ def json_mutants(document: Document, seed: int) -> Iterator[Mutant]:
 
 def plan_mutants(document: Document) -> Iterator[Mutant]:
     """Plans that cannot be executed, or that answer another question."""
+    last = len(document["cells"]) - 1
     for k, cell in enumerate(document["cells"]):
         far = [[x + 50.0, y] for x, y in cell["tidied"]["outer"]]
         place = ("cells", k, "tidied")
-        end = ("transitions", k, "target")
+        entry: Place = ("transitions", k - 1, "target") if k else ("start",)
+        end: Place = ("goal_pose",) if k == last else entry
         yield _plan(document, "cell elsewhere", (*place, "outer"), far, "it is 50 m off", end)
         for name in ("lower", "upper"):
             other = cell["upper" if name == "lower" else "lower"]
