@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
 import numpy as np
 
 from coop_drake.files import cache_folder
+from coop_drake.kernel_dispatch import dispatcher, kind_of
 from coop_drake.kernel_times import KERNEL_TIMES
 
 if TYPE_CHECKING:
@@ -74,6 +75,7 @@ class Kernel:
         _file_digest(function.__code__.co_filename)  # Now: the file may be edited while the program runs.
         self._count = function.__code__.co_argcount
         self._versions: dict[tuple[object, ...], Callable[..., Any]] = {}
+        self._dispatch: Callable[..., Any] = self._look_up
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         """Call the version for the types of the arguments."""
@@ -81,12 +83,11 @@ class Kernel:
             bound = inspect.signature(self._function).bind(*arguments, **named)
             bound.apply_defaults()
             arguments = bound.args
-        # As in `_kind`, written out because this runs a hundred thousand times in a simulation.
-        kinds = tuple([
-            (a.dtype, a.ndim, a.flags.num & _ARRAY_FLAGS)
-            if a.__class__ is _Array else _SCALARS.get(a.__class__) or _kind(a)
-            for a in arguments
-        ])  # fmt: skip
+        return self._dispatch(*arguments)
+
+    def _look_up(self, *arguments: Any) -> Any:
+        """Call the version for arguments whose types were not seen before, or not as these objects."""
+        kinds = tuple(map(kind_of, arguments))
         version = self._versions.get(kinds)
         return (version or self._version(arguments, kinds))(*arguments)
 
@@ -118,6 +119,7 @@ class Kernel:
         with KERNEL_TIMES.spent():
             if kinds not in self._versions:
                 self._versions[kinds] = self._loaded_or_compiled(arguments, " ".join(map(str, words)))
+                self._dispatch = dispatcher(self._count, self._versions, self._look_up)
         return self._versions[kinds]
 
     def _loaded_or_compiled(self, arguments: tuple[Any, ...], words: str) -> Callable[..., Any]:
@@ -138,39 +140,6 @@ class Kernel:
         if kept is not None:
             write_machine_code(path, stamp, kept)
         return version
-
-
-_ARRAY_FLAGS = 0x1 | 0x2 | 0x100 | 0x400
-"""Bits of numpy's flags that machine code depends on: C order, Fortran order, aligned, writable."""
-
-_Array = np.ndarray
-
-_SCALARS = {float: "float", np.float64: "float", int: "int", np.int64: "int", bool: "bool", np.bool_: "bool"}
-
-_SEEN_MOST = 32
-"""Number of tuples whose kind is remembered; a command has a handful of teams and floors."""
-
-_seen: dict[int, tuple[object, object]] = {}
-"""Tuples by their identity, each with its kind; arrays in them keep their types."""
-
-
-def _kind(value: Any) -> object:
-    """What numba's type of a value depends on, as something that can be compared and hashed."""
-    cls = value.__class__
-    if cls is _Array:
-        return value.dtype, value.ndim, value.flags.num & _ARRAY_FLAGS
-    if (scalar := _SCALARS.get(cls)) is not None:
-        return scalar
-    if isinstance(value, tuple):
-        seen = _seen.get(id(value))
-        if seen is not None and seen[0] is value:
-            return seen[1]
-        kind = (cls, *map(_kind, value))
-        if len(_seen) >= _SEEN_MOST:
-            _seen.clear()
-        _seen[id(value)] = value, kind
-        return kind
-    return cls
 
 
 def _words(kind: object) -> str | None:
