@@ -51,15 +51,16 @@ are too large is known but for a third of the error, which alone counts as a dis
 
 @dataclass(frozen=True)
 class Entry:
-    """The set in which an axis enters a transition: [rad or m], per s, and the largest |x''| before.
+    """The set of states in which an axis enters a transition.
 
     Attributes:
-        lower: Lowest position.
-        upper: Highest position.
-        rate_lower: Lowest rate.
-        rate_upper: Highest rate.
-        acceleration: Largest magnitude of acceleration and command at the entry.
-        history: Largest magnitude of the acceleration in the time before of which measurements still speak.
+        lower: Lowest position [rad or m].
+        upper: Highest position [rad or m].
+        rate_lower: Lowest rate [rad/s or m/s].
+        rate_upper: Highest rate [rad/s or m/s].
+        acceleration: Largest magnitude of acceleration and command at the entry [rad/s^2 or m/s^2].
+        history: Largest magnitude of the acceleration before the entry, over the age of the measurements that
+            are used at the entry [rad/s^2 or m/s^2].
     """
 
     lower: float

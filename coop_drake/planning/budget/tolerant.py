@@ -35,7 +35,7 @@ class BeyondBudget:
     budget: Budget | None
 
     def describe(self) -> str:
-        """The answer in a sentence."""
+        """Return which budget does not hold, what limits it, and the largest scaled budget that holds."""
         if self.budget is None:
             return f"not with this budget, nor with a hundredth of it: {self.limit}"
         return f"not with this budget: {self.limit}; with this one: {self.budget.describe()}"

@@ -49,7 +49,11 @@ class Axes:
         return Axes(*(getattr(self, field.name)[..., some] for field in fields(self)))
 
     def bounds(self, time: float | FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the funnels' bounds with rates and accelerations, each of shape (2, b)."""
+        """Return the bounds of (17), (39) [rad or m], their rates and their accelerations, (2, b) each.
+
+        Args:
+            time: Time since the transition began, one for all axes or shape (b,) [s].
+        """
         rate = self.decay / 5.0
         u = np.minimum(time * rate, 1.0)
         left = 1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
@@ -76,11 +80,19 @@ class Axes:
 def fit(
     axes: Axes, time: float | FloatArray, x: FloatArray, reach: FloatArray, v: FloatArray
 ) -> tuple[FloatArray, ...]:
-    """Return L at (x, v), and a line about it with the bounds of the rest.
+    """Return the acceleration L at (x, v), its linear approximation there, and bounds of the remainder.
+
+    Args:
+        axes: Funnels and gains of b axes.
+        time: Time since the transition began, one for all axes or shape (b,) [s].
+        x: Positions, shape (b,) [rad or m].
+        reach: Half the width of the interval of positions about x, shape (b,) [rad or m].
+        v: Rates, shape (b,) [rad/s or m/s].
 
     Returns:
-        L(x, v), the slopes by position and by rate, the rest for all positions within ``reach``, and how far
-        the slope by rate departs; each of shape (b,).
+        L(x, v) [rad/s^2 or m/s^2], its slopes by position [1/s^2] and by rate [1/s], the largest remainder
+        for all positions within ``reach`` [rad/s^2 or m/s^2], and the largest departure of the slope by rate
+        [1/s]; each of shape (b,).
     """
     reach = np.maximum(reach, 1e-9)
     offsets = np.linspace(-1.0, 1.0, PIECES + 1)[:, None] * reach
