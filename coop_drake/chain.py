@@ -61,7 +61,7 @@ def verify(
     *,
     progress: Progress | None = None,
 ) -> Verified:
-    """Check a plan or a proof of infeasibility by code that shares nothing with the search.
+    """Check a plan or a proof of infeasibility by code of its own; only the rule of the gains is shared.
 
     The log of a run is checked by `verify_run`.
 
