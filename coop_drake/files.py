@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import IO
 
@@ -42,10 +42,20 @@ def write_atomically(path: Path | str, content: bytes | Callable[[IO[bytes]], ob
                 file.write(content)
         part.chmod(_permissions_of_new_files())
         part.replace(target)
-    except BaseException:
+    except BaseException as error:
         part.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.filename is None:
+            error.filename = str(target)  # A full disk is reported without the name of the file.
         raise
     return target
+
+
+def remove_unfinished(folder: Path, names: Iterable[str]) -> None:
+    """Remove what `write_atomically` left of files of these names where it was killed."""
+    wanted = set(names)
+    for part in folder.glob(".*.*.part"):
+        if part.name[1:].rsplit(".", 2)[0] in wanted:
+            part.unlink(missing_ok=True)
 
 
 def _permissions_of_new_files() -> int:

@@ -16,6 +16,7 @@ from coop_drake.answers import load_plan
 from coop_drake.answers.log import SimulationLog
 from coop_drake.cli import app, run, simulate
 from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.results import ResultFolder
 from coop_drake.errors import PlanError
 from coop_drake.viz import LiveView
 from tests.support.no_figures import NoFigures
@@ -46,7 +47,15 @@ RUN_KEYS = PLAN_KEYS | {
     "simulated_seconds",
     "simulation_wall_seconds",
 }
-RESULTS = ["log.npz", "maps.json", "plan.json", "summary.png", "table_1.md", "transport.html"]
+RESULTS = [
+    ".coop_drake_results.json",
+    "log.npz",
+    "maps.json",
+    "plan.json",
+    "summary.png",
+    "table_1.md",
+    "transport.html",
+]
 
 
 def invoke(*arguments):
@@ -158,7 +167,7 @@ def test_a_gap_too_narrow_is_infeasible_and_an_older_plan_does_not_stay(tmp_path
         goal={"object": {"x": 7.0, "y": 2.0, "theta": 0.0}},
     )
     out = tmp_path / "out"
-    out.mkdir()
+    ResultFolder(out).begin("plan")
     (out / "plan.json").write_text("of an older run")
     result = invoke("plan", path, "--out", out, "--json")
     assert result.exit_code == 3, result.stderr
@@ -166,7 +175,7 @@ def test_a_gap_too_narrow_is_infeasible_and_an_older_plan_does_not_stay(tmp_path
     assert facts.keys() >= PLAN_KEYS
     assert (facts["answer"], facts["cells"]) == ("infeasible", 0)
     assert facts["reason"] in " ".join(result.stderr.split())
-    assert [path.name for path in out.iterdir()] == ["certificate.json"]
+    assert sorted(path.name for path in out.iterdir()) == [".coop_drake_results.json", "certificate.json"]
 
 
 def test_a_budget_that_ends_is_undecided(tmp_path):

@@ -16,10 +16,11 @@ from coop_drake.cli.reporter import reporting
 from tests.support.scenarios import MODELS
 
 # A shell that starts tests in the background has its children ignore Ctrl-C.
+RESULTS = [".coop_drake_results.json", "plan.json", "table_1.md"]
 INTERRUPTIBLE = """
 import signal
 signal.signal(signal.SIGINT, signal.default_int_handler)
-from coop_drake.cli import main
+from coop_drake.entry_point import main
 main()
 """
 
@@ -35,7 +36,7 @@ def test_ctrl_c_after_planning_leaves_the_plan_whole_and_nothing_half_written(tm
     assert process.returncode == 130, stderr
     assert "interrupted" in json.loads(stdout)["error"]
     assert "Traceback" not in stderr
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["plan.json", "table_1.md"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == RESULTS
     assert load_plan(tmp_path / "plan.json").cells
 
 
@@ -48,7 +49,9 @@ def _ended(error: BaseException) -> int:
 
 def test_a_missing_package_is_answered_with_the_extra_that_installs_it(capsys):
     assert _ended(ModuleNotFoundError("No module named 'trimesh'", name="trimesh")) == 2
-    assert "pip install 'coop-drake[robots]'" in " ".join(capsys.readouterr().err.split())
+    assert "pip install 'defusedxml>=0.7' 'pycollada>=0.8' 'trimesh>=4.5'" in " ".join(
+        capsys.readouterr().err.split()
+    )
     with pytest.raises(ModuleNotFoundError):
         _ended(ModuleNotFoundError("No module named 'kma'", name="kma"))
 
@@ -60,3 +63,30 @@ def test_ctrl_c_inside_compiled_code_and_imports_is_no_bug(capsys):
         assert "interrupted" in capsys.readouterr().err
     with pytest.raises(SystemError, match="of another kind"):
         _ended(SystemError("of another kind"))
+
+
+IN_COMPILED_CODE = """
+import hashlib, os, signal, sys, types
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from coop_drake import entry_point
+def command_line():
+    os.write(1, b"ready")
+    hashlib.pbkdf2_hmac("sha256", b"", b"", 200_000_000)  # a minute without Python
+sys.modules["coop_drake.cli"] = types.SimpleNamespace(main=command_line)
+entry_point.main()
+"""
+
+
+@pytest.mark.parametrize("program", [IN_COMPILED_CODE, "import os\nos.write(1, b'ready')\n" + INTERRUPTIBLE])
+def test_ctrl_c_ends_compiled_code_and_the_first_imports(program):
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, "plan", str(MODELS / "base.scenario.yaml")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    assert process.stdout.read(5) == b"ready"
+    time.sleep(0.2)  # Until the entry point has begun: before, nobody can answer.
+    process.send_signal(signal.SIGINT)
+    _, stderr = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert stderr.decode() == "Error: interrupted; files already written are whole\n"

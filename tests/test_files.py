@@ -1,10 +1,11 @@
 """Files are written whole or not at all."""
 
+import errno
 import stat
 
 import pytest
 
-from coop_drake.files import write_atomically
+from coop_drake.files import remove_unfinished, write_atomically
 
 
 def test_bytes_and_writers_both_serve_and_directories_are_made(tmp_path):
@@ -32,3 +33,20 @@ def test_permissions_are_those_of_any_new_file(tmp_path):
     plain.write_bytes(b"")
     written = write_atomically(tmp_path / "written", b"")
     assert stat.S_IMODE(written.stat().st_mode) == stat.S_IMODE(plain.stat().st_mode)
+
+
+def test_a_full_disk_is_reported_with_the_name_of_the_file(tmp_path):
+    def full(file):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(OSError, match="No space left") as refused:
+        write_atomically(tmp_path / "log.npz", full)
+    assert refused.value.filename == str(tmp_path / "log.npz")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_a_killed_program_left_is_removed_and_nothing_else(tmp_path):
+    for name in (".a.txt.x1y2.part", ".b.txt.x1y2.part", "a.txt", "a.txt.part"):
+        (tmp_path / name).write_bytes(b"")
+    remove_unfinished(tmp_path, ["a.txt"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".b.txt.x1y2.part", "a.txt", "a.txt.part"]

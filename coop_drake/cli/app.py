@@ -15,6 +15,7 @@ import json
 import os
 import sys
 from collections.abc import Callable
+from io import TextIOWrapper
 from typing import Annotated
 
 import typer
@@ -92,9 +93,14 @@ app = typer.Typer(
 def main() -> None:
     """Run the command line; wrong usage is answered like any bad input."""
     arguments = sys.argv[1:]
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # A terminal in ASCII shows ? for what it does not have.
+            stream.reconfigure(errors="replace")
     keep_kernels_somewhere()
     try:
         code = app(arguments, standalone_mode=False)
+    except typer.Abort:
+        raise KeyboardInterrupt from None
     except _UsageError as error:  # type: ignore[misc]
         error.show()
         if "--json" in arguments:

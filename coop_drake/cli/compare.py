@@ -61,13 +61,14 @@ def _compare(scenario: Path, gains: str | None, out: Path | None, reporter: Repo
     from coop_drake.files import write_atomically
 
     task = read_task(scenario, gains)
-    folder = ResultFolder.of(task.name, out, "compare")
+    folder = ResultFolder.of(task.name, out, "plan", "comparison", below="compare")
     plan = plan_of(task, folder, reporter)
     if plan is None:
         return reporter.code
     maps = map_cells(task, plan, reporter)
     measures = [_measures(task, plan, maps, grasps, reporter) for grasps, _ in _PLANTS]
     compared: dict[str, Any] = {grasps: facts for (grasps, _), facts in zip(_PLANTS, measures, strict=True)}
+    folder.begin("comparison")
     write_atomically(folder.path / "compare.json", json.dumps(compared, indent=1).encode() + b"\n")
     reporter.facts.update(compared)
     rows = [(label, *(_text(facts[key], form) for facts in measures)) for label, key, form in _ROWS]

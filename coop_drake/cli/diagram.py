@@ -41,11 +41,13 @@ def _draw(scenario: Path, robot: int, out: Path | None, reporter: Reporter) -> E
     if robot >= len(robots):
         raise ScenarioError(str(scenario), "--robot", robot, f"a number from 0 to {len(robots) - 1}")
     # An earlier run's results stay as they are: only the picture is written.
+    folder = ResultFolder.of(task.name, out, "diagram")
     plan = plan_of(task, None, reporter)
     if plan is None:
         return reporter.code
     loop = build_closed_loop(task.scenario, plan, map_cells(task, plan, reporter))
-    picture = ResultFolder.of(task.name, out).path / "diagram.svg"
+    folder.begin("diagram")
+    picture = folder.path / "diagram.svg"
     with reporter.stage("drawing"):
         save_figure(block_diagram_figure(loop, robot), picture)
     reporter.say(f"The picture is in {escape(str(picture))}")

@@ -67,7 +67,7 @@ def tune(
     task = read_task(scenario, gains)
     start = task.scenario.gain_sets[task.scenario.selected_gains]
     parameters = tunable_parameters(start, request.vary)
-    folder = ResultFolder.of(task.name, out, TUNED)
+    folder = ResultFolder.of(task.name, out, "plan", "tuning", below=TUNED)
     plan = plan_of(task, folder, reporter)
     if plan is None:
         return reporter.code
@@ -76,6 +76,7 @@ def tune(
         before = runner.try_gains(start)
     objective = Objective(weights, limits, before.outcome.values)
     found = _search(task, runner, before, parameters, objective, request, reporter)
+    folder.begin("tuning")
     write_trials(found, folder.path / "trials.json")
     write_tuning_figure(found, folder.path / "tuning.png")
     if found.interrupted:

@@ -28,7 +28,7 @@ def plan_command(
     """Plan only: write the plan, or the proof that there is none."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         task = read_task(scenario, gains)
-        folder = ResultFolder.of(task.name, out)
+        folder = ResultFolder.of(task.name, out, "plan")
         if plan_of(task, folder, reporter, _budget(budget, task)):
             reporter.table(task.name, summary_rows(reporter.facts))
             reporter.say(f"The plan is in {escape(str(folder.plan))}")
@@ -84,7 +84,7 @@ def _write(result: PlanningResult, task: Task, folder: ResultFolder) -> None:
     from coop_drake.answers.proof_file import save_proof
     from coop_drake.files import write_atomically
 
-    folder.forget("plan")
+    folder.begin("plan", "simulation")
     if isinstance(result, Found):
         save_plan(result.plan, folder.plan)
         write_atomically(folder.path / "table_1.md", table_1(result.plan).encode())

@@ -21,21 +21,13 @@ from rich.table import Table
 
 from coop_drake.cli.kernel_clock import kernel_clock
 from coop_drake.errors import CoopDrakeError, FieldError, FloorPlanError, ScenarioError, StallError
+from coop_drake.extras import install_advice
 from coop_drake.progress import Progress
 
 _SMALLEST_STEP = 0.002
 """Fraction by which a bar moves on; smaller steps cannot be seen on a terminal [-]."""
 _NEARLY = 0.999
 """Where a bar stops until its stage returns: only then it is over [-]."""
-
-_EXTRAS = {
-    "collada": "robots",
-    "defusedxml": "robots",
-    "ezdxf": "floor-plans",
-    "svgelements": "floor-plans",
-    "trimesh": "robots",
-}
-"""The extra of coop-drake that installs a package which only some commands import."""
 
 
 class ExitCode(IntEnum):
@@ -204,9 +196,8 @@ def _explain(error: BaseException, reporter: Reporter) -> bool:
         details = {"file": error.file, "place": error.place, "remedy": error.remedy, "finding": error.finding}
     elif isinstance(error, FieldError | StallError):
         code = ExitCode.FAILED_RUN
-    elif isinstance(error, ModuleNotFoundError) and error.name in _EXTRAS:
-        extra = _EXTRAS[error.name]
-        text = f"the package {error.name} is not installed; expected: pip install 'coop-drake[{extra}]'"
+    elif isinstance(error, ModuleNotFoundError) and (advice := install_advice(error.name or "")):
+        text = f"the package {error.name} is not installed; install what this needs: {advice}"
     elif isinstance(error, OSError):
         text = _system_error(error)
     elif not isinstance(error, CoopDrakeError):

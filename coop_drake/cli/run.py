@@ -50,7 +50,7 @@ def run_command(
     """Plan, map, simulate and record a transport."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         task = read_task(scenario, gains)
-        folder = ResultFolder.of(task.name, out)
+        folder = ResultFolder.of(task.name, out, "plan", "simulation")
         with FigureProcesses() as figures:
             with preparing(task.scenario):
                 plan = plan_of(task, folder, reporter)
@@ -112,7 +112,7 @@ def _simulate(
     with reporter.stage("simulating", "simulation") as progress:
         log = simulate(task.scenario, plan, maps, blocks=blocks, progress=progress, observer=observer)
     reporter.facts.update(simulation_facts(plan, log), peak_memory_mb=peak_memory_mb())
-    folder.forget("simulation")
+    folder.begin("simulation", robots=log.robot_names)
     write_certificates(task, maps, folder)
     log.save(folder.path / "log.npz")
     return log

@@ -41,7 +41,7 @@ def simulate_command(
     """Map, simulate and record a plan that was made before."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         task = read_task(scenario, gains)
-        folder = ResultFolder.of(task.name, out)
+        folder = ResultFolder.of(task.name, out, "simulation")
         found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)
         with FigureProcesses() as figures:
             reporter.code = carry_out(

@@ -69,7 +69,7 @@ def watch_command(
     """Watch the planner search: pictures, a moving picture and a page to turn in space."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         task = read_task(scenario)
-        folder = ResultFolder.of(task.name, output, "think")
+        folder = ResultFolder.of(task.name, output, "search", below="think")
         reporter.code = _watch(task.problem, folder, frames, strategy, margin, reporter)
 
 
@@ -95,7 +95,7 @@ def _watch(
         events=len(recording.events),
         frames=len(shown),
     )
-    folder.forget("search")
+    folder.begin("search")
     with reporter.stage("drawing") as progress:
         written = watching.write_pictures(recording, shown, folder.path, progress)
     with reporter.stage("scene") as progress:

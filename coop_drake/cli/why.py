@@ -24,11 +24,11 @@ def why_command(
         from coop_drake.drawing import house_style, save_figure
 
         task = read_task(scenario)
-        folder, before = ResultFolder.of(task.name, out), process_time()
+        folder, before = ResultFolder.of(task.name, out, "diagnosis"), process_time()
         with reporter.stage("diagnosing") as progress:
             diagnosis = diagnose(task.problem, progress)
         reporter.facts.update(facts_of(diagnosis), diagnosis_cpu_seconds=round(process_time() - before, 4))
-        folder.forget("diagnosis")
+        folder.begin("diagnosis")
         with house_style():
             figure = diagnosis_figure(task.problem, diagnosis)
             if figure is not None:

@@ -10,6 +10,7 @@ import shapely
 from shapely import Polygon
 
 from coop_drake.errors import FloorPlanError
+from coop_drake.extras import install_advice
 from coop_drake.floor_plans.cells import room_of_map
 from coop_drake.floor_plans.formats import READERS, SUFFIXES
 from coop_drake.floor_plans.map_file import OccupancyMap
@@ -85,7 +86,7 @@ def read_floor_plan(
             content = READERS[path.suffix.lower()](path, settings)
             room, notes, tolerance = _room(content, file, settings, inside)
     except ModuleNotFoundError as error:
-        remedy = "install it: pip install 'coop-drake[floor-plans]'"
+        remedy = f"install what drawings need: {install_advice('ezdxf')}"
         raise FloorPlanError(file, "the reader", f"it needs the package {error.name}", remedy) from error
     except shapely.GEOSException as error:
         raise FloorPlanError(

@@ -189,7 +189,7 @@ class _Work:
             factors = np.array([float(part) for part in scale.split()])
             points = _vertices(self._found(address or "")) * factors
             content = _hull(points)
-        except ScenarioError:
+        except (ScenarioError, ModuleNotFoundError):
             raise
         except Exception as error:  # Readers of meshes raise whatever they like.
             message = f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from coop_drake.errors import TuningError
+from coop_drake.extras import install_advice
 from coop_drake.laws import GainSet
 from coop_drake.tuning.objective import Objective
 from coop_drake.tuning.parameters import Parameter, to_fractions, with_fractions
@@ -110,10 +111,8 @@ def load_optimizer() -> Any:
     try:
         return import_module("cma")
     except ImportError as error:
-        remedy = "pip install 'coop-drake[tune]'"
-        raise TuningError(
-            f"tuning needs the package cma, which is not installed; expected {remedy}"
-        ) from error
+        message = f"tuning needs the package cma, which is not installed: {install_advice('cma')}"
+        raise TuningError(message) from error
 
 
 def _strategy(start: np.ndarray, budget: int, seed: int) -> Any:

@@ -14,6 +14,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.drawing.canvas import house_style, save_figure
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.viz import floor_figures, time_figures
+from coop_drake.viz.figure_names import joints_figure_name
 
 
 def write_figures(
@@ -60,7 +61,7 @@ def _figures(
     yield "fig09_angular_velocity", partial(curves, caption, twist[:, 2:], "angular velocity [rad/s]")
     for robot, name in enumerate(log.robot_names):
         draw = partial(time_figures.joints_figure, tree, log, robot)
-        yield f"fig{min(10 + robot, 11)}_joints_{name}", draw
+        yield joints_figure_name(robot, name), draw
     caption = "Figure 12. Total force that the robots apply to the object."
     yield "fig12_force", partial(curves, caption, wrench[:, :2], "x force [N]", "y force [N]")
     caption = "Figure 13. Total torque that the robots apply to the object, about its centre of mass."

@@ -6,6 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from coop_drake.cli import app
+from coop_drake.cli.results import ResultFolder
 from tests.support.scenarios import write_scenario
 
 
@@ -30,18 +31,18 @@ def test_a_blocked_goal_gets_its_sentences_its_pictures_and_exit_code_3(blocked,
     assert facts["goal"]["walls_moved_back_m"]["found_enough"] > 0.1
     assert facts["diagnosis_cpu_seconds"] > 0.0
     assert facts["sentences"][0] in " ".join(result.stderr.split())
-    assert sorted(path.name for path in out.iterdir()) == ["why.png", "why.svg"]
+    assert sorted(path.name for path in out.iterdir()) == [".coop_drake_results.json", "why.png", "why.svg"]
     assert (out / "why.svg").read_text().lstrip().startswith("<?xml")
 
 
 def test_a_feasible_scenario_is_said_to_be_so_and_an_older_picture_goes(tmp_path):
     path, out = write_scenario(tmp_path / "room.scenario.yaml"), tmp_path / "out"
-    out.mkdir()
+    ResultFolder(out).begin("diagnosis")
     (out / "why.png").write_bytes(b"of an older diagnosis")
     result = invoke("why", path, "--out", out)
     assert result.exit_code == 0, result.output
     assert "Feasible" in result.output
-    assert list(out.iterdir()) == []
+    assert [path.name for path in out.iterdir()] == [".coop_drake_results.json"]
 
 
 def test_plan_points_to_why(blocked, tmp_path):

@@ -74,7 +74,7 @@ def test_a_missing_optimizer_is_named_before_any_work(room, tmp_path, monkeypatc
     monkeypatch.setitem(sys.modules, "cma", None)
     result = called(room, "--out", tmp_path / "out")
     assert result.exit_code == 2
-    assert "pip install 'coop-drake[tune]'" in " ".join(result.output.split())
+    assert "pip install 'cma>=4.0'" in " ".join(result.output.split())
     assert not (tmp_path / "out").exists()
 
 

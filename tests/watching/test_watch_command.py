@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from coop_drake import watching
 from coop_drake.cli import app
+from coop_drake.cli.results import ResultFolder
 from coop_drake.files import write_atomically
 from tests.support.scenarios import ROOM, write_scenario
 
@@ -23,17 +24,18 @@ def room(tmp_path_factory):
 
 
 def test_a_recording_leaves_pictures_and_a_page_and_none_of_an_older_one(room, tmp_path):
+    ResultFolder(tmp_path).begin("search")
     (tmp_path / "think_0099.png").write_bytes(b"of an older recording")
     (tmp_path / "notes.txt").write_text("not ours")
     result = invoke("watch", room, "--output", tmp_path, "--frames", 3, "--json")
     assert result.exit_code == 0, result.stderr
     facts = json.loads(result.stdout)
     assert (facts["answer"], facts["frames"]) == ("found", 3)
-    names = ["notes.txt", "think.gif", "think.html", "think.png"]
+    names = [".coop_drake_results.json", "notes.txt", "think.gif", "think.html", "think.png"]
     pictures = [f"think_{number:04d}.png" for number in (1, 2, 3)]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(names + pictures)
     assert facts["bytes"] == {name: (tmp_path / name).stat().st_size for name in facts["bytes"]}
-    assert facts["bytes"].keys() == {*pictures, *names[1:]}
+    assert facts["bytes"].keys() == {*pictures, *names[2:]}
 
 
 def test_the_exit_code_says_that_there_is_no_path_and_a_margin_proves_nothing(tmp_path, monkeypatch):
@@ -88,6 +90,7 @@ def test_an_interruption_leaves_whole_files_only(room, tmp_path, monkeypatch):
     result = invoke("watch", room, "--output", tmp_path, "--frames", 2)
     assert result.exit_code == 130
     assert {path.name for path in tmp_path.iterdir()} == {
+        ".coop_drake_results.json",
         "think_0001.png",
         "think_0002.png",
         "think.png",

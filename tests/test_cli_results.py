@@ -1,0 +1,98 @@
+"""Folders for results: nothing that others wrote is replaced or removed, and old results go."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from coop_drake.cli import app
+from coop_drake.cli import results as results_module
+from coop_drake.cli.results import ResultFolder
+from coop_drake.errors import ScenarioError
+from tests.support.scenarios import write_scenario
+
+COMMANDS = {
+    "plan": ("plan.json", "certificate.json", "table_1.md"),
+    "run": (
+        "plan.json",
+        "log.npz",
+        "summary.png",
+        "fig05_path.png",
+        "fig10_joints_left.png",
+        "transport.html",
+    ),
+    "simulate": ("log.npz", "maps.json", "fig11_joints_right.png"),
+    "compare": ("plan.json", "compare.json"),
+    "tune": ("plan.json", "gains.yaml", "trials.json"),
+    "why": ("why.png", "why.svg"),
+    "watch": ("think.html", "think_0001.png"),
+    "diagram": ("diagram.svg",),
+}
+
+
+@pytest.mark.parametrize(("command", "name"), [(c, name) for c, names in COMMANDS.items() for name in names])
+def test_a_file_of_somebody_else_is_refused_before_any_work(command, name, tmp_path):
+    scenario = write_scenario(tmp_path / "room.scenario.yaml")
+    mine = tmp_path / "project" / name
+    mine.parent.mkdir()
+    mine.write_text("mine")
+    result = CliRunner().invoke(app, [command, str(scenario), "--out", str(mine.parent)])
+    assert result.exit_code == 2
+    said = result.output.replace("\n", "")
+    assert f"{mine}: --out" in said
+    assert "another program wrote it" in said
+    assert [path.name for path in mine.parent.iterdir()] == [name]
+    assert mine.read_text() == "mine"
+
+
+def test_files_of_others_stay_where_results_come_and_go(tmp_path):
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "fig99_mine.png").write_text("mine")
+    folder = ResultFolder(tmp_path)
+    folder.begin("plan", "simulation", robots=("left", "right"))
+    for name in ("plan.json", "log.npz", "fig10_joints_left.png", "fig11_joints_right.png"):
+        (tmp_path / name).write_text("ours")
+    ResultFolder.of("room", tmp_path, "plan", "simulation").begin("simulation", robots=("a", "b"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        ".coop_drake_results.json",
+        "fig99_mine.png",
+        "notes.txt",
+        "plan.json",
+    ]
+
+
+def test_a_list_that_was_altered_removes_nothing_outside_the_folder(tmp_path):
+    outside = tmp_path / "outside.txt"
+    outside.write_text("mine")
+    folder = ResultFolder(tmp_path / "out")
+    folder.begin("plan")
+    (folder.path / ".coop_drake_results.json").write_text(json.dumps({"plan": ["../outside.txt"]}))
+    folder.begin("plan")
+    assert outside.exists()
+    for nonsense in ("[]", "{", '{"plan": 3}', '{"plan": [3]}'):
+        (folder.path / ".coop_drake_results.json").write_text(nonsense)
+        (folder.path / "plan.json").write_text("whose?")
+        with pytest.raises(ScenarioError):
+            ResultFolder.of("room", folder.path, "plan")
+
+
+def test_a_folder_that_cannot_be_written_is_noticed_before_planning(tmp_path, monkeypatch):
+    def refused(dir):
+        raise PermissionError(13, "Permission denied", str(dir))
+
+    monkeypatch.setattr(results_module.tempfile, "TemporaryFile", refused)
+    scenario = write_scenario(tmp_path / "room.scenario.yaml")
+    result = CliRunner().invoke(app, ["run", str(scenario), "--out", str(tmp_path / "new" / "deeper")])
+    assert result.exit_code == 2
+    assert f"{tmp_path}: permission denied" in result.output.replace("\n", "")
+    assert not (tmp_path / "new").exists()
+
+
+def test_what_a_killed_run_left_is_removed_by_the_next(tmp_path):
+    folder = ResultFolder(tmp_path)
+    folder.begin("plan")
+    (tmp_path / ".plan.json.a1b2c3.part").write_text("half")
+    folder.begin("plan")
+    assert [path.name for path in tmp_path.iterdir()] == [".coop_drake_results.json"]
