@@ -6,8 +6,8 @@ import hashlib
 import inspect
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping
-from functools import cache, cached_property, update_wrapper
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache, cached_property, partial, update_wrapper
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
@@ -15,13 +15,14 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
 import numpy as np
 
 from coop_drake.files import cache_folder
-from coop_drake.kernel_dispatch import dispatcher, kind_of
+from coop_drake.kernel_kinds import kind_of, words_of
 from coop_drake.kernel_times import KERNEL_TIMES
 
 if TYPE_CHECKING:
     from coop_drake.kernel_compiler import NumbaFunction
 
 F = TypeVar("F", bound=Callable[..., object])
+R = TypeVar("R")
 
 _REASSOCIATED = {"contract", "reassoc"}
 """LLVM's flags for sums in any order: vector units are used; NaN and infinity keep their meaning."""
@@ -55,6 +56,22 @@ def compiled(function: F | None = None, *, reassociate: bool = False) -> F | Cal
     return decorate if function is None else decorate(function)
 
 
+def prepared(function: Callable[..., R], given: Sequence[object], *like: object) -> Callable[..., R]:
+    """Return a compiled function with its first arguments given, for further ones whose types never change.
+
+    A call of it does not look at types any more. In the functions that a simulation calls most, that would
+    take longer than what they compute.
+
+    Args:
+        function: The compiled function.
+        given: Its first arguments.
+        like: For each further argument an example. Nothing checks that a call's arguments are of these types:
+            an array needs the same type of numbers and of dimensions, and its numbers one after the other.
+    """
+    version = function.version((*given, *like)) if isinstance(function, Kernel) else function
+    return partial(version, *given)
+
+
 class Kernel:
     """A compiled function: one version for each list of types that it is called with.
 
@@ -75,7 +92,6 @@ class Kernel:
         _file_digest(function.__code__.co_filename)  # Now: the file may be edited while the program runs.
         self._count = function.__code__.co_argcount
         self._versions: dict[tuple[object, ...], Callable[..., Any]] = {}
-        self._dispatch: Callable[..., Any] = self._look_up
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         """Call the version for the types of the arguments."""
@@ -83,13 +99,12 @@ class Kernel:
             bound = inspect.signature(self._function).bind(*arguments, **named)
             bound.apply_defaults()
             arguments = bound.args
-        return self._dispatch(*arguments)
+        return self.version(arguments)(*arguments)
 
-    def _look_up(self, *arguments: Any) -> Any:
-        """Call the version for arguments whose types were not seen before, or not as these objects."""
+    def version(self, arguments: tuple[Any, ...]) -> Callable[..., Any]:
+        """Return the version for the types of all arguments in order; it is loaded or compiled at first."""
         kinds = tuple(map(kind_of, arguments))
-        version = self._versions.get(kinds)
-        return (version or self._version(arguments, kinds))(*arguments)
+        return self._versions.get(kinds) or self._new_version(arguments, kinds)
 
     def __reduce__(self) -> str:
         """Pickle by name, as a function is."""
@@ -111,15 +126,13 @@ class Kernel:
         """Digest of all that the machine code depends on."""
         return kernel_stamp(self._function, self._names)
 
-    def _version(self, arguments: tuple[Any, ...], kinds: tuple[object, ...]) -> Callable[..., Any]:
-        """Load or compile the version for some arguments of these kinds."""
-        words = [_words(kind) for kind in kinds]
+    def _new_version(self, arguments: tuple[Any, ...], kinds: tuple[object, ...]) -> Callable[..., Any]:
+        words = [words_of(kind) for kind in kinds]
         if None in words:  # Numba knows more types; none of them is kept here.
             return lambda *arguments: self._numba.call(arguments)
         with KERNEL_TIMES.spent():
             if kinds not in self._versions:
                 self._versions[kinds] = self._loaded_or_compiled(arguments, " ".join(map(str, words)))
-                self._dispatch = dispatcher(self._count, self._versions, self._look_up)
         return self._versions[kinds]
 
     def _loaded_or_compiled(self, arguments: tuple[Any, ...], words: str) -> Callable[..., Any]:
@@ -140,21 +153,6 @@ class Kernel:
         if kept is not None:
             write_machine_code(path, stamp, kept)
         return version
-
-
-def _words(kind: object) -> str | None:
-    """A kind as a text that is the same in every process; None for what is not kept."""
-    if isinstance(kind, str):
-        return kind
-    if not isinstance(kind, tuple):
-        return None
-    first, *rest = kind
-    if isinstance(first, np.dtype):
-        dimensions, flags = rest
-        order = "C" if flags & 0x1 else "F" if flags & 0x2 else "A"
-        return f"{first.str}{dimensions}{order}{flags & 0x500:x}" if first.kind in "fiub" else None
-    parts = [_words(part) for part in rest]
-    return None if None in parts else f"{first.__module__}.{first.__qualname__}({', '.join(map(str, parts))})"
 
 
 def _folder(beside: Path) -> Path:

@@ -127,7 +127,7 @@ import sys
 import numpy as np
 from grid import Grid
 
-from coop_drake.compiled import compiled
+from coop_drake.compiled import compiled, prepared
 
 @compiled
 def total(grid, weights, factor, shift=2.0):
@@ -147,6 +147,9 @@ square = np.arange(4.0).reshape(2, 2)
 print(called(square, 2.0))
 print(called(np.asfortranarray(square), np.float64(3.0)))
 print(called(square[:, :1], True, shift=1))
+weights = np.arange(3)[::-1]
+grid, _ = prepared(total, [Grid(square, 0.5)], weights, 0.0, 0.0)(weights, 2.0, 3.0)
+print(grid.values.sum())
 assert pickle.loads(pickle.dumps(total)) is total
 shown = refuse(2.5)
 print(total.loaded + refuse.loaded, "numba" in sys.modules)
@@ -162,7 +165,7 @@ def write_kinds(folder: Path, first: str = "") -> None:
     (folder / "caller.py").write_text(first + KINDS)
 
 
-RESULTS = ["Grid:float64:20.0:0.5:3", "Grid:float64:26.0:0.5:3", "Grid:float64:4.0:0.5:3"]
+RESULTS = ["Grid:float64:20.0:0.5:3", "Grid:float64:26.0:0.5:3", "Grid:float64:4.0:0.5:3", "24.0"]
 
 
 def test_machine_code_is_loaded_without_numba_and_gives_the_same(tmp_path):
@@ -189,6 +192,8 @@ def test_numba_loads_its_own_copy_where_its_libraries_are_not_as_expected(tmp_pa
 
 
 def test_nothing_is_compiled_where_numba_is_told_so(tmp_path):
-    (tmp_path / "caller.py").write_text("from callee import slope\nprint(type(slope).__name__, slope(2.0))")
+    lines = "from callee import slope", "from coop_drake.compiled import prepared"
+    results = "print(type(slope).__name__, slope(2.0), prepared(slope, [2.0])())"
+    (tmp_path / "caller.py").write_text("\n".join([*lines, results]))
     write_callee(tmp_path)
-    assert run(tmp_path, NUMBA_DISABLE_JIT="1") == ["function", "6.0"]
+    assert run(tmp_path, NUMBA_DISABLE_JIT="1") == ["function", "6.0", "6.0"]

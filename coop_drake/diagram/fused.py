@@ -134,6 +134,7 @@ def build_team_controller(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) 
         start=known.plan.start[2:][np.array(axes)],
         period=known.period,
         on_bases=known.period is None,
+        paced=known.hold is not None,
     )
 
 

@@ -148,12 +148,13 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
     laws = axis_laws(plan, axes)
     return {
         "object_estimator": ObjectEstimator(knowledge.robot, p_LE),
-        "reference_governor": ReferenceGovernor(cells),
+        "reference_governor": ReferenceGovernor(cells, paced=knowledge.hold is not None),
         "axis_ppc": AxisPpc(
             laws,
             start=plan.start[2:][np.array(axes)],
             period=knowledge.period,
             offset=knowledge.sample_offset,
+            paced=knowledge.hold is not None,
         ),
         "wrench_law": WrenchLaw(
             p_LE,
@@ -245,8 +246,6 @@ def _connect_by_name(
             name = renamed.get(port.get_name(), port.get_name())
             if name in outputs:
                 builder.Connect(outputs[name], port)
-            elif name == "clock":  # a team that is never held has none
-                continue
             elif name in outside:
                 builder.ConnectInput(name, port)
             else:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
+from coop_drake.compiled import prepared
 from coop_drake.laws.axis_table import first_jumps, track_axes, write_bounds, write_jumps
 from coop_drake.systems.axis_laws import AxisLaw
-from coop_drake.systems.block import Block
+from coop_drake.systems.block import NUMBER, VECTOR, Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.funnel_clock import CLOCK_SIZE, clock_of
+from coop_drake.systems.jump_memory import JumpMemory
 from coop_drake.tree.pose import FloatArray
 
 
@@ -24,7 +25,7 @@ class AxisPpc(Block):
     input   ``current_cell``         2          index of the current cell, time of its entry [-, s]
     input   ``ready``                2          the robot's own report: cell index, margin [-]
     input   ``clock``                3          the funnels' clock: its lag since then [s], its pace [-] and
-                                                the derivative of the pace [1/s]; may be left out
+                                                the derivative of the pace [1/s]; only where ``paced``
     output  ``axis_acceleration``    1 + n      desired angular acceleration of the object [rad/s^2],  W
                                                 of the joints [rad/s^2 or m/s^2]
     output  ``funnels``              2 (1 + n)  lower, then upper funnel bounds now [rad or m]
@@ -43,6 +44,7 @@ class AxisPpc(Block):
             the first cell's law from the beginning.
         period: Time between updates [s], None for every step.
         offset: Time of the first update where there is a period [s].
+        paced: Whether the funnels move by a clock that may slow down.
 
     Raises:
         ValueError: There is no law, or the laws differ in their number of axes or have none.
@@ -55,21 +57,24 @@ class AxisPpc(Block):
         start: FloatArray | None = None,
         period: float | None = None,
         offset: float = 0.0,
+        paced: bool = False,
     ) -> None:
         super().__init__()
         if not laws or len({law.axes for law in laws}) != 1 or laws[0].axes < 1:
             raise ValueError("AxisPpc needs one law for each cell, all of the same axes, the angle first")
         self._tables = [law.table for law in laws]
+        ports = VECTOR, VECTOR, VECTOR, VECTOR, VECTOR
+        self._track = [prepared(track_axes, [table], NUMBER, *ports) for table in self._tables]
         axes = laws[0].axes
-        self._none, self._nothing = np.zeros(axes), EventStatus.DidNothing()
+        self._memory, self._nothing = JumpMemory(self._tables), EventStatus.DidNothing()
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._robot = self.DeclareVectorInputPort("robot_state", 2 * (2 + axes))
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self._ready = self.DeclareVectorInputPort("ready", READY_SIZE)
-        self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE)
+        self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE) if paced else None
         self.DeclareDiscreteState([0.0, *first_jumps(self._tables[0], start)])
-        timed = {self.input_port_ticket(port.get_index()) for port in (self._cell, self._clock)}
-        read = {self.time_ticket()} | timed
+        timed = [self._cell, self._clock] if self._clock is not None else [self._cell]
+        read = {self.time_ticket(), *(self.input_port_ticket(port.get_index()) for port in timed)}
         states = {self.input_port_ticket(port.get_index()) for port in (self._object, self._robot)}
         # The robot's report is not among them: only the update reads it.
         self.DeclareVectorOutputPort(
@@ -85,11 +90,10 @@ class AxisPpc(Block):
 
     def _write_acceleration(self, context: Context, output: BasicVector) -> None:
         cell, clock = self._cell.Eval(context), clock_of(self._clock, context)
-        index, time = index_of(cell, len(self._tables)), context.get_time() - cell[1]
-        table = self._tables[index]
-        memory = context.get_discrete_state_vector().value()
-        jumps = memory[1:] if memory[0] == index else self._none
-        track_axes(table, time, clock, jumps, *self._states(context, len(table)), output.get_mutable_value())
+        index, time = index_of(cell, len(self._track)), context.get_time() - cell[1]
+        jumps = self._memory.jumps(context, index, time)
+        states = self._states(context, len(jumps))
+        self._track[index](time, clock, jumps, *states, output.get_mutable_value())
 
     def _write_funnels(self, context: Context, output: BasicVector) -> None:
         cell = self._cell.Eval(context)

@@ -16,9 +16,9 @@ CLOCK_SIZE = 3
 _ON_TIME = np.array([0.0, 1.0, 0.0])
 
 
-def clock_of(port: InputPort, context: Context) -> FloatArray:
-    """Return the value of a ``clock`` port, or (0, 1, 0), where none is connected."""
-    return port.Eval(context) if port.HasValue(context) else _ON_TIME
+def clock_of(port: InputPort | None, context: Context) -> FloatArray:
+    """Return the value of a ``clock`` port, or (0, 1, 0) where a block has none."""
+    return _ON_TIME if port is None else port.Eval(context)
 
 
 class FunnelClock(Block):

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
+from coop_drake.compiled import prepared
 from coop_drake.laws.robot_dynamics import estimate_object
 from coop_drake.plant import RobotPlant, robot_chain
-from coop_drake.systems.block import Block
+from coop_drake.systems.block import VECTOR, Block
 from coop_drake.tree.pose import FloatArray
 
 
@@ -29,16 +30,11 @@ class ObjectEstimator(Block):
 
     def __init__(self, robot: RobotPlant, p_LE: FloatArray) -> None:
         super().__init__()
-        self._chain, self._p_LE = robot_chain(robot), np.array(p_LE, dtype=float)
+        known = robot_chain(robot), np.array(p_LE, dtype=float)
+        self._estimate = prepared(estimate_object, known, VECTOR, VECTOR, VECTOR)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + len(robot.joints)))
         self._pose = self.DeclareVectorInputPort("object_pose", 3)
         self.DeclareVectorOutputPort("object_state", 6, self._write_state)
 
     def _write_state(self, context: Context, output: BasicVector) -> None:
-        estimate_object(
-            self._chain,
-            self._p_LE,
-            self._state.Eval(context),
-            self._pose.Eval(context),
-            output.get_mutable_value(),
-        )
+        self._estimate(self._state.Eval(context), self._pose.Eval(context), output.get_mutable_value())

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from pydrake.systems.framework import BasicVector, Context
 
+from coop_drake.compiled import prepared
 from coop_drake.systems.axis_laws import AxisLaw
-from coop_drake.systems.block import Block
+from coop_drake.systems.block import NUMBER, VECTOR, Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.ready_kernels import ready_conditions, robot_ready
 from coop_drake.systems.reference_governor import GovernedCell
@@ -54,7 +55,7 @@ class ReadyMonitor(Block):
             )
         if not position_tolerance > 0.0:
             raise ValueError(f"ReadyMonitor's position tolerance must be positive, not {position_tolerance}")
-        self._conditions = ready_conditions(
+        conditions = ready_conditions(
             [law.table for law in laws],
             [cell.clearance.edges for cell in cells],
             [cell.row for cell in cells],
@@ -62,6 +63,7 @@ class ReadyMonitor(Block):
             goal_position,
             position_tolerance,
         )
+        self._ready = [prepared(robot_ready, known, NUMBER, VECTOR, VECTOR, VECTOR) for known in conditions]
         n = laws[0].axes - 1
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + n))
@@ -71,10 +73,9 @@ class ReadyMonitor(Block):
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
         current, report = self._current.Eval(context), output.get_mutable_value()
-        index = index_of(current, len(self._conditions))
+        index = index_of(current, len(self._ready))
         report[0] = index
-        report[1] = robot_ready(
-            *self._conditions[index],
+        report[1] = self._ready[index](
             context.get_time() - current[1],
             self._object.Eval(context),
             self._state.Eval(context),

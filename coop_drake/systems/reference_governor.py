@@ -8,14 +8,15 @@ from functools import cached_property
 
 from pydrake.systems.framework import BasicVector, Context
 
+from coop_drake.compiled import prepared
 from coop_drake.fields import VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.laws.gains import TransitionGains
 from coop_drake.laws.governor import governor_velocity
 from coop_drake.laws.hand_over import governed_gains
-from coop_drake.systems.block import Block
+from coop_drake.systems.block import NUMBER, VECTOR, Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
-from coop_drake.systems.funnel_clock import CLOCK_SIZE, clock_of
+from coop_drake.systems.funnel_clock import CLOCK_SIZE
 from coop_drake.systems.governor_kernels import accelerate_object, cell_margin, govern
 from coop_drake.tree.pose import FloatArray
 
@@ -43,12 +44,12 @@ class GovernedCell:
         """The governor's row, see ``governed_gains``, shape (8,)."""
         return self.gains.governor_row(self.before or self.gains)
 
-    @cached_property
-    def kernel_arguments(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
-        """The arguments of ``govern`` for this cell; None if its field is not that of a harmonic map."""
+    def prepared_law(self) -> Callable[[float, FloatArray, FloatArray, FloatArray], object]:
+        """Return ``govern`` below; compiled as a whole where the field is that of a harmonic map."""
         if not isinstance(self.field, VelocityField):
-            return None
-        return self.row, self.clearance.edges, *self.field.kernel_arguments
+            return self.govern
+        known = self.row, self.clearance.edges, *self.field.kernel_arguments
+        return prepared(govern, known, NUMBER, VECTOR, VECTOR, VECTOR)
 
     def govern(
         self, time: float, object_state: FloatArray, governor_position: FloatArray, command: FloatArray
@@ -76,7 +77,7 @@ class ReferenceGovernor(Block):
     input   ``governor_position``       2    p_G, kept by an integrator outside [m]                 W
     input   ``current_cell``            2    index of the current cell, time of its entry [-, s]
     input   ``clock``                   3    the funnels' clock: its lag [s], its pace [-] and the
-                                             derivative of the pace [1/s]; may be left out
+                                             derivative of the pace [1/s]; only where ``paced``
     output  ``governor_command``        4    rate of p_G [m/s], desired acceleration of L's origin  W
                                              [m/s^2]
     output  ``energy_margin``           1    Delta E [m^2/s^2]
@@ -87,21 +88,22 @@ class ReferenceGovernor(Block):
 
     Args:
         cells: One entry for each cell of the plan.
+        paced: Whether p_G moves by a clock that may slow down.
 
     Raises:
         ValueError: There is no cell.
     """
 
-    def __init__(self, cells: Sequence[GovernedCell]) -> None:
+    def __init__(self, cells: Sequence[GovernedCell], *, paced: bool = False) -> None:
         super().__init__()
         if not cells:
             raise ValueError("ReferenceGovernor needs at least one cell")
         self._cells = tuple(cells)
-        self._compiled = [cell.kernel_arguments for cell in cells]
+        self._govern = [cell.prepared_law() for cell in cells]
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
-        self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE)
+        self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE) if paced else None
         self.DeclareVectorOutputPort("governor_command", 4, self._write_command)
         self.DeclareVectorOutputPort("energy_margin", 1, self._write_margin)
 
@@ -109,12 +111,10 @@ class ReferenceGovernor(Block):
         current = self._current.Eval(context)
         index, time = index_of(current, len(self._cells)), context.get_time() - current[1]
         state, governor = self._object.Eval(context), self._governor.Eval(context)
-        arguments, command = self._compiled[index], output.get_mutable_value()
-        if arguments is None:
-            self._cells[index].govern(time, state, governor, command)
-        else:
-            govern(*arguments, time, state, governor, command)
-        command[:2] *= clock_of(self._clock, context)[1]
+        command = output.get_mutable_value()
+        self._govern[index](time, state, governor, command)
+        if self._clock is not None:
+            command[:2] *= self._clock.Eval(context)[1]
 
     def _write_margin(self, context: Context, output: BasicVector) -> None:
         current, state = self._current.Eval(context), self._object.Eval(context)

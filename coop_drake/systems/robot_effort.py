@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from pydrake.systems.framework import BasicVector, Context
 
+from coop_drake.compiled import prepared
 from coop_drake.laws.robot_dynamics import robot_effort
 from coop_drake.plant import RobotPlant, robot_chain
-from coop_drake.systems.block import Block
+from coop_drake.systems.block import VECTOR, Block
 
 
 class RobotEffort(Block):
@@ -29,7 +30,8 @@ class RobotEffort(Block):
 
     def __init__(self, robot: RobotPlant) -> None:
         super().__init__()
-        self._robot, self._chain, self._springs = robot, robot_chain(robot), robot.has_springs
+        self._robot, self._springs = robot, robot.has_springs
+        self._effort = prepared(robot_effort, [robot_chain(robot)], VECTOR, VECTOR, VECTOR, VECTOR)
         self._size = size = 3 + len(robot.joints)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * size)
         self._hand = self.DeclareVectorInputPort("hand_command", 6)
@@ -38,7 +40,7 @@ class RobotEffort(Block):
 
     def _write_effort(self, context: Context, output: BasicVector) -> None:
         state, effort = self._state.Eval(context), output.get_mutable_value()
-        robot_effort(self._chain, state, self._hand.Eval(context), self._axes.Eval(context), effort)
+        self._effort(state, self._hand.Eval(context), self._axes.Eval(context), effort)
         if self._springs:
             self._robot.set_state(state[: self._size], state[self._size :])
             effort += self._robot.spring_effort()

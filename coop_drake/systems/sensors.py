@@ -6,10 +6,10 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 from pydrake.systems.primitives import Selector
 
-from coop_drake.compiled import compiled
+from coop_drake.compiled import compiled, prepared
 from coop_drake.laws.robot_dynamics import read_robot
 from coop_drake.plant import SeparateTeam, TeamPlant, base_chain
-from coop_drake.systems.block import Block
+from coop_drake.systems.block import VECTOR, Block
 from coop_drake.systems.selector import build_selector
 from coop_drake.tree.pose import FloatArray, IntArray
 
@@ -60,7 +60,7 @@ class TeamSensor(Block):
     def __init__(self, team: TeamPlant) -> None:
         super().__init__()
         chains = [base_chain(team, robot) for robot in team.robots]
-        self._team = (
+        known = (
             team.position_index[:3].astype(np.int64),
             np.array([0, *np.cumsum([len(chain.chain) for chain in chains])]),
             np.vstack([chain.chain for chain in chains]),
@@ -68,13 +68,14 @@ class TeamSensor(Block):
             np.array([0, *np.cumsum([chain.joints.shape[1] for chain in chains])]),
             np.hstack([chain.joints for chain in chains]),
         )
+        self._read = prepared(_read_team, known, VECTOR, VECTOR)
         #: Sizes of the measurements' parts: the object's, then each robot's.
         self.sizes = [3, *(2 * (3 + chain.joints.shape[1]) for chain in chains)]
         self._state = self.DeclareVectorInputPort("team_state", team.plant.num_multibody_states())
         self.DeclareVectorOutputPort("measurements", sum(self.sizes), self._write_measurements)
 
     def _write_measurements(self, context: Context, output: BasicVector) -> None:
-        _read_team(*self._team, self._state.Eval(context), output.get_mutable_value())
+        self._read(self._state.Eval(context), output.get_mutable_value())
 
 
 def build_separate_sensor(team: SeparateTeam) -> Selector:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context
 
+from coop_drake.compiled import prepared
 from coop_drake.laws.load_sharing import end_effector_command
-from coop_drake.systems.block import Block
+from coop_drake.systems.block import VECTOR, Block
 from coop_drake.tree.pose import FloatArray
 
 
@@ -46,7 +47,8 @@ class WrenchLaw(Block):
             raise ValueError(f"WrenchLaw needs positive mass and inertia, not {mass} and {inertia}")
         if not 0.0 <= share <= 1.0:
             raise ValueError(f"WrenchLaw's share must lie in [0, 1], not {share}")
-        self._load = np.array([*p_LE, *p_LLcm, mass, inertia, share], dtype=float)
+        load = np.array([*p_LE, *p_LLcm, mass, inertia, share], dtype=float)
+        self._command = prepared(end_effector_command, [load], VECTOR, VECTOR, VECTOR, VECTOR)
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._governor = self.DeclareVectorInputPort("governor_command", 4)
         self._axes = self.DeclareVectorInputPort("axis_acceleration", 1 + joints)
@@ -62,4 +64,4 @@ class WrenchLaw(Block):
             self._governor.Eval(context),
             self._axes.Eval(context),
         )
-        end_effector_command(self._load, state, governor[2:], axes, output.get_mutable_value())
+        self._command(state, governor[2:], axes, output.get_mutable_value())

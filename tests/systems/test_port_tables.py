@@ -53,7 +53,7 @@ def blocks():
     for blocks, changes in (
         ("named", {"deployment": EVERYTHING, "control": Control(predictor=True, observer=True, hold=Hold())}),
         ("named", {"plant": PlantSettings(grasps="constraints")}),
-        ("fused", {}),
+        ("fused", {"control": Control(hold=Hold(at=(1.0,)))}),
     ):
         loop = build_closed_loop(replace(scenario, **changes), plan, small_maps(), blocks=blocks)
         for leaf in leaves(loop.diagram):

@@ -41,9 +41,14 @@ def law_by_hand(axes, position, rate, cell, time):
 
 
 def test_ports(ppc):
-    assert port_sizes(ppc) == (
-        {"object_state": 6, "robot_state": 10, "current_cell": 2, "ready": 2, "clock": 3},
-        {"axis_acceleration": 3, "funnels": 6},
+    inputs = {"object_state": 6, "robot_state": 10, "current_cell": 2, "ready": 2}
+    outputs = {"axis_acceleration": 3, "funnels": 6}
+    assert port_sizes(ppc) == (inputs, outputs)
+    paced = AxisPpc(axis_laws(PLAN, AXES), paced=True)
+    assert port_sizes(paced) == ({**inputs, "clock": 3}, outputs)
+    late = {**INPUTS, "clock": [0.25, 1.0, 0.0]}
+    np.testing.assert_array_equal(
+        evaluate(paced, late, "funnels", 2.6), evaluate(ppc, INPUTS, "funnels", 2.35)
     )
 
 

@@ -36,9 +36,14 @@ def expected_margin(cell, inputs):
 
 
 def test_ports(cells):
-    inputs, outputs = port_sizes(ReferenceGovernor(cells))
-    assert inputs == {"object_state": 6, "governor_position": 2, "current_cell": 2, "clock": 3}
-    assert outputs == {"governor_command": 4, "energy_margin": 1}
+    inputs = {"object_state": 6, "governor_position": 2, "current_cell": 2}
+    outputs = {"governor_command": 4, "energy_margin": 1}
+    assert port_sizes(ReferenceGovernor(cells)) == (inputs, outputs)
+    paced = ReferenceGovernor(cells, paced=True)
+    assert port_sizes(paced) == ({**inputs, "clock": 3}, outputs)
+    command = evaluate(ReferenceGovernor(cells), INPUTS, "governor_command")
+    slowed = evaluate(paced, {**INPUTS, "clock": [0.1, 0.25, -0.5]}, "governor_command")
+    np.testing.assert_array_equal(slowed, [*(0.25 * command[:2]), *command[2:]])
 
 
 @pytest.mark.parametrize("index", [0, 1, 2])
