@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from stat import S_ISDIR, S_ISREG
 from typing import IO
 
 _FOLDER_VARIABLE = "COOP_DRAKE_CACHE"
@@ -19,6 +21,26 @@ def cache_folder(kind: str) -> Path:
     from platformdirs import user_cache_path
 
     return user_cache_path("coop_drake") / kind
+
+
+def check_readable(path: Path, most_megabytes: float) -> Path:
+    """Return the path of a file that can be read in whole; devices and pipes may never end.
+
+    Args:
+        path: The file.
+        most_megabytes: Its largest size [MB].
+
+    Raises:
+        OSError: It is missing, no ordinary file, or larger.
+    """
+    status = path.stat()
+    if not S_ISREG(status.st_mode):
+        kind = "a folder" if S_ISDIR(status.st_mode) else "a device or a pipe"
+        raise OSError(errno.EINVAL, f"it is {kind}, no file", str(path))
+    if status.st_size > 1e6 * most_megabytes:
+        size = f"it has {status.st_size / 1e6:.0f} MB; at most {most_megabytes:g} MB are read"
+        raise OSError(errno.EFBIG, size, str(path))
+    return path
 
 
 def write_atomically(path: Path | str, content: bytes | Callable[[IO[bytes]], object]) -> Path:

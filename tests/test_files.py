@@ -5,7 +5,7 @@ import stat
 
 import pytest
 
-from coop_drake.files import remove_unfinished, write_atomically
+from coop_drake.files import check_readable, remove_unfinished, write_atomically
 
 
 def test_bytes_and_writers_both_serve_and_directories_are_made(tmp_path):
@@ -50,3 +50,21 @@ def test_what_a_killed_program_left_is_removed_and_nothing_else(tmp_path):
         (tmp_path / name).write_bytes(b"")
     remove_unfinished(tmp_path, ["a.txt"])
     assert sorted(path.name for path in tmp_path.iterdir()) == [".b.txt.x1y2.part", "a.txt", "a.txt.part"]
+
+
+@pytest.mark.parametrize(
+    ("name", "finding"),
+    [
+        ("/dev/zero", "a device or a pipe"),
+        ("folder", "a folder"),
+        ("big", "at most 1 MB"),
+        ("none", "No such"),
+    ],
+)
+def test_a_file_that_cannot_be_read_in_whole_is_refused_at_once(name, finding, tmp_path):
+    (tmp_path / "folder").mkdir()
+    with (tmp_path / "big").open("wb") as file:
+        file.truncate(2_000_000)
+    with pytest.raises(OSError, match=finding) as refused:
+        check_readable(tmp_path / name, 1.0)
+    assert refused.value.filename == str(tmp_path / name)

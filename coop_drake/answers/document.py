@@ -12,9 +12,11 @@ from typing import Any, NoReturn, TypeVar
 
 from coop_drake.answers.digest import content_digest
 from coop_drake.errors import PlanError, shortened
-from coop_drake.files import write_atomically
+from coop_drake.files import check_readable, write_atomically
 from coop_drake.typed_data import DataError, convert, convert_class
 
+_LARGEST = 1000.0
+"""Largest file of a plan or a proof [MB]; those of the shipped scenarios have a few."""
 Content = TypeVar("Content")
 
 DIGITS = 300
@@ -38,7 +40,7 @@ class Document:
         """Read a JSON file that should hold ``what``; every key may stand once in a mapping."""
         file, expected = str(path), f"expected the JSON of {what}"
         try:
-            text = Path(path).read_text(encoding="utf-8")
+            text = check_readable(Path(path), _LARGEST).read_text(encoding="utf-8")
             return cls(file, json.loads(text, object_pairs_hook=_mapping, parse_int=_whole_number))
         except json.JSONDecodeError as error:
             raise PlanError(f"{file}: line {error.lineno}: {error.msg}; {expected}") from error

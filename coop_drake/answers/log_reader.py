@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from coop_drake.errors import PlanError
+from coop_drake.files import check_readable
 
 _DAMAGE = (
     OSError,
@@ -22,6 +23,8 @@ _DAMAGE = (
     zipfile.BadZipFile,
     zlib.error,
 )
+_LARGEST = 4000.0
+"""Largest log [MB]; a minute of transport has about ten."""
 _TIMES = ("T",)
 _SHAPES: dict[str, tuple[str | int, ...]] = {
     "object_pose": ("T", 3),
@@ -64,7 +67,10 @@ def read_arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray[Any, A
             kind than the others make it; the message names it.
     """
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as archive:
+        with (
+            check_readable(path, _LARGEST).open("rb") as stream,
+            np.load(stream, allow_pickle=False) as archive,
+        ):
             missing = [name for name in names if name not in archive]
             if missing:
                 raise PlanError(

@@ -13,6 +13,7 @@ import yaml
 from numpy.typing import NDArray
 
 from coop_drake.errors import FloorPlanError
+from coop_drake.files import check_readable
 from coop_drake.floor_plans.settings import FloorPlanSettings
 from coop_drake.tree.pose import FloatArray
 
@@ -21,6 +22,8 @@ BoolGrid = NDArray[np.bool_]
 _MODES = ("trinary", "scale", "raw")
 _MOST_CELLS = 64_000_000
 """Larger pictures would fill the memory: a cell takes about 50 bytes while it is read."""
+_LARGEST = 1.0
+"""Largest description of a map [MB]; its picture stands in a file of its own."""
 _REMEDY = "see the map_server's documentation for the file's keys"
 
 
@@ -99,7 +102,7 @@ def read_map(path: Path, settings: FloorPlanSettings) -> OccupancyMap:
 def _document(path: Path) -> dict[str, Any]:
     file = str(path)
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
+        document = yaml.safe_load(check_readable(path, _LARGEST).read_text(encoding="utf-8"))
     except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
         finding = f"no YAML ({' '.join(str(error).split())[:200]})"
         raise FloorPlanError(file, "the file", finding, _REMEDY) from error

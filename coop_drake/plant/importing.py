@@ -12,11 +12,14 @@ from xml.etree import ElementTree
 import numpy as np
 
 from coop_drake.errors import ScenarioError
+from coop_drake.files import check_readable
 from coop_drake.tree.pose import FloatArray
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
+_LARGEST_MODEL, _LARGEST_MESH = 20.0, 200.0
+"""Largest files [MB]: models of whole robots have less than one, their meshes some tens."""
 _DRAKE = "http://drake.mit.edu"
 _DROPPED: tuple[str, ...] = ("calibration", "safety_controller", "verbose", "transmission", "gazebo")
 _DROPPED += ("ros2_control", "plugin", "sensor", "mimic")
@@ -80,7 +83,7 @@ def _parse(path: Path) -> Element:
     if path.suffix not in (".urdf", ".sdf"):
         raise ScenarioError(str(path), "the name", path.name, "a .urdf or .sdf file (run xacro before)")
     try:
-        root: Element = fromstring(path.read_bytes())
+        root: Element = fromstring(check_readable(path, _LARGEST_MODEL).read_bytes())
     except (OSError, ParseError, DefusedXmlException, ValueError) as error:
         raise ScenarioError(str(path), "the file", str(error), "a readable URDF or SDF model") from error
     return root
@@ -227,7 +230,7 @@ def _vertices(path: Path) -> FloatArray:
     """Vertices of a mesh, shape (n, 3) [m]."""
     import trimesh
 
-    mesh = trimesh.load_mesh(path, process=False)
+    mesh = trimesh.load_mesh(check_readable(path, _LARGEST_MESH), process=False)
     points = np.asarray(mesh.vertices, dtype=float)
     if not len(points) or not np.isfinite(points).all():
         raise ValueError("it has no corners, or some that are not finite")

@@ -12,7 +12,11 @@ from math import isfinite, isnan
 from pathlib import Path
 from xml.parsers import expat
 
+from coop_drake.files import check_readable
+
 _ROOTS = {".sdf": "sdf", ".urdf": "robot"}
+_LARGEST = 20.0
+"""Largest model file [MB]; whole robots have less than one."""
 _DEEPEST = 100
 """Elements inside each other that are allowed; models have about ten, and Drake's readers recurse."""
 _URDF: dict[str, tuple[str, str]] = {
@@ -67,7 +71,7 @@ def fault_of(path: Path) -> str:
     """
     reader = _ModelText(path.suffix)
     try:
-        reader.parser.Parse(path.read_bytes(), True)
+        reader.parser.Parse(check_readable(path, _LARGEST).read_bytes(), True)
     except expat.ExpatError as error:
         return f"{path}: line {error.lineno}: {expat.ErrorString(error.code)}"
     except (_FaultError, LookupError) as error:  # LookupError: the file names an unknown encoding
