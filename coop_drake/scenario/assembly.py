@@ -1,5 +1,6 @@
 """Finds the object, the robots and the grasps in the model directives of a scenario."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +12,11 @@ from coop_drake.errors import ScenarioError
 from coop_drake.scenario.directives import checked_directives, flat
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.packages import package_map
+
+_LONGEST = 80
+_LETTERS = "letters, digits, blanks and _ . : + -, with a letter, digit or _ in front"
+_NAME = re.compile(rf"\w[\w.:+ -]{{0,{_LONGEST - 1}}}")
+"""Names of models: pictures of a robot bear its name, so that it must be part of a file's name, too."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +101,8 @@ class _Reader:
         for key, directive in zip(self.keys, self.directives, strict=True):
             if directive.add_model:
                 name = directive.add_model.name
+                if not _NAME.fullmatch(name):
+                    raise self._refuse(f"{key}.add_model.name", name, f"at most {_LONGEST} of {_LETTERS}")
                 if name in self.models:
                     raise self._refuse(f"{key}.add_model.name", name, "a name that no other model has")
                 self.models[name] = key

@@ -37,6 +37,18 @@ CASES = {
         "a::b",
         "without",
     ),
+    "model name with a path": (
+        (MODEL, MODEL.replace("robot_0", "/../../ESCAPED")),
+        "directives[1].add_model.name",
+        "/../../ESCAPED",
+        "at most 80 of letters, digits, blanks",
+    ),
+    "long model name": (
+        (MODEL, MODEL.replace("robot_0", "r" * 81)),
+        "directives[1].add_model.name",
+        "r" * 81,
+        "at most 80 of letters",
+    ),
     "model twice": (
         (MODEL, MODEL.replace("robot_0", "object")),
         "directives[1].add_model.name",
