@@ -91,6 +91,9 @@ PictureFolder = Annotated[Path | None, out_folder("Where the picture goes; out/<
 Machine = Annotated[
     bool, typer.Option("--json", help="One JSON object on standard output, all else on standard error.")
 ]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Show more rows in the closing table; --json has all facts.")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show errors only.")]
 FreshMaps = Annotated[
     bool, typer.Option("--fresh-maps", help="Solve all maps anew; others come from the cache, see `maps`.")

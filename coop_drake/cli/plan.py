@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from coop_drake.cli.options import BudgetName, GainsName, Machine, Quiet, ResultsFolder, ScenarioPath
+from coop_drake.cli.options import BudgetName, GainsName, Machine, Quiet, ResultsFolder, ScenarioPath, Verbose
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import answer_of, planning_facts, summary_rows
@@ -24,13 +24,14 @@ def plan_command(
     budget: BudgetName = None,
     machine: Machine = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Plan only: write the plan, or the proof that there is none."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
+    with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "plan")
         if plan_of(task, folder, reporter, _budget(budget, task)):
-            reporter.table(task.name, summary_rows(reporter.facts))
+            reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
             reporter.say(f"The plan is in {escape(str(folder.plan))}")
 
 
@@ -69,7 +70,7 @@ def plan_of(
         _write(result, task, folder)
     if isinstance(result, Found):
         return result.plan
-    reporter.table(task.name, summary_rows(reporter.facts))
+    reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
     reporter.say(f"[bold]{answer_of(result)}[/]: {escape(result.reason)}")
     if folder is not None and folder.certificate.exists():
         reporter.say(f"The proof is in {escape(str(folder.certificate))}")

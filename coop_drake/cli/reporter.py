@@ -52,13 +52,16 @@ class Reporter:
     Args:
         machine: Whether standard output is for one JSON object, and everything else goes to standard error.
         quiet: Whether only errors are shown.
+        verbose: Whether closing tables show more rows.
 
     Attributes:
         facts: What ``--json`` writes, by name.
         code: The exit code of the command.
+        verbose: As given.
     """
 
-    def __init__(self, *, machine: bool, quiet: bool) -> None:
+    def __init__(self, *, machine: bool, quiet: bool, verbose: bool = False) -> None:
+        self.verbose = verbose
         self.facts: dict[str, Any] = {}
         self.code = ExitCode.DONE
         self._machine = machine
@@ -164,15 +167,16 @@ def _plain(value: Any) -> Any:
 
 
 @contextmanager
-def reporting(*, machine: bool = False, quiet: bool = False) -> Iterator[Reporter]:
+def reporting(*, machine: bool = False, quiet: bool = False, verbose: bool = False) -> Iterator[Reporter]:
     """Run the body of a command, which sets ``reporter.code``, and leave with that exit code.
 
-    With ``machine`` standard output is for one JSON object, with ``quiet`` only errors are shown.
+    With ``machine`` standard output is for one JSON object, with ``quiet`` only errors are shown, with
+    ``verbose`` closing tables have more rows.
 
     Raises:
         typer.Exit: Always, with the exit code, unless the body raises an error that is a bug.
     """
-    reporter = Reporter(machine=machine, quiet=quiet)
+    reporter = Reporter(machine=machine, quiet=quiet, verbose=verbose)
     try:
         try:
             yield reporter

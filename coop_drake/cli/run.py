@@ -18,6 +18,7 @@ from coop_drake.cli.options import (
     Quiet,
     ResultsFolder,
     ScenarioPath,
+    Verbose,
 )
 from coop_drake.cli.plan import plan_of
 from coop_drake.cli.preparing import preparing
@@ -46,9 +47,10 @@ def run_command(
     blocks: BlocksName = "named",
     machine: Machine = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Plan, map, simulate and record a transport."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
+    with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "plan", "simulation")
         with FigureProcesses() as figures:
@@ -85,7 +87,7 @@ def carry_out(
         write_recording(task.scenario, plan, log, folder.recording, progress=progress)
     with reporter.stage("drawing", "drawing"):
         figures.wait()
-    reporter.table(task.name, summary_rows(reporter.facts))
+    reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
     reporter.say(
         f"Results are in {escape(str(folder.path))}; open {escape(str(folder.recording))} in a browser"
     )

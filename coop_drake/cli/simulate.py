@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from coop_drake.cli.options import BlocksName, FreshMaps, Live, Machine, Quiet, ResultsFolder, ScenarioPath
+from coop_drake.cli.options import (
+    BlocksName,
+    FreshMaps,
+    Live,
+    Machine,
+    Quiet,
+    ResultsFolder,
+    ScenarioPath,
+    Verbose,
+)
 from coop_drake.cli.reporter import Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.run import carry_out
@@ -37,9 +46,10 @@ def simulate_command(
     blocks: BlocksName = "named",
     machine: Machine = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Map, simulate and record a plan that was made before."""
-    with reporting(machine=machine, quiet=quiet) as reporter:
+    with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "simulation")
         found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)

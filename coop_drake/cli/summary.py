@@ -1,6 +1,6 @@
 """The closing table of a command, and the facts about a plan, its maps and its run that it shows.
 
-``--json`` gives machines all facts; the table shows people those that `_ROWS` lists.
+``--json`` gives machines all facts; the table shows people those that `_ROWS` lists, with ``--verbose`` more.
 """
 
 from __future__ import annotations
@@ -16,39 +16,47 @@ if TYPE_CHECKING:
 
 _ROWS: tuple[tuple[str, str, str], ...] = (
     ("answer", "answer", "{}"),
+    ("transport", "outcome", "{}"),
     ("cells", "cells", "{}"),
+    ("planning took", "planning_wall_seconds", "{:.2f} s"),
+    ("estimated transport", "estimated_seconds", "{:.1f} s"),
+    ("it took", "simulated_seconds", "{:.2f} s"),
+    ("smallest clearance to walls", "min_workspace_clearance_m", "{:.4f} m"),
+    ("smallest clearance between bodies", "min_body_clearance_m", "{:.4f} m"),
+    ("peak speed of the object", "peak_speed_m_s", "{:.2f} m/s"),
+    ("peak base force", "peak_base_wrench_n", "{:.1f} N"),
+    ("final position error", "final_position_error_m", "{:.4f} m"),
+    ("final angle error", "final_angle_error_rad", "{:.4f} rad"),
+)
+"""Label, fact and format of every row of the closing table, in its order; unknown facts have no row."""
+_MORE_ROWS: tuple[tuple[str, str, str], ...] = (
     ("slices made", "slices", "{}"),
     ("narrowest passage", "narrowest_neck_m", "{:.3f} m"),
     ("gains", "gains", "{}"),
-    ("estimated transport", "estimated_seconds", "{:.1f} s"),
     ("first plan certified after", "first_plan_cpu_seconds", "{:.2f} s"),
-    ("planning took", "planning_wall_seconds", "{:.2f} s"),
     ("mapping took", "mapping_wall_seconds", "{:.2f} s"),
     ("maps read from the cache", "maps_read", "{}"),
     ("largest map residual", "max_map_residual", "{:.1e}"),
     ("unknowns of the largest map", "max_map_unknowns", "{}"),
-    ("simulated", "simulated_seconds", "{:.2f} s"),
     ("simulating took", "simulation_wall_seconds", "{:.2f} s"),
-    ("smallest clearance", "min_clearance_m", "{:.4f} m"),
     ("smallest energy margin", "min_delta_e", "{:.2e} m²/s²"),
+    ("smallest funnel margin", "min_funnel_margin", "{:.4f} rad"),
     ("largest acceleration error", "max_acceleration_error", "{:.1e} m/s²"),
     ("largest wrench error", "max_wrench_error_n", "{:.1e} N"),
     ("largest grasp error", "max_grasp_error_m", "{:.1e} m"),
     ("messages between robots", "messages", "{}"),
     ("their payload", "message_bytes", "{} bytes"),
-    ("peak base force", "peak_base_wrench_n", "{:.1f} N"),
     ("peak rate of base forces", "peak_base_force_rate_n_s", "{:.0f} N/s"),
     ("peak joint torque", "peak_joint_torque_nm", "{:.1f} N m"),
-    ("final position error", "final_position_error_m", "{:.4f} m"),
-    ("final angle error", "final_angle_error_rad", "{:.4f} rad"),
     ("peak memory", "peak_memory_mb", "{:.0f} MB"),
 )
-"""Label, fact and format of every row of the closing table, in its order; unknown facts have no row."""
+"""Rows that ``--verbose`` adds."""
 
 
-def summary_rows(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """Return label and value of every row whose fact is known."""
-    return [(label, form.format(facts[key])) for label, key, form in _ROWS if facts.get(key) is not None]
+def summary_rows(facts: Mapping[str, Any], *, verbose: bool = False) -> list[tuple[str, str]]:
+    """Return label and value of every row whose fact is known; of more rows if ``verbose``."""
+    rows = (*_ROWS, *_MORE_ROWS) if verbose else _ROWS
+    return [(label, form.format(facts[key])) for label, key, form in rows if facts.get(key) is not None]
 
 
 def answer_of(result: PlanningResult) -> str:
@@ -100,6 +108,7 @@ def simulation_facts(plan: Plan, log: SimulationLog) -> dict[str, Any]:
     messages = communication(log)
     base_forces = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1])
     return {
+        "outcome": "arrived" if log.reached and not log.violation else "failed",
         "reached": log.reached,
         "violations": int(bool(log.violation)),
         "violation": log.violation,
