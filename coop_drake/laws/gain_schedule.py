@@ -20,6 +20,9 @@ PEAK = 10.0 / sqrt(3.0) / CLOSING**2
 """Largest acceleration of a quintic bound over lambda^2 times the distance that it moves [-]: 10 / sqrt(3) is
 the largest second derivative of the quintic over u."""
 
+PEAK_RATE = 1.875 / CLOSING
+"""Largest rate of a quintic bound over lambda times the distance that it moves [-]."""
+
 
 class Schedule(NamedTuple):
     """The rule by which gains follow the cell; in that of fixed gains, lower and upper bounds are equal.
@@ -34,6 +37,8 @@ class Schedule(NamedTuple):
         quintic: Whether funnels are quintic.
         funnel_acceleration: Largest acceleration of a funnel bound [rad/s^2 or m/s^2].
         goal_acceleration: The same over the goal interval's width [1/s^2].
+        turning_rate: Largest rate of a bound of the object's angle, over the root of the narrowest goal
+            interval of a joint [1/s].
         min_angle_rate: Smallest lambda of the object's angle [1/s].
         max_angle_rate: Largest lambda of the object's angle [1/s].
         min_joint_rate: Smallest lambda of a joint [1/s].
@@ -61,6 +66,7 @@ class Schedule(NamedTuple):
     quintic: bool
     funnel_acceleration: float
     goal_acceleration: float
+    turning_rate: float
     min_angle_rate: float
     max_angle_rate: float
     min_joint_rate: float
@@ -90,7 +96,7 @@ def _fixed(gains: FixedGains) -> Schedule:
         wall_stiffness=0.0, min_stiffness=stiffness, max_stiffness=stiffness,
         damping_factor=gains.damping / root, governor_factor=gains.governor_gain / root,
         smoothing=float(gains.smoothing), quintic=gains.funnel == "quintic", funnel_acceleration=0.0,
-        goal_acceleration=inf,
+        goal_acceleration=inf, turning_rate=inf,
         min_angle_rate=angle, max_angle_rate=angle, min_joint_rate=joint, max_joint_rate=joint,
         max_log_gain=float(gains.log_gain), log_stiffness=inf, log_acceleration=inf,
         position_gain=float(gains.position_gain), rate_gain=float(gains.rate_gain),
@@ -120,6 +126,7 @@ def _by_age(gains: ScheduledGains) -> Schedule:
         governor_factor=float(gains.governor_factor), smoothing=float(gains.smoothing), quintic=True,
         funnel_acceleration=float(gains.funnel_acceleration),
         goal_acceleration=gains.goal_acceleration * rate_gain * rate_gain,
+        turning_rate=sqrt(gains.turning_acceleration / gains.turning_coupling) * rate_gain,
         min_angle_rate=rates[0],
         max_angle_rate=rates[1], min_joint_rate=rates[0], max_joint_rate=rates[1],
         max_log_gain=float(gains.max_log_gain), log_stiffness=gains.log_fraction * rate_gain * rate_gain,
@@ -158,16 +165,20 @@ def scheduled_axis(
     goal_lower: float,
     goal_upper: float,
     resting: float,
+    narrowest: float,
 ) -> tuple[float, float, float]:
     """Return lambda, kappa and the energy bound of one axis.
 
     lambda = clamp(sqrt(A / (``PEAK`` shrink))), shrink being the distance that the faster bound moves: the
     largest acceleration of a quintic bound is ``PEAK`` lambda^2 shrink. A is ``funnel_acceleration``, or less
-    where the goal interval is narrow: an error of the model by a part of A must not fill it. kappa is the
-    largest gain, up to ``max_log_gain``, with which the log term kappa |a s| at rest stays below
-    ``log_acceleration`` and its stiffness in the middle of the goal interval below ``log_stiffness``; a and s
-    are those of ``track_axis`` in ``ppc.py``. The bound on V is ``energy_factor`` times the energy at rest,
-    plus ``energy_allowance`` times kappa, plus ``entry_energy``.
+    where the goal interval is narrow: an error of the model by a part of A must not fill it. Bounds of the
+    angle move at most at ``turning_rate`` times the root of ``narrowest``, their largest rate being
+    ``PEAK_RATE`` lambda shrink: while the object turns, centrifugal forces disturb the joints by the square
+    of its rate, and a joint bears the less the narrower its goal interval is (docs/equations.md, "Turning and
+    narrow joints"). kappa is the largest gain, up to ``max_log_gain``, with which the log term kappa |a s| at
+    rest stays below ``log_acceleration`` and its stiffness in the middle of the goal interval below
+    ``log_stiffness``; a and s are those of ``track_axis`` in ``ppc.py``. The bound on V is ``energy_factor``
+    times the energy at rest, plus ``energy_allowance`` times kappa, plus ``entry_energy``.
 
     Args:
         schedule: The rule.
@@ -177,6 +188,8 @@ def scheduled_axis(
         goal_lower: Lower end of the goal interval [rad or m].
         goal_upper: Upper end of the goal interval [rad or m].
         resting: Where the axis rests when the transition begins; moved into the slice if outside [rad or m].
+        narrowest: Width of the narrowest goal interval of a joint, infinite for a team without joints [rad or
+            m]; not used for a joint.
 
     Returns:
         lambda [1/s], kappa [rad^2/s^2 or m^2/s^2], largest V [rad^2/s^2 or m^2/s^2].
@@ -189,6 +202,8 @@ def scheduled_axis(
     acceleration = min(schedule.funnel_acceleration, schedule.goal_acceleration * goal_width)
     if PEAK * shrink * fastest * fastest > acceleration:
         rate = max(sqrt(acceleration / (PEAK * shrink)), slowest)
+    if not is_joint and PEAK_RATE * shrink * rate > schedule.turning_rate * sqrt(narrowest):
+        rate = max(schedule.turning_rate * sqrt(narrowest) / (PEAK_RATE * shrink), slowest)
     near = schedule.saturation * width
     inside = min(max(resting, slice_lower + near), slice_upper - near)
     dl, du = inside - slice_lower, slice_upper - inside
@@ -237,7 +252,8 @@ def transition_gains(
     stiffness, damping, governor_gain = scheduled_governor(schedule, float(clearance))
     if isinstance(gain_set, FixedGains):  # as given, not by way of the root of K
         damping, governor_gain = float(gain_set.damping), float(gain_set.governor_gain)
-    axes = np.transpose([slice_lower, slice_upper, goal_lower, goal_upper, resting]).astype(float)
+    narrowest = np.full(len(resting), np.min(goal_upper[1:] - goal_lower[1:], initial=inf))
+    axes = np.transpose([slice_lower, slice_upper, goal_lower, goal_upper, resting, narrowest]).astype(float)
     rows = np.array([scheduled_axis(schedule, i > 0, *axis) for i, axis in enumerate(axes)])
     return TransitionGains(
         stiffness=stiffness,

@@ -154,6 +154,9 @@ class ScheduledGains:
             m/s^2].
         goal_acceleration: The same over k2^2 and the goal interval's width: what an error of the model lets
             a narrow interval bear [-].
+        turning_coupling: Largest acceleration of a joint over the square of the rate at which the object
+            turns, if nothing were commanded [-].
+        turning_acceleration: Largest such acceleration over k2^2 and the joint's goal interval's width [-].
         min_decay_rate: Smallest lambda [1/s].
         decay_fraction: Largest lambda over k2 [-].
         max_log_gain: Largest kappa [rad^2/s^2 or m^2/s^2].
@@ -181,6 +184,8 @@ class ScheduledGains:
     smoothing: NotNegative = 0.001
     funnel_acceleration: Positive = 12.0
     goal_acceleration: Positive = 0.3
+    turning_coupling: Positive = 12.0
+    turning_acceleration: Positive = 0.4
     min_decay_rate: Positive = 1.5
     decay_fraction: Positive = 0.5
     max_log_gain: Positive = 0.1

@@ -51,6 +51,7 @@ _SCHEDULED = (
     Parameter("governor_factor", 0.3, 3.0),
     Parameter("funnel_acceleration", 2.0, 60.0),
     Parameter("goal_acceleration", 0.1, 4.0),
+    Parameter("turning_acceleration", 0.1, 4.0),
     Parameter("min_decay_rate", 0.7, 4.0),
     Parameter("decay_fraction", 0.2, 1.0),
     Parameter("max_log_gain", 0.01, 1.0),

@@ -194,9 +194,12 @@ def cross_box(
     m = len(lower)
     gains = scheduled_governor(schedule, max(smallest(clearances), LEAST_CLEARANCE))
     table = np.empty((m, LAW_COLUMNS))
+    narrowest = smallest(goal_intervals[1, 1:] - goal_intervals[0, 1:])
     for a in range(m):
         ends = lower[a], upper[a], goal_intervals[0, a], goal_intervals[1, a]
-        scheduled = scheduled_axis(schedule, a > 0, ends[0], ends[1], ends[2], ends[3], axis_rest[a])
+        scheduled = scheduled_axis(
+            schedule, a > 0, ends[0], ends[1], ends[2], ends[3], axis_rest[a], narrowest
+        )
         gains_of_axes = (
             schedule.position_gain, schedule.rate_gain, schedule.ramp_rate, schedule.saturation,
             schedule.hand_over_time,

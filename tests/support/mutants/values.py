@@ -22,6 +22,8 @@ _GAINS = [
     "governor_factor",
     "funnel_acceleration",
     "goal_acceleration",
+    "turning_coupling",
+    "turning_acceleration",
     "min_decay_rate",
     "decay_fraction",
     "max_log_gain",

@@ -1,0 +1,93 @@
+"""Why the object turns no faster than narrow joints bear: what a joint bears, and what turning does to it."""
+
+import numpy as np
+import pytest
+from pydrake.systems.framework import DiagramBuilder
+from scipy.linalg import expm
+
+from coop_drake.laws import Funnel, ScheduledGains, transition_gains
+from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
+from coop_drake.laws.slopes import slope_bounds
+from coop_drake.plant import build_team_plant
+from coop_drake.plant.configuration import set_configuration
+from coop_drake.scenario import load_scenario
+
+PERIOD, LAG, WIDTH = 0.005, 0.005, 0.06
+LONG_AFTER = 100.0  # bounds at rest [s]
+
+
+def narrow_axis(age):
+    """An axis whose funnel is its goal interval."""
+    lower, upper = np.zeros(2), np.array([1.0, WIDTH])
+    intervals = {"slice_lower": lower, "slice_upper": upper, "goal_lower": lower, "goal_upper": upper}
+    gains = transition_gains(ScheduledGains(command_age=age), clearance=0.2, resting=0.5 * upper, **intervals)
+    return axis_table(Funnel(**intervals, decay_rate=gains.decay_rate, shape=gains.funnel), gains)[1], gains
+
+
+def sampled_radius(row, s, delay, mass_error):
+    """Spectral radius of the linearised loop: samples, delay, hold, lag; (x, x', x'' and older samples)."""
+    position = WIDTH / (1.0 + np.exp(-s))
+    stiffness, _, damping, _ = -np.array(slope_bounds(row, LONG_AFTER, position, 0.0, 0.0))
+    old = round(delay / PERIOD)
+    plant = np.zeros((4, 4))
+    plant[0, 1] = plant[1, 2] = 1.0
+    plant[2, 2:] = -1.0 / LAG, 1.0 / LAG
+    step = expm(PERIOD * plant)
+    loop = np.zeros((3 + 2 * old, 3 + 2 * old))
+    loop[:3, :3] = step[:3, :3]
+    loop[3:5, :2] = np.eye(2)
+    loop[5:, 3:-2] = np.eye(2 * old - 2)
+    loop[:3, -2:] -= (1.0 + mass_error) * np.outer(step[:3, 3], [stiffness, damping])
+    return np.abs(np.linalg.eigvals(loop)).max()
+
+
+@pytest.mark.parametrize("delay", [0.01, 0.02])
+@pytest.mark.parametrize("mass_error", [-0.2, 0.0, 0.2])
+def test_a_late_joint_is_stable_up_to_a_sixth_of_its_width_before_a_bound(delay, mass_error):
+    row, gains = narrow_axis(delay + 0.5 * PERIOD + LAG)
+    radii = [sampled_radius(row, s, delay, mass_error) for s in np.linspace(0.0, 1.6, 9)]
+    assert max(radii) < 1.0
+    assert sampled_radius(row, 1.8, delay, mass_error) > 1.0
+    assert sampled_radius(row, np.log(49.0) - 1e-6, delay, mass_error) > 1.3
+    pull = -track_row(row, LONG_AFTER, WIDTH / (1.0 + np.exp(-1.6)), 0.0)[0]
+    assert pull == pytest.approx(0.31 * gains.rate_gain**2 * WIDTH, rel=0.02)
+
+
+def turned(name, *configurations):
+    """Accelerations of the joints that turn with the object at 1 rad/s, where nothing is commanded."""
+    team = build_team_plant(load_scenario(name), DiagramBuilder())
+    plant, found = team.plant, []
+    context, rates = plant.CreateDefaultContext(), np.zeros(plant.num_velocities())
+    rates[team.velocity_index[2]] = 1.0
+    for joints in configurations:
+        set_configuration(team, context, np.array([0.0, 0.0, 0.0, *joints]))
+        plant.SetVelocities(context, rates)
+        free = -np.linalg.solve(plant.CalcMassMatrix(context), plant.CalcBiasTerm(context))
+        found.append(free[team.velocity_index[3:]])
+    return np.array(found)
+
+
+def test_turning_bends_arms_of_two_joints_more_than_arms_of_one():
+    (elbow,) = turned("elbow", [-0.05, 0.22, 0.45, -0.95])
+    assert np.abs(elbow).max() == pytest.approx(11.1, abs=0.1)
+    assert elbow[2] * elbow[3] < 0.0
+    assert np.abs(elbow).max() < ScheduledGains().turning_coupling
+    middles = np.linspace(-1.2, 1.2, 7)
+    assert np.abs(turned("base", *((a, b) for a in middles for b in middles))).max() < 4.0
+
+
+@pytest.mark.parametrize("age", [0.015, 0.0275])
+def test_the_angle_turns_as_fast_as_the_narrowest_joint_bears(age):
+    rule = ScheduledGains(command_age=age)
+    lower, upper = np.array([0.0, 0.0, 0.0]), np.array([1.0, 0.5, 0.5])
+    goal_lower = np.array([0.8, 0.44, 0.1])
+    gains = transition_gains(
+        rule, clearance=0.2, slice_lower=lower, slice_upper=upper, goal_lower=goal_lower, goal_upper=upper,
+        resting=np.array([0.1, 0.4, 0.2]),
+    )  # fmt: skip
+    funnel = Funnel(lower, upper, goal_lower, upper, gains.decay_rate)
+    times = np.linspace(0.0, 5.0 / gains.decay_rate[0], 2001)
+    rows = axis_table(funnel, gains)
+    fastest = max(bounds_of(rows[0], time)[2] for time in times)
+    bearable = rule.turning_acceleration * gains.rate_gain**2 * 0.06
+    assert rule.turning_coupling * fastest**2 == pytest.approx(bearable, rel=1e-4)
