@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from benchmarks.adversaries.trial import adversary_tasks
+from benchmarks.adversaries.measured import adversary_tasks
 from benchmarks.breaking import breaking_tasks
 from benchmarks.commands import bench_commands
 from benchmarks.contents import TOPICS, WHOLE, show_contents

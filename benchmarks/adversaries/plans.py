@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from benchmarks.adversaries.alterations import Alteration, Altered, chosen, copied, region_of, step
+from benchmarks.adversaries.alterations import (
+    ANYTHING,
+    SOUND,
+    STATEMENTS,
+    Alteration,
+    Change,
+    chosen,
+    move,
+    region_of,
+    step,
+)
 from benchmarks.adversaries.collisions import Document, Team, boxes_sampled, polygon_of, positions_sampled
 
 __all__ = ["PLAN_ALTERATIONS"]
@@ -13,21 +23,19 @@ __all__ = ["PLAN_ALTERATIONS"]
 Random = np.random.Generator
 
 
-def widened(question: Document, answer: Document, random: Random) -> Altered:
+def widened(question: Document, answer: Document, random: Random) -> Change:
     """An interval of a cell is longer at one end."""
-    question, answer = copied(question, answer)
     k = chosen(answer["cells"], random)
     cell, axis = answer["cells"][k], chosen(answer["cells"][k]["lower"], random)
     if random.random() < 0.5:
         cell["lower"][axis] -= step(random)
     else:
         cell["upper"][axis] += step(random)
-    return Altered(question, answer, cells=(k,))
+    return Change((k,))
 
 
-def narrowed(question: Document, answer: Document, random: Random) -> Altered | None:
+def narrowed(question: Document, answer: Document, random: Random) -> Change | None:
     """An interval of a cell is shorter, but still holds its goal intervals and the start."""
-    question, answer = copied(question, answer)
     k = chosen(answer["cells"], random)
     cell, axis = answer["cells"][k], chosen(answer["cells"][k]["lower"], random)
     kept = [
@@ -40,36 +48,32 @@ def narrowed(question: Document, answer: Document, random: Random) -> Altered | 
     cell["lower"][axis] += share * (min(kept) - cell["lower"][axis])
     cell["upper"][axis] -= share * (cell["upper"][axis] - max(kept))
     held = cell["lower"][axis] <= min(kept) and max(kept) <= cell["upper"][axis]
-    return Altered(question, answer, true=True) if held else None
+    return SOUND if held else None
 
 
-def moved_target(question: Document, answer: Document, random: Random) -> Altered:
+def moved_target(question: Document, answer: Document, random: Random) -> Change:
     """A target and the ends of its paths lie elsewhere."""
-    question, answer = copied(question, answer)
-    k, turn, by = chosen(answer["transitions"], random), random.uniform(0.0, 2.0 * np.pi), step(random)
-    target = (
-        np.array(answer["transitions"][k]["target"]) + by * np.array([np.cos(turn), np.sin(turn)])
-    ).tolist()
+    k = chosen(answer["transitions"], random)
+    target = list(answer["transitions"][k]["target"])
+    move(target, random)
     answer["transitions"][k]["target"] = answer["transitions"][k]["path"][-1] = target
     if k + 1 < len(answer["transitions"]):
         answer["transitions"][k + 1]["path"][0] = target
-    return Altered(question, answer, cells=())
+    return STATEMENTS
 
 
-def swapped(question: Document, answer: Document, random: Random) -> Altered | None:
+def swapped(question: Document, answer: Document, random: Random) -> Change | None:
     """Two cells change places, with their transitions or without."""
-    question, answer = copied(question, answer)
     i, j = (chosen(answer["cells"], random) for _ in range(2))
     if i == j:
         return None
     for key in ("cells", "transitions")[: int(random.integers(1, 3))]:
         answer[key][i], answer[key][j] = answer[key][j], answer[key][i]
-    return Altered(question, answer, cells=())
+    return STATEMENTS
 
 
-def dropped(question: Document, answer: Document, random: Random) -> Altered | None:
+def dropped(question: Document, answer: Document, random: Random) -> Change | None:
     """A cell is left out with its transition; the next one's path begins where that of this one began."""
-    question, answer = copied(question, answer)
     if len(answer["cells"]) < 2:
         return None
     k = chosen(answer["cells"], random)
@@ -80,34 +84,29 @@ def dropped(question: Document, answer: Document, random: Random) -> Altered | N
         after["path"] = [*gone["path"][:-1], *after["path"]]
         after["length"] += gone["length"]
         after["neck"] = min(gone["neck"], after["neck"])
-    return Altered(question, answer, cells=())
+    return STATEMENTS
 
 
-def doubled(question: Document, answer: Document, random: Random) -> Altered:
+def doubled(question: Document, answer: Document, random: Random) -> Change:
     """A cell occurs twice: its target is reached, then kept."""
-    question, answer = copied(question, answer)
     k = chosen(answer["cells"], random)
     stay = dict(answer["transitions"][k])
     stay |= {"path": [stay["target"]] * 2, "length": 0.0, "neck": 0.5 * stay["inradius"]}
     answer["cells"].insert(k, answer["cells"][k])
     answer["transitions"].insert(k + 1, stay)
-    return Altered(question, answer, true=True)
+    return SOUND
 
 
-def moved_vertex(question: Document, answer: Document, random: Random) -> Altered:
+def moved_vertex(question: Document, answer: Document, random: Random) -> Change:
     """A corner of a cell lies elsewhere."""
-    question, answer = copied(question, answer)
     k = chosen(answer["cells"], random)
     ring = answer["cells"][k]["tidied"]["outer"]
-    corner, turn, by = ring[chosen(ring, random)], random.uniform(0.0, 2.0 * np.pi), step(random)
-    corner[0] += by * float(np.cos(turn))
-    corner[1] += by * float(np.sin(turn))
-    return Altered(question, answer, cells=(k,))
+    move(ring[chosen(ring, random)], random)
+    return Change((k,))
 
 
-def grown(question: Document, answer: Document, random: Random) -> Altered | None:
+def grown(question: Document, answer: Document, random: Random) -> Change | None:
     """A cell is larger all around."""
-    question, answer = copied(question, answer)
     k = chosen(answer["cells"], random)
     region = region_of(
         polygon_of(answer["cells"][k]["tidied"]).buffer(step(random, 1e-5), join_style="mitre")
@@ -115,52 +114,47 @@ def grown(question: Document, answer: Document, random: Random) -> Altered | Non
     if region is None:
         return None
     answer["cells"][k]["tidied"] = region
-    return Altered(question, answer, cells=(k,))
+    return Change((k,))
 
 
-def bridged(question: Document, answer: Document, random: Random) -> Altered | None:
+def bridged(question: Document, answer: Document, random: Random) -> Change | None:
     """A cell is the convex hull of two cells."""
-    question, answer = copied(question, answer)
     i, j = (chosen(answer["cells"], random) for _ in range(2))
     both = polygon_of(answer["cells"][i]["tidied"]).union(polygon_of(answer["cells"][j]["tidied"]))
     region = region_of(both.convex_hull)
     if region is None:
         return None
     answer["cells"][i]["tidied"] = region
-    return Altered(question, answer, cells=(i,))
+    return Change((i,))
 
 
-def overstated(question: Document, answer: Document, random: Random) -> Altered:
+def overstated(question: Document, answer: Document, random: Random) -> Change:
     """A neck, an inradius or a length is larger than it is."""
-    question, answer = copied(question, answer)
     transition = answer["transitions"][chosen(answer["transitions"], random)]
     key = ("neck", "inradius", "length")[int(random.integers(3))]
     transition[key] = transition[key] * (1.0 + step(random, 1e-4, 1e4)) + 1e-4
-    return Altered(question, answer, cells=())
+    return STATEMENTS
 
 
-def understated(question: Document, answer: Document, random: Random) -> Altered:
+def understated(question: Document, answer: Document, random: Random) -> Change:
     """A neck or an inradius is smaller than it is."""
-    question, answer = copied(question, answer)
     transition = answer["transitions"][chosen(answer["transitions"], random)]
     transition[("neck", "inradius")[int(random.integers(2))]] *= random.uniform(0.01, 1.0)
-    return Altered(question, answer, true=True)
+    return SOUND
 
 
-def cut_corner(question: Document, answer: Document, random: Random) -> Altered | None:
+def cut_corner(question: Document, answer: Document, random: Random) -> Change | None:
     """A path goes straight to its target, or by a detour; its length is stated accordingly."""
-    question, answer = copied(question, answer)
     transition = answer["transitions"][chosen(answer["transitions"], random)]
     path = transition["path"]
     middle = (np.array(path[0]) + random.uniform(-0.5, 0.5, 2)).tolist()
     way = [path[0], path[-1]] if random.random() < 0.5 else [path[0], middle, path[-1]]
     transition["path"], transition["length"] = way, float(shapely.LineString(way).length)
-    return Altered(question, answer, cells=())
+    return STATEMENTS
 
 
-def moved_goal_interval(question: Document, answer: Document, random: Random) -> Altered:
+def moved_goal_interval(question: Document, answer: Document, random: Random) -> Change:
     """A goal interval is moved, widened, or narrowed to one unit in the last place."""
-    question, answer = copied(question, answer)
     transition = answer["transitions"][chosen(answer["transitions"], random)]
     axis, by = chosen(transition["goal_lower"], random), step(random)
     kind = int(random.integers(3))
@@ -169,22 +163,20 @@ def moved_goal_interval(question: Document, answer: Document, random: Random) ->
     else:
         transition["goal_upper"][axis] += by
         transition["goal_lower"][axis] += by if kind else -by
-    return Altered(question, answer, cells=())
+    return STATEMENTS
 
 
-def turned_ring(question: Document, answer: Document, random: Random) -> Altered:
+def turned_ring(question: Document, answer: Document, random: Random) -> Change:
     """A ring begins elsewhere, runs backwards, or repeats a corner."""
-    question, answer = copied(question, answer)
     region = answer["cells"][chosen(answer["cells"], random)]["tidied"]
     ring = region["outer"]
     k = chosen(ring, random)
     region["outer"] = [*ring[k:], *ring[:k], ring[k - 1]][:: int(random.choice([-1, 1]))]
-    return Altered(question, answer, true=True)
+    return SOUND
 
 
-def hair_post(question: Document, answer: Document, random: Random) -> Altered | None:
+def hair_post(question: Document, answer: Document, random: Random) -> Change | None:
     """The floor has a post of a picometre to a centimetre where a body passes."""
-    question, answer = copied(question, answer)
     k = chosen(answer["cells"], random)
     cell, team = answer["cells"][k], Team(question)
     positions = positions_sampled(polygon_of(cell["tidied"]), random, 5)
@@ -193,35 +185,30 @@ def hair_post(question: Document, answer: Document, random: Random) -> Altered |
     place = np.array(piece.representative_point().coords[0]) + positions[chosen(positions, random)]
     size = step(random, 1e-12, 1e-2)
     question["floor"]["holes"].append((place + size * np.array([[0, 0], [1, 0], [0, 1]])).tolist())
-    return Altered(question, answer, cells=(k,))
+    return Change((k,))
 
 
-def other_floor(question: Document, answer: Document, random: Random) -> Altered:
+def other_floor(question: Document, answer: Document, random: Random) -> Change:
     """A corner of the floor lies elsewhere."""
-    question, answer = copied(question, answer)
     rings = [question["floor"]["outer"], *question["floor"]["holes"]]
     ring = rings[chosen(rings, random)]
-    corner, by = ring[chosen(ring, random)], step(random, 1e-3, 2.0)
-    turn = random.uniform(0.0, 2.0 * np.pi)
-    corner[0], corner[1] = corner[0] + by * float(np.cos(turn)), corner[1] + by * float(np.sin(turn))
-    return Altered(question, answer)
+    move(ring[chosen(ring, random)], random, 1e-3, 2.0)
+    return ANYTHING
 
 
-def other_team(question: Document, answer: Document, random: Random) -> Altered:
+def other_team(question: Document, answer: Document, random: Random) -> Change:
     """A piece is thicker, or a joint's frame lies elsewhere."""
-    question, answer = copied(question, answer)
     component = question["components"][chosen(question["components"], random)]
     if component["joint"] is not None and random.random() < 0.5:
         component["joint"]["frame"][int(random.integers(3))] += step(random, 1e-3)
     else:
         body = component["bodies"][chosen(component["bodies"], random)]
         body["shapes"][chosen(body["shapes"], random)]["radius"] += step(random, 1e-4)
-    return Altered(question, answer)
+    return ANYTHING
 
 
-def other_ends(question: Document, answer: Document, random: Random) -> Altered:
+def other_ends(question: Document, answer: Document, random: Random) -> Change:
     """Start, goal, tolerances or a limit are others than those that the plan was made for."""
-    question, answer = copied(question, answer)
     key = ("start", "goal_pose", "tolerance", "limit")[int(random.integers(4))]
     joints = [component["joint"] for component in question["components"] if component["joint"]]
     if key == "tolerance" or not joints:
@@ -231,7 +218,7 @@ def other_ends(question: Document, answer: Document, random: Random) -> Altered:
         joint["upper"] = joint["lower"] + random.random() * (joint["upper"] - joint["lower"])
     else:
         question[key][chosen(question[key], random)] += step(random, 1e-3)
-    return Altered(question, answer, cells=())
+    return STATEMENTS
 
 
 PLAN_ALTERATIONS: dict[str, Alteration] = {

@@ -8,57 +8,66 @@ import numpy as np
 import shapely
 from shapely import affinity
 
-from benchmarks.adversaries.alterations import Alteration, Altered, chosen, copied, having, region_of, step
+from benchmarks.adversaries.alterations import (
+    ANYTHING,
+    SOUND,
+    STATEMENTS,
+    Alteration,
+    Change,
+    chosen,
+    copied,
+    having,
+    in_slice,
+    move,
+    region_of,
+    step,
+)
 from benchmarks.adversaries.collisions import Document, polygon_of
 from benchmarks.adversaries.plans import other_floor, other_team
-from benchmarks.adversaries.witnesses import overlap_forged, sweep_added, sweep_altered, sweep_dropped
+from benchmarks.adversaries.witnesses import (
+    overlap_altered,
+    overlap_forged,
+    sweep_added,
+    sweep_altered,
+    sweep_dropped,
+)
 
 __all__ = ["PROOF_ALTERATIONS"]
 
 Random = np.random.Generator
 
 
-def flipped(question: Document, answer: Document, random: Random) -> Altered | None:
+@in_slice("cells")
+def flipped(question: Document, answer: Document, random: Random, k: int) -> Change | None:
     """A cell, or all cells of a slice, have the other label."""
-    question, answer = copied(question, answer)
-    k = having(answer, "cells", random)
-    if k is None:
-        return None
     cells = answer["slices"][k]["cells"]
     for cell in [cells[chosen(cells, random)]] if random.random() < 0.7 else cells:
         cell["reached"] = not cell["reached"]
-    return Altered(question, answer, cells=())
+    return STATEMENTS
 
 
-def relabelled(question: Document, answer: Document, random: Random) -> Altered | None:
+def relabelled(question: Document, answer: Document, random: Random) -> Change | None:
     """All cells have one label, or all the other."""
-    question, answer = copied(question, answer)
-    if having(answer, "cells", random) is None:
+    if not having(answer, "cells"):
         return None
     kind = int(random.integers(3))
     for part in answer["slices"]:
         for cell in part["cells"]:
             cell["reached"] = not cell["reached"] if kind == 2 else bool(kind)
-    return Altered(question, answer, cells=())
+    return STATEMENTS
 
 
-def cell_dropped(question: Document, answer: Document, random: Random) -> Altered | None:
+@in_slice("cells")
+def cell_dropped(question: Document, answer: Document, random: Random, k: int) -> Change | None:
     """A cell is left out."""
-    question, answer = copied(question, answer)
-    k = having(answer, "cells", random)
-    if k is None:
-        return None
     cells = answer["slices"][k]["cells"]
     del cells[chosen(cells, random)]
-    return Altered(question, answer, cells=(k,))
+    return Change((k,))
 
 
-def cell_reshaped(question: Document, answer: Document, random: Random) -> Altered | None:
+@in_slice("cells")
+def cell_reshaped(question: Document, answer: Document, random: Random, k: int) -> Change | None:
     """A cell is smaller or larger all around, or one of its corners lies elsewhere."""
-    question, answer = copied(question, answer)
-    k = having(answer, "cells", random)
-    if k is None:
-        return None
     cells = answer["slices"][k]["cells"]
     cell = cells[chosen(cells, random)]
     if random.random() < 0.5:
@@ -68,18 +77,13 @@ def cell_reshaped(question: Document, answer: Document, random: Random) -> Alter
             return None
         cell["polygon"] = region
     else:
-        corner = cell["polygon"]["outer"][chosen(cell["polygon"]["outer"], random)]
-        turn, by = random.uniform(0.0, tau), step(random)
-        corner[0], corner[1] = corner[0] + by * float(np.cos(turn)), corner[1] + by * float(np.sin(turn))
-    return Altered(question, answer, cells=(k,))
+        move(cell["polygon"]["outer"][chosen(cell["polygon"]["outer"], random)], random)
+    return Change((k,))
 
 
-def cell_cut(question: Document, answer: Document, random: Random) -> Altered | None:
+@in_slice("cells")
+def cell_cut(question: Document, answer: Document, random: Random, k: int) -> Change | None:
     """A cell is cut by a slanted slit, as thin as rounding or wider; one half may get the other label."""
-    question, answer = copied(question, answer)
-    k = having(answer, "cells", random)
-    if k is None:
-        return None
     cells = answer["slices"][k]["cells"]
     cell = cells.pop(chosen(cells, random))
     whole = polygon_of(cell["polygon"])
@@ -93,26 +97,22 @@ def cell_cut(question: Document, answer: Document, random: Random) -> Altered | 
     for half, label in zip(halves, (cell["reached"], cell["reached"] != flips), strict=True):
         regions = [region_of(part) for part in shapely.get_parts(whole.intersection(half))]
         cells += [{"reached": bool(label), "polygon": region} for region in regions if region is not None]
-    return Altered(question, answer, cells=(k,))
+    return Change((k,))
 
 
-def cell_doubled(question: Document, answer: Document, random: Random) -> Altered | None:
+@in_slice("cells")
+def cell_doubled(question: Document, answer: Document, random: Random, k: int) -> Change | None:
     """A cell occurs twice, its rings written otherwise, and the cells in another order."""
-    question, answer = copied(question, answer)
-    k = having(answer, "cells", random)
-    if k is None:
-        return None
     cells = answer["slices"][k]["cells"]
-    copy = copied(cells[chosen(cells, random)], {})[0]
+    copy = copied(cells[chosen(cells, random)])
     copy["polygon"]["outer"].reverse()
     cells.insert(0, copy)
     answer["slices"][k]["cells"] = [cells[i] for i in random.permutation(len(cells))]
-    return Altered(question, answer, true=True)
+    return SOUND
 
 
-def slice_dropped(question: Document, answer: Document, random: Random) -> Altered:
+def slice_dropped(question: Document, answer: Document, random: Random) -> Change:
     """A slice is left out, occurs twice, or stands in the place of another."""
-    question, answer = copied(question, answer)
     slices = answer["slices"]
     k, kind = chosen(slices, random), int(random.integers(3))
     if kind == 0 or len(slices) == 1:
@@ -121,39 +121,36 @@ def slice_dropped(question: Document, answer: Document, random: Random) -> Alter
         slices.append(slices[k])
     else:
         slices[k] = slices[k - 1]
-    return Altered(question, answer, cells=())
+    return STATEMENTS
 
 
-def slice_moved(question: Document, answer: Document, random: Random) -> Altered:
+def slice_moved(question: Document, answer: Document, random: Random) -> Change:
     """An end of a slice lies elsewhere, by one unit in the last place or more."""
-    question, answer = copied(question, answer)
     part = answer["slices"][chosen(answer["slices"], random)]
     end = ("lower", "upper")[int(random.integers(2))]
     axis = chosen(part[end], random)
     value = part[end][axis]
     by = step(random, 1e-9) * float(random.choice([-1.0, 1.0]))
     part[end][axis] = float(np.nextafter(value, np.inf)) if random.random() < 0.3 else value + by
-    return Altered(question, answer, cells=())
+    return STATEMENTS
 
 
-def slice_exchanged(question: Document, answer: Document, random: Random) -> Altered | None:
+def slice_exchanged(question: Document, answer: Document, random: Random) -> Change | None:
     """Two slices change all that they hold, but not their intervals."""
-    question, answer = copied(question, answer)
     i, j = (chosen(answer["slices"], random) for _ in range(2))
     if i == j:
         return None
     one, other = answer["slices"][i], answer["slices"][j]
     for key in one.keys() - {"lower", "upper"}:
         one[key], other[key] = other[key], one[key]
-    return Altered(question, answer, cells=(i, j))
+    return Change((i, j))
 
 
-def slice_halved(question: Document, answer: Document, random: Random) -> Altered | None:
+def slice_halved(question: Document, answer: Document, random: Random) -> Change | None:
     """A slice is halved; both halves hold what it held. Slices stand in another order."""
-    question, answer = copied(question, answer)
     slices = answer["slices"]
     k = chosen(slices, random)
-    half = copied(slices[k], {})[0]
+    half = copied(slices[k])
     axis = chosen(half["lower"], random)
     middle = 0.5 * (half["lower"][axis] + half["upper"][axis])
     if answer["kind"] == "disc" or not half["lower"][axis] < middle < half["upper"][axis]:
@@ -161,12 +158,11 @@ def slice_halved(question: Document, answer: Document, random: Random) -> Altere
     half["lower"][axis] = slices[k]["upper"][axis] = middle
     slices.append(half)
     answer["slices"] = [slices[i] for i in random.permutation(len(slices))]
-    return Altered(question, answer, true=True)
+    return SOUND
 
 
-def other_subject(question: Document, answer: Document, random: Random) -> Altered:
+def other_subject(question: Document, answer: Document, random: Random) -> Change:
     """The proof is about other robots, another component, another centre, or of another kind."""
-    question, answer = copied(question, answer)
     robots = sorted({c["joint"]["robot"] for c in question["components"] if c["joint"]})
     if answer["kind"] == "disc" and random.random() < 0.7:
         if random.random() < 0.5:
@@ -177,13 +173,13 @@ def other_subject(question: Document, answer: Document, random: Random) -> Alter
         answer["robots"] = [robot for robot in [*robots, len(robots)] if random.random() < 0.5]
     else:
         answer["kind"] = str(random.choice(["slices", "disc", "blocked goal"]))
-        answer = {"robots": [], "component": 0, "centre": [0.0, 0.0], **answer}
-    return Altered(question, answer)
+        for key, value in (("robots", []), ("component", 0), ("centre", [0.0, 0.0])):
+            answer.setdefault(key, value)
+    return ANYTHING
 
 
-def other_ends(question: Document, answer: Document, random: Random) -> Altered:
+def other_ends(question: Document, answer: Document, random: Random) -> Change:
     """Start and goal change places, lie elsewhere, or a joint moves further."""
-    question, answer = copied(question, answer)
     joints = [component["joint"] for component in question["components"] if component["joint"]]
     kind = int(random.integers(3))
     if kind == 0 or not joints:
@@ -194,30 +190,28 @@ def other_ends(question: Document, answer: Document, random: Random) -> Altered:
             question[key][:2] = (np.array(question[key][:2]) + random.uniform(-2.0, 2.0, 2)).tolist()
     else:
         joints[chosen(joints, random)]["upper"] += step(random, 1e-9, 1.0)
-    return Altered(question, answer)
+    return ANYTHING
 
 
-def thinner(question: Document, answer: Document, random: Random) -> Altered:
+def thinner(question: Document, answer: Document, random: Random) -> Change:
     """Every piece is smaller, or a pillar of the floor is gone."""
-    question, answer = copied(question, answer)
     if question["floor"]["holes"] and random.random() < 0.3:
         question["floor"]["holes"].pop()
-        return Altered(question, answer)
+        return ANYTHING
     factor = random.uniform(0.3, 0.99)
     for component in question["components"]:
         for body in component["bodies"]:
             for shape in body["shapes"]:
                 shape["vertices"] = (factor * np.array(shape["vertices"])).tolist()
                 shape["radius"] *= factor
-    return Altered(question, answer)
+    return ANYTHING
 
 
-def turned(question: Document, answer: Document, random: Random) -> Altered:
+def turned(question: Document, answer: Document, random: Random) -> Change:
     """Start and goal have angles that are whole turns away."""
-    question, answer = copied(question, answer)
     question["start"][2] += tau * int(random.integers(-3, 4))
     question["goal_pose"][2] += tau * int(random.integers(-3, 4))
-    return Altered(question, answer, true=True)
+    return SOUND
 
 
 PROOF_ALTERATIONS: dict[str, Alteration] = {
@@ -235,6 +229,7 @@ PROOF_ALTERATIONS: dict[str, Alteration] = {
     "polygon left out": sweep_dropped,
     "polygon added": sweep_added,
     "overlap forged": overlap_forged,
+    "overlap altered": overlap_altered,
     "another subject": other_subject,
     "other ends": other_ends,
     "another floor": other_floor,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import pi
 from typing import Literal
 
@@ -21,7 +22,7 @@ __all__ = ["random_question"]
 Random = np.random.Generator
 
 
-def random_question(seed: int) -> PlanningProblem | None:
+def random_question(seed: int | Sequence[int]) -> PlanningProblem | None:
     """A question whose start is free and whose goal's position is on the floor, None if none was drawn.
 
     Args:

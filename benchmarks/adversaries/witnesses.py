@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.adversaries.alterations import Altered, chosen, copied, having, step
+from benchmarks.adversaries.alterations import SOUND, Change, chosen, in_slice, move, step
 from benchmarks.adversaries.collisions import Document
 
-__all__ = ["overlap_forged", "sweep_added", "sweep_altered", "sweep_dropped"]
+__all__ = ["overlap_altered", "overlap_forged", "sweep_added", "sweep_altered", "sweep_dropped"]
 
 Random = np.random.Generator
 
 
-def sweep_altered(question: Document, answer: Document, random: Random) -> Altered | None:
+@in_slice("inner_sweeps")
+def sweep_altered(question: Document, answer: Document, random: Random, k: int) -> Change | None:
     """A polygon is larger, moved, another piece's, or in another slice."""
-    question, answer = copied(question, answer)
-    k = having(answer, "inner_sweeps", random)
-    if k is None:
-        return None
     sweeps = answer["slices"][k]["inner_sweeps"]
     sweep, kind = sweeps[chosen(sweeps, random)], int(random.integers(4))
     ring = np.array(sweep["polygon"])
@@ -33,40 +30,47 @@ def sweep_altered(question: Document, answer: Document, random: Random) -> Alter
         answer["slices"][m]["inner_sweeps"].append(sweep)
         k = m
     sweep["polygon"] = ring.tolist()
-    return Altered(question, answer, cells=(k,))
+    return Change((k,))
 
 
-def sweep_dropped(question: Document, answer: Document, random: Random) -> Altered | None:
+@in_slice("inner_sweeps")
+def sweep_dropped(question: Document, answer: Document, random: Random, k: int) -> Change | None:
     """A polygon, or all polygons of a slice, are left out."""
-    question, answer = copied(question, answer)
-    k = having(answer, "inner_sweeps", random)
-    if k is None:
-        return None
     sweeps = answer["slices"][k]["inner_sweeps"]
     del sweeps[chosen(sweeps, random) if random.random() < 0.7 else slice(None)]
-    return Altered(question, answer, cells=(k,))
+    return Change((k,))
 
 
-def sweep_added(question: Document, answer: Document, random: Random) -> Altered | None:
+@in_slice("inner_sweeps")
+def sweep_added(question: Document, answer: Document, random: Random, k: int) -> Change | None:
     """A slice has a smaller copy of one of its polygons as well."""
-    question, answer = copied(question, answer)
-    k = having(answer, "inner_sweeps", random)
-    if k is None:
-        return None
     sweeps = answer["slices"][k]["inner_sweeps"]
     sweep = dict(sweeps[chosen(sweeps, random)])
     ring = np.array(sweep["polygon"])
     sweep["polygon"] = (ring.mean(axis=0) + random.uniform(0.3, 0.9) * (ring - ring.mean(axis=0))).tolist()
     sweeps.append(sweep)
-    return Altered(question, answer, true=True)
+    return SOUND
 
 
-def overlap_forged(question: Document, answer: Document, random: Random) -> Altered:
+def overlap_forged(question: Document, answer: Document, random: Random) -> Change:
     """A slice is said to hold an overlap of two pieces, at the origin, at a corner or anywhere."""
-    question, answer = copied(question, answer)
     k = chosen(answer["slices"], random)
     pieces = [shape for c in question["components"] for body in c["bodies"] for shape in body["shapes"]]
     pair = sorted(int(random.integers(len(pieces))) for _ in range(2))
     point = pieces[pair[0]]["vertices"][0] if random.random() < 0.5 else random.uniform(-1, 1, 2).tolist()
     answer["slices"][k]["overlaps"].append({"pieces": pair, "point": point})
-    return Altered(question, answer, cells=(k,))
+    return Change((k,))
+
+
+@in_slice("overlaps")
+def overlap_altered(question: Document, answer: Document, random: Random, k: int) -> Change:
+    """The point of an overlap lies elsewhere, it names another piece, or it is left out."""
+    overlaps, kind = answer["slices"][k]["overlaps"], int(random.integers(3))
+    overlap = overlaps[chosen(overlaps, random)]
+    if kind == 0:
+        move(overlap["point"], random, 1e-3, 1.0)
+    elif kind == 1:
+        overlap["pieces"][chosen(overlap["pieces"], random)] += int(random.choice([-1, 1]))
+    else:
+        overlaps.remove(overlap)
+    return Change((k,))

@@ -1,0 +1,57 @@
+"""The questions whose answers are altered, by the kind of answer that they have."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+from benchmarks.adversaries.bends import bend_question
+from benchmarks.adversaries.crossings import crossing_question
+from benchmarks.adversaries.questions import random_question
+from benchmarks.planner.family import corridor_problem
+from coop_drake.answers import PlanningProblem
+
+__all__ = ["SOURCES", "Ask"]
+
+Ask = Callable[[], PlanningProblem | None]
+
+PLANS: dict[str, Ask] = {
+    "base": corridor_problem,
+    "tight": partial(corridor_problem, 0.9),
+    "three": partial(corridor_problem, 1.3, 1.5, 3),
+    "elbow": partial(corridor_problem, joints_per_arm=2),
+    **{f"random {seed}": partial(random_question, seed) for seed in (0, 3, 9, 13, 16, 85, 86, 87)},
+}
+SLICES: dict[str, Ask] = {
+    "closed": partial(corridor_problem, 0.77),
+    "elbow_closed": partial(corridor_problem, 0.6, joints_per_arm=2),
+    **{f"bend {seed}": partial(bend_question, seed, "object") for seed in range(8)},
+}
+JOINTS: dict[str, Ask] = {
+    "three_closed": partial(corridor_problem, 0.95, 1.5, 3),
+    **{f"hinge {seed}": partial(bend_question, seed, "revolute") for seed in (1, 3, 4, 5, 7)},
+    **{f"slide {seed}": partial(bend_question, seed, "prismatic") for seed in range(1, 6)},
+}
+DISCS: dict[str, Ask] = {
+    "narrow": partial(corridor_problem, 0.45),
+    "three_narrow": partial(corridor_problem, 0.45, 1.5, 3),
+    **{f"random {seed}": partial(random_question, seed) for seed in (5, 6, 12, 17, 25, 63, 92, 98)},
+}
+BLOCKED: dict[str, Ask] = {
+    **{f"crossing {seed}": partial(crossing_question, seed, crossed="goal") for seed in range(4)},
+    **{f"hinge {seed}": partial(bend_question, seed, "revolute", in_corridor=True) for seed in (0, 4)},
+    **{f"random {seed}": partial(random_question, seed) for seed in (7, 21, 41, 54, 57, 97)},
+}
+
+SOURCES: dict[str, tuple[Ask, int]] = {
+    f"{kind}/{name}": (ask, 1 if name == "three_closed" else rounds)
+    for kind, rounds, asks in (
+        ("plan", 5, PLANS),
+        ("slices", 6, SLICES),
+        ("slices_with_joints", 6, JOINTS),
+        ("disc", 6, DISCS),
+        ("blocked_goal", 8, BLOCKED),
+    )
+    for name, ask in asks.items()
+}
+"""By kind and name: the question, and how many times each kind of alteration is applied to its answer."""
