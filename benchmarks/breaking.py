@@ -14,7 +14,7 @@ from benchmarks.sampled_axis import attacks, push_along, run_axis
 from benchmarks.tasks import Task
 from coop_drake.answers import Found
 from coop_drake.answers.budget import Budget
-from coop_drake.laws.axis_table import axis_table
+from coop_drake.laws.axis_table import axis_table, track_row
 from coop_drake.planning.budget.axis_sets import Entry, axis_sets, conditions_of
 from coop_drake.tree.pose import FloatArray
 
@@ -74,6 +74,7 @@ def _largest(name: str, holds: Callable[[Budget], bool]) -> float:
 
 def _survives(row: FloatArray, rest: float, budget: Budget) -> bool:
     size = np.array([budget.angle_noise, budget.rate_noise, budget.acceleration_error])
+    jump = -track_row(row, 0.0, rest, 0.0)[0]
     samples, delay = ceil(2.0 / budget.period), ceil(budget.delay / budget.period - 1e-6)
     motion = np.zeros((samples, 3))
     for disturbances in attacks(row, budget.period, size, samples, 0):
@@ -82,7 +83,7 @@ def _survives(row: FloatArray, rest: float, budget: Budget) -> bool:
                 factor = 1.0 + sign * budget.model_error
                 start = (rest, 0.0, 0.0)
                 if not run_axis(
-                    row, budget.period, delay, budget.lag, start, disturbances, factor, 1, motion
+                    row, budget.period, delay, budget.lag, start, jump, disturbances, factor, 1, motion
                 ):
                     return False
                 push_along(row, budget.period, size, motion, disturbances)

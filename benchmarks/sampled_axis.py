@@ -19,6 +19,7 @@ def run_axis(
     delay: int,
     lag: float,
     entry: tuple[float, float, float],
+    jump: float,
     disturbances: FloatArray,
     model_factor: float,
     late: int,
@@ -35,16 +36,17 @@ def run_axis(
         delay: Age of a measurement in periods.
         lag: Time constant of x'' [s].
         entry: x, x' and x'' at the entry.
+        jump: What is added to the command and fades, see ``rest_jump``.
         disturbances: Errors of the measured position and rate, and of the acceleration, of every sample,
             shape (samples, 3).
         model_factor: Factor by which accelerations are larger than commanded [-].
         late: Periods for which the acceleration from before the entry is commanded on, until the robot hears
-            of the switch; from then on the jump of the command fades.
+            of the switch.
         motion: Receives x, x' and x'' at every sample, shape (samples, 3).
     """
     n = disturbances.shape[0]
     x, v, p = entry
-    old, jump = p, 0.0
+    old = p
     for k in range(n):
         motion[k, 0], motion[k, 1], motion[k, 2] = x, v, p
         lower, upper = bounds_of(row, k * period)[:2]
@@ -57,8 +59,6 @@ def run_axis(
         else:
             seen_x, seen_v = motion[k - delay, 0], motion[k - delay, 1]
         seen_x, seen_v = seen_x + disturbances[k, 0], seen_v + disturbances[k, 1]
-        if k == late:
-            jump = old / model_factor - track_row(row, 0.0, seen_x, seen_v)[0]
         u = track_row(row, k * period, seen_x, seen_v)[0] + fading(k * period, row[FADING_TIME]) * jump
         u = model_factor * u + disturbances[k, 2] if k >= late else old
         for half in range(2):

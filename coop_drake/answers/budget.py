@@ -72,7 +72,8 @@ class Tolerance:
             measurements still speak [rad/s^2 or m/s^2].
         distance: Least distance to the funnel's bounds at all times [rad or m].
         acceleration: Largest magnitude of the acceleration [rad/s^2 or m/s^2].
-        settled: Largest departure from the middle of the goal interval at the end [rad or m].
+        settled: Largest departure from the middle of the goal interval in the end [rad or m].
+        settled_rate: Largest rate in the end [rad/s or m/s].
         entry_parts: Into how many parts the positions at the entry are cut, so that these bounds follow [-].
     """
 
@@ -86,4 +87,5 @@ class Tolerance:
     distance: Vector
     acceleration: Vector
     settled: Vector
+    settled_rate: Vector
     entry_parts: tuple[Annotated[int, Limits(at_least=1, at_most=64)], ...]

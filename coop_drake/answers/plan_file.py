@@ -69,8 +69,11 @@ def read_plan(document: Document) -> Plan:
         document.check_intervals(f"cells[{k}].", axes)
         document.check_intervals(f"transitions[{k}].goal_", axes)
         document.check_length(f"transitions[{k}].target", 2)
-        for part in ("gains", "tolerance"):
-            for name, value in (document.entry(f"transitions[{k}]").get(part) or {}).items():
+        gains = document.entry(f"transitions[{k}].gains")
+        parts = {"gains": gains, "gains.rest": gains.get("rest")}
+        parts["tolerance"] = document.entry(f"transitions[{k}]").get("tolerance")
+        for part, content in parts.items():
+            for name, value in (content or {}).items():
                 if isinstance(value, list):
                     document.check_length(f"transitions[{k}].{part}.{name}", axes)
     return plan

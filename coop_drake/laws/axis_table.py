@@ -24,6 +24,7 @@ __all__ = [
     "axis_table",
     "bounds_of",
     "funnel_acceleration",
+    "rest_jump",
     "track_axes",
     "track_paced_row",
     "track_row",
@@ -31,14 +32,17 @@ __all__ = [
     "write_row",
 ]
 
-LAW_COLUMNS = 13
+LAW_COLUMNS = 16
 """Columns of a table: slice and goal interval [rad or m], lambda [1/s], 1 where the funnel is quintic and 0
 where it is not, kappa [rad^2/s^2 or m^2/s^2], k1, k2 and mu [1/s], the smallest distance to a bound over the
-funnel's width [-], the time T in which the commands of the last cell fade [s], and the largest V with which
-the cell may be entered."""
+funnel's width [-], the time T in which the commands of the last cell fade [s], the largest V with which the
+cell may be entered, the time after which it may be left [s], and within what an axis must be to leave it at
+rest: the distance from the middle of the goal interval [rad or m] and the rate [rad/s or m/s]; both are 0
+where V alone decides."""
 
 SLICE_LOWER, SLICE_UPPER, GOAL_LOWER, GOAL_UPPER, DECAY_RATE, QUINTIC = range(6)
-LOG_GAIN, POSITION_GAIN, RATE_GAIN, RAMP_RATE, SATURATION, FADING_TIME, ENERGY_BOUND = range(6, LAW_COLUMNS)
+LOG_GAIN, POSITION_GAIN, RATE_GAIN, RAMP_RATE, SATURATION, FADING_TIME, ENERGY_BOUND = range(6, 13)
+LEAVING_TIME, REST_REACH, REST_RATE = range(13, LAW_COLUMNS)
 """The columns by name, in this order."""
 
 
@@ -49,7 +53,7 @@ def axis_table(funnel: Funnel, gains: TransitionGains) -> FloatArray:
         funnel: Funnels of m axes.
         gains: Gains, those of each axis of shape (m,).
     """
-    table = np.empty((funnel.goal_lower.size, LAW_COLUMNS))
+    table, rest = np.empty((funnel.goal_lower.size, LAW_COLUMNS)), gains.rest
     for i, row in enumerate(table):
         write_row(
             row,
@@ -58,6 +62,9 @@ def axis_table(funnel: Funnel, gains: TransitionGains) -> FloatArray:
             (gains.position_gain, gains.rate_gain, gains.ramp_rate, gains.saturation, gains.hand_over_time),
             funnel.shape == "quintic",
         )
+        if rest is not None:
+            row[REST_REACH], row[REST_RATE] = rest.reach[i], rest.rate[i]
+            row[LEAVING_TIME] = max(gains.hand_over_time, rest.after)
     return table
 
 
@@ -69,7 +76,7 @@ def write_row(
     gains: tuple[float, float, float, float, float],
     quintic: bool,
 ) -> None:
-    """Write one row of a table.
+    """Write one row of a table, of an axis that leaves the cell by its V.
 
     Args:
         row: Receives the numbers, shape (``LAW_COLUMNS``,).
@@ -82,6 +89,7 @@ def write_row(
     row[DECAY_RATE], row[LOG_GAIN], row[ENERGY_BOUND] = scheduled
     row[POSITION_GAIN], row[RATE_GAIN], row[RAMP_RATE], row[SATURATION], row[FADING_TIME] = gains
     row[QUINTIC] = 1.0 if quintic else 0.0
+    row[LEAVING_TIME], row[REST_REACH], row[REST_RATE] = row[FADING_TIME], 0.0, 0.0
 
 
 @compiled
@@ -188,6 +196,8 @@ def write_jumps(
 ) -> None:
     """Write by how much the accelerations of ``track_axes`` would jump if the next cell were entered now.
 
+    Of an axis that leaves the cell at rest it is ``rest_jump``.
+
     Args:
         table: The axes in the current cell, whose hand-over is over, shape (1 + n, ``LAW_COLUMNS``).
         next_table: The axes in the next cell.
@@ -201,7 +211,22 @@ def write_jumps(
     track_axes(table, time, clock, none, object_state, robot, jumps)
     track_axes(next_table, clock[0], clock, none, object_state, robot, following)
     for i in range(table.shape[0]):
-        jumps[i] -= following[i]
+        at_rest = table[i, REST_RATE] > 0.0
+        jumps[i] = rest_jump(table[i], next_table[i]) if at_rest else jumps[i] - following[i]
+
+
+@compiled
+def rest_jump(row: FloatArray, next_row: FloatArray) -> float:
+    """Return by how much the acceleration jumps if the next cell is entered at rest [rad/s^2 or m/s^2].
+
+    The axis then rests in the middle of its goal interval, where the law of its cell asks for none. The
+    number follows from the plan alone: no error of a measurement fades with it, and all robots have the same.
+
+    Args:
+        row: The axis in its cell, a row of an ``axis_table``.
+        next_row: The axis in the next cell.
+    """
+    return -track_row(next_row, 0.0, 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]), 0.0)[0]
 
 
 def first_jumps(table: FloatArray, start: FloatArray | None) -> FloatArray:

@@ -29,6 +29,21 @@ AxisGains = Annotated[Vector, Limits(above=0.0)]
 
 
 @dataclass(frozen=True)
+class RestCondition:
+    """When a cell may be left, and where every axis must be then, and how slow; arrays of shape (1 + n,).
+
+    Attributes:
+        after: Time since the cell was entered, at least that of the hand-over [s].
+        reach: Largest distance from the middle of the goal interval [rad or m].
+        rate: Largest magnitude of the rate [rad/s or m/s].
+    """
+
+    after: Annotated[NotNegative, EXACT]
+    reach: AxisGains
+    rate: AxisGains
+
+
+@dataclass(frozen=True)
 class TransitionGains:
     """Gains of one transition; per-axis arrays are ordered (theta, q...).
 
@@ -48,6 +63,8 @@ class TransitionGains:
             [-]; see ``track_axis``.
         hand_over_time: T, in which the commands of the last cell fade; 0 for a step, as printed [s].
         energy_bound: Largest PPC energy V accepted when this transition is entered, shape (1 + n,).
+        rest: When this transition may be left, in place of the next one's energy bound; null where that bound
+            decides.
     """
 
     stiffness: Gain
@@ -63,6 +80,7 @@ class TransitionGains:
     saturation: Annotated[Saturation, EXACT]
     hand_over_time: Annotated[NotNegative, EXACT]
     energy_bound: AxisGains
+    rest: RestCondition | None = None
 
     def governor_row(self, before: "TransitionGains") -> FloatArray:
         """Return the governor's gains as compiled code reads them, see ``governed_gains``, shape (8,).
@@ -80,6 +98,7 @@ class TransitionGains:
             decay_rate=self.decay_rate[axes],
             log_gain=self.log_gain[axes],
             energy_bound=self.energy_bound[axes],
+            rest=self.rest and replace(self.rest, reach=self.rest.reach[axes], rate=self.rest.rate[axes]),
         )
 
 

@@ -8,7 +8,14 @@ those of another robot.
 from __future__ import annotations
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.axis_table import ENERGY_BOUND, GOAL_LOWER, GOAL_UPPER, track_row
+from coop_drake.laws.axis_table import (
+    ENERGY_BOUND,
+    GOAL_LOWER,
+    GOAL_UPPER,
+    REST_RATE,
+    REST_REACH,
+    track_row,
+)
 from coop_drake.laws.governor import energy_margin
 from coop_drake.tree.pose import FloatArray
 
@@ -115,12 +122,18 @@ def position_arrival(distance: float, speed: float, tolerance: float) -> float:
 def axis_ready(row: FloatArray, next_row: FloatArray, position: float, rate: float) -> float:
     """Return the margin with which one axis may enter the next cell: inside its goal, and V small enough.
 
+    An axis that leaves its cell at rest must instead be near the middle of its goal interval, and slow, as a
+    ``RestCondition`` says.
+
     Args:
         row: The axis in the current cell, a row of an ``axis_table``.
         next_row: The axis in the next cell.
         position: x [rad or m].
         rate: x' [rad/s or m/s].
     """
+    if row[REST_RATE] > 0.0:
+        away = abs(position - 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]))
+        return float(min(1.0 - away / row[REST_REACH], 1.0 - abs(rate) / row[REST_RATE]))
     energy = track_row(next_row, 0.0, position, rate)[1]
     inside = interval_margin(position, row[GOAL_LOWER], row[GOAL_UPPER])
     return min(inside, funnel_margin(energy, next_row[ENERGY_BOUND]))

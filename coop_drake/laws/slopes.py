@@ -6,11 +6,14 @@ the rate with which the funnel carries a point along, the acceleration L(t, x, x
     dL/dx' = -(k2 + k1 h - w'/w)
     dL/dx  = -h (k1 k2 + k1') + k2 w'/w - (w'/w)^2 + w''/w
              - 4 kappa (1 + cosh s)^2 (1 + s tanh(s / 2)) / w^2 - 2 k1 (s + sinh s) (r - x') / w
+
+With q = dl / w the hyperbolic functions are rational: tanh(s / 2) = 2 q - 1, 1 + cosh s = 1 / (2 q (1 - q))
+and sinh s = (2 q - 1) / (2 q (1 - q)).
 """
 
 from __future__ import annotations
 
-from math import cosh, log, sinh, tanh
+from math import log
 
 from coop_drake.compiled import compiled
 from coop_drake.laws.axis_table import (
@@ -59,18 +62,20 @@ def slope_bounds(
     low = min(max(first, saturation), 1.0 - saturation)
     high = min(max(last, saturation), 1.0 - saturation)
     s_low, s_high = log(low / (1.0 - low)), log(high / (1.0 - high))
-    far = max(abs(s_low), abs(s_high))
-    near = 0.0 if s_low <= 0.0 <= s_high else min(abs(s_low), abs(s_high))
-    pull_near, pull_far = near * tanh(0.5 * near), far * tanh(0.5 * far)
+    across = s_low <= 0.0 <= s_high
+    pulls = s_low * (2.0 * low - 1.0), s_high * (2.0 * high - 1.0)
+    pull_near, pull_far = 0.0 if across else min(pulls), max(pulls)
+    from_low, from_high = 0.5 / (low * (1.0 - low)), 0.5 / (high * (1.0 - high))
     carried_low = lower_rate + low * (upper_rate - lower_rate) - rate
     carried_high = lower_rate + high * (upper_rate - lower_rate) - rate
     turned = product_bounds(
-        s_low + sinh(s_low), s_high + sinh(s_high),
+        s_low + from_low * (2.0 * low - 1.0), s_high + from_high * (2.0 * high - 1.0),
         min(carried_low, carried_high), max(carried_low, carried_high),
     )  # fmt: skip
     spring = product_bounds(1.0 - pull_far, 1.0 - pull_near, k1 * k2 + k1_dot, k1 * k2 + k1_dot)
-    log_near = 4.0 * kappa / (w * w) * (1.0 + cosh(near)) ** 2 * (1.0 + pull_near)
-    log_far = 4.0 * kappa / (w * w) * (1.0 + cosh(far)) ** 2 * (1.0 + pull_far)
+    closest = 2.0 if across else min(from_low, from_high)
+    log_near = 4.0 * kappa / (w * w) * closest * closest * (1.0 + pull_near)
+    log_far = 4.0 * kappa / (w * w) * max(from_low, from_high) ** 2 * (1.0 + pull_far)
     steady = k2 * closing - closing * closing + bending
     x_lower = steady - spring[1] - log_far - 2.0 * k1 / w * turned[1]
     x_upper = steady - spring[0] - log_near - 2.0 * k1 / w * turned[0]

@@ -6,9 +6,10 @@ import numpy as np
 
 from coop_drake.answers.plan import Plan
 from coop_drake.geometry.boundary import BoundaryDistance
-from coop_drake.laws.axis_table import ENERGY_BOUND, axis_table, track_row
+from coop_drake.laws.axis_table import ENERGY_BOUND, REST_RATE, axis_table, track_row
 from coop_drake.laws.hand_over import governed_gains
 from coop_drake.laws.readiness import (
+    axis_ready,
     clearance_margin,
     funnel_margin,
     interval_margin,
@@ -94,12 +95,18 @@ def _readiness(plan: Plan, sample: Sample) -> dict[str, float]:
         np.concatenate([sample.z[:3], sample.rates[:3]]),
         sample.governor_position,
     )
-    margins = _intervals(plan, sample)
+    margins = _intervals(plan, sample) if plan.transitions[sample.cell].gains.rest is None else {}
     margins["the object's position is safe in the next cell (Delta E)"] = clearance_margin(
         margin, stiffness, plan.transitions[sample.cell].inradius
     )
+    own = axis_table(plan.funnel(sample.cell), plan.transitions[sample.cell].gains)
     table = axis_table(plan.funnel(following), gains)
     for i, name in enumerate(_axes(plan)):
+        if own[i, REST_RATE] > 0.0:
+            margins[f"{name} rests in the middle of its goal interval"] = axis_ready(
+                own[i], table[i], sample.z[2 + i], sample.rates[2 + i]
+            )
+            continue
         energy = track_row(table[i], 0.0, sample.z[2 + i], sample.rates[2 + i])[1]
         margins[f"the energy of {name} falls below the next funnel's bound"] = funnel_margin(
             energy, table[i, ENERGY_BOUND]

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.axis_table import FADING_TIME
+from coop_drake.laws.axis_table import LEAVING_TIME
 from coop_drake.laws.hand_over import governed_gains
 from coop_drake.laws.readiness import (
     axis_arrival,
@@ -123,7 +123,7 @@ def robot_ready(
     else:
         energy_margin = cell_margin(next_edges, next_stiffness, object_state, governor_position)
         margin = clearance_margin(energy_margin, next_stiffness, inradius)
-        margin = min(margin, hand_over_margin(time, table[0, FADING_TIME]))
+        margin = min(margin, hand_over_margin(time, table[0, LEAVING_TIME]))
     for i in range(1 + n):
         position, rate = object_state[2], object_state[5]
         if i > 0:

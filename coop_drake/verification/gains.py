@@ -10,6 +10,7 @@ import numpy as np
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains
+from coop_drake.laws.gains import RestCondition
 from coop_drake.verification.checks import Check
 
 RELATIVE = 1e-9
@@ -51,8 +52,8 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
             goal_upper=transition.goal_upper,
             resting=resting,
         )
-        if tolerance is not None:  # the energies of entry are part of what follows from the budget
-            gains = replace(gains, energy_bound=transition.gains.energy_bound)
+        if tolerance is not None:  # the condition of rest follows from the budget
+            gains = replace(gains, rest=transition.gains.rest)
         _compare(transition.gains, gains, f"{where}.gains")
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
     return Check("gains are those that the gain set gives for the cells", len(plan.transitions))
@@ -61,6 +62,6 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
 def _compare(found: TransitionGains, expected: TransitionGains, where: str) -> None:
     for name, value in vars(expected).items():
         stated = getattr(found, name)
-        text = isinstance(value, str)
-        if not (stated == value if text else np.allclose(stated, value, rtol=RELATIVE, atol=0.0)):
+        same = value is None or isinstance(value, str | RestCondition)
+        if not (stated == value if same else np.allclose(stated, value, rtol=RELATIVE, atol=0.0)):
             raise RefusalError(f"{where}.{name}", f"is {stated}; the cell gives {value}")

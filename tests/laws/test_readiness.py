@@ -5,7 +5,8 @@ import pytest
 
 from coop_drake.laws import Funnel, ScheduledGains, transition_gains
 from coop_drake.laws.axis_table import axis_table
-from coop_drake.laws.readiness import clearance_margin, funnel_margin, interval_margin
+from coop_drake.laws.gains import RestCondition
+from coop_drake.laws.readiness import axis_ready, clearance_margin, funnel_margin, interval_margin
 from coop_drake.systems.ready_kernels import ready_conditions
 from tests.support.readiness import margin_of, square_with_clearance
 
@@ -97,6 +98,21 @@ def test_the_funnel_margin_vanishes_at_the_energy_bound():
     assert funnel_margin(0.3, 0.3) == 0.0
     assert funnel_margin(0.0, 0.3) == 1.0
     assert funnel_margin(0.6, 0.3) == pytest.approx(-0.5)
+
+
+def test_a_cell_that_is_left_at_rest_asks_for_place_and_rate_in_place_of_the_energy():
+    gains = transition_gains(ScheduledGains(), clearance=0.2, resting=np.array([0.4, 0.5]), **INTERVALS)
+    gains = replace(gains, rest=RestCondition(0.5, np.array([0.05, 0.1]), np.array([0.2, 0.3])))
+    funnel = Funnel(**INTERVALS, decay_rate=gains.decay_rate, shape=gains.funnel)
+    table, alone = (
+        axis_table(funnel, gains),
+        axis_table(funnel.select(np.array([1])), gains.select(np.array([1]))),
+    )
+    assert axis_ready(table[0], NEXT_TABLE[0], 0.9, 0.05) == pytest.approx(0.75)
+    assert axis_ready(table[0], NEXT_TABLE[0], 0.88, 0.05) == pytest.approx(0.6)
+    assert axis_ready(table[0], NEXT_TABLE[0], 0.96, 0.0) < 0.0
+    assert axis_ready(table[0], NEXT_TABLE[0], 0.9, -0.21) < 0.0
+    assert axis_ready(alone[0], NEXT_TABLE[1], 0.0, 0.15) == pytest.approx(0.5)
 
 
 ARRIVED = {

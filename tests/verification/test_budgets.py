@@ -92,6 +92,7 @@ def with_transition(plan, k, **changes):
 ALTERED = {
     "entry_lower": 1.002, "entry_upper": -1.002, "entry_rate_lower": 0.9, "entry_rate_upper": 0.9,
     "entry_acceleration": 0.9, "entry_history": 0.9, "distance": 1.05, "acceleration": 0.95, "settled": 0.95,
+    "settled_rate": 0.95,
 }  # fmt: skip
 
 
@@ -122,12 +123,25 @@ def test_other_gains_are_refused(plan, name):
         check_budget(altered)
 
 
-def test_a_larger_energy_of_entry_is_refused(plan):
-    gains = plan.transitions[-1].gains
-    altered = with_transition(
-        plan, len(plan.transitions) - 1, gains=replace(gains, energy_bound=3.0 * gains.energy_bound)
-    )
-    with pytest.raises(RefusalError, match="entry"):
+@pytest.mark.parametrize(
+    ("name", "factor", "where"),
+    [
+        ("rate", 3.0, r"transitions\[1\].tolerance.entry"),
+        ("reach", 0.01, r"transitions\[0\].tolerance"),
+        ("rate", 0.01, r"transitions\[0\].tolerance"),
+    ],
+)
+def test_another_condition_of_rest_is_refused(plan, name, factor, where):
+    """A looser one lets axes enter the next cell from more states; a stricter one may never be met."""
+    gains = plan.transitions[0].gains
+    rest = replace(gains.rest, **{name: factor * getattr(gains.rest, name)})
+    with pytest.raises(RefusalError, match=where):
+        check_budget(with_transition(plan, 0, gains=replace(gains, rest=rest)))
+
+
+def test_a_plan_without_a_condition_of_rest_is_refused(plan):
+    altered = with_transition(plan, 0, gains=replace(plan.transitions[0].gains, rest=None))
+    with pytest.raises(RefusalError, match=r"transitions\[0\].gains.rest"):
         check_budget(altered)
 
 
@@ -150,8 +164,9 @@ def test_a_budget_that_is_too_large_is_answered_with_one_that_holds(folder, tmp_
     result = invoke("plan", scenario, "--budget", tmp_path / "budget.yaml", "--out", tmp_path)
     assert result.exit_code == 4, result.output
     said = " ".join(result.output.split())
-    assert "not with this budget" in said
-    assert "with this one: control_rate 200, delay" in said
+    assert "No plan was found that holds under this budget: in transition" in said
+    assert "The largest share of the budget under which a plan holds is" in said
+    assert "%: control_rate 200, delay" in said
 
 
 @pytest.mark.parametrize(

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, exp, sqrt
+from math import ceil
 
 import numpy as np
 
 from coop_drake.answers.budget import Budget
 from coop_drake.laws.axis_table import (
     DECAY_RATE,
-    ENERGY_BOUND,
     FADING_TIME,
     GOAL_LOWER,
     GOAL_UPPER,
-    LOG_GAIN,
+    LEAVING_TIME,
     RAMP_RATE,
-    SLICE_LOWER,
-    SLICE_UPPER,
+    REST_RATE,
+    REST_REACH,
+    track_row,
 )
 from coop_drake.laws.funnels import CLOSING
-from coop_drake.laws.readiness import EROSION
 from coop_drake.planning.budget.axis_tube import (
     ACCELERATION,
     COLUMNS,
@@ -33,11 +32,14 @@ from coop_drake.planning.budget.axis_tube import (
     X,
     follow_tube,
 )
-from coop_drake.planning.budget.settled import settle
+from coop_drake.planning.budget.settled import Settled, settle, tail_samples
 from coop_drake.tree.pose import FloatArray
 
-RAMPED = 7.0
-"""mu t after which the gain k1 counts as ramped in [-]: less than a hundredth of it is missing then."""
+RAMPED = 6.0
+"""mu t after which the gain k1 counts as ramped in [-]: a sixtieth of it is missing then."""
+
+SETTLED_FACTOR = 1.5
+"""An axis counts as settled while it departs from rest by so many times what it does in the end [-]."""
 
 LATE = 1
 """Periods for which the command of the cell before acts after a switch [-]: all robots compute at the instant
@@ -59,8 +61,10 @@ class Entry:
         rate_lower: Lowest rate [rad/s or m/s].
         rate_upper: Highest rate [rad/s or m/s].
         acceleration: Largest magnitude of acceleration and command at the entry [rad/s^2 or m/s^2].
-        history: Largest magnitude of the acceleration before the entry, over the age of the measurements that
-            are used at the entry [rad/s^2 or m/s^2].
+        history: Largest magnitude of the acceleration before the entry, over the age of the measurements and
+            reports that are used at the entry [rad/s^2 or m/s^2].
+        rest: Where the axis rests in the middle of the set, for which the jump of the command is known [rad
+            or m]; the middle of the positions if not given.
     """
 
     lower: float
@@ -69,6 +73,7 @@ class Entry:
     rate_upper: float = 0.0
     acceleration: float = 0.0
     history: float = 0.0
+    rest: float | None = None
 
 
 @dataclass(frozen=True)
@@ -80,18 +85,18 @@ class AxisSets:
         distance: Least distance to the funnel's bounds at all times [rad or m]; not positive if none is
             shown.
         acceleration: Largest magnitude of the acceleration [rad/s^2 or m/s^2].
-        x_most: Largest departure from the goal interval's middle after the tubes' end [rad or m].
-        v_most: Largest rate after the tubes' end [rad/s or m/s].
-        settled: Largest departure from the goal interval's middle at the end [rad or m].
+        last: Largest magnitude of the acceleration once the funnel is closed [rad/s^2 or m/s^2].
+        settled: Largest departure from the goal interval's middle once the funnel is closed [rad or m].
+        settled_rate: Largest rate once the funnel is closed [rad/s or m/s].
         parts: Into how many parts the positions at the entry were cut.
     """
 
     tubes: tuple[FloatArray, ...]
     distance: float
     acceleration: float = np.inf
-    x_most: float = np.inf
-    v_most: float = np.inf
+    last: float = np.inf
     settled: float = np.inf
+    settled_rate: float = np.inf
     parts: int = 1
 
 
@@ -129,149 +134,165 @@ def axis_sets(row: FloatArray, conditions: Sequence[AxisConditions], entry: Entr
         entry: The set in which it enters.
         parts: Into how many parts the positions at the entry are cut, each with a tube of its own.
     """
-    every = []
+    T, delay = conditions[0].period, conditions[0].delay
+    closed = max(CLOSING / row[DECAY_RATE], RAMPED / row[RAMP_RATE] if row[RAMP_RATE] > 0.0 else 0.0)
+    begin = ceil(max(closed, row[FADING_TIME]) / T) + delay
+    tail, middle = tail_samples(row, conditions[0]), 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
+    tubes, boxes, followed = [], [], (0.0, 0.0)
     for one in conditions:
-        every.append(_sets(row, one, entry, parts))
-        if not every[-1].distance > 0.0:
-            return every[-1]
+        made = _tubes(row, one, entry, parts, begin + tail + 1)
+        if not made:
+            return AxisSets((), 0.0)
+        late = np.concatenate([tube[None, begin - delay :] for tube in made])
+        x = np.abs(late[:, :, X] - middle) + late[:, :, X_REACH]
+        v = np.abs(late[:, :, V]) + late[:, :, V_REACH]
+        first = slice(0, delay + 1)
+        box = x[:, first].max(), v[:, first].max(), late[:, first, ACCELERATION].max()
+        boxes.append((float(box[0]), float(box[1]), float(box[2])))
+        followed = max(followed[0], float(x.max())), max(followed[1], float(v.max()))
+        tubes += made
+    kept = _settled(row, conditions, begin * T, boxes, followed, tail)
+    last = max(one.acceleration for one in kept)
     return AxisSets(
-        tuple(tube for sets in every for tube in sets.tubes),
-        min(sets.distance for sets in every),
-        max(sets.acceleration for sets in every),
-        max(sets.x_most for sets in every),
-        max(sets.v_most for sets in every),
-        max(sets.settled for sets in every),
+        tuple(tubes),
+        min(*(one.distance for one in kept), *(float(tube[:, DISTANCE].min()) for tube in tubes)),
+        max(last, *(float(tube[:, ACCELERATION].max()) for tube in tubes)),
+        last,
+        kept[0].x,
+        kept[0].rate,
         parts,
     )
 
 
-def _sets(row: FloatArray, conditions: AxisConditions, entry: Entry, parts: int) -> AxisSets:
-    T, delay = conditions.period, conditions.delay
-    closed = max(CLOSING / row[DECAY_RATE], RAMPED / row[RAMP_RATE] if row[RAMP_RATE] > 0.0 else 0.0)
-    samples = ceil(max(closed, row[FADING_TIME]) / T) + delay + 1
+def _settled(
+    row: FloatArray,
+    conditions: Sequence[AxisConditions],
+    time: float,
+    boxes: Sequence[tuple[float, float, float]],
+    followed: tuple[float, float],
+    samples: int,
+) -> list[Settled]:
+    """Return ``settle`` of every condition, for the same departures x and v."""
+    while True:
+        kept = [
+            settle(row, one, time, box, followed, samples) for one, box in zip(conditions, boxes, strict=True)
+        ]
+        largest = max(one.x for one in kept), max(one.rate for one in kept)
+        if largest == followed or not max(largest) < np.inf:
+            return kept
+        followed = largest
+
+
+def _tubes(
+    row: FloatArray, conditions: AxisConditions, entry: Entry, parts: int, samples: int
+) -> list[FloatArray]:
+    """Return the tubes of all parts of the positions at the entry, none if one leaves the funnel."""
     half = 0.5 * (entry.upper - entry.lower) / parts
     fast, reach = 0.5 * (entry.rate_lower + entry.rate_upper), 0.5 * (entry.rate_upper - entry.rate_lower)
-    middle, pushed = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]), (entry.acceleration, entry.history)
-    tubes, ends = [], np.zeros(3)
+    rest = 0.5 * (entry.lower + entry.upper) if entry.rest is None else entry.rest
+    tubes, jump = [], -track_row(row, 0.0, rest, 0.0)[0]
     for i in range(parts):
         tube = np.zeros((samples, COLUMNS))
-        start = float(entry.lower + (2 * i + 1) * half), fast, float(half), reach, *pushed
-        if not follow_tube(row, conditions, start, tube):
-            return AxisSets((), 0.0)
+        middle = float(entry.lower + (2 * i + 1) * half)
+        start = middle, fast, float(half), reach, entry.acceleration, entry.history
+        if not follow_tube(row, conditions, start, jump, tube):
+            return []
         tubes.append(tube)
-        last = tube[-1 - delay :]
-        away = np.abs(last[:, X] - middle) + last[:, X_REACH], np.abs(last[:, V]) + last[:, V_REACH]
-        ends = np.maximum(ends, [away[0].max(), away[1].max(), last[:, ACCELERATION].max()])
-    time = (samples - 1) * T
-    box = float(ends[0]), float(ends[1]), float(ends[2])
-    distance, fastest, x_most, v_most, settled = settle(row, conditions, time, box)
-    return AxisSets(
-        tuple(tubes),
-        min(distance, *(float(tube[:, DISTANCE].min()) for tube in tubes)),
-        max(fastest, *(float(tube[:, ACCELERATION].max()) for tube in tubes)),
-        x_most,
-        v_most,
-        settled,
-    )
+    return tubes
 
 
-def needed_energy(
-    row: FloatArray, sets: AxisSets, following: FloatArray, conditions: AxisConditions
-) -> float:
-    """Return the energy V below which the next transition must be allowed to begin, so that it does begin.
-
-    Args:
-        row: The axis in this cell.
-        sets: Its sets.
-        following: The axis in the next cell.
-        conditions: What disturbs it.
-    """
-    middle = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
-    away = sets.settled + conditions.position_noise
-    width = following[SLICE_UPPER] - following[SLICE_LOWER]
-    shares = np.clip((middle + np.array([-away, away]) - following[SLICE_LOWER]) / width, 1e-9, 1.0 - 1e-9)
-    s = np.abs(np.log(shares / (1.0 - shares))).max()
-    rate = sets.v_most + conditions.rate_noise
-    return float(0.5 * following[LOG_GAIN] * s * s + 0.5 * rate * rate)
-
-
-def becomes_ready(row: FloatArray, sets: AxisSets, conditions: AxisConditions) -> bool:
-    """Whether an axis ends where it counts as arrived in its goal interval, whatever is measured."""
-    half = 0.5 * (row[GOAL_UPPER] - row[GOAL_LOWER]) * (1.0 - 2.0 * EROSION)
-    return bool(sets.settled + conditions.position_noise < half)
+def rest_needed(row: FloatArray, sets: AxisSets, conditions: AxisConditions) -> tuple[float, float]:
+    """Return distance and rate within which a settled axis is measured [rad or m, rad/s or m/s]."""
+    return sets.settled + conditions.position_noise, sets.settled_rate + conditions.rate_noise
 
 
 def next_entry(
     row: FloatArray,
     sets: AxisSets,
     entry: Entry,
-    following: FloatArray,
     conditions: AxisConditions,
     report_periods: int,
 ) -> Entry:
     """Return the set in which an axis can enter the next cell.
 
-    It was measured inside the eroded goal interval and with a V below the bound; since then the measurement's
-    delay has passed, the time for which a report may be used, and a period. In that time it went no farther
-    than its largest acceleration allows, and it has stayed in its tube.
+    It was measured at rest; since then the measurement's delay has passed, the time for which a report may be
+    used, and a period. In that time it went no farther than its largest acceleration allows, and it has
+    stayed in its tube.
 
     Args:
-        row: The axis in this cell.
+        row: The axis in this cell, with the condition of rest under which the cell is left.
         sets: Its sets.
         entry: The set in which it entered this cell.
-        following: The axis in the next cell.
         conditions: What disturbs it.
         report_periods: How long a report may be used, in periods.
     """
-    erosion = EROSION * (row[GOAL_UPPER] - row[GOAL_LOWER])
-    s = sqrt(2.0 * following[ENERGY_BOUND] / following[LOG_GAIN])
-    share, width = 1.0 / (1.0 + exp(min(s, 700.0))), following[SLICE_UPPER] - following[SLICE_LOWER]
-    low = max(row[GOAL_LOWER] + erosion, following[SLICE_LOWER] + share * width) - conditions.position_noise
-    high = min(row[GOAL_UPPER] - erosion, following[SLICE_UPPER] - share * width) + conditions.position_noise
-    fast = sqrt(2.0 * following[ENERGY_BOUND]) + conditions.rate_noise
     middle = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
-    settled = max(float(tube[-1, ACCELERATION]) for tube in sets.tubes)
-    parts = [(middle - sets.x_most, middle + sets.x_most, -sets.v_most, sets.v_most, settled)]
-    parts += [
-        _switching(tube, (low, high, fast), conditions, report_periods, float(row[FADING_TIME]))
-        for tube in sets.tubes
-    ]
-    lows, highs, slow, quick, pushed = np.array(parts).T
-    fresh = max(float(tube[conditions.late :, ACCELERATION].max()) for tube in sets.tubes)
+    reach, fast = row[REST_REACH] + conditions.position_noise, row[REST_RATE] + conditions.rate_noise
+    since = conditions.delay + report_periods + 1
+    time = since * conditions.period
+
+    def limited(
+        x_low: float, x_high: float, v_low: float, v_high: float, pushed: float, history: float
+    ) -> tuple[float, ...]:
+        farther, faster = reach + time * (fast + 0.5 * time * history), fast + time * history
+        return (
+            max(x_low, middle - farther), min(x_high, middle + farther), max(v_low, -faster),
+            min(v_high, faster), pushed, history,
+        )  # fmt: skip
+
+    x, v, pushed = sets.settled, sets.settled_rate, sets.last
+    before = max(pushed, *(float(tube[-1 - since :, ACCELERATION].max()) for tube in sets.tubes))
+    parts = [limited(middle - x, middle + x, -v, v, pushed, before)]
+    for tube in sets.tubes:
+        found = _switching(tube, middle, reach, fast, since, float(row[LEAVING_TIME]), conditions, entry)
+        parts += [limited(*found)] if found else []
+    lows, highs, slow, quick, pushes, histories = np.array(parts).T
     return Entry(
-        float(max(lows.min(), following[SLICE_LOWER])),
-        float(min(highs.max(), following[SLICE_UPPER])),
-        float(slow.min()),
-        float(quick.max()),
-        float(pushed.max()),
-        max(fresh, entry.acceleration),
-    )
+        float(lows.min()), float(highs.max()), float(slow.min()), float(quick.max()), float(pushes.max()),
+        float(histories.max()), middle,
+    )  # fmt: skip
+
+
+def settling_time(row: FloatArray, sets: AxisSets, conditions: AxisConditions) -> float:
+    """Return the time since the entry after which an axis departs from rest no more than when settled [s].
+
+    It may depart by ``SETTLED_FACTOR`` times what it does in the end.
+    """
+    middle, samples = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]), 0
+    for tube in sets.tubes:
+        far = np.abs(tube[:, X] - middle) + tube[:, X_REACH] > SETTLED_FACTOR * sets.settled
+        fast = np.abs(tube[:, V]) + tube[:, V_REACH] > SETTLED_FACTOR * sets.settled_rate
+        moving = np.flatnonzero(far | fast)
+        samples = max(samples, int(moving[-1]) + 1) if moving.size else samples
+    return samples * conditions.period
 
 
 def _switching(
     tube: FloatArray,
-    ready: tuple[float, float, float],
+    middle: float,
+    reach: float,
+    fast: float,
+    since: int,
+    leaving: float,
     conditions: AxisConditions,
-    report_periods: int,
-    fading: float,
-) -> tuple[float, float, float, float, float]:
-    """Return the states in which a tube can be when the cell is switched, after its hand-over."""
-    low, high, fast = ready
+    entry: Entry,
+) -> tuple[float, ...]:
+    """Return bounds of x and v, the largest |x''|, and that of the time before, when a tube can be left.
+
+    Nothing if it cannot be left before its end.
+    """
     x_low, x_high = tube[:, X] - tube[:, X_REACH], tube[:, X] + tube[:, X_REACH]
     v_low, v_high = tube[:, V] - tube[:, V_REACH], tube[:, V] + tube[:, V_REACH]
-    reported = (x_low <= high) & (x_high >= low) & (v_low <= fast) & (v_high >= -fast)
+    reported = (x_low <= middle + reach) & (x_high >= middle - reach) & (v_low <= fast) & (v_high >= -fast)
     reported[0] = True  # reports may rest on measurements from before the entry
-    since = conditions.delay + report_periods + 1
     possible = np.convolve(reported, np.ones(since + 1))[: len(tube)] > 0.5
-    possible[: ceil(fading / conditions.period - 1e-6)] = False
-    pushed = float(tube[conditions.late :, ACCELERATION][possible[conditions.late :]].max())
-    time = since * conditions.period
-    farther = time * (fast + 0.5 * time * pushed)
-    faster = fast + time * pushed
+    possible[: ceil(leaving / conditions.period - 1e-6)] = False
+    if not possible.any():
+        return ()
+    pushed = tube[:, ACCELERATION]
+    ahead = np.concatenate([np.full(since, max(entry.history, entry.acceleration)), pushed])
+    history = np.lib.stride_tricks.sliding_window_view(ahead, since + 1).max(axis=1)
     return (
-        max(float(x_low[possible].min()), low - farther),
-        min(float(x_high[possible].max()), high + farther),
-        max(float(v_low[possible].min()), -faster),
-        min(float(v_high[possible].max()), faster),
-        pushed,
-    )
+        float(x_low[possible].min()), float(x_high[possible].max()), float(v_low[possible].min()),
+        float(v_high[possible].max()), float(pushed[possible].max()), float(history[possible].max()),
+    )  # fmt: skip

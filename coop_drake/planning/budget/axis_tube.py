@@ -72,6 +72,7 @@ def follow_tube(
     row: FloatArray,
     conditions: AxisConditions,
     entry: tuple[float, float, float, float, float, float],
+    jump: float,
     tube: FloatArray,
 ) -> bool:
     """Write the tube of an axis from its entry on, and return whether it keeps inside the funnel.
@@ -83,20 +84,19 @@ def follow_tube(
         conditions: What disturbs it.
         entry: x and v at the entry, the most that they may depart from these, the largest |x''| and command
             at the entry, and the largest |x''| in the time before of which measurements still speak.
+        jump: What is added to the command and fades, see ``rest_jump``.
         tube: Receives the tube, shape (samples, ``COLUMNS``).
     """
     T, delay, n = conditions.period, conditions.delay, tube.shape[0]
     responses, p, weight, nominal, reaches = _before(conditions, entry, n)
-    before = entry[4], entry[5]
-    jump, weight[n + 3] = _jump(row, conditions, entry)
+    before, jump = (entry[4], entry[5]), conditions.model_factor * jump
     p_nominal, p_reach = 0.0, entry[4]
     lagging = lag_factors(T, conditions.lag)
     for k in range(n):
         i = k + delay
         seen = nominal[0, k], nominal[1, k], reaches[0, k], reaches[1, k]
-        left = fading(k * T, row[FADING_TIME]) if k >= conditions.late else 0.0
-        fade = left * jump, left * weight[n + 3]
-        u, slope, by_rate, weight[k], most = _command(row, conditions, k, seen, before, fade)
+        faded = fading(k * T, row[FADING_TIME]) * jump
+        u, slope, by_rate, weight[k], most = _command(row, conditions, k, seen, before, faded)
         fastest = max(abs(p_nominal) + p_reach, most)
         now = nominal[0, i], reaches[0, i], nominal[1, i], reaches[1, i]
         _note(tube[k], row, k * T, T, now, fastest)
@@ -107,7 +107,7 @@ def follow_tube(
         nominal[1, i + 1] = nominal[1, i] + T * u + lagging[1] * gap
         p_nominal = u + lagging[0] * gap
         reaches[0, i + 1], reaches[1, i + 1], p_reach = _respond(
-            responses, p, weight, k, (T, slope, by_rate, left), lagging
+            responses, p, weight, k, (T, slope, by_rate), lagging
         )
     return True
 
@@ -118,12 +118,11 @@ def _before(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return responses, those of p, what they respond to, the undisturbed motion, and its largest departures.
 
-    Responses to the disturbances of n commands, then to the departures of x, v and x'' at the entry and to
-    that of the jump of the command; all with the values of the periods before the entry, of which
-    measurements speak at first.
+    Responses to the disturbances of n commands, then to the departures of x, v and x'' at the entry; all with
+    the values of the periods before the entry, of which measurements speak at first.
     """
     T, delay, ring = conditions.period, conditions.delay, conditions.delay + 1
-    responses, p, weight = np.zeros((2, ring, n + 4)), np.zeros(n + 4), np.zeros(n + 4)
+    responses, p, weight = np.zeros((2, ring, n + 3)), np.zeros(n + 3), np.zeros(n + 3)
     weight[n], weight[n + 1], weight[n + 2] = entry[2], entry[3], entry[4]
     p[n + 2] = 1.0
     nominal, reaches = np.zeros((2, n + ring)), np.empty((2, n + ring))
@@ -136,31 +135,13 @@ def _before(
 
 
 @compiled
-def _jump(
-    row: FloatArray, conditions: AxisConditions, entry: tuple[float, float, float, float, float, float]
-) -> tuple[float, float]:
-    """Return the jump of the command at the switch if the last command was zero, and the most it may depart.
-
-    It departs by the last command, and by what the new law does with a state measured up to a delay before
-    the entry, or when the robot hears of the switch.
-    """
-    ago = (conditions.delay + conditions.late) * conditions.period
-    fastest, factor = max(entry[4], entry[5]), conditions.model_factor
-    x_away = entry[2] + ago * (abs(entry[1]) + entry[3] + 0.5 * ago * fastest) + conditions.position_noise
-    v_away = entry[3] + ago * fastest + conditions.rate_noise
-    slope, by_rate, rest, spread = fit_law(row, 0.0, entry[0], x_away, entry[1])
-    away = abs(slope) * x_away + (abs(by_rate) + spread) * v_away + rest
-    return -factor * track_row(row, 0.0, entry[0], entry[1])[0], entry[4] + factor * away
-
-
-@compiled
 def _command(
     row: FloatArray,
     conditions: AxisConditions,
     k: int,
     seen: tuple[float, float, float, float],
     before: tuple[float, float],
-    fade: tuple[float, float],
+    faded: float,
 ) -> tuple[float, float, float, float, float]:
     """Return the undisturbed command, its two slopes, the size of its disturbance and its largest magnitude.
 
@@ -171,18 +152,18 @@ def _command(
         seen: x and v of the undisturbed motion when it was measured, and the most that they may depart.
         before: Largest command at the entry, and largest |x''| before it, by which measurements from before
             the entry are uncertain.
-        fade: What is left of the jump of the command at the switch, and the most that it may depart.
+        faded: What is left of the jump of the command at the switch.
     """
     ago = max(conditions.delay - k, 0) * conditions.period
     x_noise = conditions.position_noise + 0.5 * ago * ago * before[1]
     v_noise = conditions.rate_noise + ago * before[1]
     reach, fast = seen[2] + x_noise, seen[3] + v_noise
     time, factor = k * conditions.period, conditions.model_factor
-    u = factor * track_row(row, time, seen[0], seen[1])[0] + fade[0]
+    u = factor * track_row(row, time, seen[0], seen[1])[0] + faded
     slope, by_rate, rest, spread = fit_law(row, time, seen[0], reach, seen[1])
     slope, by_rate, rest = factor * slope, factor * by_rate, factor * (rest + spread * fast)
     size = abs(slope) * x_noise + abs(by_rate) * v_noise + rest
-    most = abs(u) + fade[1] + abs(slope) * reach + abs(by_rate) * fast + rest
+    most = abs(u) + abs(slope) * reach + abs(by_rate) * fast + rest
     if k < conditions.late:  # all of the command, the old one or the new one, counts as a disturbance
         most = max(most, before[0])
         u, slope, by_rate, size = 0.0, 0.0, 0.0, most
@@ -219,20 +200,19 @@ def _respond(
     p: FloatArray,
     weight: FloatArray,
     k: int,
-    law: tuple[float, float, float, float],
+    law: tuple[float, float, float],
     lagging: tuple[float, float, float],
 ) -> tuple[float, float, float]:
     """Carry all responses over a period; return the sums of their magnitudes times what they respond to."""
-    T, slope, by_rate, faded = law
+    T, slope, by_rate = law
     left, in_v, in_x = lagging
-    ring, n = responses.shape[1], p.size - 4
+    ring, n = responses.shape[1], p.size - 3
     now, old = k % ring, (k + 1) % ring
     x_sum = v_sum = p_sum = 0.0
-    for j in range(n + 4):
+    for j in range(n + 3):
         if k < j < n:
             continue
         u = 1.0 if j == k else slope * responses[0, old, j] + by_rate * responses[1, old, j]
-        u += faded if j == n + 3 else 0.0
         gap = p[j] - u
         x = responses[0, now, j] + T * responses[1, now, j] + 0.5 * T * T * u + in_x * gap
         v = responses[1, now, j] + T * u + in_v * gap

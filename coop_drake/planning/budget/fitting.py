@@ -3,73 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from coop_drake.answers.budget import Budget, Tolerance
 from coop_drake.answers.plan import Plan, Transition
-from coop_drake.laws import ScheduledGains, transition_gains
-from coop_drake.laws.axis_table import ENERGY_BOUND, axis_table
-from coop_drake.planning.budget.axis_sets import (
-    AxisSets,
-    Entry,
-    axis_sets,
-    becomes_ready,
-    conditions_of,
-    needed_energy,
-    next_entry,
-    whole_periods,
-)
-from coop_drake.planning.budget.axis_tube import AxisConditions
+from coop_drake.laws import Funnel, ScheduledGains, transition_gains
+from coop_drake.laws.axis_table import LEAVING_TIME, REST_RATE, REST_REACH, axis_table
+from coop_drake.laws.gains import RestCondition
+from coop_drake.planning.budget.axis_sets import AxisSets, Entry, whole_periods
+from coop_drake.planning.budget.chain import SLACK, Limit, Link, follow_chain
 from coop_drake.planning.execution.estimate import timed
 from coop_drake.tree.pose import FloatArray
 
 AGE_FACTORS = (1.0, 1.5, 2.2)
 """Gains are tried for so many times the age of the gain set's commands [-]: slow ones bear more delay, quick
-ones more noise and larger forces."""
-
-ENTRY_FACTOR = 1.2
-"""A stricter condition of entry than the gain set's: V below so many times what a settled axis needs [-]."""
-
-ENTRY_PARTS = (1, 4)
-"""Parts into which the positions at an entry are cut, tried in this order [-]."""
-
-SLACK = 1e-3
-"""Fraction by which stated bounds are wider than computed ones [-]: more than another way to round needs."""
+ones more noise and larger forces. All transitions have the same factor, so that K falls slowly."""
 
 BISECTIONS = 7
 """Halvings of the interval in which the largest budget is sought: it is found within a hundredth."""
 
+OVERLAPS = (0.02, 0.04, 0.06, 0.09, 0.12)
+"""Least overlaps of consecutive boxes to choose from, in every angle and joint [rad or m]: the wider the goal
+intervals, the larger are the departures that an axis bears in them, and the more cells a plan has."""
 
-@dataclass(frozen=True)
-class Limit:
-    """Where a budget does not hold.
-
-    Attributes:
-        transition: Index of the transition.
-        axis: Index of the axis, theta being 0.
-        reason: What cannot be shown, in words.
-    """
-
-    transition: int
-    axis: int
-    reason: str
-
-    def describe(self, plan: Plan) -> str:
-        """The limit in words, with the name of the axis."""
-        name = "the object's angle" if self.axis == 0 else f"joint {plan.joint_names[self.axis - 1]}"
-        return f"in transition {self.transition} {name} {self.reason}"
-
-
-@dataclass(frozen=True)
-class _Fitted:
-    """A transition with gains that fit, its table, and the sets of its axes."""
-
-    transition: Transition
-    table: FloatArray
-    entries: Sequence[Entry]
-    sets: tuple[AxisSets, ...]
+TYPICAL = (1.0, 1.5, 4.0)
+"""Widths of typical slices over those of their goal intervals [-], from axes that only keep their place to
+axes that move far."""
 
 
 def fit_budget(plan: Plan, gain_set: ScheduledGains, budget: Budget) -> Plan | Limit:
@@ -83,29 +44,56 @@ def fit_budget(plan: Plan, gain_set: ScheduledGains, budget: Budget) -> Plan | L
     Returns:
         The plan with these gains, the budget and what follows from it; or where it does not hold.
     """
-    age = (whole_periods(budget.delay, budget.period) + 0.5) * budget.period + budget.lag
-    least, first = max(1.0, age / gain_set.age), None
-    for factor in AGE_FACTORS:
-        found = _fit_all(plan, gain_set, budget, least * factor)
-        if isinstance(found, Plan):
-            return found
-        first = first or found
+    first = None
+    for factor in _factors(gain_set, budget):
+        transitions = _with_gains(plan, replace(gain_set, command_age=factor * gain_set.age))
+        again = replace(plan, transitions=transitions)
+        tables = [axis_table(again.funnel(k), one.gains) for k, one in enumerate(transitions)]
+        links = follow_chain(tables, plan.start[2:], budget)
+        if not isinstance(links, Limit):
+            fitted = tuple(_stated(*pair, factor) for pair in zip(transitions, links, strict=True))
+            return timed(replace(plan, transitions=fitted, budget=budget))
+        first = first or links
     assert first is not None  # there is a factor
     return first
 
 
-def _fit_all(plan: Plan, gain_set: ScheduledGains, budget: Budget, factor: float) -> Plan | Limit:
-    """Fit every transition, with gains for a multiple of the age, the same for all so that K falls slowly."""
-    conditions = conditions_of(budget)
-    before: _Fitted | None = None
-    fitted: list[Transition] = []
-    for k in range(len(plan.transitions)):
-        found = _fit(plan, k, gain_set, budget, conditions, before, factor)
-        if isinstance(found, Limit):
-            return found
-        before = found
-        fitted.append(found.transition)
-    return timed(replace(plan, transitions=tuple(fitted), budget=budget))
+def sufficient_overlap(gain_set: ScheduledGains, budget: Budget) -> float:
+    """Return the least overlap with which a budget holds for typical axes, the largest if it does for none.
+
+    Such an axis moves from the beginning of its slice to its end, back, and to its end again.
+    """
+    for overlap in OVERLAPS:
+        for factor in _factors(gain_set, budget):
+            gains = replace(gain_set, command_age=factor * gain_set.age)
+            forth, back = (_typical(gains, overlap, way) for way in (False, True))
+            start = np.full(len(TYPICAL), 0.5 * overlap)
+            if not isinstance(follow_chain([forth, back, forth], start, budget), Limit):
+                return overlap
+    return OVERLAPS[-1]
+
+
+def _typical(gain_set: ScheduledGains, overlap: float, back: bool) -> FloatArray:
+    """Return the table of axes that move from one end of their slices to the other, goals being this wide."""
+    width = overlap * np.array(TYPICAL)
+    ends = np.zeros_like(width), width - overlap
+    first, last = ends[::-1] if back else ends
+    gains = transition_gains(
+        gain_set,
+        clearance=1.0,
+        slice_lower=np.zeros_like(width),
+        slice_upper=width,
+        goal_lower=last,
+        goal_upper=last + overlap,
+        resting=first + 0.5 * overlap,
+    )
+    funnel = Funnel(np.zeros_like(width), width, last, last + overlap, gains.decay_rate, gains.funnel)
+    return axis_table(funnel, gains)
+
+
+def _factors(gain_set: ScheduledGains, budget: Budget) -> list[float]:
+    age = (whole_periods(budget.delay, budget.period) + 0.5) * budget.period + budget.lag
+    return [max(1.0, age / gain_set.age) * factor for factor in AGE_FACTORS]
 
 
 def largest_factor(plan: Plan, gain_set: ScheduledGains, budget: Budget) -> float:
@@ -120,87 +108,35 @@ def largest_factor(plan: Plan, gain_set: ScheduledGains, budget: Budget) -> floa
     return low
 
 
-def _fit(
-    plan: Plan,
-    k: int,
-    gain_set: ScheduledGains,
-    budget: Budget,
-    conditions: Sequence[AxisConditions],
-    before: _Fitted | None,
-    factor: float,
-) -> _Fitted | Limit:
-    limits: list[Limit] = []
-    for strict in (False, True) if before is not None else (False,):
-        transition, table = _with_gains(plan, k, gain_set, factor)
-        entries = []
-        for axis, row in enumerate(table):
-            if before is None:
-                entries.append(Entry(float(plan.start[2 + axis]), float(plan.start[2 + axis])))
-                continue
-            old, sets = before.table[axis], before.sets[axis]
-            needed = ENTRY_FACTOR * needed_energy(old, sets, row, conditions[0])
-            row[ENERGY_BOUND] = needed if strict else max(row[ENERGY_BOUND], needed)
-            periods = whole_periods(budget.report_age, budget.period)
-            entries.append(_widened(next_entry(old, sets, before.entries[axis], row, conditions[0], periods)))
-        found = _all_sets(table, conditions, entries, k)
-        if not isinstance(found, Limit):
-            gains = replace(transition.gains, energy_bound=table[:, ENERGY_BOUND].copy())
-            tolerance = _stated(factor, entries, found)
-            return _Fitted(replace(transition, gains=gains, tolerance=tolerance), table, entries, found)
-        limits.append(found)
-    return limits[0]
+def _with_gains(plan: Plan, gain_set: ScheduledGains) -> tuple[Transition, ...]:
+    """Return all transitions with the gains of another rule."""
+    resting, transitions = plan.start[2:], []
+    for cell, transition in zip(plan.cells, plan.transitions, strict=True):
+        gains = transition_gains(
+            gain_set,
+            clearance=transition.neck,
+            slice_lower=cell.lower,
+            slice_upper=cell.upper,
+            goal_lower=transition.goal_lower,
+            goal_upper=transition.goal_upper,
+            resting=resting,
+        )
+        transitions.append(replace(transition, gains=gains))
+        resting = 0.5 * (transition.goal_lower + transition.goal_upper)
+    return tuple(transitions)
 
 
-def _with_gains(plan: Plan, k: int, gain_set: ScheduledGains, factor: float) -> tuple[Transition, FloatArray]:
-    """Return a transition with the gains for a multiple of the age, and its table."""
-    cell, transition = plan.cells[k], plan.transitions[k]
-    resting = plan.start[2:]
-    if k > 0:
-        resting = 0.5 * (plan.transitions[k - 1].goal_lower + plan.transitions[k - 1].goal_upper)
-    gains = transition_gains(
-        replace(gain_set, command_age=factor * gain_set.age),
-        clearance=transition.neck,
-        slice_lower=cell.lower,
-        slice_upper=cell.upper,
-        goal_lower=transition.goal_lower,
-        goal_upper=transition.goal_upper,
-        resting=resting,
+def _stated(transition: Transition, link: Link, factor: float) -> Transition:
+    """Return a transition with what it states: its condition of rest, and the sets of its axes."""
+    table = link.table
+    rest = RestCondition(
+        float(table[0, LEAVING_TIME]), table[:, REST_REACH].copy(), table[:, REST_RATE].copy()
     )
-    transition = replace(transition, gains=gains)
-    transitions = (*plan.transitions[:k], transition, *plan.transitions[k + 1 :])
-    return transition, axis_table(replace(plan, transitions=transitions).funnel(k), gains)
+    gains = replace(transition.gains, rest=rest)
+    return replace(transition, gains=gains, tolerance=_tolerance(factor, link.entries, link.sets))
 
 
-def _all_sets(
-    table: FloatArray, conditions: Sequence[AxisConditions], entries: Sequence[Entry], k: int
-) -> tuple[AxisSets, ...] | Limit:
-    every = []
-    for axis, (row, entry) in enumerate(zip(table, entries, strict=True)):
-        for parts in ENTRY_PARTS:
-            sets = axis_sets(row, conditions, entry, parts)
-            if sets.distance > 0.0:
-                break
-        if not sets.distance > 0.0:
-            return Limit(k, axis, "may leave its funnel")
-        if not becomes_ready(row, sets, conditions[0]):
-            return Limit(k, axis, "may never count as arrived in its goal interval")
-        every.append(sets)
-    return tuple(every)
-
-
-def _widened(entry: Entry) -> Entry:
-    room, fast = SLACK * (entry.upper - entry.lower), SLACK * (entry.rate_upper - entry.rate_lower)
-    return Entry(
-        entry.lower - room,
-        entry.upper + room,
-        entry.rate_lower - fast,
-        entry.rate_upper + fast,
-        (1.0 + SLACK) * entry.acceleration,
-        (1.0 + SLACK) * entry.history,
-    )
-
-
-def _stated(factor: float, entries: Sequence[Entry], every: Sequence[AxisSets]) -> Tolerance:
+def _tolerance(factor: float, entries: Sequence[Entry], every: Sequence[AxisSets]) -> Tolerance:
     return Tolerance(
         age_factor=factor,
         entry_lower=np.array([entry.lower for entry in entries]),
@@ -212,5 +148,6 @@ def _stated(factor: float, entries: Sequence[Entry], every: Sequence[AxisSets]) 
         distance=np.array([(1.0 - SLACK) * sets.distance for sets in every]),
         acceleration=np.array([(1.0 + SLACK) * sets.acceleration for sets in every]),
         settled=np.array([(1.0 + SLACK) * sets.settled for sets in every]),
+        settled_rate=np.array([(1.0 + SLACK) * sets.settled_rate for sets in every]),
         entry_parts=tuple(sets.parts for sets in every),
     )

@@ -13,13 +13,19 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
-from coop_drake.planning.budget.fitting import Limit, fit_budget, largest_factor
+from coop_drake.planning.budget.chain import Limit
+from coop_drake.planning.budget.fitting import (
+    BISECTIONS,
+    OVERLAPS,
+    fit_budget,
+    largest_factor,
+    sufficient_overlap,
+)
 from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.progress import Progress
 
-OVERLAPS = (0.0, 0.06, 0.12, 0.2)
-"""Least overlaps of consecutive boxes that are tried, in every angle and joint [rad or m]: the wider the goal
-intervals, the larger are the departures that an axis bears in them, and the more cells a plan has."""
+SMALLEST = 0.5**BISECTIONS
+"""The smallest multiple of a budget that is tried [-]."""
 
 
 @dataclass(frozen=True)
@@ -28,17 +34,23 @@ class BeyondBudget:
 
     Attributes:
         limit: What cannot be shown for the plan that bears most, in words.
-        budget: The largest multiple of the budget under which a plan holds, None where none does.
+        budget: The budget that was asked for.
+        share: The largest multiple of it under which a plan holds, 0 where none was found.
     """
 
     limit: str
-    budget: Budget | None
+    budget: Budget
+    share: float
 
     def describe(self) -> str:
         """Return which budget does not hold, what limits it, and the largest scaled budget that holds."""
-        if self.budget is None:
-            return f"not with this budget, nor with a hundredth of it: {self.limit}"
-        return f"not with this budget: {self.limit}; with this one: {self.budget.describe()}"
+        said = f"No plan was found that holds under this budget: {self.limit}."
+        if self.share == 0.0:
+            return f"{said} Nor does one hold under {SMALLEST:.2%} of the budget."
+        scaled = self.budget.scaled(self.share).describe()
+        return (
+            f"{said} The largest share of the budget under which a plan holds is {self.share:.1%}: {scaled}."
+        )
 
 
 def tolerant_plan(
@@ -66,7 +78,8 @@ def tolerant_plan(
         StallError: No plan can be executed.
     """
     tried: list[tuple[Plan, Limit]] = []
-    for overlap in OVERLAPS:
+    least = sufficient_overlap(gain_set, budget)
+    for overlap in [overlap for overlap in OVERLAPS if overlap >= least]:
         try:
             plan = quickest_plan(
                 problem,
@@ -91,4 +104,14 @@ def _beyond(tried: list[tuple[Plan, Limit]], gain_set: ScheduledGains, budget: B
     factors = [largest_factor(plan, gain_set, budget) for plan, _ in tried]
     best = int(np.argmax(factors))
     plan, limit = tried[best]
-    return BeyondBudget(limit.describe(plan), budget.scaled(factors[best]) if factors[best] > 0.0 else None)
+    return BeyondBudget(_sentence(plan, limit), budget, factors[best])
+
+
+def _sentence(plan: Plan, limit: Limit) -> str:
+    """Say where a budget does not hold, with the names of the robot and of the joint."""
+    name = "the object's angle"
+    if limit.axis > 0:
+        robot, _, joint = plan.joint_names[limit.axis - 1].rpartition("/")
+        name = f"the joint {joint} of {robot}" if robot else f"the joint {joint}"
+    last = len(plan.transitions) - 1
+    return f"in transition {limit.transition} of 0 to {last}, {name} {limit.reason}"

@@ -13,7 +13,16 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.geometry.boundary import signed_distance
 from coop_drake.geometry.distances import nearest_fraction
-from coop_drake.laws.axis_table import FADING_TIME, LOG_GAIN, SATURATION, bounds_of, track_row
+from coop_drake.laws.axis_table import (
+    FADING_TIME,
+    LEAVING_TIME,
+    LOG_GAIN,
+    REST_RATE,
+    SATURATION,
+    bounds_of,
+    rest_jump,
+    track_row,
+)
 from coop_drake.laws.governor import (
     ATTRACTION_RATE,
     FIELD_SPEED,
@@ -132,7 +141,7 @@ def _ready(
     next_table: FloatArray,
 ) -> bool:
     """Return whether all robots are ready for the next cell."""
-    if hand_over_margin(time, table[0, FADING_TIME]) < 0.0:
+    if hand_over_margin(time, table[0, LEAVING_TIME]) < 0.0:
         return False
     m = table.shape[0]
     for i in range(m):
@@ -150,7 +159,10 @@ def _write_jumps(
     m = table.shape[0]
     for i in range(m):
         x, rate = state[6 + i], state[6 + m + i]
-        jumps[i] = track_row(table[i], time, x, rate)[0] - track_row(next_table[i], 0.0, x, rate)[0]
+        if table[i, REST_RATE] > 0.0:
+            jumps[i] = rest_jump(table[i], next_table[i])
+        else:
+            jumps[i] = track_row(table[i], time, x, rate)[0] - track_row(next_table[i], 0.0, x, rate)[0]
 
 
 @compiled

@@ -17,7 +17,7 @@ from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.budgets.axis_law import Axes
 from coop_drake.verification.budgets.entering import entering
-from coop_drake.verification.budgets.staying import staying
+from coop_drake.verification.budgets.staying import Closed, staying, tails
 from coop_drake.verification.budgets.tubes import Disturbed, tubes
 from coop_drake.verification.checks import Check
 
@@ -29,6 +29,9 @@ ROUNDING = 1e-9
 
 EROSION = 0.1
 """Fraction of a goal interval at each end in which an axis does not count as arrived [-]."""
+
+RAMPED = 6.0
+"""mu t after which a gain counts as ramped in [-]; what is missing then counts as a disturbance."""
 
 
 def check_budget(plan: Plan) -> Check | None:
@@ -53,7 +56,7 @@ def check_budget(plan: Plan) -> Check | None:
             )
         found = entry if entry is not None else _start(plan)
         _check_entry(stated, found, f"{where}.tolerance")
-        entry = _check_transition(plan, k, stated, f"{where}.tolerance")
+        entry = _check_transition(plan, k, stated, f"{where}.tolerance")  # of the next one
         smallest, count = min(smallest, float(stated.distance.min())), count + stated.distance.size
     return Check(
         "axes stay in their funnels under the budget", count, smallest, "rad or m to a funnel's bound"
@@ -99,35 +102,49 @@ def _axes(plan: Plan, k: int) -> Axes:
     return Axes(np.array([cell.lower, cell.upper]), goal, gains.decay_rate, gains.log_gain, *singles)
 
 
-def _check_transition(plan: Plan, k: int, stated: Tolerance, where: str) -> FloatArray | None:
-    """Check one transition; return in which states the next one can begin, None after the last one."""
-    budget, axes = plan.budget, _axes(plan, k)
+def _check_transition(plan: Plan, k: int, stated: Tolerance, where: str) -> FloatArray:
+    """Check one transition; return in which states the next one can begin."""
+    budget, axes, rest = plan.budget, _axes(plan, k), plan.transitions[k].gains.rest
     assert budget is not None  # checked by the caller
     members, disturbed, middle, reach, before = _parts(axes, stated, budget)
-    T, delay = budget.period, disturbed.delay
-    closed = np.maximum(5.0 / axes.decay, np.where(axes.mu > 0.0, 7.0 / np.maximum(axes.mu, 1e-9), 0.0))
-    samples = np.ceil(np.maximum(closed, axes.fading) / T).astype(int) + delay + 1
-    made = tubes(disturbed, int(samples.max()), middle, reach, before)
-    box = _ends(made, samples[members], delay, disturbed.axes)
-    kept = staying(disturbed, (samples[members] - 1) * T, box)
-    distance, fastest = kept[0].copy(), kept[1].copy()
-    for i, n in enumerate(samples[members]):
+    T = budget.period
+    ended = np.maximum(5.0 / axes.decay, np.where(axes.mu > 0.0, RAMPED / np.maximum(axes.mu, 1e-9), 0.0))
+    begins = np.ceil(np.maximum(ended, axes.fading) / T).astype(int)[members] + disturbed.delay
+    follows = tails(disturbed)
+    samples = begins + follows + 1
+    rests = plan.start[2:] if k == 0 else _middles(plan, k - 1)
+    made = tubes(disturbed, int(samples.max()), middle, reach, before, rests[members])
+    box, most = _ends(made, begins, samples, disturbed)
+    x, v = stated.settled[members], stated.settled_rate[members]
+    needed, last = staying(disturbed, Closed(begins * T, follows, box, x, v))
+    half = 0.5 * (axes.goal[1] - axes.goal[0])
+    distance, fastest = half[members] - x - 0.125 * T * T * last, last.copy()
+    for i, n in enumerate(samples):
         distance[i] = min(distance[i], made[:n, 5, i].min())
         fastest[i] = max(fastest[i], made[:n, 4, i].max())
-    names = range(axes.k1.size)
-    worst = np.array([distance[members == axis].min() for axis in names])
-    for name, found, least in (
-        ("distance", worst, True),
-        ("acceleration", _largest(fastest, members), False),
-        ("settled", _largest(kept[4], members), False),
+    needed = np.maximum(needed, most)
+    for name, found in (
+        ("distance", -_largest(-distance, members)),
+        ("acceleration", _largest(fastest, members)),
+        ("settled", _largest(needed[0], members)),
+        ("settled_rate", _largest(needed[1], members)),
     ):
-        _require(getattr(stated, name), found, least, f"{where}.{name}")
-    half = (0.5 - EROSION) * (axes.goal[1] - axes.goal[0])
-    if not (stated.distance > 0.0).all() or not (stated.settled + budget.angle_noise < half).all():
+        _require(getattr(stated, name), found, name == "distance", f"{where}.{name}")
+    if rest is None:
+        raise RefusalError(f"transitions[{k}].gains.rest", "is missing, but the plan has a budget")
+    resting = (
+        stated.settled + budget.angle_noise <= np.minimum(rest.reach, 2.0 * (0.5 - EROSION) * half)
+    ).all()
+    resting &= (stated.settled_rate + budget.rate_noise <= rest.rate).all()
+    if not (stated.distance > 0.0).all() or not resting:
         raise RefusalError(where, "an axis may leave its funnel, or never count as arrived")
-    if k + 1 == len(plan.transitions):
-        return None
-    return entering(plan, k, made, samples[members], members, kept, stated)
+    return entering(plan.transitions[k], budget, made, samples, members, last, rest, stated)
+
+
+def _middles(plan: Plan, k: int) -> FloatArray:
+    """Return the middles of the goal intervals of a transition."""
+    middles: FloatArray = 0.5 * (plan.transitions[k].goal_lower + plan.transitions[k].goal_upper)
+    return middles
 
 
 def _parts(
@@ -152,16 +169,21 @@ def _parts(
     return of, disturbed, np.array(middles).T, np.array(reaches).T, before
 
 
-def _ends(made: FloatArray, samples: FloatArray, delay: int, axes: Axes) -> FloatArray:
-    """Return the departures from the goal intervals' middles at the tubes' last samples, shape (3, b)."""
-    box = np.empty((3, samples.size))
-    middle = 0.5 * (axes.goal[0] + axes.goal[1])
-    for i, n in enumerate(samples):
-        last = made[n - 1 - delay : n, :, i]
-        box[0, i] = (np.abs(last[:, 0] - middle[i]) + last[:, 1]).max()
-        box[1, i] = (np.abs(last[:, 2]) + last[:, 3]).max()
-        box[2, i] = last[:, 4].max()
-    return box
+def _ends(
+    made: FloatArray, begins: FloatArray, samples: FloatArray, disturbed: Disturbed
+) -> tuple[FloatArray, FloatArray]:
+    """Return the departures from the goal intervals' middles when funnels are closed, and the largest after.
+
+    The first are those of x, v and acceleration, shape (3, b); the others those of x and v, shape (2, b).
+    """
+    box, most = np.empty((3, samples.size)), np.empty((2, samples.size))
+    middle = 0.5 * (disturbed.axes.goal[0] + disturbed.axes.goal[1])
+    for i, (begin, end) in enumerate(zip(begins, samples, strict=True)):
+        late = made[begin - disturbed.delay : end, :, i]
+        x, v = np.abs(late[:, 0] - middle[i]) + late[:, 1], np.abs(late[:, 2]) + late[:, 3]
+        first = slice(0, disturbed.delay + 1)
+        box[:, i], most[:, i] = (x[first].max(), v[first].max(), late[first, 4].max()), (x.max(), v.max())
+    return box, most
 
 
 def _largest(values: FloatArray, members: FloatArray) -> FloatArray:

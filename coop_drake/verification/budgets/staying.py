@@ -1,98 +1,111 @@
-"""The boxes in which axes stay for ever near the middle of their closed funnels."""
+"""Whether axes stay within stated departures near the middle of their closed funnels for ever."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.budgets.tubes import Disturbed
 
-ATTEMPTS, GROWTH, LENGTH = 60, 1.03, 12.0
-"""Number of boxes tried, factor between them, and length of a response in its slowest time constant [-]."""
+LENGTH = 5.0
+"""Length of a response in its slowest time constant [-]."""
 
 
-def staying(disturbed: Disturbed, time: FloatArray, box: FloatArray) -> FloatArray:
-    """Return distance, largest |acceleration|, largest |x| and |v|, and |x| at the end, shape (5, b).
+@dataclass(frozen=True)
+class Closed:
+    """Axes from the time at which their funnels count as closed until their tubes' end, arrays of shape (b,).
 
-    Departures are from the middle of the goal interval. A box is shown to be reached again from itself, so
-    that it holds the axis for ever; the distance is negative where none is found.
-
-    Args:
-        disturbed: The axes.
-        time: From when on, shape (b,) [s].
-        box: Departures of x, v and the acceleration then, shape (3, b).
+    Attributes:
+        time: That time [s].
+        samples: Number of samples from then on.
+        box: Departures of x, v and acceleration then, and when older measurements were made, shape (3, b).
+        x: Stated departure of x for ever [rad or m].
+        v: Stated departure of v for ever [rad/s or m/s].
     """
-    count = box.shape[1]
-    found = np.full((5, count), np.inf)
-    found[0] = -1.0
-    left, box, most = np.arange(count), box.copy(), GROWTH * box[:2]
-    for _ in range(ATTEMPTS):
-        if not left.size:
-            break
-        some = Disturbed(
-            disturbed.axes[left], disturbed.budget, disturbed.factor[left], disturbed.error[left]
-        )
-        reached, fastest = _once(some, time[left], box[:, left], most[:, left])
-        kept = (reached[:2] <= most[:, left]).all(axis=0) & (reached[2:] <= box[:, left]).all(axis=0)
-        fastest = np.maximum(fastest, box[2, left])
-        T, half = disturbed.budget.period, 0.5 * (some.axes.goal[1] - some.axes.goal[0])
-        distance = half - most[0, left] - 0.125 * T * T * fastest
-        result = np.array([distance, fastest, *most[:, left], reached[2]])
-        found[:, left[kept]] = result[:, kept]
-        alive = ~kept & (reached[0] < 10.0 * half)
-        box[:, left] = np.maximum(
-            box[:, left], np.where(reached[2:] > box[:, left], GROWTH * reached[2:], 0.0)
-        )
-        most[:, left] = np.maximum(most[:, left], GROWTH * reached[:2])
-        left = left[alive & (most[0, left] < half)]
-    return found
+
+    time: FloatArray
+    samples: FloatArray
+    box: FloatArray
+    x: FloatArray
+    v: FloatArray
 
 
-def _once(
-    some: Disturbed, time: FloatArray, box: FloatArray, most: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return largest x and v at all samples, x, v and a at the last ones, shape (5, b); largest |command|."""
-    budget, axes, delay = some.budget, some.axes, some.delay
-    reach, fast = most[0] + budget.angle_noise, most[1] + budget.rate_noise
+def tails(disturbed: Disturbed) -> FloatArray:
+    """Return for how many samples tubes go on after their funnels are closed, shape (b,)."""
+    axes, T = disturbed.axes, disturbed.budget.period
+    damping, width = axes.k1 + axes.k2, axes.goal[1] - axes.goal[0]
+    slowest = np.minimum((axes.k1 * axes.k2 + 16.0 * axes.kappa / width**2) / damping, 0.5 * damping)
+    samples: FloatArray = np.ceil(LENGTH / (slowest * T)).astype(int) + 2 * disturbed.delay + 2
+    return samples
+
+
+def staying(disturbed: Disturbed, closed: Closed) -> tuple[FloatArray, FloatArray]:
+    """Return which departures x and v follow from those stated, (2, b), and the largest |acceleration|, (b,).
+
+    If these are no larger than stated, none ever is: what holds until a sample then holds at that sample.
+    """
+    budget, axes, stated = disturbed.budget, disturbed.axes, np.array([closed.x, closed.v])
+    reach, fast = stated[0] + budget.angle_noise, stated[1] + budget.rate_noise
     middle = 0.5 * (axes.goal[0] + axes.goal[1])
-    _, slope, by_rate, rest, _ = some.command(time, middle, reach, np.zeros_like(reach), fast)
-    k1, k1_rate = axes.ramp(time)
+    _, slope, by_rate, rest, _ = disturbed.command(closed.time, middle, reach, np.zeros_like(reach), fast)
+    k1, k1_rate = axes.ramp(closed.time)
     missing = axes.k1 - k1
     growing = (axes.k2 * missing + k1_rate) * reach + missing * (1.0 - np.log(axes.share)) * fast
-    rest = rest + some.factor * growing
-    largest = np.abs(slope) * reach + np.abs(by_rate) * fast + rest
-    errors = some.errors(largest)
-    size = np.abs(slope) * budget.angle_noise + np.abs(by_rate) * budget.rate_noise + rest + errors
-    slowest = np.minimum(np.abs(slope / by_rate), 0.5 * np.abs(by_rate))
-    steps = int(np.ceil(LENGTH / (slowest.min() * budget.period))) + 2 * delay + 2
-    reached = _respond(some, (slope, by_rate), box, (size, largest + errors), steps)
-    return reached, largest + errors
+    rest = rest + disturbed.factor * growing
+    command = np.abs(slope) * reach + np.abs(by_rate) * fast + rest
+    largest = command + disturbed.errors(command)
+    size = np.abs(slope) * budget.angle_noise + np.abs(by_rate) * budget.rate_noise + largest - command + rest
+    responses = np.abs(_responses(disturbed, slope, by_rate, int(closed.samples.max())))
+    left, sums = _sums(disturbed, closed, responses, (np.abs(slope), np.abs(by_rate)), largest)
+    return left + sums * size, np.maximum(largest, closed.box[2])
 
 
-def _respond(
-    some: Disturbed,
-    slopes: tuple[FloatArray, FloatArray],
-    box: FloatArray,
-    sizes: tuple[FloatArray, FloatArray],
-    steps: int,
-) -> FloatArray:
-    matrix, enters = some.carry
-    delay, count = some.delay, box.shape[1]
-    state = np.zeros((3, 4, count))
-    state[0, 0], state[1, 1], state[2, 2] = 1.0, 1.0, 1.0
-    states, sums = [state], [np.zeros((3, count))]
-    everywhere, ends = box[:2].copy(), np.zeros((3, count))
+def _responses(disturbed: Disturbed, slope: FloatArray, by_rate: FloatArray, steps: int) -> FloatArray:
+    """Return x, v and a at every sample, of axes that begin with 1 in one of them, or with one command of 1.
+
+    The shape is (steps, 3, 4, b); the first sample is the one after the beginning.
+    """
+    matrix, enters = disturbed.carry
+    states = np.zeros((steps + 1, 3, 4, slope.size))
+    states[0, :, :3] = np.eye(3)[:, :, None]
     for k in range(steps):
-        command = np.zeros((4, count))
-        if k >= delay:
-            command = slopes[0] * states[k - delay][0] + slopes[1] * states[k - delay][1]
+        command = np.zeros((4, slope.size))
+        if k >= disturbed.delay:
+            old = states[k - disturbed.delay]
+            command = slope * old[0] + by_rate * old[1]
         if k == 0:
             command[3] += 1.0
-        states.append(np.tensordot(matrix, states[-1], 1) + enters[:, None, None] * command)
-        sums.append(sums[-1] + np.abs(states[-1][:, 3]))
-        now = sizes[0] * sums[-1] + (sizes[1] - sizes[0]) * (sums[-1] - sums[max(k + 1 - delay, 0)])
-        now = now + np.einsum("ijk,jk->ik", np.abs(states[-1][:, :3]), box)
-        everywhere = np.maximum(everywhere, now[:2])
-        if k + 1 >= steps - delay:
-            ends = np.maximum(ends, now)
-    return np.concatenate([everywhere, ends])
+        states[k + 1] = np.tensordot(matrix, states[k], 1) + enters[:, None, None] * command
+    result: FloatArray = states[1:]
+    return result
+
+
+def _sums(
+    disturbed: Disturbed,
+    closed: Closed,
+    responses: FloatArray,
+    slopes: tuple[FloatArray, FloatArray],
+    first: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return what is left of x and v after the samples, and the sums of all responses to commands, (2, b)."""
+    delay, steps = disturbed.delay, np.arange(1, len(responses) + 1)[:, None]
+    inside = steps <= closed.samples
+    followed = np.where(inside[:, None, None], responses, 0.0)
+    sums = followed[:, :2].sum(axis=0)
+    late = inside & (steps >= closed.samples - delay)
+    ends = np.where(late[:, None, None], responses, 0.0).max(axis=0)
+    ends = np.concatenate([ends, delay * (slopes[0] * ends[:1] + slopes[1] * ends[1:2])])
+    size = np.concatenate([closed.box, delay * first[None]])
+    again = np.einsum("jib,ib->jb", ends, size)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        kept = np.nan_to_num(again / size, nan=0.0).max(axis=0)
+        shares = np.nan_to_num(np.einsum("mjb,imb->ijb", ends, sums) / sums, nan=0.0).max(axis=(0, 1))
+    now = np.einsum("kijb,jb->kib", followed[:, :2, :3], closed.box)
+    commands = followed[:, :2, 3]
+    for i in range(delay):
+        now[i:] += first * commands[: len(commands) - i]
+    most = np.maximum(now.max(axis=0), closed.box[:2])
+    good = (kept < 0.5) & (shares < 0.5)
+    return np.where(good, kept * most, np.inf), np.where(good, sums[:, 3] / (1.0 - shares), np.inf)

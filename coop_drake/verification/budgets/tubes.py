@@ -66,7 +66,12 @@ class Disturbed:
 
 
 def tubes(
-    disturbed: Disturbed, samples: int, middle: FloatArray, reach: FloatArray, before: FloatArray
+    disturbed: Disturbed,
+    samples: int,
+    middle: FloatArray,
+    reach: FloatArray,
+    before: FloatArray,
+    rest: FloatArray,
 ) -> FloatArray:
     """Return the tubes of all axes, shape (samples, 6, b).
 
@@ -76,13 +81,14 @@ def tubes(
         middle: Middle of x and of v at the entry, shape (2, b).
         reach: How far they depart from it, shape (2, b).
         before: Largest |command| at the entry, and largest |acceleration| before it, shape (2, b).
+        rest: Where the axes rest when they are handed over, shape (b,).
 
     Returns:
         Per sample x, its reach, v, its reach, the largest |acceleration|, and the distance to the bounds.
     """
     T, delay, count = disturbed.budget.period, disturbed.delay, middle.shape[1]
     matrix, enters = disturbed.carry
-    past = [np.zeros((3, samples + 4, count)) for _ in range(delay + 1)]  # the oldest state first
+    past = [np.zeros((3, samples + 3, count)) for _ in range(delay + 1)]  # the oldest state first
     nominal, reaches = [], []
     for q in range(delay, -1, -1):
         state = past[delay - q]
@@ -90,9 +96,10 @@ def tubes(
         nominal.append(np.array([middle[0] - q * T * middle[1], middle[1], np.zeros(count)]))
         reaches.append(np.array([reach[0] + q * T * reach[1], reach[1], before[0]]))
     past[-1][2, samples + 2] = 1.0
-    weight = np.zeros((samples + 4, count))
-    jump, changed = _jump(disturbed, middle, reach, before)
-    weight[samples:] = *reach, before[0], changed
+    weight = np.zeros((samples + 3, count))
+    weight[samples:] = *reach, before[0]
+    nothing = np.zeros(count)
+    jump = -disturbed.command(0.0, rest, nothing, nothing, nothing)[0]
     made = np.empty((samples, 6, count))
     for k in range(samples):
         ago = max(delay - k, 0) * T
@@ -103,9 +110,8 @@ def tubes(
             k * T, seen[0], off[0] + x_noise, seen[1], off[1] + v_noise
         )
         size = np.abs(slope) * x_noise + np.abs(by_rate) * v_noise + rest
-        left = disturbed.axes.left(k * T) if k >= LATE else np.zeros(count)
-        most = most - np.abs(u) + np.abs(u + left * jump) + left * changed
-        u = u + left * jump
+        faded = disturbed.axes.left(k * T) * jump
+        most, u = most - np.abs(u) + np.abs(u + faded), u + faded
         if k < LATE:
             size = most = np.maximum(most, before[0])
             u, slope, by_rate = np.zeros(count), np.zeros(count), np.zeros(count)
@@ -113,30 +119,16 @@ def tubes(
         now, away = nominal[-1], reaches[-1]
         fastest = np.maximum(np.abs(now[2]) + away[2], most + disturbed.errors(most))
         made[k] = now[0], away[0], now[1], away[1], fastest, _distance(disturbed, k, now, away, fastest)
-        used = np.r_[: k + 1, samples : samples + 4]
+        used = np.r_[: k + 1, samples : samples + 3]
         old, state = past[0], past[-1]
         response = slope * old[0, used] + by_rate * old[1, used]
-        response[k], response[-1] = 1.0, response[-1] + left
+        response[k] = 1.0
         carried = np.zeros_like(state)
         carried[:, used] = np.tensordot(matrix, state[:, used], 1) + enters[:, None, None] * response
         past = [*past[1:], carried]
         nominal.append(matrix @ now + enters[:, None] * u)
         reaches.append(np.einsum("ijk,jk->ik", np.abs(carried[:, used]), weight[used]))
     return made
-
-
-def _jump(
-    disturbed: Disturbed, middle: FloatArray, reach: FloatArray, before: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the jump of the command at the switch after a command of zero, and how far it departs."""
-    ago, fastest = (disturbed.delay + LATE) * disturbed.budget.period, before.max(axis=0)
-    x_away = reach[0] + ago * (np.abs(middle[1]) + reach[1] + 0.5 * ago * fastest)
-    x_away, v_away = (
-        x_away + disturbed.budget.angle_noise,
-        reach[1] + ago * fastest + disturbed.budget.rate_noise,
-    )
-    u, _, _, _, most = disturbed.command(0.0, middle[0], x_away, middle[1], v_away)
-    return -u, before[0] + most - np.abs(u)
 
 
 def _distance(

@@ -9,6 +9,7 @@ from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.funnels import entry_energies
 from coop_drake.verification.runs.holds import paused
+from coop_drake.verification.runs.readiness import rest_shares
 from coop_drake.verification.runs.rows import Rows
 
 
@@ -45,7 +46,7 @@ def check_handovers(rows: Rows, *, exact: bool) -> tuple[Check, Check]:
             text = f"and all before in cell {k} are negative, but the cell is left"
             raise RefusalError(where, f"at t = {log.times[members[-1]]:.6g} s: {text}")
     shares = [float(_share(rows, k, i).max()) for k, i in enumerate(rows.entries, 1)]
-    used = "share of the energy that the axes may have when a cell is entered"
+    used = "share of the energy, or of the departure from rest, that the axes may have when a cell is entered"
     return (
         Check("cells were entered one by one, each when all robots were ready", len(shares)),
         Check(used, len(shares), max(shares, default=None), "of the bound, largest"),
@@ -53,7 +54,9 @@ def check_handovers(rows: Rows, *, exact: bool) -> tuple[Check, Check]:
 
 
 def _share(rows: Rows, cell: int, row: int) -> FloatArray:
-    """Energy of every axis over its bound when a cell is entered, shape (1 + n,) [-]."""
+    """Energy of every axis, or departure from rest, over its bound when a cell is entered, shape (1 + n,)."""
+    if rows.plan.transitions[cell - 1].gains.rest is not None:
+        return rest_shares(rows.plan, cell - 1, rows.z[row, 2:], rows.rates[row, 2:])
     energies = entry_energies(rows.plan, cell, rows.z[row, 2:], rows.rates[row, 2:])
     share: FloatArray = energies / rows.plan.transitions[cell].gains.energy_bound
     return share

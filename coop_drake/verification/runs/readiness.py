@@ -4,7 +4,9 @@ A robot is ready to leave a cell when each axis that it knows lies in its goal i
 both ends and has an energy small enough for the next funnel, when the object would provably stay in the next
 cell: Delta E = K d |d| / 2 - (|p'|^2 + K |p - p_G|^2) / 2 is at least (K / 2) (R / 2)^2, and when the gains
 have reached those of the cell, in which K goes from K_0 to K_1 within T as K_1 (K_0 / K_1)^f, f being the
-factor of a quintic funnel that closes at T. In the last cell it is ready when object and axes are at their
+factor of a quintic funnel that closes at T. Where the plan says so, a cell is left at rest instead: after a
+stated time, with each axis within a stated distance of the middle of its goal interval and below a stated
+rate. In the last cell it is ready when object and axes are at their
 goals and at rest.
 """
 
@@ -86,18 +88,42 @@ def check_reports(rows: Rows, problem: PlanningProblem) -> Check:
 def _leaving(rows: Rows, members: NDArray[np.bool_], cell: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Margins of object (m,) and axes (m, 1 + n) in a cell before the last, and what rounding changes."""
     log, plan = rows.log, rows.plan
-    following, axes = plan.transitions[cell + 1].gains, rows.z[members, 2:]
-    energy = entry_energies(plan, cell + 1, axes, rows.rates[members, 2:])
-    settled = (following.energy_bound - energy) / np.maximum(energy, following.energy_bound)
+    rest, duration = plan.transitions[cell].gains.rest, plan.transitions[cell].gains.hand_over_time
+    if rest is None:
+        following, axes = plan.transitions[cell + 1].gains, rows.z[members, 2:]
+        energy = entry_energies(plan, cell + 1, axes, rows.rates[members, 2:])
+        settled = (following.energy_bound - energy) / np.maximum(energy, following.energy_bound)
+        of_axes = np.minimum(_inside_goal(rows, members, cell), settled)
+    else:
+        of_axes = 1.0 - rest_shares(plan, cell, rows.z[members, 2:], rows.rates[members, 2:])
+        duration = max(duration, rest.after)
     at_entry = np.zeros(int(members.sum()))
     margin = _energy_margin(rows, members, cell + 1, at_entry)
     floor = 0.5 * _stiffness(plan, cell + 1, at_entry) * (0.5 * plan.transitions[cell].inradius) ** 2
     of_object = (margin - floor) / np.maximum(np.abs(margin), floor)
-    duration, time = plan.transitions[cell].gains.hand_over_time, log.times - log.transition_start
+    time = log.times - log.transition_start
     if duration > 0.0:
         of_object = np.minimum(of_object, np.minimum(time[members] / duration - 1.0, 1.0))
     change = 2.0 * STEP * np.abs(log.object_twist[members, :2]).sum(axis=1) / floor
-    return of_object, np.minimum(_inside_goal(rows, members, cell), settled), change
+    return of_object, of_axes, change
+
+
+def rest_shares(plan: Plan, cell: int, axes: FloatArray, rates: FloatArray) -> FloatArray:
+    """Departures from rest over those with which a cell may be left, per axis, the larger of both [-].
+
+    Args:
+        plan: A plan whose cells are left at rest.
+        cell: The cell that is left.
+        axes: (theta, q...), shape (..., 1 + n) [rad or m].
+        rates: Their rates, of the same shape.
+    """
+    transition = plan.transitions[cell]
+    assert transition.gains.rest is not None  # the caller asks for no other plan
+    away = np.abs(axes - 0.5 * (transition.goal_lower + transition.goal_upper))
+    shares: FloatArray = np.maximum(
+        away / transition.gains.rest.reach, np.abs(rates) / transition.gains.rest.rate
+    )
+    return shares
 
 
 def _arriving(rows: Rows, members: NDArray[np.bool_], tolerance: float) -> tuple[FloatArray, FloatArray]:

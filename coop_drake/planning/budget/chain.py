@@ -1,0 +1,152 @@
+"""The sets of all axes from transition to transition: from one entry set follows the next one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from coop_drake.answers.budget import Budget
+from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, LEAVING_TIME, REST_RATE, REST_REACH
+from coop_drake.laws.readiness import EROSION
+from coop_drake.planning.budget.axis_sets import (
+    AxisSets,
+    Entry,
+    axis_sets,
+    conditions_of,
+    next_entry,
+    rest_needed,
+    settling_time,
+    whole_periods,
+)
+from coop_drake.planning.budget.axis_tube import AxisConditions
+from coop_drake.tree.pose import FloatArray
+
+REST_FACTOR = 1.5
+"""A cell is left with so many times the departures that a settled axis has at most [-]: the larger, the
+sooner, and the larger is the set in which the next cell is entered."""
+
+QUICK_RATE = 0.2
+"""Or with this rate, anywhere in the eroded goal interval, if that is more [rad/s or m/s]."""
+
+STRICTEST = 2
+"""The last of three conditions under which a cell may be left."""
+
+ENTRY_PARTS = (1, 3)
+"""Parts into which the positions at an entry are cut, tried in this order [-]."""
+
+SLACK = 1e-3
+"""Fraction by which stated bounds are wider than computed ones [-]: more than another way to round needs."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Where a budget does not hold.
+
+    Attributes:
+        transition: Index of the transition.
+        axis: Index of the axis, theta being 0.
+        reason: What cannot be shown, in words.
+    """
+
+    transition: int
+    axis: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class Link:
+    """One transition for which a budget holds.
+
+    Attributes:
+        table: Its axes, an ``axis_table`` with the condition of rest under which the cell is left.
+        entries: The sets in which they enter.
+        sets: What follows.
+        strictness: 0 if axes may leave the cell at ``QUICK_RATE``, 1 if not, 2 if they must have settled.
+    """
+
+    table: FloatArray
+    entries: Sequence[Entry]
+    sets: Sequence[AxisSets]
+    strictness: int = 0
+
+
+def follow_chain(tables: Sequence[FloatArray], start: FloatArray, budget: Budget) -> list[Link] | Limit:
+    """Follow all axes under a budget through transitions.
+
+    Where a transition does not hold, the condition under which the cell before it is left becomes stricter.
+
+    Args:
+        tables: The axes in every transition, each an ``axis_table`` with quintic funnels.
+        start: Where they rest at the beginning, shape (axes,) [rad or m].
+        budget: The departures to be tolerated.
+    """
+    conditions, links = conditions_of(budget), list[Link]()
+    while len(links) < len(tables):
+        k = len(links)
+        found = _link(k, tables[k].copy(), _entries(links, start, budget, conditions[0]), conditions)
+        if isinstance(found, Link):
+            links.append(found)
+        elif not links or links[-1].strictness == STRICTEST:
+            return found
+        else:
+            links[-1] = _stricter(links[-1], conditions[0])
+    return links
+
+
+def _entries(
+    links: Sequence[Link], start: FloatArray, budget: Budget, conditions: AxisConditions
+) -> list[Entry]:
+    """Return the sets in which the axes enter the next transition."""
+    if not links:
+        return [Entry(float(x), float(x)) for x in start]
+    before, periods = links[-1], whole_periods(budget.report_age, budget.period)
+    return [
+        _widened(next_entry(row, sets, entry, conditions, periods))
+        for row, sets, entry in zip(before.table, before.sets, before.entries, strict=True)
+    ]
+
+
+def _stricter(link: Link, conditions: AxisConditions) -> Link:
+    """Return a transition whose cell is left under the next stricter condition."""
+    table, strictness = link.table.copy(), link.strictness + 1
+    for row, sets in zip(table, link.sets, strict=True):
+        reach, rate = rest_needed(row, sets, conditions)
+        row[REST_REACH], row[REST_RATE] = min(REST_FACTOR * reach, row[REST_REACH]), REST_FACTOR * rate
+    if strictness == STRICTEST:
+        times = [settling_time(row, sets, conditions) for row, sets in zip(table, link.sets, strict=True)]
+        table[:, LEAVING_TIME] = max(*times, float(table[0, LEAVING_TIME]))
+    return replace(link, table=table, strictness=strictness)
+
+
+def _link(
+    k: int, table: FloatArray, entries: Sequence[Entry], conditions: Sequence[AxisConditions]
+) -> Link | Limit:
+    """Return the sets of all axes of a transition, and write the condition of rest into its table."""
+    every = []
+    for axis, (row, entry) in enumerate(zip(table, entries, strict=True)):
+        for parts in ENTRY_PARTS:
+            sets = axis_sets(row, conditions, entry, parts)
+            if sets.distance > 0.0:
+                break
+        if not sets.distance > 0.0:
+            return Limit(k, axis, "may leave its funnel")
+        reach, rate = rest_needed(row, sets, conditions[0])
+        half = (0.5 - EROSION) * (row[GOAL_UPPER] - row[GOAL_LOWER])
+        if not (1.0 + SLACK) * reach < half:
+            return Limit(k, axis, "may never come to rest in its goal interval")
+        row[REST_REACH], row[REST_RATE] = half, max(REST_FACTOR * rate, QUICK_RATE)
+        every.append(sets)
+    return Link(table, entries, every)
+
+
+def _widened(entry: Entry) -> Entry:
+    room, fast = SLACK * (entry.upper - entry.lower), SLACK * (entry.rate_upper - entry.rate_lower)
+    return replace(
+        entry,
+        lower=entry.lower - room,
+        upper=entry.upper + room,
+        rate_lower=entry.rate_lower - fast,
+        rate_upper=entry.rate_upper + fast,
+        acceleration=(1.0 + SLACK) * entry.acceleration,
+        history=(1.0 + SLACK) * entry.history,
+    )
