@@ -16,6 +16,7 @@ from benchmarks.breaking import breaking_tasks
 from benchmarks.commands import bench_commands
 from benchmarks.contents import TOPICS, WHOLE, show_contents
 from benchmarks.departures import departure_tasks
+from benchmarks.deployed import deployed_tasks
 from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.ledger import Ledger, LedgerError
 from benchmarks.mapping import mapping_tasks
@@ -105,6 +106,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *mapping_tasks(),
         *simulating_tasks(),
         *departure_tasks(),
+        *deployed_tasks(),
         *adversary_tasks(),
     ]
 

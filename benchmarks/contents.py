@@ -18,6 +18,7 @@ TOPICS = {
     "mapping": "harmonic maps: accuracy, speed, how both grow",
     "simulating": "the closed loop beside the bare plant; memory of repeated runs",
     "departures": "transports of teams that are not ideal, mild and harsh; with predictor and observer",
+    "deployed": "shipped transports under the preset mobile_base, at 10 and 20 ms, beside the ideal ones",
     "breaking": "departures that an axis bears, by a search for the worst, beside those that are certified",
     "adversaries": "altered plans and proofs beside the exact checker; how long it checks random answers",
 }

@@ -114,14 +114,32 @@ PREDICTED: Mapping[str, dict[str, Any]] = {
 }
 """What a predictor may buy something against."""
 
+ADDED = {
+    "observer": (OBSERVED, Control(observer=True)),
+    "predictor": (PREDICTED, Control(predictor=True)),
+}
+"""The additions to the controllers, each with its cases."""
+
 
 def departure_tasks() -> list[Task]:
     """Every departure, and the additions to the controllers, for each team."""
-    tasks = []
-    for team in TEAMS:
-        tasks.append(Task(f"departures/{team}", partial(_case_rows, team), alone=True))
-        tasks.append(Task(f"departures/{team}_additions", partial(_added_rows, team), alone=True))
-    return tasks
+    return [
+        *(
+            Task(f"departures/{team}/{name}", partial(_case_rows, team, name, case), alone=True)
+            for team in TEAMS
+            for name, case in CASES.items()
+        ),
+        *(
+            Task(
+                f"departures/{team}_additions/{what}: {name}",
+                partial(_added_rows, team, what, name),
+                alone=True,
+            )
+            for team in TEAMS
+            for what in ADDED
+            for name in ADDED[what][0]
+        ),
+    ]
 
 
 def deployment_of(data: Mapping[str, Any]) -> Deployment:
@@ -158,25 +176,22 @@ def _planned(team: str, age: float, scenario: Scenario) -> tuple[Plan, Sequence[
     return _PLANS[team, age]
 
 
-def _case_rows(team: str, _: Sequence[Row]) -> list[Row]:
-    rows = []
-    for name, case in CASES.items():
-        rows.extend(_rows(f"departures/{team}/{name}/mild", team, case.mild, Control()))
-        if case.harsh is not None:
-            harsh = f"departures/{team}/{name}/harsh"
-            rows.extend(_rows(harsh, team, case.harsh, Control(), known=case.known))
+def _case_rows(team: str, name: str, case: Case, _: Sequence[Row]) -> list[Row]:
+    rows = _rows(f"departures/{team}/{name}/mild", team, case.mild, Control())
+    if case.harsh is not None:
+        harsh = f"departures/{team}/{name}/harsh"
+        rows += _rows(harsh, team, case.harsh, Control(), known=case.known)
     return rows
 
 
-def _added_rows(team: str, _: Sequence[Row]) -> list[Row]:
-    rows = []
-    for cases, added in ((OBSERVED, Control(observer=True)), (PREDICTED, Control(predictor=True))):
-        what = "observer" if added.observer else "predictor"
-        for name, data in cases.items():
-            for figure, control in (("without", Control()), ("with", added)):
-                where = f"departures/{team}_additions/{what}: {name}/{figure}"
-                rows.extend(_rows(where, team, data, control))
-    return rows
+def _added_rows(team: str, what: str, name: str, _: Sequence[Row]) -> list[Row]:
+    cases, added = ADDED[what]
+    where = f"departures/{team}_additions/{what}: {name}"
+    return [
+        row
+        for figure, control in (("without", Control()), ("with", added))
+        for row in _rows(f"{where}/{figure}", team, cases[name], control)
+    ]
 
 
 def _rows(
