@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-import numpy as np
-
-from benchmarks.departures import departing, deployment_of
+from benchmarks.departures import departing, deployment_of, peak_force
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake import SimulationLog
@@ -56,7 +54,7 @@ def _rows(team: str, label: str, rows: Sequence[Row]) -> list[Row]:
 
 def worst(logs: Sequence[SimulationLog]) -> list[tuple[str, float, str]]:
     """Return the largest base force and the smallest margins of some runs, each with its unit."""
-    force = max(float(np.abs(log.base_wrenches[:, :, :2]).max()) for log in logs)
+    force = max(peak_force(log) for log in logs)
     margins = [
         (name, 1e3 * min(float(getattr(log, name).min()) for log in logs))
         for name in ("funnel_margin", "cell_clearance", "workspace_clearance", "body_clearance")
