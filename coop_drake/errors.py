@@ -110,5 +110,9 @@ class RefusalError(CoopDrakeError):
         super().__init__(f"{where}: {finding}")
 
 
+class DrawingError(CoopDrakeError):
+    """A process that draws a run was ended; the message names it and the exit code."""
+
+
 class TuningError(CoopDrakeError):
     """The options of tuning are wrong, or its optimizer is missing; the message says what is expected."""

@@ -19,7 +19,7 @@ from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.errors import PlanError
 from coop_drake.viz import LiveView
-from tests.support.no_figures import NoFigures
+from tests.support.no_drawings import NoDrawings
 from tests.support.scenarios import MODELS, ROOM, write_scenario
 
 PLAN_KEYS = {
@@ -125,11 +125,11 @@ def test_people_see_bars_and_a_table_and_quiet_shows_nothing(room, tmp_path):
 
 @pytest.fixture
 def drawn(monkeypatch):
-    """Runs of which figures were to be drawn; drawing itself is slow, and looked at after the first run."""
-    NoFigures.asked.clear()
+    """Runs that were to be drawn; drawing itself is slow, and looked at after the first run."""
+    NoDrawings.asked.clear()
     for module in (run, simulate):
-        monkeypatch.setattr(module, "FigureProcesses", NoFigures)
-    return NoFigures.asked
+        monkeypatch.setattr(module, "DrawingProcesses", NoDrawings)
+    return NoDrawings.asked
 
 
 def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_path, drawn):
@@ -144,8 +144,7 @@ def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_
     assert facts["maps_read"] == facts["maps"] > 0  # the run before left them in the cache
     assert (tmp_path / "maps.json").read_bytes() == (out / "maps.json").read_bytes()
     assert not (tmp_path / "plan.json").exists()
-    assert (tmp_path / "transport.html").exists()
-    assert [directory for *_, directory in drawn] == [tmp_path]
+    assert [directory for _, directory in drawn] == [tmp_path]
 
 
 def test_a_gap_too_narrow_is_infeasible_and_an_older_plan_does_not_stay(tmp_path):

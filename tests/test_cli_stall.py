@@ -13,7 +13,7 @@ from coop_drake.answers import load_plan, save_plan
 from coop_drake.answers.log import SimulationLog
 from coop_drake.cli import app, simulate
 from coop_drake.simulation import stall
-from tests.support.no_figures import NoFigures
+from tests.support.no_drawings import NoDrawings
 from tests.support.scenarios import write_scenario
 
 
@@ -36,7 +36,7 @@ def planned(tmp_path_factory):
 def impatient(monkeypatch):
     monkeypatch.setattr(stall, "PATIENCE_FACTOR", 1.0)
     monkeypatch.setattr(stall, "PATIENCE_ALLOWANCE", 0.5)
-    monkeypatch.setattr(simulate, "FigureProcesses", NoFigures)
+    monkeypatch.setattr(simulate, "DrawingProcesses", NoDrawings)
 
 
 def assert_stalled(result, out, complaint):

@@ -21,6 +21,8 @@ def preparing(scenario: Scenario) -> Iterator[None]:
     Args:
         scenario: The one that will be simulated.
     """
+    import coop_drake.planning.planner  # noqa: F401  # First: two threads that import wait for each other.
+
     thread = Thread(target=_prepare, args=(scenario,), daemon=True)
     thread.start()
     try:
@@ -33,9 +35,9 @@ def _prepare(scenario: Scenario) -> None:
     with suppress(Exception):
         from pydrake.systems.framework import DiagramBuilder
 
-        from coop_drake import fields, simulation, viz
+        from coop_drake import fields, simulation
         from coop_drake.plant import build_team_plant
 
-        for module, name in ((simulation, "simulate"), (fields, "HarmonicMap"), (viz, "write_recording")):
+        for module, name in ((simulation, "simulate"), (fields, "HarmonicMap")):
             getattr(module, name)
         build_team_plant(scenario, DiagramBuilder())

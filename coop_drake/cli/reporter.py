@@ -20,7 +20,14 @@ from rich.progress import Progress as ProgressBars
 from rich.table import Table
 
 from coop_drake.cli.kernel_clock import kernel_clock
-from coop_drake.errors import CoopDrakeError, FieldError, FloorPlanError, ScenarioError, StallError
+from coop_drake.errors import (
+    CoopDrakeError,
+    DrawingError,
+    FieldError,
+    FloorPlanError,
+    ScenarioError,
+    StallError,
+)
 from coop_drake.extras import install_advice
 from coop_drake.progress import Progress
 
@@ -198,7 +205,7 @@ def _explain(error: BaseException, reporter: Reporter) -> bool:
         details = {"file": error.file, "key": error.key, "value": error.shown, "allowed": error.allowed}
     elif isinstance(error, FloorPlanError):
         details = {"file": error.file, "place": error.place, "remedy": error.remedy, "finding": error.finding}
-    elif isinstance(error, FieldError | StallError):
+    elif isinstance(error, DrawingError | FieldError | StallError):
         code = ExitCode.FAILED_RUN
     elif isinstance(error, ModuleNotFoundError) and (advice := install_advice(error.name or "")):
         text = f"the package {error.name} is not installed; install what this needs: {advice}"

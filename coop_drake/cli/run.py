@@ -26,7 +26,7 @@ from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import simulation_facts, summary_rows
 from coop_drake.cli.task import Task, read_task
-from coop_drake.viz.figure_processes import FigureProcesses
+from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
@@ -53,12 +53,12 @@ def run_command(
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "plan", "simulation")
-        with FigureProcesses() as figures:
+        with DrawingProcesses() as drawing:
             with preparing(task.scenario):
                 plan = plan_of(task, folder, reporter)
             if plan:
                 reporter.code = carry_out(
-                    task, plan, folder, reporter, figures, fresh_maps=fresh_maps, live=live, blocks=blocks
+                    task, plan, folder, reporter, drawing, fresh_maps=fresh_maps, live=live, blocks=blocks
                 )
 
 
@@ -67,7 +67,7 @@ def carry_out(
     plan: Plan,
     folder: ResultFolder,
     reporter: Reporter,
-    figures: FigureProcesses,
+    drawing: DrawingProcesses,
     *,
     fresh_maps: bool,
     live: bool,
@@ -77,16 +77,16 @@ def carry_out(
 
     Log, certificates of maps, recording and figures go to the folder.
     """
+    drawing.begin(task.scenario, task.problem, plan)
     maps = map_cells(task, plan, reporter, fresh=fresh_maps)
     observer = _open_live_view(task, plan, reporter) if live else None
-    log = _simulate(task, plan, maps, folder, reporter, blocks, observer)
-    from coop_drake.viz import write_recording  # after the run, which needs no Meshcat
-
-    figures.draw(task.problem.workspace, task.problem.tree, plan, log, folder.path)
-    with reporter.stage("recording", "recording") as progress:  # here, while other processes draw
-        write_recording(task.scenario, plan, log, folder.recording, progress=progress)
+    log = _simulate(task, plan, maps, reporter, blocks, observer)
+    folder.begin("simulation", robots=log.robot_names)
+    drawing.draw(log, folder.path)
+    write_certificates(task, maps, folder)
+    log.save(folder.path / "log.npz")
     with reporter.stage("drawing", "drawing"):
-        figures.wait()
+        drawing.wait()
     reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
     reporter.say(
         f"Results are in {escape(str(folder.path))}; open {escape(str(folder.recording))} in a browser"
@@ -102,21 +102,17 @@ def _simulate(
     task: Task,
     plan: Plan,
     maps: tuple[HarmonicMap, ...],
-    folder: ResultFolder,
     reporter: Reporter,
     blocks: Blocks,
     observer: Callable[..., None] | None,
 ) -> SimulationLog:
-    """Run the closed loop, note the facts, and write the log and the maps' certificates."""
+    """Run the closed loop and note the facts."""
     from coop_drake.memory import peak_memory_mb
     from coop_drake.simulation import simulate
 
     with reporter.stage("simulating", "simulation") as progress:
         log = simulate(task.scenario, plan, maps, blocks=blocks, progress=progress, observer=observer)
     reporter.facts.update(simulation_facts(plan, log), peak_memory_mb=peak_memory_mb())
-    folder.begin("simulation", robots=log.robot_names)
-    write_certificates(task, maps, folder)
-    log.save(folder.path / "log.npz")
     return log
 
 

@@ -22,7 +22,7 @@ from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.run import carry_out
 from coop_drake.cli.summary import plan_facts
 from coop_drake.cli.task import Task, read_task
-from coop_drake.viz.figure_processes import FigureProcesses
+from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
@@ -53,9 +53,9 @@ def simulate_command(
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "simulation")
         found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)
-        with FigureProcesses() as figures:
+        with DrawingProcesses() as drawing:
             reporter.code = carry_out(
-                task, found, folder, reporter, figures, fresh_maps=fresh_maps, live=live, blocks=blocks
+                task, found, folder, reporter, drawing, fresh_maps=fresh_maps, live=live, blocks=blocks
             )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import AbstractContextManager
+from io import BytesIO
 from pathlib import Path
 from textwrap import fill
 from typing import Any
@@ -77,12 +78,16 @@ def legend_above(ax: Axes, handles: list[Patch] | None = None) -> None:
 
 
 def save_figure(figure: Figure, path: Path, *, dpi: float = 120) -> None:
-    """Write a figure as PNG of ``dpi`` points per inch, or as SVG if the path ends so; whole or not at all.
+    """Write a figure, whole or not at all: PNG of ``dpi`` points per inch, or SVG if the path ends so."""
+    write_atomically(path, picture_of(figure, path.suffix, dpi=dpi))
 
-    The same figure gives the same bytes.
-    """
+
+def picture_of(figure: Figure, ending: str = ".png", *, dpi: float = 120) -> bytes:
+    """Return what `save_figure` writes. The same figure gives the same bytes."""
     options: dict[str, Any] = {"format": "png", "pil_kwargs": {"compress_level": _COMPRESSION}}
-    if path.suffix == ".svg":
+    if ending == ".svg":
         options = {"format": "svg", "metadata": {"Date": None}}
+    file = BytesIO()
     with mpl.rc_context({"svg.hashsalt": "coop_drake"}):
-        write_atomically(path, lambda file: figure.savefig(file, dpi=dpi, **options))
+        figure.savefig(file, dpi=dpi, **options)
+    return file.getvalue()

@@ -35,6 +35,10 @@ class DirectiveEntry:
 
         return read_directive(self.data, self.key)
 
+    def __reduce__(self) -> tuple[type[DirectiveEntry], tuple[object, str]]:
+        """Pickle without Drake's type, which cannot be."""
+        return type(self), (self.data, self.key)
+
 
 def _write(entry: DirectiveEntry) -> object:
     from coop_drake.scenario.drake_types import write_directive

@@ -11,46 +11,67 @@ from shapely import Polygon
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
-from coop_drake.drawing.canvas import house_style, save_figure
+from coop_drake.drawing.canvas import house_style, picture_of
+from coop_drake.files import write_atomically
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.viz import floor_figures, time_figures
 from coop_drake.viz.figure_names import joints_figure_name
 
 
 def write_figures(
-    workspace: Polygon,
-    tree: ComponentTree,
-    plan: Plan,
-    log: SimulationLog,
-    directory: Path,
-    *,
-    numbers: Iterable[int] | None = None,
+    workspace: Polygon, tree: ComponentTree, plan: Plan, log: SimulationLog, directory: Path
 ) -> list[Path]:
     """Write figures 4 to 13 of the paper and a summary of the margins as PNG; return the files written.
 
-    Figures 10 and 11 show one robot each; those of further robots are called Figure 11, too. Where several
-    processes write them, each gets the ``numbers`` of those that it shall write, counted from 0.
+    Figures 10 and 11 show one robot each; those of further robots are called Figure 11, too.
     """
-    written, known = [], list(_figures(workspace, tree, plan, log))
-    with house_style():
-        for name, draw in known if numbers is None else (known[number] for number in numbers):
-            figure = draw()
-            if figure is not None:
-                written.append(directory / f"{name}.png")
-                save_figure(figure, written[-1])
-    return written
+    return RunFigures(workspace, tree, plan).write(log, directory)
 
 
-def figure_names(workspace: Polygon, tree: ComponentTree, plan: Plan, log: SimulationLog) -> list[str]:
-    """Names of the figures that `write_figures` writes, in its order."""
-    return [name for name, _ in _figures(workspace, tree, plan, log)]
+class RunFigures:
+    """The figures of a run. The one that shows the plan alone is drawn at once.
+
+    Args:
+        workspace: The floor.
+        tree: The team.
+        plan: The plan that is followed.
+    """
+
+    def __init__(self, workspace: Polygon, tree: ComponentTree, plan: Plan) -> None:
+        self._workspace, self._tree = workspace, tree
+        with house_style():
+            self._start_and_goal = picture_of(floor_figures.start_and_goal_figure(workspace, tree, plan))
+
+    def write(
+        self, log: SimulationLog, directory: Path, *, numbers: Iterable[int] | None = None
+    ) -> list[Path]:
+        """Write the figures of a run as `write_figures` does.
+
+        Where several processes write them, each gets the ``numbers`` of those that it shall write.
+        """
+        written = []
+        known = list(self._figures(log))
+        with house_style():
+            for name, draw in known if numbers is None else (known[number] for number in numbers):
+                figure = draw()
+                if figure is not None:
+                    picture = figure if isinstance(figure, bytes) else picture_of(figure)
+                    written.append(write_atomically(directory / f"{name}.png", picture))
+        return written
+
+    def names(self, log: SimulationLog) -> list[str]:
+        """Names of the figures of a run, in the order of their numbers, from 0."""
+        return [name for name, _ in self._figures(log)]
+
+    def _figures(self, log: SimulationLog) -> Iterator[tuple[str, Callable[[], Figure | bytes | None]]]:
+        yield "fig04_start_and_goal", lambda: self._start_and_goal
+        yield from _figures(self._workspace, self._tree, log)
 
 
 def _figures(
-    workspace: Polygon, tree: ComponentTree, plan: Plan, log: SimulationLog
+    workspace: Polygon, tree: ComponentTree, log: SimulationLog
 ) -> Iterator[tuple[str, Callable[[], Figure | None]]]:
-    """Name every figure, with what draws it; a robot without joints has none of them."""
-    yield "fig04_start_and_goal", partial(floor_figures.start_and_goal_figure, workspace, tree, plan)
+    """Name every figure of a log, with what draws it; a robot without joints has none of them."""
     yield "fig05_path", partial(floor_figures.path_figure, workspace, tree, log)
     yield "fig06_position", partial(time_figures.position_figure, log)
     yield "fig07_angle", partial(time_figures.angle_figure, log)

@@ -24,29 +24,48 @@ def write_recording(
     scenario: Scenario, plan: Plan, log: SimulationLog, path: Path, *, progress: Progress | None = None
 ) -> None:
     """Write the run as one self-contained HTML page; an interrupted write leaves no file behind."""
-    write_atomically(path, recording_html(scenario, plan, log, progress=progress).encode())
+    Recording(scenario, plan).write(log, path, progress)
 
 
 def recording_html(
     scenario: Scenario, plan: Plan, log: SimulationLog, *, progress: Progress | None = None
 ) -> str:
     """Return a run as a page: the scene, an animation of what was logged, and a player."""
-    meshcat = silent_meshcat()
-    scene = TransportScene(scenario, plan, meshcat)
-    duration = float(log.times[-1])
-    rate = min(scenario.visualization.frames_per_second, _MOST_FRAMES / max(duration, 1e-9))
-    times = np.arange(0.0, duration + 0.5 / rate, 1.0 / rate)
-    meshcat.SetAnimation(animation_of(scene, log, times, progress))
-    scene.place_camera()
-    content = page_content(
-        scenario,
-        plan,
-        log,
-        duration=float(times[-1]),
-        colours=scene.team.colours,
-        of_a_metre=scene.of_a_metre,
-    )
-    return with_overlay(meshcat.StaticHtml(), content)
+    return Recording(scenario, plan).html(log, progress)
+
+
+class Recording:
+    """The scene of a plan, which becomes a page with the log of one run.
+
+    Args:
+        scenario: Floor and team.
+        plan: The plan that is followed.
+    """
+
+    def __init__(self, scenario: Scenario, plan: Plan) -> None:
+        self._scenario, self._plan = scenario, plan
+        self._scene = TransportScene(scenario, plan, silent_meshcat())
+        self._scene.place_camera()
+
+    def write(self, log: SimulationLog, path: Path, progress: Progress | None = None) -> None:
+        """Write the page as `write_recording` does."""
+        write_atomically(path, self.html(log, progress).encode())
+
+    def html(self, log: SimulationLog, progress: Progress | None = None) -> str:
+        """Return the page as `recording_html` does."""
+        scenario, scene, duration = self._scenario, self._scene, float(log.times[-1])
+        rate = min(scenario.visualization.frames_per_second, _MOST_FRAMES / max(duration, 1e-9))
+        times = np.arange(0.0, duration + 0.5 / rate, 1.0 / rate)
+        scene.meshcat.SetAnimation(animation_of(scene, log, times, progress))
+        content = page_content(
+            scenario,
+            self._plan,
+            log,
+            duration=float(times[-1]),
+            colours=scene.team.colours,
+            of_a_metre=scene.of_a_metre,
+        )
+        return with_overlay(scene.meshcat.StaticHtml(), content)
 
 
 def inline_frame(page: str, *, height: int = 600) -> str:

@@ -20,9 +20,6 @@ _MARGINS = (0.82, 0.15, 0.32)
 _SINGLE, _SEVERAL = 2.7, 1.8
 """Height of the panel of a figure that has only one, and of one among several [in]."""
 
-_SINGLE, _SEVERAL = 2.7, 1.8
-"""Height of the panel of a figure that has only one, and of one among several [in]."""
-
 _GAP = 0.28
 """Space between two panels [in]: a legend fits."""
 
@@ -35,7 +32,6 @@ def time_axes(
     A dashed vertical line marks every switch to the next cell, and the caption says so.
     """
     count = len(labels)
-    height = height or (_SINGLE if count == 1 else _SEVERAL)
     height = height or (_SINGLE if count == 1 else _SEVERAL)
     caption = f"{caption} Dashed lines mark the switches from cell to cell."
     figure = new_figure(_WIDTH, count * (height + _GAP) + 1.0, caption, margins=_MARGINS)

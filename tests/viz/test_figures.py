@@ -10,7 +10,7 @@ from matplotlib.collections import LineCollection
 from PIL import Image
 
 from coop_drake.viz import write_figures
-from coop_drake.viz.figures import figure_names
+from coop_drake.viz.figures import RunFigures
 from coop_drake.viz.floor_figures import path_figure, start_and_goal_figure
 from coop_drake.viz.time_axes import break_at_switches
 from coop_drake.viz.time_figures import angle_figure, joints_figure
@@ -56,9 +56,12 @@ def test_the_same_run_gives_the_same_picture(drawn, tmp_path):
 
 def test_a_process_writes_only_the_figures_that_it_is_given(tmp_path):
     problem = case("elbow")
-    asked = problem.workspace, problem.tree, synthetic_plan(problem), synthetic_log(problem)
-    names = figure_names(*asked)
-    written = write_figures(*asked, tmp_path, numbers=iter([5, 2]))
+    figures, log = (
+        RunFigures(problem.workspace, problem.tree, synthetic_plan(problem)),
+        synthetic_log(problem),
+    )
+    names = figures.names(log)
+    written = figures.write(log, tmp_path, numbers=iter([5, 2]))
     assert [path.stem for path in written] == [names[5], names[2]]
 
 
