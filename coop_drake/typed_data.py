@@ -248,6 +248,8 @@ def _union(value: object, kind: Any, key: str) -> Any:
 def to_plain(value: Any, kind: Any) -> Any:
     """Return the plain data of a typed value, without fields that are None; :func:`convert` reads it back."""
     origin, arguments = get_origin(kind), get_args(kind)
+    if origin in (Union, UnionType) and value is not None and not classes_by_tag(kind):
+        return to_plain(value, next(part for part in arguments if part is not type(None)))
     if origin is Annotated and isinstance(arguments[1], Codec):
         return arguments[1].write(value)
     if origin is tuple:
@@ -267,3 +269,20 @@ def _read_vector(value: object, key: str) -> NDArray[np.float64]:
 
 Vector = Annotated[NDArray[np.float64], Codec(_read_vector, np.ndarray.tolist)]
 """A list of exact numbers in files, an array of shape (n,) in programs."""
+
+
+Bound = Annotated[float, Limits(above=0.0), EXACT]
+"""A largest magnitude; none is zero or negative."""
+
+
+def _read_bounds(value: object, key: str) -> NDArray[np.float64]:
+    found = convert(value, tuple[Bound | None, ...], key)
+    return np.array([math.inf if bound is None else bound for bound in found], dtype=np.float64)
+
+
+def _write_bounds(bounds: NDArray[np.float64]) -> object:
+    return [bound if bound < math.inf else None for bound in bounds.tolist()]
+
+
+Bounds = Annotated[NDArray[np.float64], Codec(_read_bounds, _write_bounds)]
+"""Largest magnitudes, an array of shape (n,) with infinity where there is none, which is null in files."""

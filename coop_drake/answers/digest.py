@@ -9,8 +9,10 @@ from typing import Any
 
 import shapely
 
+from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.typed_data import to_plain
 
 DECIMALS = 9
 """Decimals of a problem's numbers that its digest sees [m, rad]: last bits differ between libraries."""
@@ -22,7 +24,7 @@ def content_digest(document: Mapping[str, Any]) -> str:
 
 
 def problem_digest(problem: PlanningProblem) -> str:
-    """SHA-256 over what is asked: floor, team, start, goal and tolerances; not how hard to try."""
+    """SHA-256 over what is asked: floor, team, start, goal, tolerances and limits; not how hard to try."""
     rings = (problem.workspace.exterior, *problem.workspace.interiors)
     return _digest(
         {
@@ -34,8 +36,14 @@ def problem_digest(problem: PlanningProblem) -> str:
             "tolerances": _rounded(
                 [problem.position_tolerance, problem.angle_tolerance, problem.joint_tolerance]
             ),
+            **_limits(problem.limits),
         }
     )
+
+
+def _limits(limits: TeamLimits) -> dict[str, Any]:
+    """Limits of speed, if there are any."""
+    return {"limits": _rounded(list(to_plain(limits, TeamLimits).values()))} if limits.any else {}
 
 
 def _digest(value: Any) -> str:

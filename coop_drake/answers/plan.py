@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
 from coop_drake.answers.budget import Budget, Tolerance
+from coop_drake.answers.limits import SpeedStatement
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.answers.region import Points, Region
 from coop_drake.answers.search_report import SearchReport
@@ -82,6 +83,7 @@ class Plan:
         transitions: One for each cell, in the same order.
         budget: Departures from the ideal team under which every axis provably stays in its funnel; null if
             none were asked for.
+        speeds: Limits of speed that are kept, and what follows for the bases; null where no limit is known.
     """
 
     problem: str = ""
@@ -93,9 +95,10 @@ class Plan:
     cells: tuple[Cell, ...]
     transitions: tuple[Transition, ...]
     budget: Budget | None = None
+    speeds: SpeedStatement | None = None
 
     def governor_row(self, index: int) -> Vector:
-        """Return the governor's gains in a transition, with those from which they start, shape (8,)."""
+        """Return the governor's gains in a transition, with those from which they start, shape (9,)."""
         before = self.transitions[max(index - 1, 0)].gains
         return self.transitions[index].gains.governor_row(before)
 

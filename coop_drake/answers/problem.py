@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import numpy as np
 from shapely import Polygon
 
+from coop_drake.answers.limits import TeamLimits
 from coop_drake.tree.component_tree import Component, ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import Limits, NotNegative, Positive
@@ -64,6 +65,7 @@ class PlanningProblem:
         angle_tolerance: Final angle tolerance [rad].
         joint_tolerance: Final tolerance of joints that have a goal [rad or m].
         settings: How hard to try.
+        limits: Largest speeds of bases and joints.
     """
 
     workspace: Polygon
@@ -75,6 +77,7 @@ class PlanningProblem:
     angle_tolerance: float = 0.02
     joint_tolerance: float = 0.02
     settings: PlannerSettings = field(default_factory=PlannerSettings)
+    limits: TeamLimits = field(default_factory=TeamLimits)
 
     def __post_init__(self) -> None:
         """Give room to joints at their limits."""

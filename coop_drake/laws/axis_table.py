@@ -13,6 +13,7 @@ from coop_drake.laws.gains import TransitionGains
 from coop_drake.laws.hand_over import fading
 from coop_drake.laws.hold import slowed_bounds
 from coop_drake.laws.ppc import ramped_gain, track_axis
+from coop_drake.laws.speed_limit import damped
 from coop_drake.tree.pose import FloatArray
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "axis_table",
     "bounds_of",
     "funnel_acceleration",
+    "limited_row",
     "rest_jump",
     "track_axes",
     "track_paced_row",
@@ -32,17 +34,17 @@ __all__ = [
     "write_row",
 ]
 
-LAW_COLUMNS = 16
+LAW_COLUMNS = 17
 """Columns of a table: slice and goal interval [rad or m], lambda [1/s], 1 where the funnel is quintic and 0
 where it is not, kappa [rad^2/s^2 or m^2/s^2], k1, k2 and mu [1/s], the smallest distance to a bound over the
 funnel's width [-], the time T in which the commands of the last cell fade [s], the largest V with which the
 cell may be entered, the time after which it may be left [s], and within what an axis must be to leave it at
 rest: the distance from the middle of the goal interval [rad or m] and the rate [rad/s or m/s]; both are 0
-where V alone decides."""
+where V alone decides. The last column is the limit of the axis's rate, infinity for none [rad/s or m/s]."""
 
 SLICE_LOWER, SLICE_UPPER, GOAL_LOWER, GOAL_UPPER, DECAY_RATE, QUINTIC = range(6)
 LOG_GAIN, POSITION_GAIN, RATE_GAIN, RAMP_RATE, SATURATION, FADING_TIME, ENERGY_BOUND = range(6, 13)
-LEAVING_TIME, REST_REACH, REST_RATE = range(13, LAW_COLUMNS)
+LEAVING_TIME, REST_REACH, REST_RATE, RATE_LIMIT = range(13, LAW_COLUMNS)
 """The columns by name, in this order."""
 
 
@@ -61,6 +63,7 @@ def axis_table(funnel: Funnel, gains: TransitionGains) -> FloatArray:
             (funnel.decay_rate[i], gains.log_gain[i], gains.energy_bound[i]),
             (gains.position_gain, gains.rate_gain, gains.ramp_rate, gains.saturation, gains.hand_over_time),
             funnel.shape == "quintic",
+            gains.rate_limit_of(i),
         )
         if rest is not None:
             row[REST_REACH], row[REST_RATE] = rest.reach[i], rest.rate[i]
@@ -75,6 +78,7 @@ def write_row(
     scheduled: tuple[float, float, float],
     gains: tuple[float, float, float, float, float],
     quintic: bool,
+    rate_limit: float,
 ) -> None:
     """Write one row of a table, of an axis that leaves the cell by its V.
 
@@ -84,11 +88,12 @@ def write_row(
         scheduled: lambda, kappa and the largest V, as ``scheduled_axis`` returns them.
         gains: k1, k2 and mu [1/s], the smallest distance to a bound over the width [-], and T [s].
         quintic: Whether the funnel is quintic.
+        rate_limit: Largest rate of the axis, infinity for none [rad/s or m/s].
     """
     row[SLICE_LOWER], row[SLICE_UPPER], row[GOAL_LOWER], row[GOAL_UPPER] = intervals
     row[DECAY_RATE], row[LOG_GAIN], row[ENERGY_BOUND] = scheduled
     row[POSITION_GAIN], row[RATE_GAIN], row[RAMP_RATE], row[SATURATION], row[FADING_TIME] = gains
-    row[QUINTIC] = 1.0 if quintic else 0.0
+    row[QUINTIC], row[RATE_LIMIT] = 1.0 if quintic else 0.0, rate_limit
     row[LEAVING_TIME], row[REST_REACH], row[REST_RATE] = row[FADING_TIME], 0.0, 0.0
 
 
@@ -161,7 +166,8 @@ def track_axes(
 ) -> None:
     """Write the desired accelerations of the object's angle and of one robot's joints.
 
-    Each is that of ``track_row``, plus the jump at the switch times ``fading``. While a jump delta fades,
+    Each is that of ``track_row``, plus the jump at the switch times ``fading``, with the damping by which
+    the axis keeps its rate limit, with gamma = k2. While a jump delta fades,
     V' <= -kappa k1 s^2 - k2 (x' - v)^2 + |delta| f |x' - v| <= delta^2 f^2 / (4 k2): V grows by at most
     delta^2 T / (8 k2) in all, so that no axis leaves its funnel whatever the jump.
 
@@ -175,13 +181,40 @@ def track_axes(
         acceleration: Receives theta'' and q_k'', shape (1 + n,) [rad/s^2 or m/s^2].
     """
     n, left = table.shape[0] - 1, fading(time, table[0, FADING_TIME])
+    _write_accelerations(table, time, clock, object_state, robot, acceleration)
+    for i in range(1 + n):
+        rate = object_state[5] if i == 0 else robot[5 + n + i]
+        acceleration[i] = limited_row(table[i], acceleration[i] + left * jumps[i], rate)
+
+
+@compiled
+def limited_row(row: FloatArray, acceleration: float, rate: float) -> float:
+    """Return an acceleration with the damping that keeps the rate limit of the axis [rad/s^2 or m/s^2].
+
+    Args:
+        row: The axis, shape (``LAW_COLUMNS``,).
+        acceleration: What the funnel's law and the hand-over ask for [rad/s^2 or m/s^2].
+        rate: x' [rad/s or m/s].
+    """
+    return damped(acceleration, rate, row[RATE_LIMIT], row[RATE_GAIN])
+
+
+@compiled
+def _write_accelerations(
+    table: FloatArray,
+    time: float,
+    clock: FloatArray,
+    object_state: FloatArray,
+    robot: FloatArray,
+    acceleration: FloatArray,
+) -> None:
+    """Write what the funnels' law asks for, without jumps and rate limits; arguments as in ``track_axes``."""
+    n = table.shape[0] - 1
     tau, pace, pace_rate = time - clock[0], clock[1], clock[2]
-    own = track_paced_row(table[0], tau, pace, pace_rate, object_state[2], object_state[5])[0]
-    acceleration[0] = own + left * jumps[0]
+    acceleration[0] = track_paced_row(table[0], tau, pace, pace_rate, object_state[2], object_state[5])[0]
     for i in range(n):
         x, v = robot[3 + i], robot[6 + n + i]
-        own = track_paced_row(table[1 + i], tau, pace, pace_rate, x, v)[0]
-        acceleration[1 + i] = own + left * jumps[1 + i]
+        acceleration[1 + i] = track_paced_row(table[1 + i], tau, pace, pace_rate, x, v)[0]
 
 
 @compiled
@@ -196,7 +229,8 @@ def write_jumps(
 ) -> None:
     """Write by how much the accelerations of ``track_axes`` would jump if the next cell were entered now.
 
-    Of an axis that leaves the cell at rest it is ``rest_jump``.
+    Of an axis that leaves the cell at rest it is ``rest_jump``. Rate limits do not count:
+    they are the same in all cells, and act on the sum of law and fading jump.
 
     Args:
         table: The axes in the current cell, whose hand-over is over, shape (1 + n, ``LAW_COLUMNS``).
@@ -207,9 +241,9 @@ def write_jumps(
         robot: (z_k, z_k'), shape (2 (3 + n),); not read where the robot has no joints.
         jumps: Receives the law of the current cell less that of the next, shape (1 + n,).
     """
-    none, following = np.zeros(table.shape[0]), np.empty(table.shape[0])
-    track_axes(table, time, clock, none, object_state, robot, jumps)
-    track_axes(next_table, clock[0], clock, none, object_state, robot, following)
+    following = np.empty(table.shape[0])
+    _write_accelerations(table, time, clock, object_state, robot, jumps)
+    _write_accelerations(next_table, clock[0], clock, object_state, robot, following)
     for i in range(table.shape[0]):
         at_rest = table[i, REST_RATE] > 0.0
         jumps[i] = rest_jump(table[i], next_table[i]) if at_rest else jumps[i] - following[i]

@@ -16,6 +16,9 @@ CLOSING = 5.0
 """lambda times the time T_f after which a quintic funnel is closed [-]: e^-5 is below a hundredth, so
 that the exponential funnel of the same lambda is closed for all purposes then, too."""
 
+STEEPEST = 1.875
+"""Largest rate of the quintic over u [-], at u = 1 / 2."""
+
 
 @dataclass(frozen=True)
 class Funnel:

@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.funnels import CLOSING, axis_bounds
+from coop_drake.laws.funnels import CLOSING, STEEPEST, axis_bounds
 from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains, TransitionGains
 from coop_drake.laws.hand_over import shortest_hand_over
 from coop_drake.laws.ppc import ramped_gain, track_axis
+from coop_drake.laws.speed_limit import slowed_decay_rate
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["Schedule", "schedule_of", "scheduled_axis", "scheduled_governor", "transition_gains"]
@@ -20,7 +21,7 @@ PEAK = 10.0 / sqrt(3.0) / CLOSING**2
 """Largest acceleration of a quintic bound over lambda^2 times the distance that it moves [-]: 10 / sqrt(3) is
 the largest second derivative of the quintic over u."""
 
-PEAK_RATE = 1.875 / CLOSING
+PEAK_RATE = STEEPEST / CLOSING
 """Largest rate of a quintic bound over lambda times the distance that it moves [-]."""
 
 
@@ -166,6 +167,7 @@ def scheduled_axis(
     goal_upper: float,
     resting: float,
     narrowest: float,
+    rate_limit: float,
 ) -> tuple[float, float, float]:
     """Return lambda, kappa and the energy bound of one axis.
 
@@ -175,10 +177,11 @@ def scheduled_axis(
     angle move at most at ``turning_rate`` times the root of ``narrowest``, their largest rate being
     ``PEAK_RATE`` lambda shrink: while the object turns, centrifugal forces disturb the joints by the square
     of its rate, and a joint bears the less the narrower its goal interval is (docs/equations.md, "Turning and
-    narrow joints"). kappa is the largest gain, up to ``max_log_gain``, with which the log term kappa |a s| at
-    rest stays below ``log_acceleration`` and its stiffness in the middle of the goal interval below
-    ``log_stiffness``; a and s are those of ``track_axis`` in ``ppc.py``. The bound on V is ``energy_factor``
-    times the energy at rest, plus ``energy_allowance`` times kappa, plus ``entry_energy``.
+    narrow joints"). Where a bound would be too fast for the axis's rate limit, lambda is smaller, see
+    ``slowed_decay_rate``. kappa is the largest gain, up to ``max_log_gain``, with which the log term
+    kappa |a s| at rest stays below ``log_acceleration`` and its stiffness in the middle of the goal interval
+    below ``log_stiffness``; a and s are those of ``track_axis`` in ``ppc.py``. The bound on V is
+    ``energy_factor`` times the energy at rest, plus ``energy_allowance`` times kappa, plus ``entry_energy``.
 
     Args:
         schedule: The rule.
@@ -190,6 +193,7 @@ def scheduled_axis(
         resting: Where the axis rests when the transition begins; moved into the slice if outside [rad or m].
         narrowest: Width of the narrowest goal interval of a joint, infinite for a team without joints [rad or
             m]; not used for a joint.
+        rate_limit: Largest rate of the axis, infinity for none [rad/s or m/s].
 
     Returns:
         lambda [1/s], kappa [rad^2/s^2 or m^2/s^2], largest V [rad^2/s^2 or m^2/s^2].
@@ -204,6 +208,7 @@ def scheduled_axis(
         rate = max(sqrt(acceleration / (PEAK * shrink)), slowest)
     if not is_joint and PEAK_RATE * shrink * rate > schedule.turning_rate * sqrt(narrowest):
         rate = max(schedule.turning_rate * sqrt(narrowest) / (PEAK_RATE * shrink), slowest)
+    rate = slowed_decay_rate(rate, shrink, schedule.quintic, rate_limit)
     near = schedule.saturation * width
     inside = min(max(resting, slice_lower + near), slice_upper - near)
     dl, du = inside - slice_lower, slice_upper - inside
@@ -227,6 +232,8 @@ def transition_gains(
     goal_lower: FloatArray,
     goal_upper: FloatArray,
     resting: FloatArray,
+    speed_limit: float | None = None,
+    rate_limit: FloatArray | None = None,
 ) -> TransitionGains:
     """Return the gains with which a transition is executed.
 
@@ -239,6 +246,8 @@ def transition_gains(
         goal_upper: Upper ends, above the lower ones, shape (m,).
         resting: Where each axis rests when the transition begins: the middle of the previous goal interval,
             or the start; moved into the slice where it lies outside, shape (m,).
+        speed_limit: Largest speed of the object's origin, None for none [m/s].
+        rate_limit: Largest rate of every axis, infinity for none, shape (m,) [rad/s or m/s]; None for none.
 
     Returns:
         Gains of the governor and of the funnels, and for each axis the energy V below which the transition
@@ -253,7 +262,9 @@ def transition_gains(
     if isinstance(gain_set, FixedGains):  # as given, not by way of the root of K
         damping, governor_gain = float(gain_set.damping), float(gain_set.governor_gain)
     narrowest = np.full(len(resting), np.min(goal_upper[1:] - goal_lower[1:], initial=inf))
-    axes = np.transpose([slice_lower, slice_upper, goal_lower, goal_upper, resting, narrowest]).astype(float)
+    limits = np.full(len(resting), inf) if rate_limit is None else rate_limit
+    ends = slice_lower, slice_upper, goal_lower, goal_upper, resting, narrowest, limits
+    axes = np.transpose(ends).astype(float)
     rows = np.array([scheduled_axis(schedule, i > 0, *axis) for i, axis in enumerate(axes)])
     return TransitionGains(
         stiffness=stiffness,
@@ -269,6 +280,8 @@ def transition_gains(
         saturation=schedule.saturation,
         hand_over_time=schedule.hand_over_time,
         energy_bound=rows[:, 2].copy(),
+        speed_limit=speed_limit,
+        rate_limit=rate_limit,
     )
 
 

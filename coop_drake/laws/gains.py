@@ -1,13 +1,23 @@
 """Gain sets: fixed gains (the paper's Table 2) or scheduled by cell; and the gains of one transition."""
 
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coop_drake.tree.pose import FloatArray
-from coop_drake.typed_data import EXACT, DataError, Limits, NotNegative, Positive, Vector, check_fields
+from coop_drake.typed_data import (
+    EXACT,
+    Bounds,
+    DataError,
+    Limits,
+    NotNegative,
+    Positive,
+    Vector,
+    check_fields,
+)
 
 FunnelShape = Literal["exponential", "quintic"]
 
@@ -65,6 +75,8 @@ class TransitionGains:
         energy_bound: Largest PPC energy V accepted when this transition is entered, shape (1 + n,).
         rest: When this transition may be left, in place of the next one's energy bound; null where that bound
             decides.
+        speed_limit: Largest speed of the object's origin; null for none [m/s].
+        rate_limit: Largest rate of every axis; null for none, shape (1 + n,) [rad/s or m/s].
     """
 
     stiffness: Gain
@@ -81,15 +93,18 @@ class TransitionGains:
     hand_over_time: Annotated[NotNegative, EXACT]
     energy_bound: AxisGains
     rest: RestCondition | None = None
+    speed_limit: Gain | None = None
+    rate_limit: Bounds | None = None
 
     def governor_row(self, before: "TransitionGains") -> FloatArray:
-        """Return the governor's gains as compiled code reads them, see ``governed_gains``, shape (8,).
+        """Return the governor's gains as compiled code reads them, see ``governed_gains``, shape (9,).
 
         Args:
             before: Gains of the cell before; in the first cell its own.
         """
-        own = self.stiffness, self.damping, self.governor_gain, self.smoothing
-        return np.array([*own, before.stiffness, before.damping, before.governor_gain, self.hand_over_time])
+        own, limit = (self.stiffness, self.damping, self.governor_gain, self.smoothing), self.speed_limit
+        first = before.stiffness, before.damping, before.governor_gain
+        return np.array([*own, *first, self.hand_over_time, inf if limit is None else limit])
 
     def select(self, axes: NDArray[np.intp]) -> "TransitionGains":
         """Return the same gains for some axes only, for instance those that one robot controls."""
@@ -99,7 +114,12 @@ class TransitionGains:
             log_gain=self.log_gain[axes],
             energy_bound=self.energy_bound[axes],
             rest=self.rest and replace(self.rest, reach=self.rest.reach[axes], rate=self.rest.rate[axes]),
+            rate_limit=None if self.rate_limit is None else self.rate_limit[axes],
         )
+
+    def rate_limit_of(self, axis: int) -> float:
+        """Return the largest rate of an axis, infinity for none [rad/s or m/s]."""
+        return inf if self.rate_limit is None else float(self.rate_limit[axis])
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ The governor moves a reference point p_G towards the target of the cell. A sprin
 object's origin p towards p_G. The governor slows down when the energy of this motion comes near what the
 clearance of p_G allows. The controllers, the planner's time estimate, the log, the figures and the tests
 all call these functions. One closed form is derived from them by hand and must follow a change:
-``speed_per_clearance`` in ``planning/execution/estimate.py``, which a test compares with a run.
+``steady_clearance``, which a test compares with a run.
 """
 
 from __future__ import annotations
@@ -109,6 +109,42 @@ def object_energy_margin(
     vx = np.rint(object_state[3] / VELOCITY_STEP) * VELOCITY_STEP
     vy = np.rint(object_state[4] / VELOCITY_STEP) * VELOCITY_STEP
     return energy_margin(tracking_energy(x, y, vx, vy, stiffness), clearance, stiffness)
+
+
+@compiled
+def steady_clearance(speed: float, stiffness: float, damping: float, governor_gain: float) -> float:
+    """Return the clearance in a long aisle with which the governed object has a steady speed [m].
+
+    At a steady speed v the object lags behind p_G by zeta v / K, so that E = v^2 (1 + zeta^2 / K) / 2, and
+    v = K_G sqrt(Delta E / K) with Delta E = K d^2 / 2 - E gives
+    d = v sqrt((2 K / K_G^2 + 1 + zeta^2 / K) / K).
+
+    Args:
+        speed: v [m/s].
+        stiffness: K [1/s^2].
+        damping: zeta [1/s].
+        governor_gain: K_G [-].
+    """
+    share = 2.0 * stiffness / (governor_gain * governor_gain) + 1.0 + damping * damping / stiffness
+    return float(speed * np.sqrt(share / stiffness))
+
+
+@compiled
+def driving_margin(margin: float, clearance: float, most: float, stiffness: float) -> float:
+    """Return Delta E as it would be with a clearance of at most ``most``: what drives p_G [m^2/s^2].
+
+    p_G so runs no further ahead of the object than its largest speed needs. That the object stays in its
+    cell rests on Delta E itself, and p_G stands still where that is zero.
+
+    Args:
+        margin: Delta E [m^2/s^2].
+        clearance: d, signed distance of p_G to the boundary of the safe set [m].
+        most: Largest clearance that counts, infinity for any [m].
+        stiffness: K [1/s^2].
+    """
+    if clearance <= most:
+        return margin
+    return margin - energy_margin(0.0, clearance, stiffness) + energy_margin(0.0, most, stiffness)
 
 
 @compiled

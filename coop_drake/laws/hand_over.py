@@ -11,17 +11,17 @@ from __future__ import annotations
 from math import log
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.funnels import CLOSING, decay_factor
+from coop_drake.laws.funnels import CLOSING, STEEPEST, decay_factor
 from coop_drake.tree.pose import FloatArray
 
 STIFFNESS, DAMPING, GOVERNOR_GAIN, SMOOTHING = range(4)
 """Columns of a governor's row: the gains of the cell, c [m] ..."""
 
 FIRST_STIFFNESS, FIRST_DAMPING, FIRST_GOVERNOR_GAIN, HAND_OVER_TIME = range(4, 8)
-"""... and the gains of the cell before it, from which they start, and T [s]."""
+"""... and the gains of the cell before it, from which they start, and T [s] ..."""
 
-STEEPEST = 1.875
-"""Largest rate of ``fading`` times T [-], at T / 2."""
+SPEED_LIMIT = 8
+"""... and the largest speed of the object, infinity for none [m/s]."""
 
 
 @compiled
@@ -47,7 +47,7 @@ def governed_gains(row: FloatArray, time: float) -> tuple[float, float, float]:
     may rise at any rate, and fall as slowly as ``shortest_hand_over`` sees to.
 
     Args:
-        row: A governor's row, shape (8,).
+        row: A governor's row, shape (9,).
         time: Time since the cell was entered [s].
 
     Returns:

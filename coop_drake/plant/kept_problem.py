@@ -1,7 +1,7 @@
 """Keeps on disk what the models of a scenario give to the planner, so that later commands need no Drake.
 
-A file holds the component tree and the digests of all files that it was read from. It is used only while
-every one of these files, and the code that read them, is the same.
+A file holds the component tree, limits of speed, and the digests of all files that these were read from. It
+is used only while every one of these files, and the code that read them, is the same.
 """
 
 from __future__ import annotations
@@ -21,12 +21,14 @@ import numpy as np
 
 import coop_drake
 from coop_drake.answers.digest import content_digest
+from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.files import write_atomically
 from coop_drake.plant.stated_problem import stated_problem
 from coop_drake.scenario.model import Scenario
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
+from coop_drake.typed_data import convert_class, to_plain
 
 _DAMAGE = (OSError, ValueError, KeyError, TypeError, AttributeError)
 """What reading a file that is missing, cut off or of another layout can raise."""
@@ -58,7 +60,8 @@ def kept_problem(scenario: Scenario, folder: Path) -> PlanningProblem | None:
         # A floor plan may have been read from a file that only its reader knows.
         if content["workspace"] != repr(scenario.workspace):
             return None
-        return stated_problem(scenario, _tree(content["tree"]), content["joints"])
+        limits = convert_class(content["limits"], TeamLimits)
+        return stated_problem(scenario, _tree(content["tree"]), content["joints"], limits)
     except _DAMAGE:
         return None
 
@@ -83,6 +86,7 @@ def keep_problem(scenario: Scenario, problem: PlanningProblem, folder: Path) -> 
         "workspace": repr(scenario.workspace),
         "joints": dict(zip(files.robots, counts, strict=True)),
         "tree": _plain(problem.tree),
+        "limits": to_plain(problem.limits, TeamLimits),
     }
     text = json.dumps({**content, "digest": content_digest(content)})
     with suppress(OSError):

@@ -48,6 +48,8 @@ _ALIKE = 0.8
 """Similarity of two names, by difflib's ratio, from which one counts as a misspelling of the other [-]."""
 _LIMITS = ("lower", "upper", "effort", "velocity")
 """Numbers that may be infinite."""
+_MAGNITUDES = ("velocity", "drake:acceleration")
+"""Limits that Drake's reader of URDF ends the process over where they are negative; in SDF these are none."""
 _COUNTS: dict[str, tuple[int, ...]] = {
     **dict.fromkeys(("mass", "ixx", "ixy", "ixz", "iyy", "iyz", "izz", "radius", "length", "damping"), (1,)),
     **dict.fromkeys(_LIMITS, (1,)),
@@ -123,6 +125,8 @@ class _ModelText:
                 shown = f"{attribute} of <{name}>"
                 _check_name(shown, attribute, _URDF[name][1].split())
                 _check_numbers(shown, attribute, value, _URDF_COUNTS)
+                if attribute in _MAGNITUDES and _number(value) < 0.0:
+                    raise _FaultError(f"{value!r} in {shown} is negative; expected a magnitude")
 
     def _entity(self, name: str, *_: object) -> None:
         raise _FaultError(f"the entity {name} is declared; Drake's readers know none")

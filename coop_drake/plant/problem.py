@@ -4,6 +4,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.plant.component_tree import read_component_tree
+from coop_drake.plant.limits import read_limits
 from coop_drake.plant.stated_problem import stated_problem
 from coop_drake.plant.team import TeamPlant, build_team_plant
 from coop_drake.plant.validation import check_joints, check_places
@@ -23,6 +24,7 @@ def planning_problem(scenario: Scenario, team: TeamPlant | None = None) -> Plann
         team = build_team_plant(scenario, DiagramBuilder())
     check_joints(scenario, team)
     joints = {robot.name: len(robot.joints) for robot in team.robots}
-    problem = stated_problem(scenario, read_component_tree(team), joints)
+    tree = read_component_tree(team)
+    problem = stated_problem(scenario, tree, joints, read_limits(team, tree))
     check_places(scenario, problem)
     return problem

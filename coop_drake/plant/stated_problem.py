@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
+from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.problem import PlanningProblem
+from coop_drake.scenario.limits import ALL_ROBOTS, RobotLimits
 from coop_drake.scenario.model import Scenario
 from coop_drake.tree.component_tree import ComponentTree
 
 
-def stated_problem(scenario: Scenario, tree: ComponentTree, joints: Mapping[str, int]) -> PlanningProblem:
+def stated_problem(
+    scenario: Scenario, tree: ComponentTree, joints: Mapping[str, int], limits: TeamLimits
+) -> PlanningProblem:
     """Put floor, team, start and goal together.
 
     Args:
         scenario: The scenario; its joint values have been checked, or will be.
         tree: The team as seen from the object.
         joints: The robots in their order, each with its number of joints.
+        limits: What the models say about largest speeds.
     """
     start, goal = scenario.start, scenario.goal
     values = [value for robot in joints for value in start.joints.get(robot, ())]
@@ -33,4 +39,20 @@ def stated_problem(scenario: Scenario, tree: ComponentTree, joints: Mapping[str,
         angle_tolerance=goal.tolerances.angle,
         joint_tolerance=goal.tolerances.joint,
         settings=scenario.planner,
+        limits=_stated_limits(scenario, joints, limits),
     )
+
+
+def _stated_limits(scenario: Scenario, joints: Mapping[str, int], limits: TeamLimits) -> TeamLimits:
+    """Limits of the models with those that the scenario states in their place."""
+    speeds, turns, rates = limits.base_speeds.copy(), limits.turn_rates.copy(), limits.joint_rates.copy()
+    first = 0
+    for k, (robot, count) in enumerate(joints.items()):
+        stated = scenario.limits.get(robot, scenario.limits.get(ALL_ROBOTS, RobotLimits()))
+        speeds[k] = speeds[k] if stated.base_speed is None else stated.base_speed
+        turns[k] = turns[k] if stated.base_turn_rate is None else stated.base_turn_rate
+        given = stated.joint_rates * count if len(stated.joint_rates) == 1 else stated.joint_rates
+        for i, rate in enumerate(given):
+            rates[first + i] = rates[first + i] if rate is None else rate
+        first += count
+    return replace(limits, base_speeds=speeds, turn_rates=turns, joint_rates=rates)

@@ -8,6 +8,7 @@ from coop_drake.plant.chain import limits_of
 from coop_drake.plant.placement import collisions, wall_clearance
 from coop_drake.plant.team import TeamPlant
 from coop_drake.scenario import Scenario
+from coop_drake.scenario.limits import ALL_ROBOTS
 
 
 def check_joints(scenario: Scenario, team: TeamPlant) -> None:
@@ -18,6 +19,7 @@ def check_joints(scenario: Scenario, team: TeamPlant) -> None:
     """
     _check_section(scenario, team, "start.joints", scenario.start.joints)
     _check_section(scenario, team, "goal.joints", scenario.goal.joints)
+    _check_rates(scenario, team)
     for robot in team.robots:
         if robot.joints and robot.name not in scenario.start.joints:
             allowed = f"a list of {len(robot.joints)}, the values of {', '.join(robot.joint_names)}"
@@ -42,6 +44,17 @@ def _check_section(
             if value is not None and not lower <= value <= upper:
                 allowed = f"a value of {robot.joint_names[place]} between its limits {lower:g} and {upper:g}"
                 raise ScenarioError(file, f"{key}.{name}[{place}]", value, allowed)
+
+
+def _check_rates(scenario: Scenario, team: TeamPlant) -> None:
+    """Refuse limits of joints that are not as many as the joints."""
+    for robot in team.robots:
+        name = robot.name if robot.name in scenario.limits else ALL_ROBOTS
+        given = scenario.limits[name].joint_rates if name in scenario.limits else ()
+        if len(given) not in (0, 1, len(robot.joints)):
+            names = ", ".join(robot.joint_names) or "no joints"
+            allowed = f"one for all joints, or a list of {len(robot.joints)}, for {names} of {robot.name}"
+            raise ScenarioError(str(scenario.path), f"limits.{name}.joint_rates", list(given), allowed)
 
 
 def check_places(scenario: Scenario, problem: PlanningProblem) -> None:

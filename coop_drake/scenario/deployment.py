@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from math import ceil, sqrt
 from typing import Annotated, Literal
 
+from coop_drake.scenario.limits import ALL_ROBOTS
 from coop_drake.scenario.presets import Preset, with_preset
 from coop_drake.typed_data import Limits, NotNegative, Positive
 
@@ -34,9 +35,6 @@ RelativeError = Annotated[float, Limits(at_least=-0.9, at_most=10.0)]
 
 _ALMOST_ALL = 0.99
 """Largest probability of losses for which gains are scheduled [-]; where all is lost no gain would help."""
-
-ALL_ROBOTS = "*"
-"""Name that stands for all robots without an entry of their own."""
 
 
 @dataclass(frozen=True)

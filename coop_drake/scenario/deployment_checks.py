@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 
 from coop_drake.errors import ScenarioError
-from coop_drake.scenario.deployment import ALL_ROBOTS
+from coop_drake.scenario.limits import ALL_ROBOTS
 from coop_drake.scenario.model import Scenario
 
 _SAMPLED = ("sample_offset", "switch_delay", "silence")

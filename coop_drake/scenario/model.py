@@ -13,6 +13,7 @@ from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains
 from coop_drake.scenario.control import Control
 from coop_drake.scenario.deployment import Deployment
 from coop_drake.scenario.directive import Directive
+from coop_drake.scenario.limits import RobotLimits
 from coop_drake.tree.pose import PlanarPose
 from coop_drake.typed_data import Limits, Positive
 
@@ -237,6 +238,8 @@ class Scenario:
         maps: Accuracy of the harmonic maps.
         plant: Model of the grasps in the simulated plant.
         simulator: Numerical integration of the closed loop.
+        limits: Largest speeds of robots, by name; ``"*"`` for all that have no entry of their own. Transports
+            are planned and driven so that these, and those of the robots' models, are kept.
         deployment: Departures of the real team from the ideal one.
         control: Additions to the controllers.
         visualization: Appearance of recordings.
@@ -255,6 +258,7 @@ class Scenario:
     maps: MapSettings = field(default_factory=MapSettings)
     plant: PlantSettings = field(default_factory=PlantSettings)
     simulator: SimulatorSettings = field(default_factory=SimulatorSettings)
+    limits: dict[str, RobotLimits] = field(default_factory=dict)
     deployment: Deployment = field(default_factory=Deployment)
     control: Control = field(default_factory=Control)
     visualization: VisualizationSettings = field(default_factory=VisualizationSettings)

@@ -3,6 +3,7 @@
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.assembly import assemble
 from coop_drake.scenario.deployment_checks import check_deployment
+from coop_drake.scenario.limits import ALL_ROBOTS
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.rings import check_workspace
 
@@ -28,9 +29,9 @@ def validate(scenario: Scenario) -> None:
         raise ScenarioError(
             file, "control.hold.silence", hold.silence, "null without deployment.control_rate"
         )
-    for section in ("fixed_joints", "load_shares"):
+    for section in ("fixed_joints", "load_shares", "limits"):
         for name in getattr(scenario, section):
-            if name not in robots:
+            if name not in robots and (section, name) != ("limits", ALL_ROBOTS):
                 raise ScenarioError(file, f"{section}.{name}", name, "a robot, one of " + ", ".join(robots))
     _check_load_shares(scenario, robots)
 

@@ -5,8 +5,15 @@ from __future__ import annotations
 from coop_drake.compiled import compiled
 from coop_drake.fields.flat_field import velocity_in_field
 from coop_drake.geometry.boundary import signed_distance
-from coop_drake.laws.governor import governed_acceleration, governor_velocity, object_energy_margin
-from coop_drake.laws.hand_over import SMOOTHING, governed_gains
+from coop_drake.laws.governor import (
+    driving_margin,
+    governed_acceleration,
+    governor_velocity,
+    object_energy_margin,
+    steady_clearance,
+)
+from coop_drake.laws.hand_over import SMOOTHING, SPEED_LIMIT, governed_gains
+from coop_drake.laws.speed_limit import speed_damping
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["accelerate_object", "cell_margin", "govern"]
@@ -31,22 +38,27 @@ def cell_margin(
 @compiled
 def accelerate_object(
     gains: tuple[float, float, float],
+    speed_limit: float,
     object_state: FloatArray,
     governor_position: FloatArray,
     acceleration: FloatArray,
 ) -> None:
-    """Write ``governed_acceleration`` of both coordinates, shape (2,) [m/s^2].
+    """Write ``governed_acceleration`` of both coordinates with the damping that keeps the speed limit.
+
+    The rate at which the speed may approach its limit is zeta.
 
     Args:
         gains: K, zeta and K_G now.
+        speed_limit: Largest speed of the object's origin, infinity for none [m/s].
         object_state: Pose and twist of the object, shape (6,).
         governor_position: p_G, shape (2,) [m].
-        acceleration: Receives them.
+        acceleration: Receives both coordinates, shape (2,) [m/s^2].
     """
-    for i in range(2):
-        acceleration[i] = governed_acceleration(
-            object_state[i], object_state[3 + i], governor_position[i], gains[0], gains[1]
-        )
+    vx, vy = object_state[3], object_state[4]
+    ax = governed_acceleration(object_state[0], vx, governor_position[0], gains[0], gains[1])
+    ay = governed_acceleration(object_state[1], vy, governor_position[1], gains[0], gains[1])
+    damping = speed_damping(ax * vx + ay * vy, vx * vx + vy * vy, speed_limit, gains[1])
+    acceleration[0], acceleration[1] = ax - damping * vx, ay - damping * vy
 
 
 @compiled
@@ -63,7 +75,7 @@ def govern(
     """Write p_G', then the desired acceleration of L's origin, both of (14), and return Delta E of (15).
 
     Args:
-        row: The governor's row, see ``governed_gains``, shape (8,).
+        row: The governor's row, see ``governed_gains``, shape (9,).
         edges: Edges of the governed set, shape (edges, 4) [m].
         flat: The cell's map, as ``VelocityField.kernel_arguments`` has it.
         field: What the velocity field adds to the map.
@@ -75,12 +87,14 @@ def govern(
     Returns:
         Delta E [m^2/s^2].
     """
-    gains = governed_gains(row, time)
-    accelerate_object(gains, object_state, governor_position, command[2:])
-    margin = cell_margin(edges, gains[0], object_state, governor_position)
-    if margin <= 0.0:  # the map is not evaluated in vain
+    gains, limit = governed_gains(row, time), row[SPEED_LIMIT]
+    accelerate_object(gains, limit, object_state, governor_position, command[2:])
+    clearance = signed_distance(edges, governor_position[0], governor_position[1])
+    margin = object_energy_margin(object_state, governor_position, clearance, gains[0])
+    driving = driving_margin(margin, clearance, steady_clearance(limit, *gains), gains[0])
+    if driving <= 0.0:  # the map is not evaluated in vain
         command[0], command[1] = 0.0, 0.0
         return margin
     vx, vy = velocity_in_field(flat, field, governor_position[0], governor_position[1])
-    command[0], command[1] = governor_velocity(vx, vy, margin, gains[0], gains[2], row[SMOOTHING])
+    command[0], command[1] = governor_velocity(vx, vy, driving, gains[0], gains[2], row[SMOOTHING])
     return margin

@@ -12,8 +12,8 @@ from coop_drake.compiled import prepared
 from coop_drake.fields import VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.laws.gains import TransitionGains
-from coop_drake.laws.governor import governor_velocity
-from coop_drake.laws.hand_over import governed_gains
+from coop_drake.laws.governor import driving_margin, governor_velocity, steady_clearance
+from coop_drake.laws.hand_over import SPEED_LIMIT, governed_gains
 from coop_drake.systems.block import NUMBER, VECTOR, Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 from coop_drake.systems.funnel_clock import CLOCK_SIZE
@@ -41,7 +41,7 @@ class GovernedCell:
 
     @cached_property
     def row(self) -> FloatArray:
-        """The governor's row, see ``governed_gains``, shape (8,)."""
+        """The governor's row, see ``governed_gains``, shape (9,)."""
         return self.gains.governor_row(self.before or self.gains)
 
     def prepared_law(self) -> Callable[[float, FloatArray, FloatArray, FloatArray], object]:
@@ -63,10 +63,12 @@ class GovernedCell:
             command: Receives both, shape (4,) [m/s, m/s^2].
         """
         gains, edges = governed_gains(self.row, time), self.clearance.edges
+        clearance, limit = self.clearance(governor_position), self.row[SPEED_LIMIT]
         margin = cell_margin(edges, gains[0], object_state, governor_position)
+        driving = driving_margin(margin, clearance, steady_clearance(limit, *gains), gains[0])
         vx, vy = (float(part) for part in self.field(governor_position))
-        command[:2] = governor_velocity(vx, vy, margin, gains[0], gains[2], self.gains.smoothing)
-        accelerate_object(gains, object_state, governor_position, command[2:])
+        command[:2] = governor_velocity(vx, vy, driving, gains[0], gains[2], self.gains.smoothing)
+        accelerate_object(gains, limit, object_state, governor_position, command[2:])
 
 
 class ReferenceGovernor(Block):

@@ -21,7 +21,7 @@ class FusedCell(NamedTuple):
     """One cell for the whole team.
 
     Attributes:
-        row: The governor's row, see ``governed_gains``, shape (8,).
+        row: The governor's row, see ``governed_gains``, shape (9,).
         edges: Edges of the governed set, shape (edges, 4) [m].
         flat: The cell's map, as ``VelocityField.kernel_arguments`` has it.
         field: What the velocity field adds to the map.

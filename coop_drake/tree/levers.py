@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import hypot
+
 import numpy as np
 
 from coop_drake.tree.component_tree import ComponentTree
@@ -48,3 +50,39 @@ def configuration_scale(tree: ComponentTree) -> FloatArray:
     It is the lever, but at least ``_LEAST_LEVER``: a joint that moves no solid body still has to be moved.
     """
     return np.maximum([1.0, 1.0, *axis_levers(tree)], _LEAST_LEVER)
+
+
+def point_levers(tree: ComponentTree, component: int, point: tuple[float, float]) -> FloatArray:
+    """Bound how far a point of a component moves per unit of (theta, q...), in all configurations.
+
+    Args:
+        tree: The team.
+        component: Index of the component.
+        point: In the component's frame [m].
+
+    Returns:
+        Shape (1 + n,), in m/rad for an angle and without a unit for a prismatic joint; 0 for joints that do
+        not move the point.
+    """
+    levers, reach = np.zeros(1 + len(tree.joints)), hypot(*point)
+    for index in tree.ancestors[component]:
+        joint = tree.components[index].joint
+        if joint is None:
+            levers[0] = reach
+            continue
+        along = hypot(*joint.axis)
+        levers[1 + joint.index] = reach if joint.kind == "revolute" else along
+        slide = 0.0 if joint.kind == "revolute" else along * max(abs(joint.lower), abs(joint.upper))
+        reach += slide + hypot(joint.X_PJ.x, joint.X_PJ.y)
+    return levers
+
+
+def turn_levers(tree: ComponentTree, component: int) -> FloatArray:
+    """Return by how much a component turns at most per unit of (theta, q...), shape (1 + n,) [-]."""
+    levers = np.zeros(1 + len(tree.joints))
+    levers[0] = 1.0
+    for index in tree.ancestors[component]:
+        joint = tree.components[index].joint
+        if joint is not None and joint.kind == "revolute":
+            levers[1 + joint.index] = 1.0
+    return levers

@@ -19,6 +19,7 @@ from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.gains import check_gains
 from coop_drake.verification.problem_match import check_problem
 from coop_drake.verification.question import question_of
+from coop_drake.verification.speeds import check_speeds
 
 
 def verify_plan(
@@ -41,9 +42,9 @@ def verify_plan(
     same = check_problem(plan, problem)
     exact = _exactly(problem, plan_document(plan), progress)
     checks = [same, *exact, check_gains(plan, gain_sets)]
-    tolerated = check_budget(plan)
-    if tolerated is not None:
-        checks.append(tolerated)
+    checks += [
+        further for further in (check_speeds(plan, problem), check_budget(plan)) if further is not None
+    ]
     return Verified("found", f"plan of {len(plan.cells)} cells", tuple(checks))
 
 

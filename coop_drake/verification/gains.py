@@ -23,6 +23,8 @@ SAME_PLACE = 1e-9
 def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
     """Compute the gains of every transition again; all that is geometry belongs to the exact checker.
 
+    Limits of speed are taken as they are stated; ``check_speeds`` checks them.
+
     The estimated time comes of a simulation and does not matter for safety: it is the only figure that
     nothing but the digest of the file protects.
 
@@ -51,6 +53,8 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
             goal_lower=transition.goal_lower,
             goal_upper=transition.goal_upper,
             resting=resting,
+            speed_limit=transition.gains.speed_limit,
+            rate_limit=transition.gains.rate_limit,
         )
         if tolerance is not None:  # the condition of rest follows from the budget
             gains = replace(gains, rest=transition.gains.rest)

@@ -23,6 +23,8 @@ MOTION = {
     "tracking_energy",
     "governed_acceleration",
     "governor_velocity",
+    "driving_margin",
+    "speed_damping",
     "axis_bounds",
     "track_axis",
 }

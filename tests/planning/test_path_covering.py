@@ -104,8 +104,9 @@ def test_a_long_aisle_is_crossed_at_the_governors_speed():
     lower, upper = np.array([-0.1]), np.array([0.1])
     state = np.zeros(5)
     seconds = cross_box(
-        state, places, room, lower, upper, np.array([lower, upper]), np.zeros(1), schedule, 0.0, 60.0
-    )
+        state, places, room, lower, upper, np.array([lower, upper]), np.zeros(1), schedule,
+        np.full(2, np.inf), 0.0, 60.0,
+    )  # fmt: skip
     gains = transition_gains(
         ScheduledGains(), clearance=0.2, slice_lower=lower, slice_upper=upper,
         goal_lower=lower, goal_upper=upper, resting=np.zeros(1),

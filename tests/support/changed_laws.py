@@ -105,8 +105,9 @@ def estimated(plan: Plan):
     path = np.array([plan.start[:2], plan.transitions[0].target])
     edges, gains, table = cells[0]
     seconds = cross_cell(
-        state, np.zeros(n), edges, path, gains, table, plan.transitions[0].inradius, *cells[1], False, 10.0
-    )
+        state, np.zeros(n), edges, path, gains, table, plan.transitions[0].inradius, *cells[1], False, 10.0,
+        np.zeros(1 + n),
+    )  # fmt: skip
     return np.array([*state, seconds])
 
 
@@ -115,7 +116,8 @@ def crossed():
     state, axis = np.zeros(5), np.array([0.0])
     seconds = cross_box(
         state, np.array([0.0, 0.5]), np.array([0.2, 0.2]), axis - 0.5, axis + 0.5,
-        np.array([axis + 0.1, axis + 0.4]), axis, schedule_of(ScheduledGains()), 0.0, 5.0,
+        np.array([axis + 0.1, axis + 0.4]), axis, schedule_of(ScheduledGains()),
+        np.full(2, np.inf), 0.0, 5.0,
     )  # fmt: skip
     return np.array([*state, seconds])
 

@@ -120,6 +120,8 @@ def _with_gains(plan: Plan, gain_set: ScheduledGains) -> tuple[Transition, ...]:
             goal_lower=transition.goal_lower,
             goal_upper=transition.goal_upper,
             resting=resting,
+            speed_limit=transition.gains.speed_limit,
+            rate_limit=transition.gains.rate_limit,
         )
         transitions.append(replace(transition, gains=gains))
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)

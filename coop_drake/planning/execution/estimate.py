@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite, sqrt
+from math import isfinite
 
 import numpy as np
 
@@ -11,11 +11,13 @@ from coop_drake.answers.plan import Plan
 from coop_drake.geometry.boundary import edges_of
 from coop_drake.laws import TransitionGains
 from coop_drake.laws.axis_table import axis_table, first_jumps
+from coop_drake.laws.governor import steady_clearance
 from coop_drake.planning.execution.transport_kernels import cross_cell
 from coop_drake.planning.travel_time import transition_time
 from coop_drake.tree.pose import FloatArray
 
 __all__ = [
+    "estimated",
     "plan_time",
     "speed_per_clearance",
     "timed",
@@ -26,20 +28,8 @@ LONGEST = 120.0
 
 
 def speed_per_clearance(gains: TransitionGains) -> float:
-    """Return the speed of the governed object in a long aisle over its clearance there.
-
-    At a steady speed v behind the governor (14)-(16) the object lags by zeta v / K, so that
-    E = v^2 (1 + zeta^2 / K) / 2, and v = K_G sqrt(Delta E / K) gives
-    v / d = sqrt(K / (2 K / K_G^2 + 1 + zeta^2 / K)). A change of ``laws/governor.py`` changes this form.
-
-    Args:
-        gains: Gains of the transition.
-
-    Returns:
-        v / d [1/s].
-    """
-    K, K_G, zeta = gains.stiffness, gains.governor_gain, gains.damping
-    return sqrt(K / (2.0 * K / K_G**2 + 1.0 + zeta**2 / K))
+    """Return the speed of the governed object in a long aisle over its clearance there, v / d [1/s]."""
+    return 1.0 / steady_clearance(1.0, gains.stiffness, gains.damping, gains.governor_gain)
 
 
 def plan_time(plan: Plan) -> float:
@@ -48,7 +38,12 @@ def plan_time(plan: Plan) -> float:
 
 
 def timed(plan: Plan) -> Plan:
-    """Estimate the time of every transition of a plan.
+    """Return the plan with the times of ``estimated``."""
+    return estimated(plan)[0]
+
+
+def estimated(plan: Plan) -> tuple[Plan, FloatArray]:
+    """Estimate the time of every transition of a plan, and the largest speeds.
 
     The closed loop is integrated from cell to cell: a point mass behind the governor (14)-(16) with the exact
     distance to the boundary of Q_i, a double integrator in its funnel for every axis, and the conditions of
@@ -59,7 +54,8 @@ def timed(plan: Plan) -> Plan:
         plan: The plan; its present estimates are not read.
 
     Returns:
-        The plan with estimates; ``transition_time`` where a transition is not left within two minutes.
+        The plan with estimates; ``transition_time`` where a transition is not left within two minutes. And
+        the largest speed of the object, then those of the axes (theta, q...), shape (2 + n,) [m/s, rad/s].
     """
     crossings = [
         (
@@ -72,7 +68,7 @@ def timed(plan: Plan) -> Plan:
     jumps = first_jumps(crossings[0][2], plan.start[2:])
     following = [*crossings[1:], crossings[-1]]
     state = _at_rest(plan.start[:2], plan.start[2:])
-    transitions = []
+    transitions, peaks = [], np.zeros(len(plan.start) - 1)
     for index, (transition, (edges, gains, table)) in enumerate(
         zip(plan.transitions, crossings, strict=True)
     ):
@@ -80,7 +76,7 @@ def timed(plan: Plan) -> Plan:
         next_edges, next_gains, next_table = following[index]
         seconds = cross_cell(
             state, jumps, edges, transition.path, gains, table, transition.inradius,
-            next_edges, next_gains, next_table, last, LONGEST,
+            next_edges, next_gains, next_table, last, LONGEST, peaks,
         )  # fmt: skip
         if not isfinite(seconds):
             speed = speed_per_clearance(transition.gains)
@@ -88,7 +84,7 @@ def timed(plan: Plan) -> Plan:
             state = _at_rest(transition.target, 0.5 * (transition.goal_lower + transition.goal_upper))
             jumps[:] = 0.0
         transitions.append(replace(transition, estimated_time=seconds))
-    return replace(plan, transitions=tuple(transitions))
+    return replace(plan, transitions=tuple(transitions)), peaks
 
 
 def _at_rest(position: FloatArray, axes: FloatArray) -> FloatArray:

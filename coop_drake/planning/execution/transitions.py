@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import cos, pi, sin
+from math import cos, isfinite, pi, sin
 
 import numpy as np
 import shapely
@@ -21,7 +21,8 @@ from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.laws import GainSet, TransitionGains, transition_gains
 from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.execution.channel_ends import Bounds, check_ends, goal_intervals, turned_to_start
-from coop_drake.planning.execution.estimate import timed
+from coop_drake.planning.execution.estimate import plan_time, timed
+from coop_drake.planning.execution.speed_shares import limits_of, speed_shares, stated_speeds
 from coop_drake.planning.execution.targets import choose_targets
 from coop_drake.planning.travel_time import travel_time
 from coop_drake.progress import Progress
@@ -91,7 +92,24 @@ def make_plan(
         gain_set=gain_set_name,
         problem=problem_digest(problem),
     )
-    return _timed(problem, made, routes)
+    return _checked(problem, keep_limits(problem, timed(made), gain_set), routes)
+
+
+def keep_limits(problem: PlanningProblem, plan: Plan, gain_set: GainSet) -> Plan:
+    """Return a plan that keeps the limits of speed, the quickest of a few ways to share them among the axes.
+
+    Args:
+        problem: What was asked, with the limits.
+        plan: A plan with the gains of the gain set, without limits of speed.
+        gain_set: Gains, fixed or to be scheduled.
+    """
+    if not problem.limits.any:
+        return plan
+    tried = []
+    for shares in speed_shares(problem, plan):
+        limited = timed(with_gains(plan, gain_set, plan.gain_set, shares))
+        tried.append(replace(limited, speeds=stated_speeds(problem, shares)))
+    return min(tried, key=plan_time)
 
 
 def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
@@ -99,19 +117,20 @@ def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
     return timed(with_gains(plan, gain_set, name))
 
 
-def with_gains(plan: Plan, gain_set: GainSet, name: str) -> Plan:
+def with_gains(plan: Plan, gain_set: GainSet, name: str, limits: FloatArray | None = None) -> Plan:
     """A plan with the gains of another gain set; its estimated times are kept.
 
     Args:
         plan: The plan.
         gain_set: Gains, fixed or to be scheduled.
         name: Name under which the scenario knows them.
+        limits: Largest speed of the object and rates of all axes, shape (2 + n,); those of the plan if None.
     """
-    resting = plan.start[2:]
+    resting, limits = plan.start[2:], limits_of(plan) if limits is None else limits
     transitions = []
     for cell, transition in zip(plan.cells, plan.transitions, strict=True):
         goals = (transition.goal_lower, transition.goal_upper)
-        gains = _gains(gain_set, cell, transition.neck, goals, resting)
+        gains = _gains(gain_set, cell, transition.neck, goals, resting, limits)
         transitions.append(replace(transition, gains=gains))
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
     return replace(plan, transitions=tuple(transitions), gain_set=name)
@@ -146,9 +165,8 @@ def _route(
     return route
 
 
-def _timed(problem: PlanningProblem, plan: Plan, routes: Sequence[_TransitionGeometry]) -> Plan:
-    """The plan with estimated times; raises a StallError if one of them is too long."""
-    plan = timed(plan)
+def _checked(problem: PlanningProblem, plan: Plan, routes: Sequence[_TransitionGeometry]) -> Plan:
+    """The plan; raises a StallError if one of its estimated times is too long."""
     for index, (route, transition) in enumerate(zip(routes, plan.transitions, strict=True)):
         if transition.estimated_time > problem.settings.max_transition_time:
             raise StallError(_stall(problem, index, route, transition.estimated_time))
@@ -194,8 +212,14 @@ def _cell(box: FreeBox, entry: FloatArray, target: FloatArray, index: int) -> Ce
 
 
 def _gains(
-    gain_set: GainSet, cell: Cell, clearance: float, goal: Bounds, resting: FloatArray
+    gain_set: GainSet,
+    cell: Cell,
+    clearance: float,
+    goal: Bounds,
+    resting: FloatArray,
+    limits: FloatArray | None = None,
 ) -> TransitionGains:
+    speed = None if limits is None or not isfinite(limits[0]) else float(limits[0])
     return transition_gains(
         gain_set,
         clearance=clearance,
@@ -204,6 +228,8 @@ def _gains(
         goal_lower=goal[0],
         goal_upper=goal[1],
         resting=resting,
+        speed_limit=speed,
+        rate_limit=None if limits is None else limits[1:],
     )
 
 

@@ -20,19 +20,22 @@ from coop_drake.laws.axis_table import (
     REST_RATE,
     SATURATION,
     bounds_of,
+    limited_row,
     rest_jump,
     track_row,
 )
 from coop_drake.laws.governor import (
     ATTRACTION_RATE,
     FIELD_SPEED,
+    driving_margin,
     energy_margin,
     governed_acceleration,
     governor_velocity,
     slowdown_radius,
+    steady_clearance,
     tracking_energy,
 )
-from coop_drake.laws.hand_over import SMOOTHING, STIFFNESS, fading, governed_gains
+from coop_drake.laws.hand_over import SMOOTHING, SPEED_LIMIT, STIFFNESS, fading, governed_gains
 from coop_drake.laws.readiness import (
     axis_arrival,
     axis_ready,
@@ -40,6 +43,7 @@ from coop_drake.laws.readiness import (
     hand_over_margin,
     position_arrival,
 )
+from coop_drake.laws.speed_limit import speed_damping
 from coop_drake.tree.pose import FloatArray
 
 __all__ = ["PERIOD", "axis_frequency", "cross_cell"]
@@ -118,16 +122,23 @@ def _rates(
     for i in range(2):
         result[i] = state[2 + i]
         result[2 + i] = governed_acceleration(state[i], state[2 + i], state[4 + i], stiffness, damping)
+    power, speed_squared = result[2] * state[2] + result[3] * state[3], state[2] ** 2 + state[3] ** 2
+    braking = speed_damping(power, speed_squared, row[SPEED_LIMIT], damping)
+    result[2] -= braking * state[2]
+    result[3] -= braking * state[3]
     result[4], result[5] = 0.0, 0.0
-    if margin > 0.0:
+    most = steady_clearance(row[SPEED_LIMIT], stiffness, damping, gain)
+    driving = driving_margin(margin, clearance, most, stiffness)
+    if driving > 0.0:
         ahead = max(LOOKAHEAD * clearance, SHORTEST_LOOKAHEAD)
         vx, vy = _steer(path, state[4], state[5], ahead, slowdown_radius(FIELD_SPEED, gain))
-        result[4], result[5] = governor_velocity(vx, vy, margin, stiffness, gain, row[SMOOTHING])
+        result[4], result[5] = governor_velocity(vx, vy, driving, stiffness, gain, row[SMOOTHING])
     m = table.shape[0]
     left = fading(time, table[0, FADING_TIME])
     for i in range(m):
         x, rate = state[6 + i], state[6 + m + i]
-        result[6 + i], result[6 + m + i] = rate, track_row(table[i], time, x, rate)[0] + left * jumps[i]
+        wanted = track_row(table[i], time, x, rate)[0] + left * jumps[i]
+        result[6 + i], result[6 + m + i] = rate, limited_row(table[i], wanted, rate)
 
 
 @compiled
@@ -203,6 +214,15 @@ def _steps(state: FloatArray, time: float, row: FloatArray, table: FloatArray) -
 
 
 @compiled
+def _note_peaks(state: FloatArray, peaks: FloatArray) -> None:
+    """Write the speed of the object and the rates of all axes where they are larger than before."""
+    peaks[0] = max(peaks[0], hypot(state[2], state[3]))
+    m = peaks.size - 1
+    for i in range(m):
+        peaks[1 + i] = max(peaks[1 + i], abs(state[6 + m + i]))
+
+
+@compiled
 def cross_cell(
     state: FloatArray,
     jumps: FloatArray,
@@ -216,6 +236,7 @@ def cross_cell(
     next_table: FloatArray,
     last: bool,
     time_limit: float,
+    peaks: FloatArray,
 ) -> float:
     """Integrate one transition until it may be left, and leave the state as it is then.
 
@@ -225,7 +246,7 @@ def cross_cell(
             switch to the next one are written there.
         edges: Edges of Q, shape (e, 4) [m].
         path: Path to the target, shape (k, 2) [m].
-        row: The governor's row, see ``governed_gains``, shape (8,).
+        row: The governor's row, see ``governed_gains``, shape (9,).
         table: The axes in this cell, shape (m, ``LAW_COLUMNS``).
         inradius: R, in the last cell the tolerance of the goal's position [m].
         next_edges: Edges of the next cell.
@@ -233,6 +254,8 @@ def cross_cell(
         next_table: ``table`` of the next cell.
         last: Whether the object shall come to rest here; the next cell's data are then not read.
         time_limit: Longest time [s].
+        peaks: Largest speed of the object so far, then largest rates of all axes, shape (1 + m,); what is
+            larger on the way is written there [m/s, rad/s or m/s].
 
     Returns:
         Time that passed [s]; infinite beyond the limit.
@@ -256,5 +279,6 @@ def cross_cell(
             _rates(state + 0.5 * h * k2, t + 0.5 * h, edges, path, row, table, jumps, k3)
             _rates(state + h * k3, t + h, edges, path, row, table, jumps, k4)
             state += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            _note_peaks(state, peaks)
         time += PERIOD
     return np.inf

@@ -43,6 +43,7 @@ class Waypoints(NamedTuple):
         pads: Paddings of a box to choose from, shape (p,) [rad or m].
         goals: Lower and upper ends of the last goal intervals, shape (2, m) [rad, m].
         schedule: The rules by which gains are chosen.
+        limits: Largest speed of the object, then largest rates of all axes, shape (1 + m,) [m/s, rad/s].
         least_clearance: Clearance that every waypoint must keep [m].
         tolerance: Tolerance of the goal's position [m].
     """
@@ -54,6 +55,7 @@ class Waypoints(NamedTuple):
     pads: FloatArray
     goals: FloatArray
     schedule: Schedule
+    limits: FloatArray
     least_clearance: float
     tolerance: float
 
@@ -151,7 +153,7 @@ def _reach(
         time = best[i, p] + BOX_COST / waypoints.pads[p]
         time += cross_box(
             state, waypoints.places[i : j + 1], clearances, lower, upper, ends, waypoints.path[i, 2:],
-            waypoints.schedule, waypoints.tolerance if last else 0.0, limit,
+            waypoints.schedule, waypoints.limits, waypoints.tolerance if last else 0.0, limit,
         )  # fmt: skip
         if time < best[j, q]:
             best[j, q] = time

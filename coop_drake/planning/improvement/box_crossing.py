@@ -18,19 +18,23 @@ from coop_drake.laws.axis_table import (
     LAW_COLUMNS,
     LOG_GAIN,
     SATURATION,
+    limited_row,
     track_row,
     write_row,
 )
 from coop_drake.laws.gain_schedule import Schedule, scheduled_axis, scheduled_governor
 from coop_drake.laws.governor import (
     FIELD_SPEED,
+    driving_margin,
     energy_margin,
     governed_acceleration,
     governor_velocity,
     slowdown_radius,
+    steady_clearance,
     tracking_energy,
 )
 from coop_drake.laws.readiness import axis_arrival, clearance_margin, interval_margin, position_arrival
+from coop_drake.laws.speed_limit import damped
 from coop_drake.planning.execution.transport_kernels import PERIOD, axis_frequency
 from coop_drake.tree.pose import FloatArray
 
@@ -76,6 +80,7 @@ def _advance_position(
     clearances: FloatArray,
     gains: tuple[float, float, float],
     smoothing: float,
+    limit: float,
 ) -> None:
     """Take one step of (s, s', s_G) at constant speed of p_G, which changes slowly against the step."""
     s, v, g = state[0], state[1], state[2]
@@ -83,15 +88,16 @@ def _advance_position(
     d = _clearance_at(arc_lengths, clearances, g)
     margin = energy_margin(tracking_energy(s - g, 0.0, v, 0.0, stiffness), d, stiffness)
     field = FIELD_SPEED * min(1.0, max(arc_lengths[-1] - g, 0.0) / slowdown_radius(FIELD_SPEED, gain))
-    speed, _ = governor_velocity(field, 0.0, margin, stiffness, gain, smoothing)
+    driving = driving_margin(margin, d, steady_clearance(limit, stiffness, damping, gain), stiffness)
+    speed, _ = governor_velocity(field, 0.0, driving, stiffness, gain, smoothing)
     middle = g + 0.5 * h * speed
-    a1 = governed_acceleration(s, v, g, stiffness, damping)
+    a1 = damped(governed_acceleration(s, v, g, stiffness, damping), v, limit, damping)
     v2 = v + 0.5 * h * a1
-    a2 = governed_acceleration(s + 0.5 * h * v, v2, middle, stiffness, damping)
+    a2 = damped(governed_acceleration(s + 0.5 * h * v, v2, middle, stiffness, damping), v2, limit, damping)
     v3 = v + 0.5 * h * a2
-    a3 = governed_acceleration(s + 0.5 * h * v2, v3, middle, stiffness, damping)
+    a3 = damped(governed_acceleration(s + 0.5 * h * v2, v3, middle, stiffness, damping), v3, limit, damping)
     v4 = v + h * a3
-    a4 = governed_acceleration(s + h * v3, v4, g + h * speed, stiffness, damping)
+    a4 = damped(governed_acceleration(s + h * v3, v4, g + h * speed, stiffness, damping), v4, limit, damping)
     state[0] = s + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4)
     state[1] = v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
     state[2] = g + h * speed
@@ -106,13 +112,13 @@ def _advance_axis(state: FloatArray, at: int, m: int, time: float, row: FloatArr
     for k in range(steps):
         t = time + k * h
         x, v1 = state[at], state[at + m]
-        a1 = track_row(row, t, x, v1)[0]
+        a1 = limited_row(row, track_row(row, t, x, v1)[0], v1)
         v2 = v1 + 0.5 * h * a1
-        a2 = track_row(row, t + 0.5 * h, x + 0.5 * h * v1, v2)[0]
+        a2 = limited_row(row, track_row(row, t + 0.5 * h, x + 0.5 * h * v1, v2)[0], v2)
         v3 = v1 + 0.5 * h * a2
-        a3 = track_row(row, t + 0.5 * h, x + 0.5 * h * v2, v3)[0]
+        a3 = limited_row(row, track_row(row, t + 0.5 * h, x + 0.5 * h * v2, v3)[0], v3)
         v4 = v1 + h * a3
-        a4 = track_row(row, t + h, x + h * v3, v4)[0]
+        a4 = limited_row(row, track_row(row, t + h, x + h * v3, v4)[0], v4)
         state[at] = x + h / 6.0 * (v1 + 2.0 * v2 + 2.0 * v3 + v4)
         state[at + m] = v1 + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
 
@@ -171,6 +177,7 @@ def cross_box(
     goal_intervals: FloatArray,
     axis_rest: FloatArray,
     schedule: Schedule,
+    limits: FloatArray,
     tolerance: float,
     time_limit: float,
 ) -> float:
@@ -185,6 +192,8 @@ def cross_box(
         goal_intervals: Lower and upper ends of the goal intervals, shape (2, m).
         axis_rest: Where the axes were aimed at before, shape (m,).
         schedule: The rule that gives the gains.
+        limits: Largest speed of the object, then largest rates of all axes, infinity for none, shape
+            (1 + m,) [m/s, rad/s or m/s].
         tolerance: Of the goal's position in the last box, otherwise 0 [m].
         time_limit: Longest time [s].
 
@@ -198,13 +207,13 @@ def cross_box(
     for a in range(m):
         ends = lower[a], upper[a], goal_intervals[0, a], goal_intervals[1, a]
         scheduled = scheduled_axis(
-            schedule, a > 0, ends[0], ends[1], ends[2], ends[3], axis_rest[a], narrowest
+            schedule, a > 0, ends[0], ends[1], ends[2], ends[3], axis_rest[a], narrowest, limits[1 + a]
         )
         gains_of_axes = (
             schedule.position_gain, schedule.rate_gain, schedule.ramp_rate, schedule.saturation,
             schedule.hand_over_time,
         )  # fmt: skip
-        write_row(table[a], ends, scheduled, gains_of_axes, schedule.quintic)
+        write_row(table[a], ends, scheduled, gains_of_axes, schedule.quintic, limits[1 + a])
     time = 0.0
     while time <= time_limit:
         if tolerance > 0.0:
@@ -215,7 +224,9 @@ def cross_box(
         ):
             return time
         for _ in range(2):
-            _advance_position(state, 0.5 * PERIOD, arc_lengths, clearances, gains, schedule.smoothing)
+            _advance_position(
+                state, 0.5 * PERIOD, arc_lengths, clearances, gains, schedule.smoothing, limits[0]
+            )
         for a in range(m):
             _advance_axis(state, 3 + a, m, time, table[a])
         time += PERIOD

@@ -62,7 +62,12 @@ class PathCovering:
 
 
 def cover_path(
-    problem: PlanningProblem, path: FloatArray, margin: float, gain_set: GainSet, least_overlap: float = 0.0
+    problem: PlanningProblem,
+    path: FloatArray,
+    margin: float,
+    gain_set: GainSet,
+    least_overlap: float = 0.0,
+    limits: FloatArray | None = None,
 ) -> PathCovering | None:
     """Cover a path with boxes such that the transport is fast: few boxes, and narrow ones in narrow passages.
 
@@ -75,6 +80,8 @@ def cover_path(
         margin: The margin that the path keeps [m].
         gain_set: Gains, fixed or to be scheduled.
         least_overlap: Least overlap of consecutive boxes in every angle and joint [rad or m].
+        limits: Largest speed of the object, then largest rates of all axes, shape (2 + n,) [m/s, rad/s or
+            m/s]; None for none.
 
     Returns:
         The boxes, or None if no sequence of such boxes was found.
@@ -85,6 +92,7 @@ def cover_path(
     boxes, grid = box_arrays(swept, pairs), grid_inside(floor, problem.tree.reach)
     angle = float(path[-1, 2] + nearest_turn(float(problem.goal_pose[2] - path[-1, 2])))
     goals = np.array(final_intervals(problem, angle))
+    limits = np.full(len(problem.start) - 1, np.inf) if limits is None else limits
     # At a small margin some levels are equal; each is tried once.
     for least_clearance, pads in dict.fromkeys(
         (max(fraction * margin, LEAST_CLEARANCE), _wide(pads, 0.5 * least_overlap))
@@ -95,8 +103,8 @@ def cover_path(
             continue
         places = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points[:, :2], axis=0).T))])
         waypoints = Waypoints(
-            boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), least_clearance,
-            problem.position_tolerance,
+            boxes, grid, points, places, np.array(pads), goals, schedule_of(gain_set), limits,
+            least_clearance, problem.position_tolerance,
         )  # fmt: skip
         found = _fastest_boxes(waypoints, Regions(problem, swept, pairs, CORE_FRACTION * least_clearance))
         if found is not None:

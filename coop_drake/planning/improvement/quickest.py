@@ -14,10 +14,13 @@ from coop_drake.laws import GainSet
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
 from coop_drake.planning.execution.channel_ends import check_ends, turned_to_start
 from coop_drake.planning.execution.channel_path import path_through
-from coop_drake.planning.execution.transitions import make_plan, with_gains
+from coop_drake.planning.execution.estimate import estimated, plan_time
+from coop_drake.planning.execution.speed_shares import NEED_FACTOR, limits_of
+from coop_drake.planning.execution.transitions import keep_limits, make_plan, with_gains
 from coop_drake.planning.improvement.path_covering import cover_path
 from coop_drake.planning.search.rescaling import Rescaling
 from coop_drake.progress import Progress
+from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.usual_unit import usual_unit
 
 
@@ -66,7 +69,7 @@ def quickest_plan(
     except (GeometryError, PlanError, StallError) as error:
         raise StallError(f"{error} (these lengths are to be multiplied by {unit:g})") from error
     plan = with_gains(scale.plan(made), gain_set, gain_set_name)
-    return replace(plan, problem=problem_digest(problem))
+    return replace(keep_limits(problem, plan, gain_set), problem=problem_digest(problem))
 
 
 def _quickest(
@@ -83,8 +86,11 @@ def _quickest(
     path = found.path if found.path is not None else path_through(problem, found)
     if progress is not None:
         progress("choosing boxes", 0.0)
-    better = cover_path(problem, path, found.margin, gain_set, least_overlap)
-    if better is not None:
+
+    def covered(limits: FloatArray | None = None) -> Plan | None:
+        better = cover_path(problem, path, found.margin, gain_set, least_overlap, limits)
+        if better is None:
+            return None
         try:
             return make_plan(
                 problem, better.channel, gain_set, gain_set_name=gain_set_name, targets=better.targets,
@@ -92,6 +98,17 @@ def _quickest(
             )  # fmt: skip
         except (GeometryError, PlanError, StallError, ShapelyError):
             # The boxes that the search found are proved free too, and their passages may be wider.
-            pass
+            return None
+
+    plan = covered()
+    if plan is not None:
+        slower = covered(limits_of(plan)) if _is_slowed(plan) else None
+        return plan if slower is None or plan_time(plan) <= plan_time(slower) else slower
     channel = found if isinstance(found, Channel) else found.channel()
     return make_plan(problem, channel, gain_set, gain_set_name=gain_set_name, progress=progress)
+
+
+def _is_slowed(plan: Plan) -> bool:
+    """Whether limits of speed slow a plan down, so that other boxes may be quicker."""
+    limits = limits_of(plan)
+    return limits is not None and bool((NEED_FACTOR * estimated(plan)[1] > limits).any())

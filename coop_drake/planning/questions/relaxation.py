@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 from shapely import Point, Polygon
 
+from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape
 
@@ -39,6 +40,7 @@ def relaxed(problem: PlanningProblem, robots: Collection[int]) -> tuple[Planning
         tree=ComponentTree(components, tree.unchecked_pairs),
         start=np.concatenate((problem.start[:3], problem.start[3:][joints])),
         goal_joints=tuple(problem.goal_joints[index] for index in joints),
+        limits=TeamLimits(),
     )
     return question, tuple(joints)
 

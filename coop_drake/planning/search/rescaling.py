@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 from shapely import Polygon
 
+from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.plan import Cell, Plan
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
@@ -49,7 +50,7 @@ class Rescaling:
     unit: float
 
     def question(self) -> PlanningProblem:
-        """The question with all lengths in the unit."""
+        """The question with all lengths in the unit; limits of speeds are kept in metres afterwards."""
         problem, scale = self.problem, 1.0 / self.unit
         tree = problem.tree
         components = tuple(_component(component, scale) for component in tree.components)
@@ -64,6 +65,7 @@ class Rescaling:
             goal_joints=tuple(None if goal is None else float(goal * unit) for goal, unit in goals),
             position_tolerance=scale * problem.position_tolerance,
             settings=_settings(problem.settings, scale),
+            limits=TeamLimits(),
         )
 
     def answer(self, found: CoveredPath | Channel | NoChannel) -> CoveredPath | Channel | NoChannel:

@@ -10,7 +10,8 @@ Each function raises a RefusalError at the first entry for which a statement doe
 6. Robots report what their states say, and cells were entered one by one when all were ready: ``readiness``,
    ``handovers``.
 7. Bases, wrenches and efforts go with the motion: ``grasps``, ``mechanics``.
-8. Nothing touched: ``clearances.check_clearances``.
+8. Bases and joints kept their limits of speed: ``speeds.check_run_speeds``.
+9. Nothing touched: ``clearances.check_clearances``.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from coop_drake.verification.runs.mechanics import check_mechanics
 from coop_drake.verification.runs.readiness import check_energy_margin, check_reports
 from coop_drake.verification.runs.rows import Rows, check_complete
 from coop_drake.verification.runs.setup import RunSetup
+from coop_drake.verification.runs.speeds import check_run_speeds
 
 
 def verify_log(
@@ -72,6 +74,8 @@ def verify_log(
     checks += [check_grasps(rows, problem, setup), check_wrenches(rows, setup)]
     if setup.mechanics:
         checks.append(check_mechanics(rows, problem, setup))
+    kept = check_run_speeds(rows, problem)
+    checks += [] if kept is None else [kept]
     checks += check_clearances(rows, between, problem, progress)
     return Verified("arrived", f"run of {log.times[-1]:.2f} s in {len(log.times)} rows", tuple(checks))
 

@@ -79,6 +79,7 @@ _BEYOND = {
     "maps.tolerance": (0.5, "the error would be half the disk"),
     "simulator.accuracy": (1.0, "an error as large as the value is none"),
     "deployment.mass_error": (-1.5, "masses would be negative"),
+    "limits": ({"nobody": {"base_speed": 1.0}}, "no robot has this name"),
     "deployment.control_rate": (-100.0, "time does not run backwards"),
     "deployment.messages.loss": (1.5, "it is a probability"),
     "deployment.messages.repeat": (2, "it is a probability"),

@@ -1,0 +1,60 @@
+"""The largest speeds of the bases and joints of a team, and what a plan states about them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from coop_drake.tree.pose import FloatArray
+from coop_drake.typed_data import Bounds
+
+
+def _none() -> FloatArray:
+    return np.empty(0)
+
+
+@dataclass(frozen=True)
+class TeamLimits:
+    """What the robots' models and the scenario say about largest speeds, N robots and n joints.
+
+    Attributes:
+        base_components: Of every robot the index of its base's component in the team's tree.
+        base_points: Origin of the base's frame Bk in that component's frame [m].
+        base_speeds: Largest speed of that origin in W, shape (N,) [m/s].
+        turn_rates: Largest rate of the base's angle in W, shape (N,) [rad/s].
+        joint_rates: Largest rate of every joint, shape (n,) [rad/s or m/s].
+    """
+
+    base_components: tuple[int, ...] = ()
+    base_points: tuple[tuple[float, float], ...] = ()
+    base_speeds: Bounds = field(default_factory=_none)
+    turn_rates: Bounds = field(default_factory=_none)
+    joint_rates: Bounds = field(default_factory=_none)
+
+    @property
+    def any(self) -> bool:
+        """Whether there is a limit."""
+        return bool(np.isfinite(np.concatenate((self.base_speeds, self.turn_rates, self.joint_rates))).any())
+
+
+@dataclass(frozen=True)
+class SpeedStatement:
+    """The limits that a plan keeps, and the largest speeds of the bases that follow from its gains.
+
+    ``speed_limit`` and ``rate_limit`` of the gains bound the speed of the object and the rates of its angle
+    and of the joints.
+
+    Attributes:
+        base_speed_limits: Limits of the bases' speeds, shape (N,) [m/s].
+        turn_rate_limits: Limits of the bases' turn rates, shape (N,) [rad/s].
+        joint_rate_limits: Limits of the joints' rates, shape (n,) [rad/s or m/s].
+        base_speeds: Largest speed that each base can have, shape (N,) [m/s].
+        turn_rates: Largest turn rate that each base can have, shape (N,) [rad/s].
+    """
+
+    base_speed_limits: Bounds
+    turn_rate_limits: Bounds
+    joint_rate_limits: Bounds
+    base_speeds: Bounds
+    turn_rates: Bounds

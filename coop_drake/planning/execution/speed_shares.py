@@ -1,0 +1,129 @@
+"""How limits of bases are shared among the object's speed and the rates of its angle and of the joints.
+
+The speed of a base is at most the object's speed, plus the rate of each axis that moves the base times its
+lever, whatever the configuration; its turn rate is at most the sum of the rates of the object's angle and of
+the joints between. Limits of these speeds and rates, the same in the whole plan, therefore keep the limits of
+the bases. The limit of a base is shared in proportion to what each part would need without limits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coop_drake.answers.limits import SpeedStatement, TeamLimits
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.laws.readiness import RATE_TOLERANCE
+from coop_drake.laws.speed_limit import FUNNEL_SHARE, funnel_rate
+from coop_drake.planning.execution.estimate import estimated
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.levers import point_levers, turn_levers
+from coop_drake.tree.pose import FloatArray
+
+KEPT = 0.95
+"""Share of every limit that is planned with [-]; the rest is for sampling, noise and integration."""
+
+NEED_FACTOR = 1.15
+"""What an axis needs over its largest estimated rate [-]: the closed loop differs from the estimate by a few
+per cent, and no limit shall act there that need not."""
+
+ROUNDING = 1e-9
+"""Relative difference of sums in another order [-]."""
+
+OBJECT_FACTORS = (1.0, 0.5, 0.7, 1.5, 2.0)
+"""Shares of the object are tried that are so many times its need [-]: where it is the object that takes long,
+a larger share is quicker, and a smaller one where the angles do."""
+
+
+def speed_shares(problem: PlanningProblem, plan: Plan) -> Iterator[FloatArray]:
+    """Yield limits of the object's speed and of all axes that keep the limits of bases and joints.
+
+    Args:
+        problem: What was asked, with the limits.
+        plan: A plan for it without limits of speed.
+
+    Yields:
+        Limits, infinity where there is none, shape (2 + n,) [m/s, rad/s or m/s]. Only the first ones, where
+        they do not slow the plan down.
+    """
+    limits, needs = problem.limits, _needs(plan)
+    levers = base_levers(problem.tree, limits)
+    bounds = KEPT * np.concatenate((limits.base_speeds, limits.turn_rates))
+    caps = np.concatenate((np.full(2, np.inf), KEPT * limits.joint_rates))
+    for factor in OBJECT_FACTORS:
+        shares = fill(levers, bounds, caps, needs * np.array([factor, *np.ones(len(needs) - 1)]))
+        yield shares
+        if (shares >= needs).all():
+            return
+
+
+def base_levers(tree: ComponentTree, limits: TeamLimits) -> FloatArray:
+    """Return what the object's speed and the rates of all axes add to the speeds of bases at most.
+
+    Returns:
+        Rows for the N speeds, then for the N turn rates of the bases, shape (2 N, 2 + n).
+    """
+    bases = list(zip(limits.base_components, limits.base_points, strict=True))
+    speeds = [np.array([1.0, *point_levers(tree, component, point)]) for component, point in bases]
+    turns = [np.array([0.0, *turn_levers(tree, component)]) for component, _ in bases]
+    return np.array([*speeds, *turns])
+
+
+def fill(levers: FloatArray, bounds: FloatArray, caps: FloatArray, needs: FloatArray) -> FloatArray:
+    """Return the largest x that grow in proportion to needs while levers x <= bounds and x <= caps.
+
+    Entries of a bound that is reached grow no more; the others go on.
+
+    Args:
+        levers: Not negative, shape (k, m).
+        bounds: Infinity for none, shape (k,).
+        caps: Infinity for none, shape (m,).
+        needs: Positive, shape (m,).
+
+    Returns:
+        Shape (m,); infinity for entries without any bound.
+    """
+    levers, bounds = levers[np.isfinite(bounds)], bounds[np.isfinite(bounds)]
+    growing: NDArray[np.bool_] = (levers > 0.0).any(axis=0) | np.isfinite(caps)
+    shares, bounded = np.where(growing, 0.0, np.inf), growing.copy()
+    while growing.any():
+        growth = levers @ np.where(growing, needs, 0.0)
+        left = bounds - levers @ np.where(bounded, shares, 0.0)
+        steps = np.full(len(bounds), np.inf)
+        np.divide(left, growth, where=growth > 0.0, out=steps)
+        room = (caps[growing] - shares[growing]) / needs[growing]
+        step = max(min(*steps, *room, np.inf, np.inf), 0.0)
+        shares[growing] += step * needs[growing]
+        reached = (levers[steps <= step * (1.0 + ROUNDING)] > 0.0).any(axis=0)
+        growing &= ~reached & (shares < caps * (1.0 - ROUNDING))
+    return np.minimum(shares, caps)
+
+
+def limits_of(plan: Plan) -> FloatArray | None:
+    """Return the limits in a plan's gains, as ``speed_shares`` yields them; None for a plan without."""
+    gains = plan.transitions[0].gains
+    if gains.rate_limit is None:
+        return None
+    return np.array([np.inf if gains.speed_limit is None else gains.speed_limit, *gains.rate_limit])
+
+
+def stated_speeds(problem: PlanningProblem, shares: FloatArray) -> SpeedStatement:
+    """Return what a plan states about the speeds of bases that keeps these limits, shape (2 + n,)."""
+    limits, levers = problem.limits, base_levers(problem.tree, problem.limits)
+    parts = np.multiply(levers, shares, where=levers > 0.0, out=np.zeros_like(levers))
+    speeds, turns = np.split(parts.sum(axis=1), 2)
+    return SpeedStatement(limits.base_speeds, limits.turn_rates, limits.joint_rates, speeds, turns)
+
+
+def _needs(plan: Plan) -> FloatArray:
+    """What the object and the axes need without limits, shape (2 + n,) [m/s, rad/s or m/s]."""
+    fastest = NEED_FACTOR * estimated(plan)[1]
+    for index, transition in enumerate(plan.transitions):
+        funnel, quintic = plan.funnel(index), transition.gains.funnel == "quintic"
+        shrink = np.maximum(funnel.goal_lower - funnel.slice_lower, funnel.slice_upper - funnel.goal_upper)
+        rates = [funnel_rate(*axis, quintic) for axis in zip(funnel.decay_rate, shrink, strict=True)]
+        fastest[1:] = np.maximum(fastest[1:], np.array(rates) / FUNNEL_SHARE)
+    return np.maximum(fastest, RATE_TOLERANCE)
