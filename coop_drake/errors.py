@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+import traceback
+
 _LONGEST_VALUE = 200
 """Characters of a value that a message shows; a whole section of a file would fill the screen."""
 
@@ -14,6 +17,20 @@ def shortened(value: object) -> str:
 
 class CoopDrakeError(Exception):
     """Base of all exceptions raised on purpose by coop_drake."""
+
+
+def transferable(error: Exception) -> Exception:
+    """Return an error that another process can raise, with the traceback as a note.
+
+    Where the error cannot be pickled, it is another one with the same message.
+    """
+    notes = traceback.format_exception(error)
+    try:
+        copy: Exception = pickle.loads(pickle.dumps(error))
+    except Exception:
+        copy = CoopDrakeError(str(error)) if isinstance(error, CoopDrakeError) else RuntimeError(repr(error))
+    copy.add_note("".join(notes))
+    return copy
 
 
 class ScenarioError(CoopDrakeError):
@@ -110,8 +127,8 @@ class RefusalError(CoopDrakeError):
         super().__init__(f"{where}: {finding}")
 
 
-class DrawingError(CoopDrakeError):
-    """A process that draws a run was ended; the message names it and the exit code."""
+class ProcessError(CoopDrakeError):
+    """A process that works for a command was ended before it was done; the message names it."""
 
 
 class TuningError(CoopDrakeError):

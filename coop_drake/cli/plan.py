@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
 from coop_drake.cli.options import BudgetName, GainsName, Machine, Quiet, ResultsFolder, ScenarioPath, Verbose
+from coop_drake.cli.planning_process import beside, prepare_simulation
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import answer_of, planning_facts, summary_rows
@@ -51,11 +53,17 @@ def _budget(choice: str | None, task: Task) -> Budget | None:
 
 
 def plan_of(
-    task: Task, folder: ResultFolder | None, reporter: Reporter, budget: Budget | None = None
+    task: Task,
+    folder: ResultFolder | None,
+    reporter: Reporter,
+    budget: Budget | None = None,
+    *,
+    simulated: bool = False,
 ) -> Plan | None:
     """Plan, and note the facts; without a plan say so, and set the exit code.
 
-    The plan with its table of cells, or the proof that there is none, goes to the folder if one is given.
+    The plan with its table of cells, or the proof that there is none, goes to the folder if one is given. If
+    the plan will be ``simulated``, this is prepared at the same time.
     """
     from coop_drake.answers import Found
     from coop_drake.memory import peak_memory_mb
@@ -64,7 +72,12 @@ def plan_of(
     name = task.scenario.selected_gains
     with reporter.stage("planning", "planning", cpu=True) as progress:
         gain_set = task.scenario.gain_sets[name]
-        result = plan(task.problem, gain_set, gain_set_name=name, budget=budget, progress=progress)
+        work = partial(plan, task.problem, gain_set, gain_set_name=name, budget=budget)
+        if simulated:
+            prepare = partial(prepare_simulation, task.scenario)
+            result = beside(lambda advance: work(progress=advance), prepare, progress)
+        else:
+            result = work(progress=progress)
     reporter.facts.update(planning_facts(result), peak_memory_mb=peak_memory_mb())
     if folder is not None:
         _write(result, task, folder)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import resource
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -22,9 +23,9 @@ from rich.table import Table
 from coop_drake.cli.kernel_clock import kernel_clock
 from coop_drake.errors import (
     CoopDrakeError,
-    DrawingError,
     FieldError,
     FloorPlanError,
+    ProcessError,
     ScenarioError,
     StallError,
 )
@@ -87,12 +88,13 @@ class Reporter:
             name: What is shown.
             facts: Name under which the seconds of the stage are noted, even if it fails. Seconds that pass
                 while kernels are loaded or compiled are noted as ``loading``: they depend on the cache.
-            cpu: Whether the seconds of the processor in this thread are noted, too.
+            cpu: Whether the seconds of the processor are noted, too: those of this thread, and of processes
+                that end with the stage.
 
         Yields:
             The callback that moves the bar.
         """
-        wall, processor = perf_counter(), thread_time()
+        wall, processor = perf_counter(), _processor_seconds()
         with (
             self._bar(name) as advance,
             kernel_clock(partial(self._compiling, advance)) as kernels,
@@ -104,7 +106,8 @@ class Reporter:
                     self._add("loading_cpu_seconds", kernels.cpu_seconds)
                     self._add(f"{facts}_wall_seconds", perf_counter() - wall - kernels.wall_seconds)
                     if cpu:
-                        self._add(f"{facts}_cpu_seconds", thread_time() - processor - kernels.cpu_seconds)
+                        own = _processor_seconds() - processor
+                        self._add(f"{facts}_cpu_seconds", own - kernels.cpu_seconds)
 
     def _add(self, fact: str, seconds: float) -> None:
         self.facts[fact] = round(self.facts.get(fact, 0.0) + seconds, 4)
@@ -164,6 +167,12 @@ class Reporter:
             sys.stdout.flush()
 
 
+def _processor_seconds() -> float:
+    """Time of the processor in this thread and in child processes that have ended [s]."""
+    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return thread_time() + ended.ru_utime + ended.ru_stime
+
+
 def _plain(value: Any) -> Any:
     """JSON knows neither infinities nor numpy's numbers."""
     if hasattr(value, "item"):
@@ -205,7 +214,7 @@ def _explain(error: BaseException, reporter: Reporter) -> bool:
         details = {"file": error.file, "key": error.key, "value": error.shown, "allowed": error.allowed}
     elif isinstance(error, FloorPlanError):
         details = {"file": error.file, "place": error.place, "remedy": error.remedy, "finding": error.finding}
-    elif isinstance(error, DrawingError | FieldError | StallError):
+    elif isinstance(error, FieldError | ProcessError | StallError):
         code = ExitCode.FAILED_RUN
     elif isinstance(error, ModuleNotFoundError) and (advice := install_advice(error.name or "")):
         text = f"the package {error.name} is not installed; install what this needs: {advice}"

@@ -21,7 +21,6 @@ from coop_drake.cli.options import (
     Verbose,
 )
 from coop_drake.cli.plan import plan_of
-from coop_drake.cli.preparing import preparing
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import simulation_facts, summary_rows
@@ -54,8 +53,7 @@ def run_command(
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "plan", "simulation")
         with DrawingProcesses() as drawing:
-            with preparing(task.scenario):
-                plan = plan_of(task, folder, reporter)
+            plan = plan_of(task, folder, reporter, simulated=True)
             if plan:
                 reporter.code = carry_out(
                     task, plan, folder, reporter, drawing, fresh_maps=fresh_maps, live=live, blocks=blocks

@@ -11,14 +11,13 @@ import pickle
 import signal
 import subprocess
 import sys
-import traceback
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any
 
-from coop_drake.errors import DrawingError
+from coop_drake.errors import ProcessError, transferable
 
 if TYPE_CHECKING:
     from coop_drake.answers.log import SimulationLog
@@ -69,7 +68,7 @@ class DrawingProcesses:
         """Wait until all is written.
 
         Raises:
-            DrawingError: A process was ended.
+            ProcessError: A process was ended.
             Exception: Whatever went wrong in a process.
         """
         for subject, process in self._running.items():
@@ -82,7 +81,7 @@ class DrawingProcesses:
             if error:
                 raise pickle.loads(error)
             if code:
-                raise DrawingError(f"the process that draws the {subject} ended with code {code}")
+                raise ProcessError(f"the process that draws the {subject} ended with code {code}")
 
     def _send(self, *message: Any) -> None:
         content = pickle.dumps(message)
@@ -120,8 +119,7 @@ def main(subject: str) -> None:
         draw = {"figures": _draw_figures, "recording": _draw_recording}[subject]
         draw(_Messages(sys.stdin.buffer))
     except Exception as error:
-        error.add_note(traceback.format_exc())
-        sys.stdout.buffer.write(pickle.dumps(error))
+        sys.stdout.buffer.write(pickle.dumps(transferable(error)))
         sys.stdout.flush()
         os._exit(1)
     os._exit(0)  # To take down Drake and matplotlib object by object takes time.
@@ -168,7 +166,7 @@ def _draw_in_two(figures: RunFigures, log: SimulationLog, folder: Path) -> None:
     other = os.fork() if (os.cpu_count() or 1) >= _MOST else None
     figures.write(log, folder, numbers=_taken(waiting))
     if other and os.waitpid(other, 0)[1]:
-        raise DrawingError("a process that draws figures was ended")
+        raise ProcessError("a process that draws figures was ended")
 
 
 def _taken(waiting: int) -> Iterator[int]:

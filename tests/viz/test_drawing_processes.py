@@ -7,7 +7,7 @@ import signal
 
 import pytest
 
-from coop_drake.errors import DrawingError
+from coop_drake.errors import ProcessError
 from coop_drake.scenario import load_scenario
 from coop_drake.viz.drawing_processes import DrawingProcesses
 from tests.support.cases import case
@@ -54,7 +54,7 @@ def test_a_process_that_is_ended_is_named(drawing, tmp_path):
     processes, log = drawing
     os.killpg(processes._running["recording"].pid, signal.SIGKILL)
     processes.draw(log, tmp_path)
-    with pytest.raises(DrawingError, match="the process that draws the recording ended with code -9"):
+    with pytest.raises(ProcessError, match="the process that draws the recording ended with code -9"):
         processes.wait()
 
 
