@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +68,8 @@ def _largest(name: str, holds: Callable[[Budget], bool]) -> float:
     low, high = 0.0, _LARGEST[name]
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if holds(replace(Budget(), **{name: middle})) else (low, middle)
+        departure: dict[str, Any] = {name: middle}
+        low, high = (middle, high) if holds(Budget(**departure)) else (low, middle)
     return low
 
 

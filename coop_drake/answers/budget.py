@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Annotated
 
-from coop_drake.typed_data import EXACT, Limits, NotNegative, Positive, Vector, check_fields
+from coop_drake.typed_data import EXACT, DataError, Limits, NotNegative, Positive, Vector, check_fields
 
 _Exact = Annotated[NotNegative, EXACT]
 
 SCALED = (
-    "delay", "lag", "angle_noise", "rate_noise", "model_error", "acceleration_error", "report_age",
+    "delay", "lag", "angle_noise", "rate_noise", "position_noise", "velocity_noise", "model_error",
+    "acceleration_error", "report_age",
 )  # fmt: skip
 """Departures that a budget of the same control rate has more or less of."""
 
@@ -25,10 +26,17 @@ class Budget:
         lag: Time constant with which accelerations follow their commands [s].
         angle_noise: Largest error of a measured angle or joint position [rad or m].
         rate_noise: Largest error of a measured rate of these [rad/s or m/s].
+        position_noise: Largest distance of the measured position of the object from the true one, as the mean
+            over the robots by the masses that they move [m].
+        velocity_noise: Largest error of its measured velocity, as such a mean [m/s].
         model_error: Largest error of an acceleration over its command, as a wrong mass causes [-].
-        acceleration_error: Largest error of the acceleration of an axis besides: what robots that disagree,
-            friction, and the coupling of axes leave [rad/s^2 or m/s^2].
+        acceleration_error: Largest error of the acceleration of an axis or of the object's origin besides:
+            what robots that disagree, friction, and the coupling of axes leave [rad/s^2 or m/s^2].
         report_age: How long a report of readiness may be used after it was made [s].
+        base_force: Largest force of a base with which the object's position is moved; null for no limit [N].
+        moved_mass: Largest mass that one robot moves, its own and its share of the object's; needed where
+            ``base_force`` is given [kg].
+        axes: Whether angles and joints are part of the budget; false for the position alone.
     """
 
     control_rate: Annotated[float, Limits(at_least=1.0, at_most=1e4)] = 200.0
@@ -36,12 +44,19 @@ class Budget:
     lag: NotNegative = 0.0
     angle_noise: NotNegative = 0.0
     rate_noise: NotNegative = 0.0
+    position_noise: NotNegative = 0.0
+    velocity_noise: NotNegative = 0.0
     model_error: Annotated[float, Limits(at_least=0.0, below=1.0)] = 0.0
     acceleration_error: NotNegative = 0.0
     report_age: NotNegative = 0.0
+    base_force: Positive | None = None
+    moved_mass: Positive | None = None
+    axes: bool = True
 
     def __post_init__(self) -> None:
         check_fields(self)
+        if self.base_force is not None and self.moved_mass is None:
+            raise DataError("moved_mass", None, "a positive number, because base_force is given")
 
     @property
     def period(self) -> float:
@@ -54,7 +69,9 @@ class Budget:
 
     def describe(self) -> str:
         """All bounds in a line."""
-        return ", ".join(f"{field.name} {getattr(self, field.name):.4g}" for field in fields(self))
+        stated = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "axes"}
+        text = ", ".join(f"{name} {value:.4g}" for name, value in stated.items() if value is not None)
+        return text if self.axes else f"{text}, axes false"
 
 
 @dataclass(frozen=True)

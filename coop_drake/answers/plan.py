@@ -8,8 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
+from shapely import Polygon
+
 from coop_drake.answers.budget import Budget, Tolerance
 from coop_drake.answers.limits import SpeedStatement
+from coop_drake.answers.position_tube import PositionTube
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.answers.region import Points, Region
 from coop_drake.answers.search_report import SearchReport
@@ -52,7 +55,9 @@ class Transition:
         only_angles: True where the position is already at the target and only angles move.
         gains: Gains of the governor and of the funnels.
         path: Such a path from where the cell is entered to the target, shape (k, 2) [m].
-        tolerance: What follows from the plan's budget; null in a plan without one.
+        tolerance: What follows from the plan's budget for the axes; null in a plan without one for them.
+        governed: Positions of Q_i that keep the distance of the plan's position tube from its boundary, to
+            which p_G and the object's nominal motion are kept; null in a plan without a tube [m].
     """
 
     target: Vector
@@ -66,6 +71,7 @@ class Transition:
     gains: TransitionGains
     path: Points
     tolerance: Tolerance | None = None
+    governed: Region | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,8 +87,9 @@ class Plan:
         goal_joints: Goal of each joint, None where free.
         cells: From the start's cell to the goal's.
         transitions: One for each cell, in the same order.
-        budget: Departures from the ideal team under which every axis provably stays in its funnel; null if
-            none were asked for.
+        budget: Departures from the ideal team under which the object provably stays in its cells, and every
+            axis in its funnel if the budget says so; null if none were asked for.
+        tube: How far the object may depart from its nominal motion under the budget; null without one.
         speeds: Limits of speed that are kept, and what follows for the bases; null where no limit is known.
     """
 
@@ -96,6 +103,11 @@ class Plan:
     transitions: tuple[Transition, ...]
     budget: Budget | None = None
     speeds: SpeedStatement | None = None
+    tube: PositionTube | None = None
+
+    def governed(self, index: int) -> Polygon:
+        """Return the region to which the governor keeps p_G in a cell: Q_i, or less where there is a tube."""
+        return self.transitions[index].governed or self.cells[index].tidied
 
     def governor_row(self, index: int) -> Vector:
         """Return the governor's gains in a transition, with those from which they start, shape (9,)."""

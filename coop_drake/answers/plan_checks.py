@@ -27,10 +27,11 @@ def check_plan(plan: Plan, file: str) -> None:
 def _check_handover(plan: Plan, k: int, m: int, file: str) -> None:
     """Transition k must end inside cell m, its own or the next one."""
     transition, cell = plan.transitions[k], plan.cells[m]
-    if not cell.tidied.contains(Point(transition.target)):
+    if not plan.governed(m).contains(Point(transition.target)):
+        region = "cells[{}].tidied" if plan.transitions[m].governed is None else "transitions[{}].governed"
         raise PlanError(
             f"{file}: transitions[{k}].target: {transition.target.tolist()} is not allowed; expected a point "
-            f"inside cells[{m}].tidied"
+            f"inside {region.format(m)}"
         )
     inside = (cell.lower - ROUNDING <= transition.goal_lower) & (
         transition.goal_upper <= cell.upper + ROUNDING

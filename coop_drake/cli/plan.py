@@ -43,13 +43,14 @@ def _budget(choice: str | None, task: Task) -> Budget | None:
         return None
     from coop_drake.errors import ScenarioError
     from coop_drake.laws import ScheduledGains
+    from coop_drake.plant.run_masses import moved_masses
     from coop_drake.scenario.budget_file import read_budget
 
     name = task.scenario.selected_gains
     if not isinstance(task.scenario.gain_sets[name], ScheduledGains):
         allowed = "a gain set of scheduled gains: the funnels of others never close, so that no budget holds"
         raise ScenarioError(str(task.scenario.path), "gains.selected", name, allowed)
-    return read_budget(choice, task.scenario)
+    return read_budget(choice, task.scenario, task.problem.tree, lambda: moved_masses(task.scenario))
 
 
 def plan_of(

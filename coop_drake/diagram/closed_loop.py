@@ -63,8 +63,8 @@ class ClosedLoop:
         context = self.diagram.CreateDefaultContext()
         team = self.team
         set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.plan.start)
-        if self.fused is not None:
-            governor = self.fused.governor
+        if self.fused is not None and self.fused.integrator is not None:
+            governor = self.fused.integrator
             governor.set_integral_value(governor.GetMyMutableContextFromRoot(context), self.plan.start[:2])
         for deployed in self.deployed:
             deployed.prepare(context)

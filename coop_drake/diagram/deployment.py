@@ -37,8 +37,9 @@ class DeployedController:
     def prepare(self, root: Context) -> None:
         """Seed the noise, and set p_G and held measurements to their values at the start."""
         pose = self.diagram.GetInputPort("object_pose").Eval(self.diagram.GetMyContextFromRoot(root))
-        governor = self.controller.GetSubsystemByName("governor_state")
-        governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), pose[:2])
+        if self.controller.HasSubsystemNamed("governor_state"):
+            governor = self.controller.GetSubsystemByName("governor_state")
+            governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), pose[:2])
         generator = RandomGenerator(self.seed)
         for noise in self.noises:
             noise.SetRandomContext(noise.GetMyMutableContextFromRoot(root), generator)

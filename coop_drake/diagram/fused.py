@@ -29,9 +29,11 @@ from coop_drake.systems import (
     FusedCell,
     FusedTeam,
     HoldSupervisor,
+    NominalGovernor,
     TeamController,
     axis_laws,
 )
+from coop_drake.systems.nominal_kernels import NOTHING
 
 
 @dataclass(frozen=True)
@@ -40,13 +42,15 @@ class FusedControllers:
 
     Attributes:
         driver: The block that computes all controllers.
-        governor: The integrator of p_G.
+        governor_position: The output that holds p_G.
+        integrator: The integrator of p_G, None where a nominal governor keeps it.
         clock: The funnels' clock, None where a scenario has no holds.
         efforts: The held effort of each robot in a sampled loop; empty in continuous time.
     """
 
     driver: TeamController
-    governor: Integrator | DiscreteTimeIntegrator
+    governor_position: OutputPort
+    integrator: Integrator | DiscreteTimeIntegrator | None
     clock: FunnelClock | None
     efforts: tuple[OutputPort, ...]
 
@@ -77,22 +81,47 @@ def add_fused_controllers(
     driver = builder.AddNamedSystem("team_controller", build_team_controller(team, knowledge))
     sizes = [3 * robots, len(team.joints), 2]
     parts = builder.AddNamedSystem("command_parts", Demultiplexer([size for size in sizes if size]))
-    governor = builder.AddNamedSystem(
-        "governor_state", Integrator(2) if period is None else DiscreteTimeIntegrator(2, period)
-    )
     builder.Connect(driver.GetOutputPort("team_command"), parts.get_input_port())
-    builder.Connect(parts.get_output_port(parts.num_output_ports() - 1), governor.get_input_port())
-    builder.Connect(governor.get_output_port(), driver.GetInputPort("governor_position"))
     builder.Connect(station.diagram.GetOutputPort("team_state"), driver.GetInputPort("team_state"))
     builder.Connect(planner.GetOutputPort("current_cell"), driver.GetInputPort("current_cell"))
     clock = None if supervisor is None else _add_clock(builder, supervisor, planner, driver, period)
+    governor = _add_governor(builder, knowledge[0], driver, parts, planner, clock)
+    nominal = isinstance(governor, NominalGovernor)
+    position = governor.GetOutputPort("governor_position") if nominal else governor.get_output_port()
+    integrator = None if isinstance(governor, NominalGovernor) else governor
+    builder.Connect(position, driver.GetInputPort("governor_position"))
     _report(builder, scenario.deployment, planner, driver, robots)
     if period is not None:
-        return FusedControllers(driver, governor, clock, _hold(builder, station, parts, period))
+        efforts = _hold(builder, station, parts, period)
+        return FusedControllers(driver, position, integrator, clock, efforts)
     builder.Connect(parts.get_output_port(0), station.diagram.GetInputPort("base_forces"))
     if team.joints:
         builder.Connect(parts.get_output_port(1), station.diagram.GetInputPort("joint_torques"))
-    return FusedControllers(driver, governor, clock, ())
+    return FusedControllers(driver, position, integrator, clock, ())
+
+
+def _add_governor(
+    builder: DiagramBuilder,
+    known: RobotKnowledge,
+    driver: TeamController,
+    parts: Demultiplexer,
+    planner: CellPlanner,
+    clock: FunnelClock | None,
+) -> Integrator | DiscreteTimeIntegrator | NominalGovernor:
+    """Add what keeps p_G: an integrator of its rate, or the nominal governor that all robots would have."""
+    period = known.period
+    if known.motion is None:
+        integrator = Integrator(2) if period is None else DiscreteTimeIntegrator(2, period)
+        state = builder.AddNamedSystem("governor_state", integrator)
+        builder.Connect(parts.get_output_port(parts.num_output_ports() - 1), state.get_input_port())
+        return state
+    block = NominalGovernor(known.cells, known.motion, paced=clock is not None)
+    governor = builder.AddNamedSystem("nominal_governor", block)
+    builder.Connect(planner.GetOutputPort("current_cell"), governor.GetInputPort("current_cell"))
+    builder.Connect(governor.GetOutputPort("nominal"), driver.GetInputPort("nominal"))
+    if clock is not None:
+        builder.Connect(clock.GetOutputPort("clock"), governor.GetInputPort("clock"))
+    return governor
 
 
 def _add_clock(
@@ -140,7 +169,7 @@ def build_team_controller(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) 
 
 def _stacked(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> FusedTeam:
     chains = [robot_chain(known.robot) for known in knowledge]
-    bases = [base_chain(team, robot) for robot in team.robots]
+    bases, motion = [base_chain(team, robot) for robot in team.robots], knowledge[0].motion
     counts = [
         [len(chain) for chain in chains],
         [len(base.chain) for base in bases],
@@ -153,6 +182,7 @@ def _stacked(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> FusedTeam:
         base_chains=np.vstack([base.chain for base in bases]),
         yaws=np.array([base.yaw for base in bases]),
         loads=np.array([known.load for known in knowledge]),
+        tracking=NOTHING if motion is None else motion.tracking_row(knowledge[0].cells[0]),
     )
 
 

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.robot_controller import RobotKnowledge
-from coop_drake.errors import PlanError
+from coop_drake.errors import PlanError, ScenarioError
 from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.laws.disturbance import observer_gains
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
 from coop_drake.plant import RobotPlant, TeamPlant, build_robot_plant
 from coop_drake.scenario import Scenario
-from coop_drake.systems import GovernedCell, whole_periods
+from coop_drake.systems import GovernedCell, NominalMotion, whole_periods
+
+REPORT_PERIODS = 2
+"""Periods in which p_G moves on in the old cell after a report was received [-]: the one in which the switch
+is made, and the one after which robots hear of it."""
 
 
 def robot_knowledge(
@@ -33,13 +39,13 @@ def robot_knowledge(
     _check(plan, maps, team)
     cells = [
         GovernedCell(
-            BoundaryDistance(cell.tidied),
+            BoundaryDistance(plan.governed(index)),
             _field(field_map, transition.gains.governor_gain),
             transition.gains,
             before.gains,
         )
-        for cell, transition, before, field_map in zip(
-            plan.cells, plan.transitions, (plan.transitions[0], *plan.transitions[:-1]), maps, strict=True
+        for index, (transition, before, field_map) in enumerate(
+            zip(plan.transitions, (plan.transitions[0], *plan.transitions[:-1]), maps, strict=True)
         )
     ]
     factor, deployment, control = 1.0 + scenario.deployment.mass_error, scenario.deployment, scenario.control
@@ -53,12 +59,13 @@ def robot_knowledge(
             load_share=scenario.load_share(robot.name, len(team.robots)),
             plan=plan,
             cells=cells,
-            position_tolerance=scenario.goal.tolerances.position,
+            position_tolerance=scenario.goal.tolerances.position - (plan.tube.rest if plan.tube else 0.0),
             period=deployment.period,
             sample_offset=deployment.of_robot(robot.name).sample_offset,
             predicted_periods=delay if control.predictor else 0,
             hold=control.hold,
             observer_gains=observer_gains(scenario.command_age) if control.observer else None,
+            motion=_motion(scenario, plan, robot.name, 0 if control.predictor else delay),
         )
         for robot in team.robots
     ]
@@ -69,6 +76,27 @@ def _robot(scenario: Scenario, index: int, factor: float) -> RobotPlant:
     if factor != 1.0:
         robot.scale_masses(factor)
     return robot
+
+
+def _motion(scenario: Scenario, plan: Plan, robot: str, age: int) -> NominalMotion | None:
+    """Return the nominal motion of a plan with a position tube, None for other plans."""
+    if plan.tube is None or plan.budget is None:
+        return None
+    deployment, budget = scenario.deployment, plan.budget
+    if deployment.period is None:
+        raise ScenarioError(
+            str(scenario.path), "deployment.control_rate", None,
+            f"a number, {budget.control_rate:g} Hz: the plan's budget holds for a sampled team",
+        )  # fmt: skip
+    return NominalMotion(
+        tube=plan.tube,
+        start=plan.start[:2],
+        targets=np.array([transition.target for transition in plan.transitions]),
+        period=deployment.period,
+        report_periods=whole_periods(budget.report_age, deployment.period) + REPORT_PERIODS,
+        measurement_periods=age,
+        offset=deployment.of_robot(robot).sample_offset,
+    )
 
 
 def _field(harmonic_map: HarmonicMap, governor_gain: float) -> VelocityField:

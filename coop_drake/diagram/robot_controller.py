@@ -19,6 +19,8 @@ from coop_drake.systems import (
     FunnelClock,
     GovernedCell,
     HoldMonitor,
+    NominalGovernor,
+    NominalMotion,
     ObjectEstimator,
     ReadyMonitor,
     ReferenceGovernor,
@@ -61,6 +63,7 @@ class RobotKnowledge:
         predicted_periods: Age of its measurements that it predicts over, in control periods; 0 for none.
         hold: When the team is held, None for never.
         observer_gains: Gain and leak of its disturbance observer [1/s]; None for no observer.
+        motion: The nominal motion of the position; None where p_G follows the measured position.
     """
 
     robot: RobotPlant
@@ -76,6 +79,7 @@ class RobotKnowledge:
     predicted_periods: int = 0
     observer_gains: tuple[float, float] | None = None
     hold: Hold | None = None
+    motion: NominalMotion | None = None
 
     @property
     def p_LE(self) -> FloatArray:
@@ -126,10 +130,11 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
         for block in blocks.values()
         for port in (block.get_output_port(i) for i in range(block.num_output_ports()))
     }
-    halves = builder.AddNamedSystem("governor_rate", Demultiplexer([2, 2]))
-    builder.Connect(outputs["governor_command"], halves.get_input_port())
-    start, rate = knowledge.plan.start[:2], halves.get_output_port(0)
-    outputs["governor_position"] = _integrated(builder, knowledge, "governor_state", rate, start)
+    if knowledge.motion is None:
+        halves = builder.AddNamedSystem("governor_rate", Demultiplexer([2, 2]))
+        builder.Connect(outputs["governor_command"], halves.get_input_port())
+        start, rate = knowledge.plan.start[:2], halves.get_output_port(0)
+        outputs["governor_position"] = _integrated(builder, knowledge, "governor_state", rate, start)
     if "disturbance_observer" in blocks:
         rate = outputs["observer_rate"]
         at_rest = np.zeros(rate.size())
@@ -145,16 +150,16 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
     plan, cells, inertia, p_LE = knowledge.plan, knowledge.cells, knowledge.object_inertia, knowledge.p_LE
     joints = range(knowledge.joints.start, knowledge.joints.stop)
     axes = [0, *(1 + i for i in joints)]
-    laws = axis_laws(plan, axes)
+    laws, paced = axis_laws(plan, axes), knowledge.hold is not None
     return {
         "object_estimator": ObjectEstimator(knowledge.robot, p_LE),
-        "reference_governor": ReferenceGovernor(cells, paced=knowledge.hold is not None),
+        **_governor(knowledge, paced=paced),
         "axis_ppc": AxisPpc(
             laws,
             start=plan.start[2:][np.array(axes)],
             period=knowledge.period,
             offset=knowledge.sample_offset,
-            paced=knowledge.hold is not None,
+            paced=paced,
         ),
         "wrench_law": WrenchLaw(
             p_LE,
@@ -171,9 +176,17 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
             [transition.inradius for transition in plan.transitions],
             plan.goal_pose[:2],
             knowledge.position_tolerance,
+            nominal=knowledge.motion is not None,
         ),
         **_additions(knowledge, laws),
     }
+
+
+def _governor(knowledge: RobotKnowledge, *, paced: bool) -> dict[str, LeafSystem]:
+    """Return the block that moves p_G: by the measured position, or by the nominal one."""
+    if knowledge.motion is None:
+        return {"reference_governor": ReferenceGovernor(knowledge.cells, paced=paced)}
+    return {"nominal_governor": NominalGovernor(knowledge.cells, knowledge.motion, paced=paced)}
 
 
 def _additions(knowledge: RobotKnowledge, laws: Sequence[AxisLaw]) -> dict[str, LeafSystem]:

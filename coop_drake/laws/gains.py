@@ -106,6 +106,10 @@ class TransitionGains:
         first = before.stiffness, before.damping, before.governor_gain
         return np.array([*own, *first, self.hand_over_time, inf if limit is None else limit])
 
+    def with_governor(self, stiffness: float, damping: float, governor_gain: float) -> "TransitionGains":
+        """Return the same gains with another K [1/s^2], zeta [1/s] and K_G [-]."""
+        return replace(self, stiffness=stiffness, damping=damping, governor_gain=governor_gain)
+
     def select(self, axes: NDArray[np.intp]) -> "TransitionGains":
         """Return the same gains for some axes only, for instance those that one robot controls."""
         return replace(

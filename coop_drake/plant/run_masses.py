@@ -47,6 +47,24 @@ def run_setup(scenario: Scenario) -> RunSetup:
     )
 
 
+def moved_masses(scenario: Scenario) -> tuple[float, ...]:
+    """Return the mass that every robot of a scenario moves: its own and its share of the object's [kg].
+
+    Args:
+        scenario: The scenario.
+
+    Raises:
+        ScenarioError: The models do not make a team.
+    """
+    setup = run_setup(scenario)
+    own = [sum(body.mass for body in setup.bodies if body.robot == k) for k in range(len(setup.robot_names))]
+    load = sum(body.mass for body in setup.bodies if body.robot is None)
+    return tuple(
+        mass + scenario.load_share(name, len(own)) * load
+        for mass, name in zip(own, setup.robot_names, strict=True)
+    )
+
+
 def _masses(team: TeamPlant, context: Context, tree: ComponentTree) -> list[BodyMass]:
     """Masses of every robot's and the object's bodies in every component; the team stands at zero."""
     plant, origins = team.plant, [np.zeros(2)]

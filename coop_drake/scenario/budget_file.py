@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from math import hypot
 from pathlib import Path
 
 from coop_drake.answers.budget import Budget
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.reading import read_file
+from coop_drake.tree import ComponentTree
+from coop_drake.tree.levers import axis_levers
 
 FROM_DEPLOYMENT = "deployment"
 """The choice that stands for the scenario's own departures."""
+
+FROM_DEPLOYMENT_POSITION = "position"
+"""The choice that stands for these, for the object's position alone."""
+
+PLANE_DEVIATIONS = 3.44
+"""Standard deviations of the coordinates that count as the bound of a vector in the plane [-]: as rarely
+beyond it as a normal number is beyond ``DEVIATIONS``."""
 
 DEVIATIONS = 3.0
 """Standard deviations of a normal noise that count as its bound [-]: one sample in 370 is beyond."""
@@ -24,31 +35,37 @@ coupling of axes and for robots that measure differently [rad/s^2 or m/s^2]. It 
 log of a run can be compared with."""
 
 
-def read_budget(choice: str, scenario: Scenario) -> Budget:
+def read_budget(
+    choice: str, scenario: Scenario, tree: ComponentTree, masses: Callable[[], Sequence[float]]
+) -> Budget:
     """Return the budget that ``plan --budget`` names.
 
     Args:
-        choice: ``deployment`` for what the scenario's section of this name departs from the ideal team by, or
-            a file with the keys of ``Budget``.
+        choice: ``deployment`` for what the scenario's section of this name departs from the ideal team by,
+            ``position`` for the same without the axes, or a file with the keys of ``Budget``.
         scenario: The scenario.
+        tree: The team.
+        masses: Returns what each robot moves, itself and its share of the object [kg].
 
     Raises:
         ScenarioError: There is no such file, it is wrong, or the scenario has no control rate.
     """
-    if choice == FROM_DEPLOYMENT:
-        return _of_deployment(scenario)
+    if choice in (FROM_DEPLOYMENT, FROM_DEPLOYMENT_POSITION):
+        return _of_deployment(scenario, tree, masses(), axes=choice == FROM_DEPLOYMENT)
     if not Path(choice).is_file():
-        raise ScenarioError(str(scenario.path), "--budget", choice, "deployment, or a file with a budget")
+        allowed = "deployment, position, or a file with a budget"
+        raise ScenarioError(str(scenario.path), "--budget", choice, allowed)
     budget: Budget = read_file(Budget, Path(choice))
     return budget
 
 
-def _of_deployment(scenario: Scenario) -> Budget:
+def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: Sequence[float], *, axes: bool) -> Budget:
     deployment = scenario.deployment
     if deployment.control_rate is None or deployment.period is None:
         allowed = "a number, for a budget of the scenario's own departures"
         raise ScenarioError(str(scenario.path), "deployment.control_rate", None, allowed)
     measured, messages = deployment.measurements, deployment.messages
+    mean = PLANE_DEVIATIONS * hypot(*masses) / sum(masses)  # errors of several robots rarely add up
     lost = REPORTS_LOST * deployment.period if messages.loss > 0.0 else 0.0
     return Budget(
         control_rate=deployment.control_rate,
@@ -56,7 +73,35 @@ def _of_deployment(scenario: Scenario) -> Budget:
         lag=deployment.actuators.lag,
         angle_noise=DEVIATIONS * measured.angle_noise,
         rate_noise=DEVIATIONS * measured.rate_noise,
+        position_noise=mean * measured.position_noise,
+        velocity_noise=mean * measured.rate_noise * _rate_levers(tree),
         model_error=abs(deployment.mass_error),
         acceleration_error=DISAGREEMENT,
         report_age=messages.delay + lost,
+        base_force=deployment.actuators.base_force,
+        moved_mass=max(masses),
+        axes=axes,
     )
+
+
+def _rate_levers(tree: ComponentTree) -> float:
+    """Return the error of the object's velocity over that of the rates of a robot, by which it is known [-].
+
+    The velocity of the base counts once, that of every angle by its largest distance from the object; their
+    errors are independent.
+    """
+    reach, levers = axis_levers(tree)[0], [0.0] * len(tree.components)
+    longest = 0.0
+    for index, component in enumerate(tree.components):
+        if component.joint is None or component.parent is None:
+            continue
+        pose = component.joint.X_PJ
+        levers[index] = levers[component.parent] + hypot(pose.x, pose.y)
+        joints = (tree.components[i].joint for i in tree.ancestors[index])
+        own = [
+            levers[i] if joint.kind == "revolute" else 1.0
+            for i, joint in zip(tree.ancestors[index], joints, strict=True)
+            if joint is not None
+        ]
+        longest = max(longest, hypot(1.0, reach, *own))
+    return longest or hypot(1.0, reach)

@@ -42,7 +42,7 @@ def build_maps(
     """
 
     def solve(index: int) -> HarmonicMap:
-        cell, target = plan.cells[index].tidied, Point(plan.transitions[index].target)
+        cell, target = plan.governed(index), Point(plan.transitions[index].target)
         if store is not None:
             return store.map_of(cell, target, tolerance=tolerance)
         return HarmonicMap(cell, target, tolerance=tolerance)

@@ -220,6 +220,7 @@ def _fused_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
         part.astype(np.intp) for part in telemetry_parts(added, robots)
     )
     clock = [] if fused.clock is None else ports.add(fused.clock, "clock")
+    governor = fused.governor_position
     wrenches, torques = efforts[: 3 * robots].reshape(robots, 3), efforts[3 * robots :]
     if fused.efforts:
         held = [ports.add(port.get_system(), port.get_name()) for port in fused.efforts]
@@ -228,7 +229,7 @@ def _fused_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
     return _Places(
         instant=_instant(loop, ports),
         base_poses=bases,
-        governors=ports.add(fused.governor, fused.governor.get_output_port().get_name())[None],
+        governors=ports.add(governor.get_system(), governor.get_name())[None],
         funnel_lower=bounds[: len(bounds) // 2],
         funnel_upper=bounds[len(bounds) // 2 :],
         energy_margins=margin,

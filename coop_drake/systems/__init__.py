@@ -13,6 +13,7 @@ from coop_drake.systems.hold_supervisor import HoldSupervisor
 from coop_drake.systems.interruption import Interruption
 from coop_drake.systems.lossy_measurement import LossyMeasurement
 from coop_drake.systems.message_channel import MessageChannel, clear_channel, whole_periods
+from coop_drake.systems.nominal_governor import NominalGovernor, NominalMotion
 from coop_drake.systems.object_estimator import ObjectEstimator
 from coop_drake.systems.ready_monitor import ReadyMonitor
 from coop_drake.systems.reference_governor import GovernedCell, ReferenceGovernor
@@ -44,6 +45,8 @@ __all__ = [
     "Interruption",
     "LossyMeasurement",
     "MessageChannel",
+    "NominalGovernor",
+    "NominalMotion",
     "ObjectEstimator",
     "ReadyMonitor",
     "ReferenceGovernor",

@@ -18,9 +18,10 @@ from coop_drake.laws.readiness import (
     position_arrival,
 )
 from coop_drake.systems.governor_kernels import cell_margin
+from coop_drake.systems.nominal_kernels import nominal_ready
 from coop_drake.tree.pose import FloatArray
 
-__all__ = ["ReadyConditions", "ready_conditions", "robot_ready"]
+__all__ = ["ReadyConditions", "ready_conditions", "robot_ready", "robot_ready_along"]
 
 
 class ReadyConditions(NamedTuple):
@@ -115,7 +116,6 @@ def robot_ready(
         robot: (z_k, z_k'), shape (2 (3 + n),).
         governor_position: p_G as the robot keeps it, shape (2,) [m].
     """
-    n = table.shape[0] - 1
     if last:
         distance = np.hypot(object_state[0] - goal[0], object_state[1] - goal[1])
         speed = np.hypot(object_state[3], object_state[4])
@@ -123,7 +123,61 @@ def robot_ready(
     else:
         energy_margin = cell_margin(next_edges, next_stiffness, object_state, governor_position)
         margin = clearance_margin(energy_margin, next_stiffness, inradius)
-        margin = min(margin, hand_over_margin(time, table[0, LEAVING_TIME]))
+    return min(margin, axes_ready(table, next_table, last, time, object_state, robot))
+
+
+@compiled
+def robot_ready_along(
+    table: FloatArray, next_table: FloatArray, next_edges: FloatArray, next_stiffness: float,
+    inradius: float, goal: FloatArray, tolerance: float, last: bool, time: float, object_state: FloatArray,
+    robot: FloatArray, governor_position: FloatArray, nominal: FloatArray,
+) -> float:  # fmt: skip
+    """Return ``robot_ready`` where the position is judged by its nominal motion, see ``laws/nominal.py``.
+
+    Args:
+        table: This and the next eleven arguments are those of ``robot_ready``; see there.
+        next_table: The axes in the next cell.
+        next_edges: Edges of the next governed region.
+        next_stiffness: K with which it is entered.
+        inradius: R of the transition; not used here.
+        goal: Goal position.
+        tolerance: Tolerance of the nominal position.
+        last: Whether this is the last cell.
+        time: Time since the current cell was entered [s].
+        object_state: Pose and twist of the object.
+        robot: The robot's own state.
+        governor_position: p_G.
+        nominal: What ``show_nominal`` writes, shape (6,).
+    """
+    if last:
+        distance = np.hypot(nominal[0] - goal[0], nominal[1] - goal[1])
+        margin = position_arrival(distance, np.hypot(nominal[2], nominal[3]), tolerance)
+    else:
+        margin = nominal_ready(next_edges, next_stiffness, nominal, governor_position)
+    return min(margin, axes_ready(table, next_table, last, time, object_state, robot))
+
+
+@compiled
+def axes_ready(
+    table: FloatArray,
+    next_table: FloatArray,
+    last: bool,
+    time: float,
+    object_state: FloatArray,
+    robot: FloatArray,
+) -> float:
+    """Return the margin with which the axes that a robot knows are ready, and the last hand-over is over.
+
+    Args:
+        table: The axes (theta, own joints) in this cell, shape (1 + n, ``LAW_COLUMNS``).
+        next_table: The axes in the next cell.
+        last: Whether this is the last cell.
+        time: Time since the current cell was entered [s].
+        object_state: Pose and twist of the object, shape (6,).
+        robot: (z_k, z_k'), shape (2 (3 + n),).
+    """
+    n = table.shape[0] - 1
+    margin = 1.0 if last else hand_over_margin(time, table[0, LEAVING_TIME])
     for i in range(1 + n):
         position, rate = object_state[2], object_state[5]
         if i > 0:

@@ -10,7 +10,8 @@ from coop_drake.compiled import prepared
 from coop_drake.systems.axis_laws import AxisLaw
 from coop_drake.systems.block import NUMBER, VECTOR, Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
-from coop_drake.systems.ready_kernels import ready_conditions, robot_ready
+from coop_drake.systems.nominal_kernels import NOMINAL_SIZE
+from coop_drake.systems.ready_kernels import ready_conditions, robot_ready, robot_ready_along
 from coop_drake.systems.reference_governor import GovernedCell
 from coop_drake.tree.pose import FloatArray
 
@@ -23,6 +24,7 @@ class ReadyMonitor(Block):
     input   ``robot_state``        2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)         W
     input   ``governor_position``  2          p_G as the robot keeps it [m]                          W
     input   ``current_cell``       2          index of the current cell, time of its entry [-, s]
+    input   ``nominal``            6          what ``NominalGovernor`` shows; only with ``nominal``
     output  ``ready``              2          index of the current cell, signed margin [-]
     ======= ====================== ========== ====================================================== =====
 
@@ -34,6 +36,7 @@ class ReadyMonitor(Block):
         inradii: R of every transition [m].
         goal_position: Where the object shall end, shape (2,) [m].
         position_tolerance: How close to it counts as arrived [m].
+        nominal: Whether the position is judged by its nominal motion.
 
     Raises:
         ValueError: The sequences are empty or differ in length, or the tolerance is not positive.
@@ -46,6 +49,7 @@ class ReadyMonitor(Block):
         inradii: Sequence[float],
         goal_position: FloatArray,
         position_tolerance: float,
+        nominal: bool = False,
     ) -> None:
         super().__init__()
         if not cells or not len(cells) == len(laws) == len(inradii):
@@ -63,21 +67,25 @@ class ReadyMonitor(Block):
             goal_position,
             position_tolerance,
         )
-        self._ready = [prepared(robot_ready, known, NUMBER, VECTOR, VECTOR, VECTOR) for known in conditions]
+        law, more = (robot_ready_along, [VECTOR]) if nominal else (robot_ready, [])
+        self._ready = [prepared(law, known, NUMBER, VECTOR, VECTOR, VECTOR, *more) for known in conditions]
         n = laws[0].axes - 1
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._state = self.DeclareVectorInputPort("robot_state", 2 * (3 + n))
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
+        self._nominal = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE) if nominal else None
         self.DeclareVectorOutputPort("ready", READY_SIZE, self._write_ready)
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
         current, report = self._current.Eval(context), output.get_mutable_value()
         index = index_of(current, len(self._ready))
         report[0] = index
+        led = () if self._nominal is None else (self._nominal.Eval(context),)
         report[1] = self._ready[index](
             context.get_time() - current[1],
             self._object.Eval(context),
             self._state.Eval(context),
             self._governor.Eval(context),
+            *led,
         )

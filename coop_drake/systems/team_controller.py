@@ -13,6 +13,7 @@ from coop_drake.systems.block import NUMBER, VECTOR, Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.funnel_clock import CLOCK_SIZE, clock_of
 from coop_drake.systems.jump_memory import JumpMemory
+from coop_drake.systems.nominal_kernels import NOMINAL_SIZE, NOTHING
 from coop_drake.systems.ready_kernels import ready_conditions
 from coop_drake.systems.team_kernels import (
     FusedCell,
@@ -36,6 +37,7 @@ class TeamController(Block):
     input   ``governor_position``  2             p_G [m]                                                W
     input   ``current_cell``       2             index of the current cell, time of its entry [-, s]
     input   ``clock``              3             as that of ``AxisPpc``; only where ``paced``
+    input   ``nominal``            6             that of ``NominalGovernor``; only where ``team`` tracks it
     output  ``team_command``       3 N + n + 2   wrench on every base at Bk [N, N m], all joint torques W, or
                                                  [N m or N], p_G' [m/s]                                 Bk
     output  ``telemetry``          6 + 12 N + 3n what the robots' blocks show to the log, see           W
@@ -43,8 +45,7 @@ class TeamController(Block):
     output  ``ready``              2 N           for each robot: index of the current cell, margin [-]
     ======= ====================== ============= ====================================================== =====
 
-    State: one discrete group (index of a cell, jumps of the accelerations of all axes at the switch to it),
-    as that of ``AxisPpc``. Base wrenches are in the axes of W, or where ``on_bases`` is set of their bases.
+    State: one discrete group as that of ``AxisPpc``: index of a cell, jumps of all axes at the switch to it.
 
     Args:
         cells: Every cell of the plan.
@@ -54,7 +55,7 @@ class TeamController(Block):
         position_tolerance: Largest distance to it that counts as arrived [m].
         start: Where the axes of every robot, (theta, q_k), rest at the beginning, shape (N + n,).
         period: Time between updates of the state [s], None for every step.
-        on_bases: In whose axes the wrenches are given.
+        on_bases: Whether base wrenches are given in the axes of the bases, not of W.
         paced: Whether funnels and p_G move by a clock that may slow down.
 
     Raises:
@@ -78,14 +79,14 @@ class TeamController(Block):
         if not cells or len(cells) != len(inradii):
             found = f"{len(inradii)} for {len(cells)}"
             raise ValueError(f"TeamController needs one inradius for each cell, not {found}")
-        ports = VECTOR, VECTOR, VECTOR, VECTOR
+        ports = VECTOR, VECTOR, VECTOR, VECTOR, VECTOR
         driving = NUMBER, *ports, on_bases, VECTOR, VECTOR
         self._on_bases = on_bases
         self._laws = [prepared(drive_team, (*cell, *team), *driving) for cell in cells]
         self._tables, edges, rows = zip(*((cell.table, cell.edges, cell.row) for cell in cells), strict=True)
         conditions = ready_conditions(self._tables, edges, rows, inradii, goal_position, position_tolerance)
         reading = team.places, team.first, team.base_chains, team.yaws
-        told = 0, NUMBER, VECTOR, VECTOR, VECTOR
+        told = 0, NUMBER, VECTOR, VECTOR, VECTOR, VECTOR
         self._report = [prepared(report_readiness, (*each, *reading), *told) for each in conditions]
         self._reading = reading
         self._memory, self._nothing = JumpMemory(self._tables), EventStatus.DidNothing()
@@ -94,6 +95,8 @@ class TeamController(Block):
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE) if paced else None
+        nominal = team.tracking.size > 0
+        self._nominal = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE) if nominal else None
         sizes = 3 * robots + joints + 2, telemetry_size(robots, joints)
         self._unread = tuple(map(np.empty, sizes))
         self.DeclareVectorOutputPort("team_command", sizes[0], self._write_command)
@@ -113,14 +116,18 @@ class TeamController(Block):
         cell = self._cell.Eval(context)
         index, time = index_of(cell, len(self._laws)), context.get_time() - cell[1]
         clock, jumps = clock_of(self._clock, context), self._memory.jumps(context, index, time)
-        state, governor = self._state.Eval(context), self._governor.Eval(context)
-        self._laws[index](time, clock, jumps, state, governor, self._on_bases, command, telemetry)
+        state, led = self._state.Eval(context), self._led(context)
+        self._laws[index](time, clock, jumps, state, *led, self._on_bases, command, telemetry)
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
         cell = self._cell.Eval(context)
         index = index_of(cell, len(self._report))
-        state, governor = self._state.Eval(context), self._governor.Eval(context)
-        self._report[index](index, context.get_time() - cell[1], state, governor, output.get_mutable_value())
+        state, led = self._state.Eval(context), self._led(context)
+        self._report[index](index, context.get_time() - cell[1], state, *led, output.get_mutable_value())
+
+    def _led(self, context: Context) -> tuple[FloatArray, FloatArray]:
+        """Return p_G and what the nominal governor shows, nothing without one."""
+        return self._governor.Eval(context), NOTHING if self._nominal is None else self._nominal.Eval(context)
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         reports = self._ready.Eval(context)

@@ -14,7 +14,7 @@ from coop_drake.checking import RefusedError, check
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
 from coop_drake.progress import Progress
-from coop_drake.verification.budgets import check_budget
+from coop_drake.verification.budgets import check_budget, check_position
 from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.gains import check_gains
 from coop_drake.verification.problem_match import check_problem
@@ -45,6 +45,7 @@ def verify_plan(
     checks += [
         further for further in (check_speeds(plan, problem), check_budget(plan)) if further is not None
     ]
+    checks += check_position(plan, problem.position_tolerance)
     return Verified("found", f"plan of {len(plan.cells)} cells", tuple(checks))
 
 

@@ -58,6 +58,9 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
         )
         if tolerance is not None:  # the condition of rest follows from the budget
             gains = replace(gains, rest=transition.gains.rest)
+        if plan.tube is not None:  # K of a plan with a tube is part of what follows from its budget
+            own = transition.gains
+            gains = gains.with_governor(own.stiffness, own.damping, own.governor_gain)
         _compare(transition.gains, gains, f"{where}.gains")
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
     return Check("gains are those that the gain set gives for the cells", len(plan.transitions))

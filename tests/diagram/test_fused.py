@@ -55,7 +55,7 @@ class Side:
 
     def governors(self):
         if self.loop.fused:
-            return [self.loop.fused.governor]
+            return [self.loop.fused.integrator]
         return [law.GetSubsystemByName("governor_state") for law in self.loop.bare_controllers]
 
     def derivatives(self):

@@ -69,7 +69,7 @@ class Loop:
         rates = np.linspace(0.02, 0.05, len(z))
         set_configuration(team, team.plant.GetMyMutableContextFromRoot(root), z, rates)
         integrators = (
-            [loop.fused.governor]
+            [loop.fused.integrator]
             if loop.fused
             else [law.GetSubsystemByName("governor_state") for law in loop.bare_controllers]
         )

@@ -20,8 +20,10 @@ from coop_drake.scenario import (
     RobotDepartures,
     Silence,
 )
+from coop_drake.simulation import build_maps
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.system_checks import SIZE_OF_ABSTRACT, port_sizes, state_of
+from tests.support.tubes import tubed_problem
 
 ROW = re.compile(r"^ *(input|output) +``(\S+)`` +(\S(?:.*?\S)?)(?:  |$)", re.MULTILINE)
 BLOCKS = sorted(
@@ -47,15 +49,19 @@ def leaves(system):
 
 @pytest.fixture(scope="module")
 def blocks():
-    """One of each block: from a loop that is sampled, one whose robots are separate, and a fused one."""
-    scenario, plan = small_problem("base")
+    """One of each block: from loops with a tube, one that is sampled, and one whose robots are separate."""
+    own, (scenario, plan) = small_problem("base"), tubed_problem()
+    tubed, hold = (scenario, plan, build_maps(plan)), Control(hold=Hold(at=(1.0,)))
+    everything = {"deployment": EVERYTHING, "control": Control(predictor=True, observer=True, hold=Hold())}
+    separate = {"plant": PlantSettings(grasps="constraints")}
     found = {}
-    for blocks, changes in (
-        ("named", {"deployment": EVERYTHING, "control": Control(predictor=True, observer=True, hold=Hold())}),
-        ("named", {"plant": PlantSettings(grasps="constraints")}),
-        ("fused", {"control": Control(hold=Hold(at=(1.0,)))}),
+    for (scenario, plan, maps), blocks, changes in (
+        (tubed, "named", {"control": hold}),
+        (tubed, "fused", {"control": hold}),
+        ((*own, small_maps()), "named", everything),
+        ((*own, small_maps()), "named", separate),
     ):
-        loop = build_closed_loop(replace(scenario, **changes), plan, small_maps(), blocks=blocks)
+        loop = build_closed_loop(replace(scenario, **changes), plan, maps, blocks=blocks)
         for leaf in leaves(loop.diagram):
             found.setdefault(type(leaf).__name__, (leaf, loop))
     return found
@@ -90,11 +96,11 @@ def test_a_block_without_state_has_none_and_any_other_says_which(blocks, name):
         assert re.search(r"^ *State: ", type(block).__doc__, re.MULTILINE)
 
 
-def test_only_switches_jumps_holds_a_predictor_and_what_models_failures_are_remembered(blocks):
+def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_are_remembered(blocks):
     remembering = {name for name in BLOCKS if any(map(len, state_of(blocks[name][0].CreateDefaultContext())))}
     failures = {"Interruption", "LossyMeasurement", "MessageChannel"}
     holds = {"FunnelClock", "HoldMonitor", "HoldSupervisor"}
-    laws = {"CellPlanner", "AxisPpc", "TeamController", "StatePredictor"}
+    laws = {"CellPlanner", "AxisPpc", "TeamController", "StatePredictor", "NominalGovernor"}
     assert remembering == laws | holds | failures
 
 

@@ -21,9 +21,6 @@ AGE_FACTORS = (1.0, 1.5, 2.2)
 """Gains are tried for so many times the age of the gain set's commands [-]: slow ones bear more delay, quick
 ones more noise and larger forces. All transitions have the same factor, so that K falls slowly."""
 
-BISECTIONS = 7
-"""Halvings of the interval in which the largest budget is sought: it is found within a hundredth."""
-
 OVERLAPS = (0.02, 0.04, 0.06, 0.09, 0.12)
 """Least overlaps of consecutive boxes to choose from, in every angle and joint [rad or m]: the wider the goal
 intervals, the larger are the departures that an axis bears in them, and the more cells a plan has."""
@@ -94,18 +91,6 @@ def _typical(gain_set: ScheduledGains, overlap: float, back: bool) -> FloatArray
 def _factors(gain_set: ScheduledGains, budget: Budget) -> list[float]:
     age = (whole_periods(budget.delay, budget.period) + 0.5) * budget.period + budget.lag
     return [max(1.0, age / gain_set.age) * factor for factor in AGE_FACTORS]
-
-
-def largest_factor(plan: Plan, gain_set: ScheduledGains, budget: Budget) -> float:
-    """Return the largest multiple of a budget that holds, at most 1, by bisection; 0 if none was found."""
-    low, high = 0.0, 1.0
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        if isinstance(fit_budget(plan, gain_set, budget.scaled(middle)), Limit):
-            high = middle
-        else:
-            low = middle
-    return low
 
 
 def _with_gains(plan: Plan, gain_set: ScheduledGains) -> tuple[Transition, ...]:

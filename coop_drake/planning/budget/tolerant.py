@@ -14,15 +14,13 @@ from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
 from coop_drake.planning.budget.chain import Limit
-from coop_drake.planning.budget.fitting import (
-    BISECTIONS,
-    OVERLAPS,
-    fit_budget,
-    largest_factor,
-    sufficient_overlap,
-)
+from coop_drake.planning.budget.fitting import OVERLAPS, fit_budget, sufficient_overlap
+from coop_drake.planning.budget.position_fit import PositionLimit, fit_position
 from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.progress import Progress
+
+BISECTIONS = 7
+"""Halvings of the interval in which the largest budget is sought: it is found within a hundredth."""
 
 SMALLEST = 0.5**BISECTIONS
 """The smallest multiple of a budget that is tried [-]."""
@@ -77,9 +75,8 @@ def tolerant_plan(
         PlanError: No plan can be made.
         StallError: No plan can be executed.
     """
-    tried: list[tuple[Plan, Limit]] = []
-    least = sufficient_overlap(gain_set, budget)
-    for overlap in [overlap for overlap in OVERLAPS if overlap >= least]:
+    tried: list[tuple[Plan, Limit | PositionLimit]] = []
+    for overlap in _overlaps(gain_set, budget):
         try:
             plan = quickest_plan(
                 problem,
@@ -93,22 +90,52 @@ def tolerant_plan(
             if not tried:
                 raise
             continue
-        fitted = fit_budget(plan, gain_set, budget)
+        fitted = _fitted(problem, plan, gain_set, budget)
         if isinstance(fitted, Plan):
             return fitted
         tried.append((plan, fitted))
-    return _beyond(tried, gain_set, budget)
-
-
-def _beyond(tried: list[tuple[Plan, Limit]], gain_set: ScheduledGains, budget: Budget) -> BeyondBudget:
-    factors = [largest_factor(plan, gain_set, budget) for plan, _ in tried]
+    factors = [_largest_factor(problem, plan, gain_set, budget) for plan, _ in tried]
     best = int(np.argmax(factors))
     plan, limit = tried[best]
     return BeyondBudget(_sentence(plan, limit), budget, factors[best])
 
 
-def _sentence(plan: Plan, limit: Limit) -> str:
+def _overlaps(gain_set: ScheduledGains, budget: Budget) -> list[float]:
+    """Return the least overlaps of boxes that are tried; the position alone asks for none."""
+    if not budget.axes:
+        return [0.0]
+    least = sufficient_overlap(gain_set, budget)
+    return [overlap for overlap in OVERLAPS if overlap >= least]
+
+
+def _fitted(
+    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget
+) -> Plan | Limit | PositionLimit:
+    """Return a plan with gains, sets and regions under which its budget holds; or where it does not."""
+    if budget.axes:
+        fitted = fit_budget(plan, gain_set, budget)
+        if isinstance(fitted, Limit):
+            return fitted
+        plan = fitted
+    return fit_position(problem, plan, gain_set, budget)
+
+
+def _largest_factor(problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget) -> float:
+    """Return the largest multiple of a budget that holds, at most 1, by bisection; 0 if none was found."""
+    low, high = 0.0, 1.0
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        if isinstance(_fitted(problem, plan, gain_set, budget.scaled(middle)), Plan):
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def _sentence(plan: Plan, limit: Limit | PositionLimit) -> str:
     """Say where a budget does not hold, with the names of the robot and of the joint."""
+    if isinstance(limit, PositionLimit):
+        return limit.reason
     name = "the object's angle"
     if limit.axis > 0:
         robot, _, joint = plan.joint_names[limit.axis - 1].rpartition("/")

@@ -59,11 +59,11 @@ def estimated(plan: Plan) -> tuple[Plan, FloatArray]:
     """
     crossings = [
         (
-            np.ascontiguousarray(edges_of(cell.tidied)),
+            np.ascontiguousarray(edges_of(plan.governed(index))),
             plan.governor_row(index),
             axis_table(plan.funnel(index), transition.gains),
         )
-        for index, (cell, transition) in enumerate(zip(plan.cells, plan.transitions, strict=True))
+        for index, transition in enumerate(plan.transitions)
     ]
     jumps = first_jumps(crossings[0][2], plan.start[2:])
     following = [*crossings[1:], crossings[-1]]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, isfinite, pi, sin
+from typing import Any
 
 import numpy as np
 import shapely
@@ -79,7 +80,7 @@ def make_plan(
     routes, transitions, resting = [], [], problem.start[2:]
     for index, (entry, target) in enumerate(zip(entries, targets, strict=True)):
         goals = goal_intervals(problem, channel, index)
-        routes.append(_route(problem, cells[index : index + 2], entry, target, index))
+        routes.append(find_route(problem, cells[index : index + 2], entry, target, index))
         transitions.append(_transition(gain_set, cells[index], routes[-1], goals, resting))
         resting = 0.5 * (goals[0] + goals[1])
     made = Plan(
@@ -118,7 +119,7 @@ def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
 
 
 def with_gains(plan: Plan, gain_set: GainSet, name: str, limits: FloatArray | None = None) -> Plan:
-    """A plan with the gains of another gain set; its estimated times are kept.
+    """A plan with the gains of another gain set, without a budget; its estimated times are kept.
 
     Args:
         plan: The plan.
@@ -131,31 +132,53 @@ def with_gains(plan: Plan, gain_set: GainSet, name: str, limits: FloatArray | No
     for cell, transition in zip(plan.cells, plan.transitions, strict=True):
         goals = (transition.goal_lower, transition.goal_upper)
         gains = _gains(gain_set, cell, transition.neck, goals, resting, limits)
-        transitions.append(replace(transition, gains=gains))
+        transitions.append(replace(transition, gains=gains, tolerance=None, governed=None))
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
-    return replace(plan, transitions=tuple(transitions), gain_set=name)
+    return replace(plan, transitions=tuple(transitions), gain_set=name, budget=None, tube=None)
 
 
 @dataclass(frozen=True)
-class _TransitionGeometry:
+class Route:
     """The positions of one transition: its target with the room around it, and its passage."""
 
     target: FloatArray
     inradius: float
     passage: Passage
 
+    @property
+    def passage_fields(self) -> dict[str, Any]:
+        """What a transition states about its passage."""
+        return {
+            "path": shapely.get_coordinates(self.passage.path),
+            "neck": self.passage.clearance,
+            "length": self.passage.length,
+            "only_angles": bool(self.passage.length <= SAME_PLACE),
+        }
 
-def _route(
+
+def find_route(
     problem: PlanningProblem, cells: Sequence[Cell], entry: FloatArray, target: FloatArray, index: int
-) -> _TransitionGeometry:
-    """The route from entry to target in the first cell; the second cell, if any, is entered there."""
+) -> Route:
+    """Return the route from entry to target in the first cell; the second one, if any, is entered there.
+
+    Args:
+        problem: What was asked.
+        cells: The cell, and the next one if there is one.
+        entry: Where the cell is entered, shape (2,) [m].
+        target: Where it is left, shape (2,) [m].
+        index: Index of the cell, for messages.
+
+    Raises:
+        GeometryError: The cell does not join them.
+        StallError: The passage or the room around the target is too narrow.
+    """
     here = cells[0].tidied
     if len(cells) > 1:
         region = component_at(here.intersection(cells[1].tidied), Point(target))
     else:
         region = component_at(_disc(target, problem.position_tolerance).intersection(here), Point(target))
     inradius = 0.0 if region.is_empty else BoundaryDistance(region)(target)
-    route = _TransitionGeometry(target, inradius, PassageFinder(here).find(entry, target))
+    route = Route(target, inradius, PassageFinder(here).find(entry, target))
     wanted = NARROWEST
     if len(cells) == 1:
         wanted = min(NARROWEST, GOAL_REGION_FRACTION * problem.position_tolerance)
@@ -165,7 +188,7 @@ def _route(
     return route
 
 
-def _checked(problem: PlanningProblem, plan: Plan, routes: Sequence[_TransitionGeometry]) -> Plan:
+def _checked(problem: PlanningProblem, plan: Plan, routes: Sequence[Route]) -> Plan:
     """The plan; raises a StallError if one of its estimated times is too long."""
     for index, (route, transition) in enumerate(zip(routes, plan.transitions, strict=True)):
         if transition.estimated_time > problem.settings.max_transition_time:
@@ -174,24 +197,21 @@ def _checked(problem: PlanningProblem, plan: Plan, routes: Sequence[_TransitionG
 
 
 def _transition(
-    gain_set: GainSet, cell: Cell, route: _TransitionGeometry, goals: Bounds, resting: FloatArray
+    gain_set: GainSet, cell: Cell, route: Route, goals: Bounds, resting: FloatArray
 ) -> Transition:
     """A transition without its estimated time."""
     return Transition(
         target=route.target,
-        path=shapely.get_coordinates(route.passage.path),
         goal_lower=goals[0],
         goal_upper=goals[1],
         inradius=route.inradius,
-        neck=route.passage.clearance,
-        length=route.passage.length,
         estimated_time=0.0,
-        only_angles=bool(route.passage.length <= SAME_PLACE),
+        **route.passage_fields,
         gains=_gains(gain_set, cell, route.passage.clearance, goals, resting),
     )
 
 
-def _stall(problem: PlanningProblem, index: int, route: _TransitionGeometry, seconds: float) -> str:
+def _stall(problem: PlanningProblem, index: int, route: Route, seconds: float) -> str:
     passage = route.passage
     x, y = passage.narrowest
     return (

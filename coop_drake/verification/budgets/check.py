@@ -40,11 +40,12 @@ def check_budget(plan: Plan) -> Check | None:
     Raises:
         RefusalError: Names the transition, the entry and the axis.
     """
-    if plan.budget is None:
+    if plan.budget is None or not plan.budget.axes:
         for k, transition in enumerate(plan.transitions):
             if transition.tolerance is not None:
-                raise RefusalError(f"transitions[{k}].tolerance", "is stated, but the plan has no budget")
-        return None
+                finding = "is stated, but the plan has no budget for the axes"
+                raise RefusalError(f"transitions[{k}].tolerance", finding)
+        return None if plan.budget is None else Check("angles and joints are not part of the budget", 0)
     smallest, count, entry = np.inf, 0, None
     for k, transition in enumerate(plan.transitions):
         stated, where = transition.tolerance, f"transitions[{k}]"

@@ -1,0 +1,34 @@
+"""The position's part of a budget: how far the object may depart from its nominal motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from coop_drake.typed_data import EXACT, NotNegative, Positive
+
+_Exact = Annotated[Positive, EXACT]
+_NotNegative = Annotated[NotNegative, EXACT]
+
+
+@dataclass(frozen=True)
+class PositionTube:
+    """The tube about the nominal motion of the object's origin, the same in every transition of a plan.
+
+    Attributes:
+        tracking_stiffness: K_t, with which robots pull the object to its nominal motion [1/s^2].
+        tracking_damping: zeta_t, likewise for velocities [1/s].
+        speed: Largest speed of p_G [m/s].
+        radius: r, largest distance of the object's origin from its nominal position [m].
+        rate: Largest departure of its velocity from the nominal one [m/s].
+        rest: Largest distance from the nominal position after both have come to rest [m].
+        acceleration: Largest acceleration that a robot commands for the object's origin [m/s^2].
+    """
+
+    tracking_stiffness: _Exact
+    tracking_damping: _Exact
+    speed: _Exact
+    radius: _NotNegative
+    rate: _NotNegative
+    rest: _NotNegative
+    acceleration: _NotNegative

@@ -1,0 +1,197 @@
+"""A plan whose position holds under a budget: gains of its loop, and cells without their outer strip.
+
+The object stays within r of its nominal motion, which the governor keeps in a region whose points are at
+least r from the boundary of the cell. Targets, paths and clearances are chosen again in these regions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import sqrt
+
+import numpy as np
+from shapely import Point, Polygon
+
+from coop_drake.answers.budget import Budget
+from coop_drake.answers.plan import Cell, Plan, Transition
+from coop_drake.answers.position_tube import PositionTube
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.errors import GeometryError, StallError
+from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.parts import component_at, parts_of
+from coop_drake.geometry.passage import pole
+from coop_drake.geometry.tidy import tidy_cell
+from coop_drake.laws import ScheduledGains
+from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
+from coop_drake.planning.execution.estimate import timed
+from coop_drake.planning.execution.transitions import find_route
+from coop_drake.tree.pose import FloatArray
+
+SPEEDS = (1.0, 0.6, 0.35, 0.2)
+"""Largest speeds of p_G that are tried, in this order [m/s]: slow motions have narrow tubes."""
+
+TRACKING_STIFFNESSES = (50.0, 100.0, 150.0, 250.0, 400.0)
+"""K_t that are tried [1/s^2]; the narrowest tube is taken. Stiffer loops follow the noise more than they
+narrow the tube."""
+
+TRACKING_DAMPINGS = (1.4, 2.0)
+"""zeta_t over the root of K_t that is tried [-]: aperiodic loops answer less to what lasts."""
+
+MITRE_LIMIT = 2.0
+"""Longest mitre over r where a strip is taken off a cell [-]; corners of walls that are sharper are cut off
+farther away."""
+
+KEPT = 0.6
+"""A target is kept if its clearance in the regions is this share of the largest there [-]."""
+
+SMALLEST_SHARE = 0.1
+"""Share of the goal's tolerance that must be left for the nominal motion to arrive in [-]."""
+
+GAP = 1e-6
+"""The strip is wider than r by this [m], more than rounding."""
+
+
+@dataclass(frozen=True)
+class PositionLimit:
+    """Where the position does not hold under a budget.
+
+    Attributes:
+        reason: What cannot be shown, in words.
+    """
+
+    reason: str
+
+
+def fit_position(
+    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget
+) -> Plan | PositionLimit:
+    """Choose gains and regions with which the object's position holds under a budget, the quickest that do.
+
+    Args:
+        problem: What was asked.
+        plan: A plan with the gains of the gain set.
+        gain_set: The rule of its gains.
+        budget: The departures to be tolerated.
+
+    Returns:
+        The plan with the tube and these regions; or what cannot be shown.
+    """
+    stiffness = max(transition.gains.stiffness for transition in plan.transitions)
+    uniform = _with_stiffness(plan, stiffness, gain_set)
+    found: Plan | PositionLimit = PositionLimit(
+        "the object's position is not stable under the delay, the lag and the model's error"
+    )
+    for tube in _tubes(stiffness, gain_set, budget):
+        found = _limit(tube, budget, problem) or _within(problem, uniform, tube)
+        if isinstance(found, Plan):
+            return timed(replace(found, budget=budget))
+    return found  # of the slowest motion, which has the narrowest tube
+
+
+def _tubes(stiffness: float, gain_set: ScheduledGains, budget: Budget) -> list[PositionTube]:
+    """Return the narrowest tube for each speed of p_G with which the loop is stable."""
+    damping = gain_set.damping_factor * sqrt(stiffness)
+    choices = [
+        PositionGains(stiffness, damping, tracking, factor * sqrt(tracking), speed)
+        for speed in SPEEDS
+        for tracking in TRACKING_STIFFNESSES
+        for factor in TRACKING_DAMPINGS
+    ]
+    stable = [tube for tube in position_tubes(choices, budget) if tube is not None]
+    of_speed = ([tube for tube in stable if tube.speed == speed] for speed in SPEEDS)
+    return [min(tubes, key=lambda tube: tube.radius) for tubes in of_speed if tubes]
+
+
+def _limit(tube: PositionTube, budget: Budget, problem: PlanningProblem) -> PositionLimit | None:
+    """Return what the tube itself does not allow: too large a force, or a rest too far from the goal."""
+    if tube.rest > (1.0 - SMALLEST_SHARE) * problem.position_tolerance:
+        allowed = (1.0 - SMALLEST_SHARE) * problem.position_tolerance
+        return PositionLimit(
+            f"the object may rest {1e3 * tube.rest:.1f} mm from the goal; the goal's tolerance allows "
+            f"{1e3 * allowed:.1f} mm"
+        )
+    if budget.base_force is not None and budget.moved_mass is not None:
+        force = budget.moved_mass * tube.acceleration
+        if force > budget.base_force:
+            return PositionLimit(f"a base may need {force:.0f} N to move the object's position")
+    return None
+
+
+def _with_stiffness(plan: Plan, stiffness: float, gain_set: ScheduledGains) -> Plan:
+    """Return a plan with one K, zeta and K_G for all transitions, so that its loop does not vary in time."""
+    root = sqrt(stiffness)
+    own = stiffness, gain_set.damping_factor * root, gain_set.governor_factor * root
+    transitions = tuple(
+        replace(transition, gains=transition.gains.with_governor(*own)) for transition in plan.transitions
+    )
+    return replace(plan, transitions=transitions)
+
+
+def _within(problem: PlanningProblem, plan: Plan, tube: PositionTube) -> Plan | PositionLimit:
+    """Return a plan whose regions, targets and paths leave room for the tube; or where there is none."""
+    strips = [
+        cell.tidied.buffer(-(tube.radius + GAP), join_style="mitre", mitre_limit=MITRE_LIMIT)
+        for cell in plan.cells
+    ]
+    transitions, cells, targets = [], [], []
+    entry: FloatArray = plan.start[:2]
+    for k, transition in enumerate(plan.transitions):
+        region, last = component_at(strips[k], Point(entry)), k + 1 == len(plan.cells)
+        target = transition.target if last else _target(region, strips[k + 1], transition)
+        if target is None or not region.contains(Point(target)):
+            return _no_room(k, tube)
+        try:
+            cells.append(replace(plan.cells[k], tidied=tidy_cell(region, (entry, target))))
+        except GeometryError:
+            return _no_room(k, tube)
+        targets.append(target)
+        entry = target
+    entries = (plan.start[:2], *targets[:-1])
+    for k, transition in enumerate(plan.transitions):
+        made = _routed(problem, cells[k : k + 2], entries[k], targets[k], transition, k)
+        if made is None:
+            return _no_room(k, tube)
+        transitions.append(made)
+    return replace(plan, transitions=tuple(transitions), tube=tube)
+
+
+def _no_room(k: int, tube: PositionTube) -> PositionLimit:
+    return PositionLimit(
+        f"in transition {k} the object may depart from its nominal motion by {1e3 * tube.radius:.1f} mm, "
+        "more than the cell leaves"
+    )
+
+
+def _target(region: Polygon, following: Polygon, transition: Transition) -> FloatArray | None:
+    """Return the target of a transition, or another one if it would be too near to the regions' boundary."""
+    parts = parts_of(region.intersection(following))
+    if not parts:
+        return None
+    best, clearance = max((pole(part) for part in parts), key=lambda found: found[1])
+    own = next((part for part in parts if part.contains(Point(transition.target))), None)
+    if own is not None and BoundaryDistance(own)(transition.target) >= KEPT * clearance:
+        return transition.target
+    return np.asarray(best)
+
+
+def _routed(
+    problem: PlanningProblem,
+    cells: Sequence[Cell],
+    entry: FloatArray,
+    target: FloatArray,
+    transition: Transition,
+    k: int,
+) -> Transition | None:
+    """Return a transition along the widest path in a region; None where there is none."""
+    try:
+        route = find_route(problem, cells, entry, target, k)
+    except (GeometryError, StallError):
+        return None
+    return replace(
+        transition,
+        target=target,
+        inradius=route.inradius,
+        governed=cells[0].tidied,
+        **route.passage_fields,
+    )

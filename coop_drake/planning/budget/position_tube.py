@@ -1,0 +1,168 @@
+"""How far the object's origin may depart from its nominal motion under a budget.
+
+Let e be one coordinate of p less its nominal value. The nominal motion obeys p^'' = -K (p^ - p_G) - zeta p^'
+with p_G at rest between samples. Robots command, at sample k and with measurements that are m periods old,
+
+    u_k = p^''_k - K_t (e_(k-m) + n_p) - zeta_t (e'_(k-m) + n_v),
+
+which is held for a period T, and the acceleration s follows with s' = (u - s) / lag. The object accelerates
+by p'' = (1 + epsilon) s + w. This loop is linear and does not vary in time. Its response at sample k to
+inputs at earlier samples j is a sum of h(k - j) times the inputs, so that the largest response to inputs of
+bounded size is the sum of all |h| times their bound, for vectors in the plane, too, because both coordinates
+have the same h. Inputs are what noise adds to a command, the accelerations w, and the steps of p_G, each of
+at most T times its largest speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+
+import numpy as np
+from scipy.linalg import expm
+
+from coop_drake.answers.budget import Budget
+from coop_drake.answers.position_tube import PositionTube
+from coop_drake.tree.pose import FloatArray
+
+MODEL_PARTS = 5
+"""Parts into which the range of the model's error is cut [-]; within each only the rest is a disturbance."""
+
+HORIZON = 6.0
+"""Responses are summed for so long [s]; what is left of them then must be below ``LEFT``."""
+
+LEFT = 1e-9
+"""Largest response at the end of ``HORIZON`` to a unit input [-]; a loop that is slower is refused."""
+
+SLACK = 1e-3
+"""Fraction by which stated bounds are wider than computed ones [-]: more than the responses after
+``HORIZON`` and another way to round need."""
+
+E, V, S, Q, R = range(5)
+"""State: e [m], e' [m/s], s [m/s^2], p^ - p_G [m], p^' [m/s]; then older e, e' for a delay."""
+
+
+@dataclass(frozen=True)
+class PositionGains:
+    """Gains of the position's loop.
+
+    Attributes:
+        stiffness: K of the nominal motion [1/s^2].
+        damping: zeta of the nominal motion [1/s].
+        tracking_stiffness: K_t [1/s^2].
+        tracking_damping: zeta_t [1/s].
+        speed: Largest speed of p_G [m/s].
+    """
+
+    stiffness: float
+    damping: float
+    tracking_stiffness: float
+    tracking_damping: float
+    speed: float
+
+
+def position_tubes(gains: Sequence[PositionGains], budget: Budget) -> list[PositionTube | None]:
+    """Return the tube of each choice of gains under a budget, None where the loop is not stable.
+
+    Args:
+        gains: The choices.
+        budget: The departures to be tolerated.
+    """
+    worst: list[FloatArray | None] = [np.zeros(4) for _ in gains]
+    parts = MODEL_PARTS if budget.model_error > 0.0 else 1
+    rest = budget.model_error / parts
+    for part in range(parts):
+        error = budget.model_error * ((2 * part + 1) / parts - 1.0)
+        for i, (own, sums) in enumerate(zip(gains, _response_sums(gains, budget, error), strict=True)):
+            before, found = worst[i], _bounds(own, budget, sums, rest)
+            worst[i] = None if before is None or found is None else np.maximum(before, found)
+    return [
+        None if bounds is None else _stated(own, bounds) for own, bounds in zip(gains, worst, strict=True)
+    ]
+
+
+def _stated(gains: PositionGains, bounds: FloatArray) -> PositionTube:
+    radius, rate, rest, acceleration = (float((1.0 + SLACK) * value) for value in bounds)
+    return PositionTube(
+        gains.tracking_stiffness, gains.tracking_damping, gains.speed, radius, rate, rest, acceleration
+    )
+
+
+def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, rest: float) -> FloatArray | None:
+    """Return radius, rate, rest and commanded acceleration, shape (4,), from the sums of responses (4, 4).
+
+    Part of the error of the model is a disturbance of at most ``rest`` times the command itself, which the
+    command's bound must allow for.
+    """
+    if sums is None or rest * sums[2, 1] >= 1.0:
+        return None
+    noise = gains.tracking_stiffness * budget.position_noise + gains.tracking_damping * budget.velocity_noise
+    quiet = noise * sums[:, 0] + budget.acceleration_error * sums[:, 1]
+    moving = quiet + gains.speed * sums[:, 2]
+    still = quiet[2] + noise
+    command = (moving[2] + noise + gains.speed * sums[3, 2]) / (1.0 - rest * sums[2, 1])
+    settled = still / (1.0 - rest * sums[2, 1])
+    radius, rate = moving[:2] + rest * command * sums[:2, 1]
+    nominal = gains.speed * sums[3, 2]
+    relative = (1.0 + budget.model_error) * command + nominal + budget.acceleration_error
+    between = budget.period**2 / 8.0 * relative
+    rests = quiet[0] + rest * settled * sums[0, 1]
+    return np.array([radius + between, rate + budget.period / 2.0 * relative, rests + between, command])
+
+
+def _response_sums(gains: Sequence[PositionGains], budget: Budget, error: float) -> list[FloatArray | None]:
+    """Return for each choice the sums of |h|, rows: e, e', feedback, nominal acceleration; shape (4, 4).
+
+    Columns: for a unit of command in each period, for a unit of acceleration w, for a unit of speed of p_G;
+    the last one is not used. A disturbance w within a period acts on the sample after it by (T - t) on e and
+    by 1 on e'; |h_e (T - t) + h_v| is convex in t, so that its chord is above it.
+    """
+    T, delay = budget.period, ceil(budget.delay / budget.period - 1e-6)
+    loops = [_loop(own, T, delay, budget.lag, error) for own in gains]
+    matrix, held, feedback, nominal = (np.array(part) for part in zip(*loops, strict=True))
+    state = np.zeros((len(gains), matrix.shape[1], 4))
+    state[:, :, 0], state[:, V, 1], state[:, E, 2], state[:, Q, 3] = held, 1.0, 1.0, -1.0
+    sums = np.zeros((len(gains), 4, 4))
+    for _ in range(ceil(HORIZON / T)):
+        h = np.stack((state[:, E], state[:, V], _applied(feedback, state), _applied(nominal, state)), axis=1)
+        kick = np.abs(h[:, :, 1])
+        sums[:, :, 0] += np.abs(h[:, :, 0])
+        sums[:, :, 1] += 0.5 * T * (np.abs(h[:, :, 2] * T + h[:, :, 1]) + kick)
+        sums[:, :, 2] += T * np.abs(h[:, :, 3])
+        state = matrix @ state
+    left = np.abs(state).max(axis=(1, 2))
+    return [own if small < LEFT else None for own, small in zip(sums, left, strict=True)]
+
+
+def _applied(row: FloatArray, state: FloatArray) -> FloatArray:
+    product: FloatArray = (row[:, None, :] @ state)[:, 0]
+    return product
+
+
+def _loop(
+    gains: PositionGains, T: float, delay: int, lag: float, error: float
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Return the matrix of one period, the response to a unit command held for it, and two rows.
+
+    The rows give what e adds to the command, and the nominal acceleration.
+    """
+    motion, size = np.zeros((6, 6)), 5 + 2 * delay
+    motion[E, V] = motion[Q, R] = 1.0
+    motion[V, Q], motion[V, R] = gains.stiffness, gains.damping
+    motion[R, Q], motion[R, R] = -gains.stiffness, -gains.damping
+    if lag > 0.0:
+        motion[V, S], motion[S, S], motion[S, 5] = 1.0 + error, -1.0 / lag, 1.0 / lag
+    else:
+        motion[V, 5] = 1.0 + error
+    flow = expm(T * motion)
+    feedback, nominal, held = np.zeros(size), np.zeros(size), np.zeros(size)
+    nominal[[Q, R]] = -gains.stiffness, -gains.damping
+    oldest = 5 + 2 * (delay - 1) if delay else E
+    feedback[[oldest, oldest + 1]] = -gains.tracking_stiffness, -gains.tracking_damping
+    held[:5] = flow[:5, 5]
+    matrix = np.outer(held, feedback + nominal)
+    matrix[:5, :5] += flow[:5, :5]
+    for i in range(2 * delay):  # e, e' of one period before, then those of two, and so on
+        matrix[5 + i, i if i < 2 else 5 + i - 2] = 1.0
+    return matrix, held, feedback, nominal

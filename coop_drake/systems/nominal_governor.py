@@ -1,0 +1,167 @@
+"""The nominal governor of the object's position as a block: p_G from a model that all robots share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
+
+from coop_drake.answers.position_tube import PositionTube
+from coop_drake.compiled import prepared
+from coop_drake.fields import VelocityField
+from coop_drake.laws.nominal import nominal_flow
+from coop_drake.systems.block import NUMBER, VECTOR, Block
+from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
+from coop_drake.systems.funnel_clock import CLOCK_SIZE, clock_of
+from coop_drake.systems.nominal_kernels import (
+    NOMINAL_SIZE,
+    STATE_SIZE,
+    accelerate_along,
+    nominal_margin,
+    show_nominal,
+    step_nominal,
+)
+from coop_drake.systems.reference_governor import GovernedCell
+from coop_drake.tree.pose import FloatArray
+
+
+@dataclass(frozen=True)
+class NominalMotion:
+    """What a nominal governor needs to know beside the cells.
+
+    Attributes:
+        tube: The plan's position tube.
+        start: Where the object is at rest at the beginning, shape (2,) [m].
+        targets: Where p_G goes in every cell, shape (cells, 2) [m].
+        period: T, the control period [s].
+        report_periods: For how many periods a report of readiness is used [-].
+        measurement_periods: Age of the measurements of the object's state in periods [-].
+        offset: Time of the first computation [s].
+    """
+
+    tube: PositionTube
+    start: FloatArray
+    targets: FloatArray
+    period: float
+    report_periods: int
+    measurement_periods: int
+    offset: float = 0.0
+
+    def tracking_row(self, cell: GovernedCell) -> FloatArray:
+        """Return K, zeta, K_t and zeta_t, shape (4,)."""
+        own = cell.gains.stiffness, cell.gains.damping
+        return np.array([*own, self.tube.tracking_stiffness, self.tube.tracking_damping])
+
+
+class NominalGovernor(Block):
+    """Leads a nominal motion to the cell's target, and the object along it, see ``laws/nominal.py``.
+
+    ======= =========================== ==== ====================================================== =====
+    input   ``object_state``            6    pose and twist of L as measured                        W
+    input   ``current_cell``            2    index of the current cell, time of its entry [-, s]
+    input   ``clock``                   3    the funnels' clock: its lag [s], its pace [-] and the
+                                             derivative of the pace [1/s]; only where ``paced``
+    output  ``governor_command``        4    mean velocity of p_G in the last period [m/s], desired W
+                                             acceleration of L's origin [m/s^2]
+    output  ``governor_position``       2    p_G [m]                                                W
+    output  ``energy_margin``           1    Delta E of the nominal motion [m^2/s^2]
+    output  ``nominal``                 6    p^ [m], p^' [m/s], Delta E [m^2/s^2], and how far p_G  W
+                                             can go while a report of now is used [m]
+    ======= =========================== ==== ====================================================== =====
+
+    State: one discrete group (p^, p^', p_G, p_G a period before, then p^ and p^' of the last m samples, m
+    being the age of measurements in periods), updated every period.
+
+    Args:
+        cells: One entry for each cell of the plan, all with the same K, zeta and K_G.
+        motion: What else it needs.
+        paced: Whether p_G moves by a clock that may slow down.
+
+    Raises:
+        ValueError: There is no cell, or not one target for each, or K changes.
+        TypeError: A cell's velocity field is not that of a harmonic map.
+    """
+
+    def __init__(self, cells: Sequence[GovernedCell], motion: NominalMotion, *, paced: bool = False) -> None:
+        super().__init__()
+        if not cells or len(cells) != len(motion.targets):
+            found = f"{len(motion.targets)} for {len(cells)}"
+            raise ValueError(f"NominalGovernor needs one target for each cell, not {found}")
+        gains = cells[0].gains
+        if any(cell.gains.stiffness != gains.stiffness for cell in cells):
+            raise ValueError("NominalGovernor needs the same K in all cells")
+        flow = nominal_flow(gains.stiffness, gains.damping, motion.period)
+        self._motion, self._stiffness = motion, gains.stiffness
+        self._steps = [_prepared_step(cell, flow, motion) for cell in cells]
+        self._edges = [cell.clearance.edges for cell in cells]
+        self._tracking = motion.tracking_row(cells[0])
+        self._object = self.DeclareVectorInputPort("object_state", 6)
+        self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
+        self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE) if paced else None
+        at_rest = np.array([*motion.start, 0.0, 0.0])
+        past = np.tile(at_rest, motion.measurement_periods)
+        group = self.DeclareDiscreteState(np.array([*at_rest, *motion.start, *motion.start, *past]))
+        state = {self.discrete_state_ticket(group)}
+        self.DeclareVectorOutputPort("governor_command", 4, self._write_command)
+        self.DeclareVectorOutputPort("governor_position", 2, self._write_position, state)
+        self.DeclareVectorOutputPort("energy_margin", 1, self._write_margin)
+        self.DeclareVectorOutputPort("nominal", NOMINAL_SIZE, self._write_nominal)
+        self.declare_update(self._step, motion.period, motion.offset)
+
+    def _write_command(self, context: Context, output: BasicVector) -> None:
+        state, command = self._state(context), output.get_mutable_value()
+        command[:2] = (state[4:6] - state[6:8]) / self._motion.period
+        expected = state[-4:] if self._motion.measurement_periods else state
+        measured = self._object.Eval(context)
+        accelerate_along(self._tracking, measured, state[4:6], state, expected, command[2:])
+
+    def _write_position(self, context: Context, output: BasicVector) -> None:
+        output.set_value(self._state(context)[4:6])
+
+    def _write_margin(self, context: Context, output: BasicVector) -> None:
+        index = index_of(self._current.Eval(context), len(self._edges))
+        output[0] = nominal_margin(self._edges[index], self._stiffness, self._state(context)[:6])
+
+    def _write_nominal(self, context: Context, output: BasicVector) -> None:
+        motion, index = self._motion, index_of(self._current.Eval(context), len(self._edges))
+        show_nominal(
+            self._edges[index],
+            self._stiffness,
+            motion.targets[index],
+            motion.period,
+            float(motion.report_periods),
+            motion.tube.speed,
+            self._state(context)[:STATE_SIZE],
+            output.get_mutable_value(),
+        )
+
+    def _step(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
+        motion, state = self._motion, self._state(context)
+        index = index_of(self._current.Eval(context), len(self._steps))
+        following = discrete_state.get_mutable_vector().get_mutable_value()
+        pace = float(clock_of(self._clock, context)[1])
+        self._steps[index](pace, state[:STATE_SIZE], following[:STATE_SIZE])
+        following[6:8] = state[4:6]
+        if motion.measurement_periods:
+            following[8:12], following[12:] = state[:4], state[8:-4]
+        return EventStatus.Succeeded()
+
+    def _state(self, context: Context) -> FloatArray:
+        state: FloatArray = context.get_discrete_state_vector().value()
+        return state
+
+
+def _prepared_step(
+    cell: GovernedCell, flow: FloatArray, motion: NominalMotion
+) -> Callable[[float, FloatArray, FloatArray], None]:
+    """Return ``step_nominal`` for one cell.
+
+    Raises:
+        TypeError: The cell's velocity field is not that of a harmonic map.
+    """
+    if not isinstance(cell.field, VelocityField):
+        raise TypeError("NominalGovernor needs the velocity fields of harmonic maps")
+    known = cell.row, cell.clearance.edges, *cell.field.kernel_arguments, flow
+    return prepared(step_nominal, (*known, motion.period, motion.tube.speed), NUMBER, VECTOR, VECTOR)

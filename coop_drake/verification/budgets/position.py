@@ -1,0 +1,114 @@
+"""Check that the object's position holds under a plan's budget: its tube, its regions and its forces."""
+
+from __future__ import annotations
+
+import shapely
+from shapely import LineString, Point, Polygon
+
+from coop_drake.answers.budget import Budget
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.position_tube import PositionTube
+from coop_drake.errors import RefusalError
+from coop_drake.verification.budgets.position_loop import position_bounds
+from coop_drake.verification.checks import Check
+
+ROUNDING = 1e-9
+"""Differences that rounding explains, relative and absolute [m, s]."""
+
+_BOUNDS = ("radius", "rate", "rest", "acceleration")
+
+
+def check_position(plan: Plan, position_tolerance: float) -> list[Check]:
+    """Check what a plan states about its position under its budget; nothing for a plan without one.
+
+    Args:
+        plan: The plan.
+        position_tolerance: How close to the goal the object shall come to rest [m].
+
+    Raises:
+        RefusalError: Names the entry, and what the budget gives.
+    """
+    if plan.budget is None:
+        for where, stated in (("tube", plan.tube), *_regions(plan)):
+            if stated is not None:
+                raise RefusalError(where, "is stated, but the plan has no budget")
+        return []
+    if plan.tube is None:
+        raise RefusalError("tube", "is missing, but the plan has a budget")
+    _check_tube(plan, plan.tube, plan.budget)
+    least = min(_check_region(plan, k, plan.tube.radius) for k in range(len(plan.cells)))
+    for k in range(len(plan.cells)):
+        _check_path(plan, k)
+    checks = [
+        Check("the object stays in its cells under the budget", len(plan.cells), least, "m to spare, least")
+    ]
+    rest = plan.tube.rest
+    if not rest < position_tolerance:
+        finding = f"is {rest:.6g} m; the goal's tolerance is {position_tolerance:.6g} m"
+        raise RefusalError("tube.rest", finding)
+    checks.append(Check("the object comes to rest at the goal", 1, position_tolerance - rest, "m to spare"))
+    if plan.budget.base_force is not None:
+        checks.append(_check_force(plan.tube, plan.budget, plan.budget.base_force))
+    return checks
+
+
+def _regions(plan: Plan) -> list[tuple[str, Polygon | None]]:
+    return [
+        (f"transitions[{k}].governed", transition.governed) for k, transition in enumerate(plan.transitions)
+    ]
+
+
+def _check_tube(plan: Plan, tube: PositionTube, budget: Budget) -> None:
+    """Check the tube against the responses of the loop, which must be the same in all transitions."""
+    gains = [transition.gains for transition in plan.transitions]
+    for k, own in enumerate(gains):
+        for name in ("stiffness", "damping"):
+            if getattr(own, name) != getattr(gains[0], name):
+                finding = f"is {getattr(own, name):.6g}; a plan with a tube has one for all transitions"
+                raise RefusalError(f"transitions[{k}].gains.{name}", finding)
+    found = position_bounds(tube, gains[0].stiffness, gains[0].damping, budget)
+    for name, value in zip(_BOUNDS, found, strict=True):
+        stated = getattr(tube, name)
+        if not stated >= value * (1.0 - ROUNDING) - ROUNDING:
+            raise RefusalError(f"tube.{name}", f"is {stated:.6g}; the budget gives up to {value:.6g}")
+
+
+def _check_region(plan: Plan, k: int, radius: float) -> float:
+    """Check the governed region of a transition; return by how much more than r it is inside its cell [m]."""
+    cell, region, where = plan.cells[k].tidied, plan.transitions[k].governed, f"transitions[{k}].governed"
+    if region is None:
+        raise RefusalError(where, "is missing, but the plan has a budget")
+    if not cell.contains(region):
+        raise RefusalError(where, "leaves its cell")
+    away = float(shapely.distance(region.boundary, cell.boundary))
+    if not away >= radius:
+        finding = f"comes within {away:.6g} m of the cell's boundary; the tube's radius is {radius:.6g} m"
+        raise RefusalError(where, finding)
+    return away - radius
+
+
+def _check_path(plan: Plan, k: int) -> None:
+    """Check that p_G can go from where a governed region is entered to a target in this and the next one."""
+    transition, where, region = plan.transitions[k], f"transitions[{k}]", plan.governed(k)
+    path = LineString(transition.path)
+    kept = float(shapely.distance(path, region.boundary)) - transition.neck
+    entered = plan.start[:2] if k == 0 else plan.transitions[k - 1].target
+    if not region.contains(path) or path.coords[0] != tuple(entered) or not kept >= -ROUNDING:
+        raise RefusalError(f"{where}.path", "does not keep its clearance in the governed region")
+    target = Point(transition.target)
+    for i in range(k, min(k + 2, len(plan.cells))):
+        held = plan.governed(i)
+        if not held.contains(target):
+            raise RefusalError(f"{where}.target", "is outside a governed region that it joins")
+        if not float(held.boundary.distance(target)) >= transition.inradius - ROUNDING:
+            raise RefusalError(f"{where}.inradius", "is more than the governed regions leave")
+
+
+def _check_force(tube: PositionTube, budget: Budget, limit: float) -> Check:
+    assert budget.moved_mass is not None  # a budget with a force limit has it
+    force = budget.moved_mass * tube.acceleration
+    if not force <= limit:
+        raise RefusalError(
+            "budget.base_force", f"is {limit:.6g} N; moving the position may take {force:.6g} N"
+        )
+    return Check("no base needs more than its force to move the position", 1, limit - force, "N to spare")

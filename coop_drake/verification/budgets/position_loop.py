@@ -1,0 +1,140 @@
+"""The largest departure of the object's position from its nominal motion, computed again.
+
+The object and its nominal motion are two points here, each carried over a control period in closed form: the
+object as a double integrator behind a lag, the nominal motion as an oscillator about p_G. What the planner
+adds up as powers of one matrix, this adds up as four runs: one with a unit of command for one period, one
+with a kick of the velocity and one of the position, and one with a unit step of p_G.
+"""
+
+from __future__ import annotations
+
+from cmath import cosh, exp, sinh, sqrt
+from collections import deque
+from math import ceil
+
+import numpy as np
+
+from coop_drake.answers.budget import Budget
+from coop_drake.answers.position_tube import PositionTube
+from coop_drake.errors import RefusalError
+from coop_drake.tree.pose import FloatArray
+
+PARTS = 5
+"""Parts into which the range of the model's error is cut [-]."""
+
+HORIZON = 6.0
+"""Responses are summed for so long [s]."""
+
+LEFT = 1e-7
+"""What may be left of a unit response after that [m, m/s]."""
+
+COMMAND, KICK, PLACE, STEP = range(4)
+"""The runs: a unit of command, of velocity, of position, and of p_G."""
+
+
+def oscillator(stiffness: float, damping: float, time: float) -> FloatArray:
+    """Return the matrix that carries position and velocity of a damped oscillator, shape (2, 2).
+
+    Args:
+        stiffness: K [1/s^2].
+        damping: zeta [1/s].
+        time: T [s].
+    """
+    half = 0.5 * damping
+    root = sqrt(half * half - stiffness)
+    even, odd = cosh(root * time), sinh(root * time) / root if abs(root * time) > 1e-6 else time
+    decay = exp(-half * time)
+    rows = [[even + half * odd, odd], [-stiffness * odd, even - half * odd]]
+    matrix: FloatArray = (decay * np.array(rows)).real
+    return matrix
+
+
+def position_bounds(tube: PositionTube, stiffness: float, damping: float, budget: Budget) -> FloatArray:
+    """Return the least radius, rate, rest and commanded acceleration that a tube must state, shape (4,).
+
+    Args:
+        tube: The tube.
+        stiffness: K of the nominal motion [1/s^2].
+        damping: zeta of the nominal motion [1/s].
+        budget: The budget.
+
+    Raises:
+        RefusalError: The loop does not come to rest.
+    """
+    parts = PARTS if budget.model_error > 0.0 else 1
+    rest = budget.model_error / parts
+    errors = budget.model_error * (np.arange(1, 2 * parts, 2) / parts - 1.0)
+    sums = _sums(tube, oscillator(stiffness, damping, budget.period), stiffness, damping, budget, errors)
+    noise = tube.tracking_stiffness * budget.position_noise + tube.tracking_damping * budget.velocity_noise
+    quiet = noise * sums[COMMAND, :3] + budget.acceleration_error * sums[KICK, :3]
+    moving = quiet + tube.speed * sums[STEP, :3]
+    nominal, gain = tube.speed * sums[STEP, 3], 1.0 - rest * sums[KICK, 2]
+    if not (gain > 0.0).all():
+        raise RefusalError("tube", "the error of the model may exceed what the loop makes up for")
+    command, settled = (moving[2] + noise + nominal) / gain, (quiet[2] + noise) / gain
+    off, fast = moving[:2] + rest * command * sums[KICK, :2]
+    relative = (1.0 + budget.model_error) * command + nominal + budget.acceleration_error
+    off += budget.period**2 / 8.0 * relative
+    fast += budget.period / 2.0 * relative
+    still = quiet[0] + rest * settled * sums[KICK, 0] + budget.period**2 / 8.0 * relative
+    return np.array([value.max() for value in (off, fast, still, command)])
+
+
+def _sums(
+    tube: PositionTube,
+    flow: FloatArray,
+    stiffness: float,
+    damping: float,
+    budget: Budget,
+    errors: FloatArray,
+) -> FloatArray:
+    """Return the sums of absolute responses, shape (4 runs, 4, parts): e, e', feedback, nominal acceleration.
+
+    The second run's are those to a unit of acceleration at all times, the fourth run's those to a unit of
+    speed of p_G; the third run's are not used.
+    """
+    T, delay = budget.period, ceil(budget.delay / budget.period - 1e-6)
+    p, v, s = np.zeros((3, 4, len(errors)))
+    q, w, goal = np.zeros((3, 4, 1))  # the nominal motion and p_G, which only the last run moves
+    v[KICK], p[PLACE], goal[STEP] = 1.0, 1.0, 1.0
+    past = deque([(0.0 * p, 0.0 * v)] * delay, maxlen=delay + 1)
+    sums = np.zeros((4, 4, len(errors)))
+    for k in range(ceil(HORIZON / T)):
+        past.append((p - q, v - w))
+        old, old_rate = past[0]
+        feedback = -tube.tracking_stiffness * old - tube.tracking_damping * old_rate
+        nominal = -stiffness * (q - goal) - damping * w
+        found = np.stack(np.broadcast_arrays(p - q, v - w, feedback, nominal), axis=1)
+        sums[[COMMAND, STEP]] += np.abs(found[[COMMAND, STEP]])
+        sums[KICK] += _mean_size(found[KICK], found[KICK] + T * found[PLACE])
+        command = feedback + nominal
+        if k == 0:
+            command[COMMAND] += 1.0
+        p, v, s = _carried(p, v, s, command, 1.0 + errors, budget.lag, T)
+        q, w = goal + flow[0, 0] * (q - goal) + flow[0, 1] * w, flow[1, 0] * (q - goal) + flow[1, 1] * w
+    if not max(np.abs(p - q).max(), np.abs(v - w).max()) < LEFT:
+        raise RefusalError("tube.tracking_stiffness", f"the position has not come to rest after {HORIZON} s")
+    sums[[KICK, STEP]] *= T
+    return sums
+
+
+def _mean_size(first: FloatArray, last: FloatArray) -> FloatArray:
+    """Return the mean of |x| while x goes evenly from one value to another."""
+    span = np.maximum(np.abs(last - first), 1e-300)
+    mean: FloatArray = np.where(
+        first * last >= 0.0, 0.5 * np.abs(first + last), 0.5 * (first**2 + last**2) / span
+    )
+    return mean
+
+
+def _carried(
+    p: FloatArray, v: FloatArray, s: FloatArray, command: FloatArray, factor: FloatArray, lag: float, T: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Carry position, velocity and the lagging acceleration over a period in which a command is held."""
+    if lag == 0.0:
+        return p + T * v + 0.5 * T * T * factor * command, v + T * factor * command, command
+    gone = -np.expm1(-T / lag)
+    late = s - command
+    turned = v + factor * (T * command + lag * gone * late)
+    moved = p + T * v + factor * (0.5 * T * T * command + lag * (T - lag * gone) * late)
+    return moved, turned, command + (1.0 - gone) * late

@@ -1,0 +1,119 @@
+"""The tube of the position holds every motion that its budget allows, and hardly more."""
+
+import re
+from dataclasses import replace
+from math import ceil, sqrt
+
+import numpy as np
+import pytest
+from shapely import box
+
+from benchmarks.sampled_position import run_position, worst_departures
+from coop_drake.answers import Plan
+from coop_drake.answers.budget import Budget
+from coop_drake.laws import ScheduledGains
+from coop_drake.laws.nominal import nominal_flow
+from coop_drake.planning.budget.position_fit import PositionLimit, fit_position
+from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
+from coop_drake.plant import planning_problem
+from tests.support.small_loop import small_problem
+from tests.support.tubes import BUDGET, tubed_problem
+
+GAINS = PositionGains(100.0, 14.0, 250.0, 1.4 * sqrt(250.0), 0.8)
+BUDGETS = {
+    "sampled": Budget(acceleration_error=0.5),
+    "old": Budget(delay=0.01, acceleration_error=0.3),
+    "lagging": Budget(delay=0.005, lag=0.005, position_noise=1e-3),
+    "noisy": Budget(position_noise=2e-3, velocity_noise=0.04),
+    "wrong": Budget(delay=0.005, model_error=0.3),
+    "all": BUDGET,
+}
+
+
+def sizes_of(budget):
+    speed = GAINS.speed * budget.period
+    return np.array([speed, budget.position_noise, budget.velocity_noise, budget.acceleration_error])
+
+
+@pytest.mark.parametrize("name", BUDGETS)
+def test_the_worst_disturbances_stay_in_the_tube_and_almost_reach_it(name):
+    budget = BUDGETS[name]
+    (tube,) = position_tubes([GAINS], budget)
+    delay, reached = ceil(budget.delay / budget.period - 1e-6), 0.0
+    for factor in 1.0 + budget.model_error * np.linspace(-1.0, 1.0, 5):
+        departures = worst_departures(GAINS, budget.period, delay, budget.lag, factor, sizes_of(budget))
+        assert np.abs(departures).max() <= tube.radius
+        reached = max(reached, np.abs(departures[-1]))
+    assert reached >= (0.9 if budget.model_error == 0.0 else 0.7) * tube.radius
+
+
+@pytest.mark.parametrize("name", BUDGETS)
+def test_random_disturbances_stay_in_the_tube_and_rest_nearer(name):
+    budget, generator = BUDGETS[name], np.random.default_rng(7)
+    (tube,) = position_tubes([GAINS], budget)
+    row = GAINS.stiffness, GAINS.damping, GAINS.tracking_stiffness, GAINS.tracking_damping
+    flow, motion = nominal_flow(GAINS.stiffness, GAINS.damping, budget.period), np.zeros((1200, 4))
+    for _ in range(30):
+        lengths = generator.integers(1, 80, 1200)
+        signs = np.repeat(generator.choice([-1.0, 1.0], (1200, 4)), lengths, axis=0)[:1200]
+        disturbances = sizes_of(budget) * signs * generator.choice([1.0, generator.random()])
+        disturbances[600:, 0] = 0.0
+        factor = 1.0 + budget.model_error * generator.uniform(-1.0, 1.0)
+        delay = ceil(budget.delay / budget.period - 1e-6)
+        run_position(flow, row, budget.period, delay, budget.lag, factor, disturbances, motion)
+        assert np.abs(motion[:, 0] - motion[:, 2]).max() <= tube.radius
+        assert np.abs(motion[:, 1] - motion[:, 3]).max() <= tube.rate
+        assert np.abs(motion[-200:, 0] - motion[-200:, 2]).max() <= tube.rest + 1e-4
+
+
+def test_without_departures_the_tube_is_what_sampling_leaves():
+    (tube,) = position_tubes([GAINS], Budget())
+    assert tube.radius < 0.005
+    assert tube.rest < 2e-4
+
+
+def test_a_loop_that_is_not_stable_has_no_tube():
+    assert position_tubes([GAINS], Budget(delay=0.2)) == [None]
+
+
+def test_the_plan_keeps_its_nominal_motion_as_far_from_the_walls_as_the_tube_is_wide():
+    _, plan = tubed_problem()
+    for cell, transition in zip(plan.cells, plan.transitions, strict=True):
+        assert cell.tidied.contains(transition.governed)
+        assert transition.governed.boundary.distance(cell.tidied.boundary) >= plan.tube.radius
+    assert len({transition.gains.stiffness for transition in plan.transitions}) == 1
+
+
+LIMITS = {
+    "rest": (replace(BUDGET, position_noise=0.02), r"may rest .* mm from the goal"),
+    "force": (replace(BUDGET, base_force=60.0), r"a base may need .* N to move the object's position"),
+    "delay": (replace(BUDGET, delay=0.3), "is not stable"),
+}
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_what_does_not_hold_is_said(name):
+    scenario, plan = small_problem()
+    budget, said = LIMITS[name]
+    found = fit_position(planning_problem(scenario), plan, ScheduledGains(), budget)
+    assert isinstance(found, PositionLimit)
+    assert re.search(said, found.reason)
+
+
+def test_slower_motion_is_chosen_where_a_force_is_limited():
+    scenario, plan = small_problem()
+    budget = replace(BUDGET, base_force=150.0)
+    found = fit_position(planning_problem(scenario), plan, ScheduledGains(), budget)
+    assert isinstance(found, Plan)
+    assert found.tube.speed < 1.0
+    assert found.tube.acceleration * budget.moved_mass <= budget.base_force
+
+
+def test_a_cell_that_is_too_narrow_is_named():
+    scenario, plan = small_problem()
+    x, y = plan.transitions[0].target
+    cell = replace(plan.cells[1], tidied=box(x - 0.005, y - 0.005, x + 3.0, y + 0.005))
+    narrow = replace(plan, cells=(plan.cells[0], cell, *plan.cells[2:]))
+    found = fit_position(planning_problem(scenario), narrow, ScheduledGains(), BUDGET)
+    assert isinstance(found, PositionLimit)
+    assert "in transition 0 the object may depart" in found.reason

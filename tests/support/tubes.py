@@ -1,0 +1,37 @@
+"""Plans with a position tube for the open room of ``small_plan``."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from coop_drake.answers import Plan
+from coop_drake.answers.budget import Budget
+from coop_drake.laws import ScheduledGains
+from coop_drake.planning.budget.position_fit import fit_position
+from coop_drake.plant import planning_problem
+from coop_drake.scenario import Deployment, Scenario
+from tests.support.small_loop import small_problem
+
+BUDGET = Budget(
+    control_rate=200.0,
+    delay=0.01,
+    lag=0.005,
+    position_noise=0.0024,
+    velocity_noise=0.04,
+    model_error=0.2,
+    acceleration_error=0.2,
+    report_age=0.03,
+    base_force=300.0,
+    moved_mass=8.5,
+    axes=False,
+)
+"""About that of the preset ``mobile_base``."""
+
+
+def tubed_problem(budget: Budget = BUDGET, team: str = "base") -> tuple[Scenario, Plan]:
+    """Scenario with this control rate, and its plan with a tube for a budget."""
+    scenario, plan = small_problem(team, ScheduledGains(command_age=0.0175))
+    scenario = replace(scenario, deployment=Deployment(control_rate=budget.control_rate))
+    fitted = fit_position(planning_problem(scenario), plan, ScheduledGains(command_age=0.0175), budget)
+    assert isinstance(fitted, Plan), fitted
+    return scenario, fitted

@@ -1,0 +1,138 @@
+"""The position's part of a budget is accepted by code of its own, and refused with any statement altered."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from coop_drake.answers import load_plan, save_plan
+from coop_drake.answers.budget import Budget
+from coop_drake.errors import RefusalError
+from coop_drake.laws.nominal import nominal_flow
+from coop_drake.planning.budget.position_tube import SLACK, PositionGains, position_tubes
+from coop_drake.typed_data import DataError
+from coop_drake.verification.budgets import check_budget, check_position
+from coop_drake.verification.budgets.position_loop import oscillator, position_bounds
+from tests.support.tubes import BUDGET, tubed_problem
+
+TOLERANCE = 0.01
+
+
+@cache
+def plan():
+    return tubed_problem()[1]
+
+
+def refusal(altered):
+    with pytest.raises(RefusalError) as refused:
+        check_position(altered, TOLERANCE)
+    return refused.value.where
+
+
+def test_the_plan_is_accepted_and_says_that_the_axes_are_not_part_of_it():
+    stays, rests, force = check_position(plan(), TOLERANCE)
+    assert stays.count == len(plan().cells)
+    assert stays.tightest > 0.0
+    assert rests.tightest == pytest.approx(TOLERANCE - plan().tube.rest)
+    assert force.tightest == pytest.approx(300.0 - BUDGET.moved_mass * plan().tube.acceleration)
+    assert check_budget(plan()).name == "angles and joints are not part of the budget"
+
+
+@pytest.mark.parametrize("damping", [3.0, 20.0, 70.0])
+def test_the_oscillator_is_the_nominal_flow(damping):
+    np.testing.assert_allclose(
+        oscillator(100.0, damping, 0.01), nominal_flow(100.0, damping, 0.01), rtol=1e-12
+    )
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.005, 0.02])
+@pytest.mark.parametrize("lag", [0.0, 0.01])
+@pytest.mark.parametrize("error", [0.0, 0.2])
+def test_both_computations_agree(delay, lag, error):
+    budget = replace(BUDGET, delay=delay, lag=lag, model_error=error)
+    gains = PositionGains(120.0, 15.0, 200.0, 26.0, 0.6)
+    (tube,) = position_tubes([gains], budget)
+    stated = np.array([tube.radius, tube.rate, tube.rest, tube.acceleration]) / (1.0 + SLACK)
+    np.testing.assert_allclose(position_bounds(tube, 120.0, 15.0, budget), stated, rtol=2e-4)
+
+
+LARGER = {
+    "delay": 0.03, "lag": 0.015, "position_noise": 0.003, "velocity_noise": 0.05, "model_error": 0.25,
+    "acceleration_error": 0.3, "control_rate": 120.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LARGER)
+def test_a_larger_budget_is_refused(name):
+    assert "tube" in refusal(replace(plan(), budget=replace(plan().budget, **{name: LARGER[name]})))
+
+
+@pytest.mark.parametrize("name", ["radius", "rate", "rest", "acceleration"])
+def test_a_narrower_tube_is_refused(name):
+    tube = replace(plan().tube, **{name: 0.99 * getattr(plan().tube, name)})
+    assert refusal(replace(plan(), tube=tube)) == f"tube.{name}"
+
+
+@pytest.mark.parametrize("name", ["speed", "tracking_stiffness", "tracking_damping"])
+def test_another_loop_is_refused(name):
+    factor = {"speed": 1.1, "tracking_stiffness": 0.6, "tracking_damping": 0.4}[name]
+    tube = replace(plan().tube, **{name: factor * getattr(plan().tube, name)})
+    assert "tube" in refusal(replace(plan(), tube=tube))
+
+
+def with_transition(k, **changes):
+    transitions = list(plan().transitions)
+    transitions[k] = replace(transitions[k], **changes)
+    return replace(plan(), transitions=tuple(transitions))
+
+
+def altered():
+    """What is altered, by the place that is named."""
+    own, region = plan().transitions[1], plan().transitions[1].governed
+    gains = replace(own.gains, stiffness=own.gains.stiffness + 1.0)
+    return {
+        "transitions[1].governed": [
+            {"governed": region.buffer(1e-4, join_style="mitre")},
+            {"governed": region.buffer(0.1)},
+            {"governed": None},
+        ],
+        "transitions[1].gains.stiffness": [{"gains": gains}],
+        "transitions[1].path": [{"neck": own.neck + 1e-3}, {"path": own.path + 1e-3}],
+        "transitions[1].inradius": [{"inradius": 2.0}],
+    }
+
+
+@pytest.mark.parametrize("place", altered())
+def test_altered_regions_and_paths_are_refused(place):
+    for changes in altered()[place]:
+        assert refusal(with_transition(1, **changes)) == place
+
+
+def test_a_target_outside_the_next_region_is_refused():
+    target = np.array([3.0, 3.0])
+    path = np.array([plan().start[:2], target])
+    assert refusal(with_transition(0, target=target, path=path, neck=1e-3)) == "transitions[0].target"
+
+
+def test_a_goal_that_is_too_narrow_and_a_force_that_is_too_small_are_refused():
+    with pytest.raises(RefusalError, match=r"the goal's tolerance is 0\.005 m"):
+        check_position(plan(), 0.005)
+    weak = replace(plan(), budget=replace(plan().budget, base_force=50.0))
+    assert refusal(weak) == "budget.base_force"
+    with pytest.raises(DataError, match="moved_mass"):
+        Budget(base_force=50.0)
+
+
+def test_a_tube_without_a_budget_and_a_budget_without_a_tube_are_refused():
+    assert refusal(replace(plan(), tube=None)) == "tube"
+    assert refusal(replace(plan(), budget=None)) == "tube"
+    assert refusal(replace(plan(), budget=None, tube=None)) == "transitions[0].governed"
+    bare = tuple(replace(transition, governed=None) for transition in plan().transitions)
+    assert check_position(replace(plan(), budget=None, tube=None, transitions=bare), TOLERANCE) == []
+
+
+def test_a_file_keeps_all_of_it(tmp_path):
+    again = load_plan(save_plan(plan(), tmp_path / "plan.json"))
+    assert again.tube == plan().tube
+    assert again.transitions[1].governed.equals(plan().transitions[1].governed)
