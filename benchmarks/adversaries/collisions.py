@@ -68,16 +68,13 @@ class Team:
     def __init__(self, question: Document) -> None:
         self._components = question["components"]
         self.pieces = [
-            Piece(body["name"], k, *_shapes(shape))
-            for k, component in enumerate(self._components)
-            for body in component["bodies"]
-            for shape in body["shapes"]
+            Piece(piece["body"], piece["component"], *_shapes(piece)) for piece in question["pieces"]
         ]
-        aside = {frozenset(entry[:2]) for entry in question["left_aside"]}
+        aside = {tuple(entry[:2]) for entry in question["left_aside"]}
         self.pairs = [
             (i, j)
             for (i, a), (j, b) in combinations(enumerate(self.pieces), 2)
-            if a.component != b.component and frozenset((a.body, b.body)) not in aside
+            if a.component != b.component and (i, j) not in aside
         ]
         self._floor = floor_of(question)
         rings = [question["floor"]["outer"], *question["floor"]["holes"]]
@@ -87,26 +84,20 @@ class Team:
     @cached_property
     def axes(self) -> list[list[int]]:
         """For each component the axes of (theta, q...) that move it."""
-        axes: list[list[int]] = []
+        axes: list[list[int]] = [[0]]
         for component in self._components:
-            joint = component["joint"]
-            axes.append([0] if joint is None else [*axes[component["parent"]], 1 + joint["index"]])
+            axes.append([*axes[component["parent"]], 1 + component["joint"]])
         return axes
 
     def frames(self, angles: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
         """Origins (N, 2) and angles (N,) of all components, p_WL = 0, for (theta, q...), shape (N, 1 + n)."""
         frames = [(np.zeros((len(angles), 2)), angles[:, 0])]
-        for component in self._components[1:]:
-            joint = component["joint"]
+        for component in self._components:
             place, turned = frames[component["parent"]]
-            x, y, angle = joint["frame"]
-            value, slide = angles[:, 1 + joint["index"]], np.zeros((len(angles), 2))
-            here = turned + angle
-            if joint["kind"] == "revolute":
-                here = here + joint["sign"] * value
-            else:
-                slide = _turned(value[:, None] * np.array(joint["direction"]), here)
-            frames.append((place + _turned(np.array([[x, y]]), turned) + slide, here))
+            value = angles[:, 1 + component["joint"]]
+            moved = value[:, None] * np.array(component["slide"]) + np.array(component["offset"])
+            here = turned + component["sign"] * value + component["angle"]
+            frames.append((place + _turned(moved, turned), here))
         return frames
 
     def placed(self, index: int, angles: FloatArray, *, inner: bool) -> NDArray[np.object_]:
@@ -162,7 +153,7 @@ def positions_sampled(region: BaseGeometry, random: np.random.Generator, count: 
 
 def _shapes(shape: Document) -> tuple[BaseGeometry, float, BaseGeometry, BaseGeometry]:
     """Hull, radius, whole and inner shape of a piece."""
-    hull = shapely.MultiPoint(shape["vertices"]).convex_hull
+    hull = shapely.MultiPoint(shape["corners"]).convex_hull
     whole = hull.buffer(shape["radius"], quad_segs=16) if shape["radius"] > 0.0 else hull
     return hull, shape["radius"], whole, whole.buffer(-DEPTH, join_style="mitre")
 

@@ -27,7 +27,7 @@ def forged_proof(question: Document, seed: int) -> Document | None:
         seed: Of the cut.
     """
     random = np.random.default_rng(seed)
-    start, goal = np.array(question["start"][:2]), np.array(question["goal_pose"][:2])
+    start, goal = np.array(question["start"][:2]), np.array(question["goal"])
     if np.hypot(*(goal - start)) < 0.1:
         return None
     place = start + random.uniform(0.2, 0.8) * (goal - start)
@@ -49,13 +49,14 @@ def forged_proof(question: Document, seed: int) -> Document | None:
     if sweep is None:
         return None
     piece, centre, polygon = sweep
-    part = {"overlaps": [], "inner_sweeps": [{"piece": piece, "polygon": polygon}], "cells": cells}
-    head = {"format": "coop_drake proof of infeasibility", "version": 2, "problem": ""}
+    witness = {"pieces": [piece], "component": 0, "polygon": polygon}
+    slice_ends = {"lower": [-pi, *question["lower"]], "upper": [pi, *question["upper"]]}
+    head = {"format": "coop_drake proof of infeasibility", "version": 3, "problem": ""}
     return head | {
         "kind": "disc",
         "component": 0,
-        "centre": centre,
-        "slices": [{"lower": [-pi], "upper": [pi], **part}],
+        "point": centre,
+        "slices": [{**slice_ends, "witnesses": [witness], "cells": cells}],
     }
 
 

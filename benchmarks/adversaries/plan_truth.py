@@ -37,17 +37,13 @@ def plan_fault(question: Document, answer: Document, cells: Iterable[int] | None
     count = len(answer["cells"])
     if not count or count != len(answer["transitions"]):
         return "cells and transitions differ in number"
-    limits = sorted(
-        (c["joint"]["index"], c["joint"]["lower"], c["joint"]["upper"])
-        for c in question["components"]
-        if c["joint"]
-    )
+    limits = list(zip(question["lower"], question["upper"], strict=True))
     for cell in answer["cells"]:
         ends = list(zip(cell["lower"], cell["upper"], strict=True))
         if any(low >= high for low, high in ends):
             return "an interval is empty"
         joints = zip(ends[1:], limits, strict=True)
-        if any(low < least - SURELY or high > most + SURELY for (low, high), (_, least, most) in joints):
+        if any(low < least - SURELY or high > most + SURELY for (low, high), (least, most) in joints):
             return "a joint leaves its limits"
     return (
         _ends(question, answer) or _transitions(question, answer) or _collision(question, answer, cells, seed)
@@ -63,16 +59,16 @@ def _ends(question: Document, answer: Document) -> str:
         return "the start's angles lie outside"
     if not place.buffer(SURELY).contains(Point(start[:2])):
         return "the start lies outside"
-    if last["target"] != question["goal_pose"][:2]:
+    if last["target"] != question["goal"]:
         return "the last target is not the goal"
-    if last["inradius"] > question["position_tolerance"] * (1.0 + SURELY):
+    most, *rooms = question["tolerances"]
+    if last["inradius"] > most * (1.0 + SURELY):
         return "the last inradius is beyond the tolerance"
-    goals = [(question["goal_pose"][2], question["angle_tolerance"])]
-    goals += [(goal, question["joint_tolerance"]) for goal in question["goal_joints"]]
-    for axis, (goal, room) in enumerate(goals):
-        for value in (last["goal_lower"][axis], last["goal_upper"][axis]) if goal is not None else ():
-            off = value - goal if axis else remainder(value - goal, tau)
-            if abs(off) > room + SURELY:
+    goals = zip(question["goal_lower"], question["goal_upper"], rooms, strict=True)
+    for axis, (low, high, room) in enumerate(goals):
+        for value in (last["goal_lower"][axis], last["goal_upper"][axis]):
+            off = value - 0.5 * (low + high)
+            if abs(off if axis else remainder(off, tau)) > 0.5 * (high - low) + room + SURELY:
                 return "a goal interval is beyond the tolerance"
     return ""
 

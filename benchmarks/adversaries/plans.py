@@ -198,24 +198,27 @@ def other_floor(question: Document, answer: Document, random: Random) -> Change:
 
 def other_team(question: Document, answer: Document, random: Random) -> Change:
     """A piece is thicker, or a joint's frame lies elsewhere."""
-    component = question["components"][chosen(question["components"], random)]
-    if component["joint"] is not None and random.random() < 0.5:
-        component["joint"]["frame"][int(random.integers(3))] += step(random, 1e-3)
+    if question["components"] and random.random() < 0.3:
+        component = question["components"][chosen(question["components"], random)]
+        k = int(random.integers(3))
+        if k == 2:
+            component["angle"] += step(random, 1e-3)
+        else:
+            component["offset"][k] += step(random, 1e-3)
     else:
-        body = component["bodies"][chosen(component["bodies"], random)]
-        body["shapes"][chosen(body["shapes"], random)]["radius"] += step(random, 1e-4)
+        question["pieces"][chosen(question["pieces"], random)]["radius"] += step(random, 1e-4)
     return ANYTHING
 
 
 def other_ends(question: Document, answer: Document, random: Random) -> Change:
     """Start, goal, tolerances or a limit are others than those that the plan was made for."""
-    key = ("start", "goal_pose", "tolerance", "limit")[int(random.integers(4))]
-    joints = [component["joint"] for component in question["components"] if component["joint"]]
-    if key == "tolerance" or not joints:
-        question[("position_tolerance", "angle_tolerance")[int(random.integers(2))]] *= 0.1
+    key = ("start", "goal", "tolerance", "limit")[int(random.integers(4))]
+    if key == "tolerance" or not question["upper"]:
+        question["tolerances"][int(random.integers(2))] *= 0.1
     elif key == "limit":
-        joint = joints[chosen(joints, random)]
-        joint["upper"] = joint["lower"] + random.random() * (joint["upper"] - joint["lower"])
+        k = chosen(question["upper"], random)
+        low, high = question["lower"][k], question["upper"][k]
+        question["upper"][k] = low + random.random() * (high - low)
     else:
         question[key][chosen(question[key], random)] += step(random, 1e-3)
     return STATEMENTS

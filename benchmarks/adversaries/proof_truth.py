@@ -42,11 +42,8 @@ def proof_fault(question: Document, answer: Document, slices: tuple[int, ...] | 
         slices: Slices whose witnesses or cells may be wrong; all of them if None.
         seed: Of the samples.
     """
-    whole = len(answer["slices"]) == 1 and answer.get("component", 0) < len(question["components"])
-    if answer["kind"] == "disc" and not whole:
-        return "a disc of no component, or with other slices than one"
-    if answer["kind"] != "blocked goal" and any("cells" not in part for part in answer["slices"]):
-        return "a slice says nothing of cells"
+    if not answer["component"] <= len(question["components"]):
+        return "a point of no component"
     truth = _ProofTruth(question, answer, np.random.default_rng(seed))
     return truth.tiling() or truth.labels() or truth.witnesses(slices)
 
@@ -55,28 +52,19 @@ class _ProofTruth:
     def __init__(self, question: Document, answer: Document, random: np.random.Generator) -> None:
         self._question, self._answer, self._random = question, answer, random
         self._team, self._slices = Team(question), answer["slices"]
-        joints = sorted((c["joint"] for c in question["components"] if c["joint"]), key=lambda j: j["index"])
-        robots = answer.get("robots", [])
-        self._axes = [0, *[1 + k for k, joint in enumerate(joints) if joint["robot"] in robots]]
-        self._limits = [(joint["lower"], joint["upper"]) for joint in joints]
-        self._disc, self._blocked = answer["kind"] == "disc", answer["kind"] == "blocked goal"
-        self._goals = [
-            limits if goal is None else (goal, goal)
-            for goal, limits in zip(question["goal_joints"], self._limits, strict=True)
-        ]
+        self._limits = list(zip(question["lower"], question["upper"], strict=True))
+        self._goals = list(zip(question["goal_lower"], question["goal_upper"], strict=True))
+        self._component, self._centre = answer["component"], np.array(answer["point"])
 
     def tiling(self) -> str:
         """Boxes that leave the range, overlap, or are less than the range."""
         boxes = [list(zip(part["lower"], part["upper"], strict=True)) for part in self._slices]
-        if not boxes or any(len(box) != len(self._axes) for box in boxes):
-            return "slices have other axes than the kept joints"
+        if not boxes or any(len(box) != 1 + len(self._limits) for box in boxes):
+            return "slices have other axes than an angle and all joints"
         ends = min(box[0][0] for box in boxes), max(box[0][1] for box in boxes)
-        if abs(ends[1] - ends[0] - (0.0 if self._blocked else tau)) > SURELY:
-            return "slices are not about a turn, or about one angle"
-        if self._blocked and abs(remainder(ends[0] - self._question["goal_pose"][2], tau)) > SURELY:
-            return "slices are not about the goal's angle"
-        joints = self._goals if self._blocked else self._limits
-        whole = [ends, *[joints[axis - 1] for axis in self._axes[1:]]]
+        if abs(ends[1] - ends[0] - tau) > SURELY:
+            return "slices are not about a turn"
+        whole = [ends, *self._limits]
         wide = [axis for axis, (low, high) in enumerate(whole) if low < high]
         for box in boxes:
             if any(low < least or high > most for (low, high), (least, most) in zip(box, whole, strict=True)):
@@ -91,8 +79,6 @@ class _ProofTruth:
 
     def labels(self) -> str:
         """Cells that touch with two labels; a start that is not reached, a goal that is."""
-        if self._blocked:
-            return ""
         cells = [
             [(polygon_of(cell["polygon"]), cell["reached"]) for cell in part["cells"]]
             for part in self._slices
@@ -102,7 +88,7 @@ class _ProofTruth:
                 if first != second and one.intersects(other):
                     return "cells with two labels touch"
         start = np.array([self._question["start"]])
-        goals = np.array([[*self._question["goal_pose"], *q] for q in self._sampled(self._goals)])
+        goals = np.array([[*self._question["goal"], *z] for z in self._sampled(self._goals)])
         for z, wrong in [(start[0], False), *((z, True) for z in goals)]:
             for k, part in enumerate(self._slices):
                 place = self._point(z)
@@ -116,71 +102,51 @@ class _ProofTruth:
         """Polygons that leave their piece, points that are not in both, positions that nothing covers."""
         for k in range(len(self._slices)) if chosen is None else chosen:
             part = self._slices[k]
-            box = [tuple(limits) for limits in ((-np.pi, np.pi), *self._limits)]
-            for axis, ends in zip(self._axes, zip(part["lower"], part["upper"], strict=True), strict=True):
-                box[axis] = ends
-            angles = np.array(self._sampled(box))
-            fault = self._sweeps(part, angles) or self._overlaps(part, angles)
-            if not fault and not part["overlaps"]:
+            angles = np.array(self._sampled(list(zip(part["lower"], part["upper"], strict=True))))
+            fault = self._held(part, angles)
+            if not fault and all(len(witness["pieces"]) == 1 for witness in part["witnesses"]):
                 fault = self._uncovered(part)
             if fault:
                 return fault
         return ""
 
-    def _sweeps(self, part: Document, angles: FloatArray) -> str:
-        for sweep in part["inner_sweeps"]:
-            if not 0 <= sweep["piece"] < len(self._team.pieces):
+    def _held(self, part: Document, angles: FloatArray) -> str:
+        at_zero = np.column_stack((np.zeros(len(angles)), angles[:, 1:]))
+        theta = angles[:, 0] - self._team.frames(at_zero)[self._component][1]
+        frames = self._team.frames(np.column_stack((theta, angles[:, 1:])))
+        for witness in part["witnesses"]:
+            numbers, corners = tuple(witness["pieces"]), np.array(witness["polygon"])
+            if not all(0 <= number < len(self._team.pieces) for number in numbers):
                 return "a piece does not exist"
-            piece, corners = self._team.pieces[sweep["piece"]], np.array(sweep["polygon"])
-            if self._disc:
-                if piece.component != self._answer["component"]:
-                    return "a piece of another component"
-                centre = np.array(self._answer["centre"])
-                turned = [_turn(corners, -angle) + centre for angle in np.linspace(0.0, tau, 3 * ANGLES)]
+            if len(numbers) != 1 and numbers not in self._team.pairs:
+                return "neither one piece nor two that must not meet"
+            seen = frames[self._component if len(numbers) == 1 else witness["component"]]
+            if len(numbers) == 1:
+                points = [corners + p + _turn(self._centre, a) for p, a in zip(*seen, strict=True)]
             else:
-                if not set(self._team.axes[piece.component]) <= set(self._axes):
-                    return "a piece that a joint moves which is not kept"
-                frames = zip(*self._team.frames(angles)[piece.component], strict=True)
-                turned = [_turn(corners - place, -angle) for place, angle in frames]
-            if _leaves(piece, np.concatenate(turned)):
-                return "a polygon leaves its piece"
-        return ""
-
-    def _overlaps(self, part: Document, angles: FloatArray) -> str:
-        for overlap in part["overlaps"]:
-            pair = tuple(overlap["pieces"])
-            if pair not in self._team.pairs:
-                return "two pieces that may meet"
-            frames, pieces = self._team.frames(angles), [self._team.pieces[k] for k in pair]
-            common = self._common(*(piece.component for piece in pieces))
-            points = np.array(
-                [_turn(np.array(overlap["point"]), a) + p for p, a in zip(*frames[common], strict=True)]
-            )
-            for piece in pieces:
-                place, angle = frames[piece.component]
-                here = np.array([_turn(x - p, -a) for x, p, a in zip(points, place, angle, strict=True)])
-                if _leaves(piece, here):
-                    return "a point is not in both pieces"
+                points = [_turn(corners, a) + p for p, a in zip(*seen, strict=True)]
+            for piece in (self._team.pieces[number] for number in numbers):
+                placed = zip(points, *frames[piece.component], strict=True)
+                if _leaves(piece, np.concatenate([_turn(x - p, -a) for x, p, a in placed])):
+                    return "a polygon leaves its piece"
         return ""
 
     def _uncovered(self, part: Document) -> str:
         """Positions outside all cells that are not forbidden, or where cells of two labels would meet."""
-        if not part["inner_sweeps"]:
+        if not part["witnesses"]:
             return "nothing is shown to be blocked"
-        floor, goal = floor_of(self._question), Point(self._question["goal_pose"][:2])
+        floor = floor_of(self._question)
         rings = [self._question["floor"]["outer"], *self._question["floor"]["holes"]]
         walls = np.array([(a, b) for ring in rings for a, b in zip(ring, [*ring[1:], ring[0]], strict=True)])
         sums: list[NDArray[np.object_]] = []
         rest: BaseGeometry = floor.envelope.buffer(1e3)
-        for sweep in part["inner_sweeps"]:
-            ring = np.array(sweep["polygon"])
+        for witness in part["witnesses"]:
+            ring = np.array(witness["polygon"])
             middle = ring.mean(axis=0)
             rest = rest.intersection(translate(floor, -middle[0], -middle[1]))
             copies = (walls[:, :, None, :] - ring).reshape(len(walls), -1, 2)
             sums.append(shapely.convex_hull(shapely.multipoints(copies)))
         left = rest.difference(shapely.union_all(np.concatenate(sums))).buffer(-SURELY)
-        if self._blocked:
-            return "the goal's position is not shown to be blocked" if left.covers(goal) else ""
         cells = [(polygon_of(cell["polygon"]), cell["reached"]) for cell in part["cells"]]
         if not left.difference(shapely.union_all([cell for cell, _ in cells])).buffer(-SURELY).is_empty:
             return "a position is neither in a cell nor shown to be blocked"
@@ -221,25 +187,15 @@ class _ProofTruth:
 
     def _point(self, z: FloatArray) -> Point:
         """Where the point that a proof is about lies at a configuration."""
-        if not self._disc:
-            return Point(z[:2])
-        place, angle = self._team.frames(z[None, 2:])[self._answer["component"]]
-        return Point(z[:2] + place[0] + _turn(np.array(self._answer["centre"]), angle[0]))
+        (place,), (angle,) = self._team.frames(z[None, 2:])[self._component]
+        return Point(z[:2] + place + _turn(self._centre, angle))
 
     def _holds(self, part: Document, angles: FloatArray) -> bool:
         low, high = np.array(part["lower"]), np.array(part["upper"])
-        middle, off = 0.5 * (low + high), np.array(angles)[self._axes]
-        off = off - middle
-        off[0] = remainder(off[0], tau)
+        off = np.array(angles) - 0.5 * (low + high)
+        (angle,) = self._team.frames(np.array(angles)[None])[self._component][1]
+        off[0] = remainder(off[0] + angle - angles[0], tau)
         return bool((np.abs(off) <= 0.5 * (high - low)).all())
-
-    def _common(self, first: int, second: int) -> int:
-        chains = []
-        for k in (first, second):
-            chains.append([k])
-            while chains[-1][-1]:
-                chains[-1].append(self._question["components"][chains[-1][-1]]["parent"])
-        return max(set(chains[0]) & set(chains[1]))
 
 
 def _read(value: float) -> int:

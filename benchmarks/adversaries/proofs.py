@@ -153,7 +153,7 @@ def slice_halved(question: Document, answer: Document, random: Random) -> Change
     half = copied(slices[k])
     axis = chosen(half["lower"], random)
     middle = 0.5 * (half["lower"][axis] + half["upper"][axis])
-    if answer["kind"] == "disc" or not half["lower"][axis] < middle < half["upper"][axis]:
+    if not half["lower"][axis] < middle < half["upper"][axis]:
         return None
     half["lower"][axis] = slices[k]["upper"][axis] = middle
     slices.append(half)
@@ -162,34 +162,26 @@ def slice_halved(question: Document, answer: Document, random: Random) -> Change
 
 
 def other_subject(question: Document, answer: Document, random: Random) -> Change:
-    """The proof is about other robots, another component, another centre, or of another kind."""
-    robots = sorted({c["joint"]["robot"] for c in question["components"] if c["joint"]})
-    if answer["kind"] == "disc" and random.random() < 0.7:
-        if random.random() < 0.5:
-            answer["component"] = int(random.integers(len(question["components"]) + 1))
-        else:
-            answer["centre"] = (np.array(answer["centre"]) + random.uniform(-0.3, 0.3, 2)).tolist()
-    elif answer["kind"] != "disc" and random.random() < 0.5:
-        answer["robots"] = [robot for robot in [*robots, len(robots)] if random.random() < 0.5]
+    """The proof is about another component or another point."""
+    if random.random() < 0.4:
+        answer["component"] = int(random.integers(len(question["components"]) + 2))
     else:
-        answer["kind"] = str(random.choice(["slices", "disc", "blocked goal"]))
-        for key, value in (("robots", []), ("component", 0), ("centre", [0.0, 0.0])):
-            answer.setdefault(key, value)
+        answer["point"] = (np.array(answer["point"]) + step(random, 1e-6) * random.normal(size=2)).tolist()
     return ANYTHING
 
 
 def other_ends(question: Document, answer: Document, random: Random) -> Change:
     """Start and goal change places, lie elsewhere, or a joint moves further."""
-    joints = [component["joint"] for component in question["components"] if component["joint"]]
     kind = int(random.integers(3))
-    if kind == 0 or not joints:
-        start = question["start"][:3]
-        question["start"][:3], question["goal_pose"] = question["goal_pose"], start
+    if kind == 0 or not question["upper"]:
+        x, y, angle = question["start"][:3]
+        question["start"][:3] = [*question["goal"], question["goal_lower"][0]]
+        question["goal"], question["goal_lower"][0], question["goal_upper"][0] = [x, y], angle, angle
     elif kind == 1:
-        for key in ("start", "goal_pose"):
+        for key in ("start", "goal"):
             question[key][:2] = (np.array(question[key][:2]) + random.uniform(-2.0, 2.0, 2)).tolist()
     else:
-        joints[chosen(joints, random)]["upper"] += step(random, 1e-9, 1.0)
+        question["upper"][chosen(question["upper"], random)] += step(random, 1e-9, 1.0)
     return ANYTHING
 
 
@@ -199,18 +191,17 @@ def thinner(question: Document, answer: Document, random: Random) -> Change:
         question["floor"]["holes"].pop()
         return ANYTHING
     factor = random.uniform(0.3, 0.99)
-    for component in question["components"]:
-        for body in component["bodies"]:
-            for shape in body["shapes"]:
-                shape["vertices"] = (factor * np.array(shape["vertices"])).tolist()
-                shape["radius"] *= factor
+    for piece in question["pieces"]:
+        piece["corners"] = (factor * np.array(piece["corners"])).tolist()
+        piece["radius"] *= factor
     return ANYTHING
 
 
 def turned(question: Document, answer: Document, random: Random) -> Change:
     """Start and goal have angles that are whole turns away."""
     question["start"][2] += tau * int(random.integers(-3, 4))
-    question["goal_pose"][2] += tau * int(random.integers(-3, 4))
+    turns = tau * int(random.integers(-3, 4))
+    question["goal_lower"][0] = question["goal_upper"][0] = question["goal_lower"][0] + turns
     return SOUND
 
 

@@ -12,10 +12,10 @@ __all__ = ["overlap_altered", "overlap_forged", "sweep_added", "sweep_altered", 
 Random = np.random.Generator
 
 
-@in_slice("inner_sweeps")
+@in_slice("witnesses")
 def sweep_altered(question: Document, answer: Document, random: Random, k: int) -> Change | None:
     """A polygon is larger, moved, another piece's, or in another slice."""
-    sweeps = answer["slices"][k]["inner_sweeps"]
+    sweeps = answer["slices"][k]["witnesses"]
     sweep, kind = sweeps[chosen(sweeps, random)], int(random.integers(4))
     ring = np.array(sweep["polygon"])
     if kind == 0:
@@ -23,28 +23,27 @@ def sweep_altered(question: Document, answer: Document, random: Random, k: int) 
     elif kind == 1:
         ring = ring + step(random, 1e-4) * random.uniform(-1.0, 1.0, 2)
     elif kind == 2:
-        count = sum(len(body["shapes"]) for c in question["components"] for body in c["bodies"])
-        sweep["piece"] = int(random.integers(count + 1))
+        sweep["pieces"] = [int(random.integers(len(question["pieces"]) + 1))]
     else:
         m = chosen(answer["slices"], random)
-        answer["slices"][m]["inner_sweeps"].append(sweep)
+        answer["slices"][m]["witnesses"].append(sweep)
         k = m
     sweep["polygon"] = ring.tolist()
     return Change((k,))
 
 
-@in_slice("inner_sweeps")
+@in_slice("witnesses")
 def sweep_dropped(question: Document, answer: Document, random: Random, k: int) -> Change | None:
     """A polygon, or all polygons of a slice, are left out."""
-    sweeps = answer["slices"][k]["inner_sweeps"]
+    sweeps = answer["slices"][k]["witnesses"]
     del sweeps[chosen(sweeps, random) if random.random() < 0.7 else slice(None)]
     return Change((k,))
 
 
-@in_slice("inner_sweeps")
+@in_slice("witnesses")
 def sweep_added(question: Document, answer: Document, random: Random, k: int) -> Change | None:
     """A slice has a smaller copy of one of its polygons as well."""
-    sweeps = answer["slices"][k]["inner_sweeps"]
+    sweeps = answer["slices"][k]["witnesses"]
     sweep = dict(sweeps[chosen(sweeps, random)])
     ring = np.array(sweep["polygon"])
     sweep["polygon"] = (ring.mean(axis=0) + random.uniform(0.3, 0.9) * (ring - ring.mean(axis=0))).tolist()
@@ -55,22 +54,27 @@ def sweep_added(question: Document, answer: Document, random: Random, k: int) ->
 def overlap_forged(question: Document, answer: Document, random: Random) -> Change:
     """A slice is said to hold an overlap of two pieces, at the origin, at a corner or anywhere."""
     k = chosen(answer["slices"], random)
-    pieces = [shape for c in question["components"] for body in c["bodies"] for shape in body["shapes"]]
+    pieces = question["pieces"]
     pair = sorted(int(random.integers(len(pieces))) for _ in range(2))
-    point = pieces[pair[0]]["vertices"][0] if random.random() < 0.5 else random.uniform(-1, 1, 2).tolist()
-    answer["slices"][k]["overlaps"].append({"pieces": pair, "point": point})
+    point = pieces[pair[0]]["corners"][0] if random.random() < 0.5 else random.uniform(-1, 1, 2).tolist()
+    component = int(random.integers(len(question["components"]) + 1))
+    witness = {"pieces": pair, "component": component, "polygon": [point]}
+    answer["slices"][k]["witnesses"].append(witness)
     return Change((k,))
 
 
-@in_slice("overlaps")
-def overlap_altered(question: Document, answer: Document, random: Random, k: int) -> Change:
+@in_slice("witnesses")
+def overlap_altered(question: Document, answer: Document, random: Random, k: int) -> Change | None:
     """The point of an overlap lies elsewhere, it names another piece, or it is left out."""
-    overlaps, kind = answer["slices"][k]["overlaps"], int(random.integers(3))
+    witnesses, kind = answer["slices"][k]["witnesses"], int(random.integers(3))
+    overlaps = [witness for witness in witnesses if len(witness["pieces"]) == 2]
+    if not overlaps:
+        return None
     overlap = overlaps[chosen(overlaps, random)]
     if kind == 0:
-        move(overlap["point"], random, 1e-3, 1.0)
+        move(overlap["polygon"][0], random, 1e-3, 1.0)
     elif kind == 1:
         overlap["pieces"][chosen(overlap["pieces"], random)] += int(random.choice([-1, 1]))
     else:
-        overlaps.remove(overlap)
+        witnesses.remove(overlap)
     return Change((k,))

@@ -9,21 +9,14 @@ from typing import Any
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.document import Document, write_document
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import BlockedGoalProof, DiscProof, InfeasibilityProof, SlicesProof
+from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.typed_data import to_plain
 
 FORMAT = "coop_drake proof of infeasibility"
 """What the document says it is."""
 
-VERSION = 2
+VERSION = 3
 """Version of its layout; another one is refused."""
-
-KINDS: dict[str, type[InfeasibilityProof]] = {
-    "slices": SlicesProof,
-    "disc": DiscProof,
-    "blocked goal": BlockedGoalProof,
-}
-"""How the document names the kinds of proof."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +39,8 @@ def save_proof(proof: InfeasibilityProof, problem: PlanningProblem, path: Path |
 
 def proof_document(proof: InfeasibilityProof, problem: PlanningProblem) -> dict[str, Any]:
     """The content of a proof's file without its digest, as plain data."""
-    kind = next(name for name, kind in KINDS.items() if isinstance(proof, kind))
-    own = {"format": FORMAT, "version": VERSION, "problem": problem_digest(problem), "kind": kind}
-    content: dict[str, Any] = own | to_plain(proof, KINDS[kind])
+    own = {"format": FORMAT, "version": VERSION, "problem": problem_digest(problem)}
+    content: dict[str, Any] = own | to_plain(proof, InfeasibilityProof)
     return content
 
 
@@ -60,10 +52,8 @@ def read_proof(document: Document) -> SavedProof:
     """
     document.check_entry("format", FORMAT)
     document.check_entry("version", VERSION)
-    kind = KINDS[document.check_entry("kind", *KINDS)]
-    proof = document.read(kind, head=("format", "version", "problem", "kind"))
-    if isinstance(proof, DiscProof):
-        document.check_length("centre", 2)
+    proof = document.read(InfeasibilityProof, head=("format", "version", "problem"))
+    document.check_length("point", 2)
     if not proof.slices:
         document.refuse("slices", [], "at least one slice")
     for k, part in enumerate(proof.slices):

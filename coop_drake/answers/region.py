@@ -33,6 +33,9 @@ def _holds_pairs(value: object) -> bool:
 
 Ring = Annotated[FloatArray, Codec(partial(_read_points, least=3), np.ndarray.tolist)]
 
+Corners = Annotated[FloatArray, Codec(partial(_read_points, least=1), np.ndarray.tolist)]
+"""Corners of a convex polygon, or a single point [m]."""
+
 Points = Annotated[FloatArray, Codec(partial(_read_points, least=2), np.ndarray.tolist)]
 """A polyline that a file holds as the list of its points [m]."""
 

@@ -1,6 +1,26 @@
 """A checker of plans and proofs in exact arithmetic, with nothing but the standard library."""
 
-from coop_drake.checking.check import check
+from typing import Any
+
+from coop_drake.checking import plane
+from coop_drake.checking.found import check_plan
+from coop_drake.checking.infeasible import check_proof
 from coop_drake.checking.plane import RefusedError
+from coop_drake.checking.team import Question
 
 __all__ = ["RefusedError", "check"]
+
+
+def check(question: Any, answer: Any, progress: Any = lambda phase, share: None) -> list[tuple[str, int]]:
+    """Check an answer to a question, both as ``json.load`` gives them; ``progress`` gets phase and fraction.
+
+    Returns the statements that hold, each with how often it was checked. Raises ``RefusedError`` if one does
+    not or is not shown within 10^8 elementary steps, about a minute, or a document is not as the format says.
+    """
+    plane.work_left[0] = 10**8
+    formats = {("coop_drake plan", 3): check_plan, ("coop_drake proof of infeasibility", 3): check_proof}
+    try:
+        found = formats[answer["format"], answer["version"]](Question(question), answer, progress)
+        return [(statement, count) for statement, count in found if count > 0]
+    except (LookupError, TypeError, ValueError, AttributeError) as error:
+        raise RefusedError(f"document: {type(error).__name__}: {str(error)[:200]}") from error

@@ -1,179 +1,147 @@
 """A proof holds: forbidden sets and cells cover all configurations, labels part start from goal."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-from functools import partial
+from itertools import product
 from math import prod
-from typing import Any, NamedTuple
+from typing import Any
 
-from coop_drake.checking.cover import OpenSet, blocked, check_cover
-from coop_drake.checking.found import holds, intervals
-from coop_drake.checking.plane import ONE, TURN, Point, Region, demand, hull, index, numbers, spend, within
-from coop_drake.checking.team import Interval, Open, Question, Step, backwards, bisect, swept
+from coop_drake.checking import plane, team
+from coop_drake.checking.plane import FULL, ONE, Point, Region, demand, hull, index, points, spend
+from coop_drake.checking.team import Interval, Question, Step, intervals, settled
 
 WIDENING = ONE >> 40
 """Slices are widened by this on either side: ends of a turn in doubles are off by less [rad, m]."""
 
 
-class Part(NamedTuple):
-    """A slice: kept intervals, widened ones of all axes (None if not kept), cells, labels, forbidden sets."""
-
-    where: str
-    box: list[Interval]
-    wide: list[Any]
-    cells: list[Region]
-    reached: list[bool]
-    forbidden: list[OpenSet]
-    overlap: bool
-
-
 def check_proof(question: Question, answer: Any, progress: Any) -> list[tuple[str, int]]:
-    """Check a proof that no plan exists; returns the statements that hold and how often each was checked."""
-    kind, axes, carrier, parts = answer["kind"], [0], (0, (0, 0)), []
-    demand(kind in ("slices", "disc", "blocked goal"), "kind", "is unknown")
-    if kind == "disc":
-        x, y = numbers(answer["centre"], 2)
-        carrier = index(answer["component"], len(question.parents)), (x, y)
-    else:
-        axes += [1 + k for k, robot in enumerate(question.robots) if robot in answer["robots"]]
-    at_goal, count = kind == "blocked goal", len(answer["slices"])
-    demand(count == 1 or (kind != "disc" and count > 0), "slices", "are none, or more than one for a disc")
-    for k, value in enumerate(answer["slices"]):
-        parts.append(_read(question, carrier, axes, value, f"slices[{k}]", at_goal=at_goal))
-        progress("checking inner sweeps", (k + 1) / count)
-    ends = min(part.box[0][0] for part in parts), max(part.box[0][1] for part in parts)
-    length, middle = (0, question.goal[2]) if at_goal else (TURN, (ends[0] + ends[1]) // 2)
-    turns = (ends[0] + ends[1] - 2 * middle + TURN) // (2 * TURN)
-    off = max(abs(ends[1] - ends[0] - length), abs(ends[0] + ends[1] - 2 * (middle + turns * TURN)))
-    demand(off <= WIDENING, "slices", "are not about a whole turn, or about the goal's angle")
-    ranges = question.goal_box if at_goal else [ends, *question.limits]
-    facets = _facets([part.box for part in parts], [ends, *[ranges[axis] for axis in axes[1:]]])
-    edges, goal = 0, (question.goal[0], question.goal[1])
-    for k, part in enumerate(parts):
-        if at_goal and not part.overlap:
-            collides = any(one.stretches((goal, goal)) for one in part.forbidden)
-            demand(collides, part.where, "the team may be free at the goal's position")
-        elif not part.overlap:
-            edges += check_cover(part.cells, part.forbidden, part.where)
-        progress("checking slices", (k + 1) / count)
-    labels = 0 if at_goal else _check_labels(question, carrier, parts, facets)
+    """Check a proof that no plan exists; returns the statements that hold and how often each was checked.
+
+    A proof is about the positions in W of a point of a component, and about that component's angle in W.
+    """
+    slices, (point,), edges = answer["slices"], points([answer["point"]]), 0
+    chain = question.chains[index(answer["component"], len(question.chains))]
+    boxes = [intervals(value["lower"], value["upper"], question.axes) for value in slices]
+    neighbours = _facets(boxes, question.limits) + [(k, k) for k in range(len(boxes))]
+    cells = [[(c["reached"], plane.read_region(c["polygon"])) for c in value["cells"]] for value in slices]
+    starts, goals = (question.start, question.start_box, False), (question.goal, question.goal_box, True)
+    for k, value in enumerate(slices):
+        where, wide = f"slices[{k}]", [(low - WIDENING, high + WIDENING) for low, high in boxes[k]]
+        demand(all(type(label) is bool for label, _ in cells[k]), where, "has labels that are no booleans")
+        for place, box, label in (starts, goals):
+            wrong = [cell for its, cell in cells[k] if its == label and _meets(wide, box, chain)]
+            steps, name = [*chain, Step(offset=place)], "goal" if label else "start"
+            clear = settled([point], 0, steps, box, wrong, lambda cell, *at: cell.side(*at) < 0)
+            demand(clear, where, f"cells may hold the {name} and have reached: {label}")
+        forbidden = _forbidden(question, [Step(0, -1, offset=point), *chain], wide, value["witnesses"], where)
+        edges += 0 if forbidden is None else _check_cover([cell for _, cell in cells[k]], forbidden, where)
+        progress("checking slices", (k + 1) / len(slices))
+    for a, b in neighbours:
+        for (i, (one, cell)), (j, (other, another)) in product(enumerate(cells[a]), enumerate(cells[b])):
+            finding = f"touches slices[{b}].cells[{j}], which has another label"
+            demand(one == other or not cell.touches(another), f"slices[{a}].cells[{i}]", finding)
     return [
-        ("slices tile the angles and the limits of the kept joints", count),
-        ("polygons lie inside their pieces in all of their slice; or two pieces meet there", count),
-        ("the team collides at the goal in each slice", count * at_goal),
+        ("slices tile a turn and the limits of the joints", len(slices)),
+        ("pieces hold witnesses in all of a slice", sum(len(value["witnesses"]) for value in slices)),
         ("edges of cells and of forbidden positions lie inside others: they are all positions", edges),
-        ("cells that touch have one label, the start's is reached and the goal's is not", labels),
+        ("cells that touch, in a slice or across a facet, have one label", len(neighbours)),
+        ("the start lies in reached cells alone, the goal in none of them", 2),
     ]
 
 
-def _read(
-    question: Question, carrier: tuple[int, Point], axes: list[int], value: Any, where: str, *, at_goal: bool
-) -> Part:
-    """Read a slice; check that pieces hold its polygons, and two pieces of a pair its points."""
-    box, wide = intervals(value, "", len(axes), 0), list[Any]([None] * (1 + len(question.limits)))
-    for axis, (low, high) in zip(axes, box, strict=True):
-        wide[axis] = (low - WIDENING, high + WIDENING)
-    cells, forbidden = [] if at_goal else value["cells"], list[OpenSet]()
-    labels = [cell["reached"] for cell in cells]
-    demand(all(isinstance(label, bool) for label in labels), where, "has labels that are no truth values")
-    for overlap in value["overlaps"]:
-        pair, (x, y) = tuple(overlap["pieces"]), numbers(overlap["point"], 2)
-        demand(pair in question.pairs, f"{where}.overlaps", "are of pieces that may meet")
-        for k in pair:
-            steps = question.steps(question.pieces[k].component, question.common(pair))
-            _check_held(question, k, steps, [(x, y)], wide, f"{where}.overlaps")
-    for sweep in value["inner_sweeps"]:
-        ring = hull([(x, y) for x, y in (numbers(corner, 2) for corner in sweep["polygon"])])
-        piece = index(sweep["piece"], len(question.pieces))
-        steps = question.steps(question.pieces[piece].component)
-        if carrier != (0, (0, 0)):
-            same, (x, y) = question.pieces[piece].component == carrier[0], carrier[1]
-            demand(same, f"{where}.inner_sweeps", "name a piece of another component than the disc's")
-            steps = [Step(offset=(-x, -y)), Step(0, 1)]
-        _check_held(question, piece, steps, ring, wide, f"{where}.inner_sweeps")
-        forbidden += blocked(question.floor, ring)
-    regions = [Region(cell["polygon"]) for cell in cells]
-    return Part(where, box, wide, regions, labels, forbidden, len(value["overlaps"]) > 0)
+def _meets(wide: list[Interval], box: list[Interval], carrier: list[Step]) -> bool:
+    """Whether a slice, whose first axis is the carrier's angle, may hold configurations of a box."""
+    turns = [sorted(step.sign * end + step.angle for end in box[step.axis]) for step in carrier]
+    angles = team.unwrapped((sum(low for low, _ in turns), sum(high for _, high in turns)), wide[0])
+    return all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(wide, [angles, *box[1:]], strict=True))
 
 
-def _check_held(
-    question: Question, piece: int, steps: list[Step], points: list[Point], box: list[Any], where: str
-) -> None:
-    """Check that points, seen from a piece that moves by steps, stay inside it all over a box."""
-    body, _, vertices, radius = question.pieces[piece]
-    kept = all(step.axis < 0 or box[step.axis] is not None for step in steps)
-    demand(kept, where, "name a piece that a joint moves which is not kept")
+def _forbidden(question: Question, frame: list[Step], box: list[Interval], witnesses: Any, where: str) -> Any:
+    """Check that pieces hold witnesses; returns open sets of forbidden positions, None if all are.
 
-    def leaves(part: list[Interval], tested: list[int]) -> Open:
-        moved, error, spread = swept(points, backwards(steps), part)
-        return [] if within(moved, vertices, error - radius) else tested, spread
+    A witness is a convex polygon K inside one piece, relative to the position p that the proof is about and
+    in directions of W, or inside both pieces of a pair, in a component's frame. A position p is forbidden if
+    the mean of K's corners, a point of the piece, is off the floor, and if p + K meets a wall e: p is in the
+    interior of the Minkowski sum of e and -K.
+    """
+    forbidden, overlap, floor = list[Region](), False, question.floor
+    for witness in witnesses:
+        pieces = [question.pieces[index(k, len(question.pieces))] for k in witness["pieces"]]
+        polygon, paired = hull(points(witness["polygon"])), tuple(witness["pieces"]) in question.pairs
+        demand(paired or len(pieces) == 1, where, "has a witness of neither one piece nor a pair")
+        seen = question.chains[index(witness["component"], len(question.chains))] if paired else frame
+        for piece in pieces:
+            motion = team.relative(seen, piece.chain)
+            inside = settled(polygon, 2 - piece.radius, motion, box, [piece.corners], _inside)
+            demand(inside, f"{where}.witnesses", f"may leave the inside of {piece.body}")
+        spend(300 * len(floor.edges))
+        x0, y0 = (sum(values) // len(polygon) for values in zip(*polygon, strict=True))
+        off_floor = Region([[(x - x0, y - y0) for x, y in ring] for ring in floor.rings], odd=False)
+        sums = [hull((wx - x, wy - y) for wx, wy in wall for x, y in polygon) for wall in floor.edges]
+        forbidden += [off_floor, *[Region([corners]) for corners in sums]]
+        overlap = overlap or paired
+    return None if overlap else forbidden
 
-    bisect(box, [0], leaves, where, f"may leave the inside of {body}")
+
+def _inside(piece: list[Point], corners: list[Point], depth: int) -> bool:
+    """Whether corners lie more than a depth inside a convex polygon, or less than -depth outside."""
+    least, gap = (1, depth) if depth >= 0 else (0, -depth - 1)
+    return all(Region([piece]).side([corner], gap) >= least for corner in corners)
 
 
-def _check_labels(
-    question: Question, carrier: tuple[int, Point], parts: list[Part], facets: list[tuple[int, int]]
-) -> int:
-    """Check that touching cells have one label, and that start and goal lie in no cell of the wrong one."""
-    count, angles = 0, [(value, value) for value in question.start[2:]]
-    for one, other in [*[(parts[a], parts[b]) for a, b in facets], *zip(parts, parts, strict=True)]:
-        for i, j in ((i, j) for i in range(len(one.cells)) for j in range(len(other.cells))):
-            if one.reached[i] != other.reached[j]:
-                finding = f"touches {other.where}.cells[{j}], which has another label"
-                demand(not one.cells[i].touches(other.cells[j]), f"{one.where}.cells[{i}]", finding)
-                count += 1
-    for box, place, wrong in ((angles, question.start, False), (question.goal_box, question.goal, True)):
-        steps = [*question.steps(carrier[0]), Step(offset=(place[0], place[1]))]
-        for part in parts:
-            cells = [k for k, label in enumerate(part.reached) if label == wrong]
-            finding = f"cells may hold the {'goal' if wrong else 'start'} and have reached: {wrong}"
-            if _may_hold(part.wide, box):
-                bisect(box, cells, partial(_held, carrier[1], steps, part), part.where, finding)
+def _check_cover(cells: list[Region], forbidden: list[Region], where: str) -> int:
+    """Check that the interiors of cells and forbidden sets cover the plane; counts their edges.
+
+    The union of some open sets is open. If each point of each of their boundaries lies in one of them, it is
+    closed as well, thus the whole plane. All cells belong to these sets; a forbidden one does as soon as it
+    covers a part of a boundary.
+    """
+    sets, count, taken = [*cells, *forbidden], 0, set(range(max(len(cells), 1)))
+    demand(len(sets) > 0, where, "has neither cells nor witnesses")
+    left = [edge for k in taken for edge in sets[k].edges]
+    while left:
+        edge, count = left.pop(), count + 1
+        spend(len(sets))
+        box, (x, y) = plane.box_of(edge), edge[0]
+        near = [k for k, one in enumerate(sets) if not (one.odd and plane.boxes_apart(one.box, box, 0))]
+        chosen = _chosen(sets, [k for k in near if k in taken], edge) or _chosen(sets, near, edge)
+        demand(len(chosen) > 0, where, f"no cell covers ({x / ONE:.6f}, {y / ONE:.6f}), which may be free")
+        left += [edge for k in chosen - taken for edge in sets[k].edges]
+        taken |= chosen
     return count
 
 
-def _held(point: Point, steps: list[Step], part: Part, box: list[Interval], cells: list[int]) -> Open:
-    """Cells that a point may lie in when steps carry it, and what to halve."""
-    places, error, spread = swept([point], steps, box)
-    return [k for k in cells if not part.cells[k].clear_of(places, error)], spread
+def _chosen(sets: list[Region], among: list[int], edge: Any) -> set[int]:
+    """Some sets whose stretches together cover an edge, the far-reaching first; none if they do not."""
+    stretches = [(low, high, k) for k in among for low, high in sets[k].stretches(edge)]
+    chosen, covered = set[int](), -1
+    while covered < FULL:
+        high, k = max([(high, -k) for low, high, k in stretches if low <= max(covered, 0)], default=(-1, 0))
+        if high <= covered:
+            return set()
+        chosen, covered = chosen | {-k}, high
+    return chosen
 
 
-def _may_hold(wide: list[Any], ends: list[Interval]) -> bool:
-    """Whether a widened slice meets intervals of (theta, q...) on all kept axes; theta modulo a turn."""
-    (low, high), theta, kept = wide[0], ends[0][0], zip(wide[1:], ends[1:], strict=True)
-    turns = (low + high - 2 * theta + TURN) // (2 * TURN)
-    held = any(low <= theta + k * TURN <= high for k in (turns - 1, turns, turns + 1))
-    return held and all(a is None or (a[0] <= b[1] and b[0] <= a[1]) for a, b in kept)
-
-
-def _facets(boxes: Sequence[Sequence[Interval]], whole: Sequence[Interval]) -> list[tuple[int, int]]:
-    """Check that boxes tile a range; returns pairs that share a facet, across the ends of theta too.
+def _facets(boxes: list[list[Interval]], limits: list[Interval]) -> list[tuple[int, int]]:
+    """Check that boxes tile a turn and the joints' limits; returns pairs that share a facet, modulo a turn.
 
     Boxes within a range whose interiors are disjoint tile it if their volumes add up to its volume. An axis
     on which the range is a single value does not count.
     """
-    wide, pairs = [axis for axis, (low, high) in enumerate(whole) if low < high], list[tuple[int, int]]()
-    volume, *volumes = (prod(box[a][1] - box[a][0] for a in wide) for box in (whole, *boxes))
-    tiled = all(holds(whole, box) for box in boxes) and sum(volumes) == volume
+    first, last = min([box[0][0] for box in boxes], default=0), max([box[0][1] for box in boxes], default=0)
+    demand(abs(last - first - plane.TURN) <= WIDENING, "slices", "are not about a whole turn")
+    whole, pairs = [(first, last), *limits], list[tuple[int, int]]()
+    wide = [axis for axis, (low, high) in enumerate(whole) if low < high]
+    volume, *volumes = [prod(box[a][1] - box[a][0] for a in wide) for box in (whole, *boxes)]
+    tiled = all(team.holds(whole, box) for box in boxes) and sum(volumes) == volume
     demand(tiled, "slices", "do not tile their range: they leave it, leave a gap or overlap")
-    sorting = max(range(len(whole)), key=lambda a: len({box[a][0] for box in boxes}))
-    order = sorted(range(len(boxes)), key=lambda k: boxes[k][sorting])
-    for place, i in enumerate(order):
-        for j in order[place + 1 :]:
-            spend(1)
-            if boxes[j][sorting][0] > boxes[i][sorting][1]:
+    again = [(k, [(last, last + b[0][1] - first), *b[1:]]) for k, b in enumerate(boxes) if b[0][0] == first]
+    placed = sorted([*enumerate(boxes), *again], key=lambda entry: entry[1])
+    for n, (i, one) in enumerate(placed):
+        for j, other in placed[n + 1 :]:
+            if other[0][0] > one[0][1]:
                 break
-            shared = [_shared(boxes[i][a], boxes[j][a]) for a in wide]
-            demand(min(shared, default=1) <= 0, f"slices[{i}], slices[{j}]", "overlap")
-            if min(shared) == 0 and shared.count(0) == 1:
-                pairs.append((i, j))
-    begins = [k for k, box in enumerate(boxes) if box[0][0] == whole[0][0]]
-    ends = [k for k, box in enumerate(boxes) if box[0][1] == whole[0][1]]
-    rest = [axis for axis in wide if axis > 0]
-    across = [(i, j) for i in ends for j in begins]
-    return pairs + [(i, j) for i, j in across if all(_shared(boxes[i][a], boxes[j][a]) > 0 for a in rest)]
-
-
-def _shared(one: Interval, other: Interval) -> int:
-    return min(one[1], other[1]) - max(one[0], other[0])
+            spend(4)
+            shared = [min(one[a][1], other[a][1]) - max(one[a][0], other[a][0]) for a in wide]
+            demand(min(shared) <= 0, f"slices[{i}], slices[{j}]", "overlap")
+            pairs += [(i, j)] if min(shared) == 0 and shared.count(0) == 1 else []
+    return pairs

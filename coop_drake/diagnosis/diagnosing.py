@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 from coop_drake.answers import PlanningProblem
-from coop_drake.answers.proof import BlockedGoalProof
 from coop_drake.diagnosis.bracket import Amounts, bracketed
 from coop_drake.diagnosis.contacts import deepest
 from coop_drake.diagnosis.findings import Diagnosis, PassageFindings
@@ -51,7 +50,7 @@ def diagnose(problem: PlanningProblem, progress: Progress | None = None) -> Diag
     known = Answer.INFEASIBLE if answer.proved else Answer.UNDECIDED
     made = Diagnosis(known, answer.reason, mixed=answer.mixed)
     floor = WidenedFloor(problem.workspace, problem.start[:2], LARGEST * problem.tree.reach)
-    if isinstance(answer.proof, BlockedGoalProof):
+    if answer.proof is not None and answer.proof.kind == "blocked goal":
         made = replace(made, goal=blocked_pose(problem, floor, planner))
     else:
         made = replace(made, passages=find_passages(problem, floor, planner, refuted=answer.proved))

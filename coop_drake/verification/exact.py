@@ -8,7 +8,7 @@ from typing import Any
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_document
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import DiscProof, InfeasibilityProof, SlicesProof
+from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.answers.proof_file import proof_document
 from coop_drake.checking import RefusedError, check
 from coop_drake.errors import RefusalError
@@ -66,13 +66,11 @@ def verify_proof(
         RefusalError: Names the first statement that does not hold.
     """
     checks = _exactly(problem, proof_document(proof, problem), progress)
-    if isinstance(proof, DiscProof):
-        name = problem.tree.components[proof.component].name
-        return Verified("infeasible", f"a disc in {name} cannot get from start to goal", checks)
-    robots = list(proof.robots)
-    team = f"the object with robots {robots}" if robots else "the object alone"
-    what = "cannot get from start to goal" if isinstance(proof, SlicesProof) else "collides at the goal"
-    return Verified("infeasible", f"{team} {what}, by {len(proof.slices)} slices", checks)
+    pieces = {number for part in proof.slices for witness in part.witnesses for number in witness.pieces}
+    names = [body.name for c in problem.tree.components for body in c.bodies for _ in body.shapes]
+    bodies = ", ".join(dict.fromkeys(names[number] for number in sorted(pieces)))
+    subject = f"there is no plan, by {len(proof.slices)} slices about {bodies}"
+    return Verified("infeasible", subject, checks)
 
 
 def _silent(phase: str, share: float) -> None:
@@ -93,4 +91,5 @@ def _exactly(
         checks = tuple(Check(*entry) for entry in check(question, answer, progress or _silent))
         return (*checks, Check(name, len(aside))) if aside else checks
     except RefusedError as refusal:
-        raise RefusalError(refusal.where, refusal.finding) from refusal
+        where, _, finding = str(refusal).partition(": ")
+        raise RefusalError(where, finding) from refusal

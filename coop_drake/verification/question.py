@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import json
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import shapely
 from shapely import Polygon
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.files import write_atomically
-from coop_drake.tree.component_tree import Body, ComponentTree, TreeJoint
+from coop_drake.tree.component_tree import Component, ComponentTree
+from coop_drake.tree.pose import PlanarPose
 
 TRUSTED = (
-    "how Drake parses the scenario and its models (coop_drake/scenario, coop_drake/plant)",
+    "the readers of the scenario, the plan and the proof (coop_drake/scenario, coop_drake/answers)",
+    "how Drake parses the models (coop_drake/plant)",
     "the convex pieces, joints and pairs of bodies left aside that are read there, and their question "
     "(coop_drake/verification/question.py; --question FILE writes it)",
+    "the rule by which a plan's gains follow from its cells, which the planner uses too (coop_drake/laws)",
     "Python's integers, and the checker (coop_drake/checking)",
 )
 """What remains to be trusted when the exact checker accepts an answer."""
@@ -29,25 +34,35 @@ def save_question(problem: PlanningProblem, path: Path | str) -> Path:
 
 def question_of(problem: PlanningProblem) -> dict[str, Any]:
     """Write a planning problem down as a question for the checker: plain data for a JSON file."""
+    tree, goals = problem.tree, problem.goal_joints
+    ends = [
+        ((j.lower, j.upper) if goal is None else (goal, goal))
+        for j, goal in zip(tree.joints, goals, strict=True)
+    ]
+    angle, joints = float(problem.goal_pose[2]), len(tree.joints)
     return {
         "format": "coop_drake question",
-        "version": 1,
+        "version": 2,
         "floor": _region(problem.workspace),
-        "components": [
-            {
-                "parent": component.parent,
-                "joint": None if component.joint is None else _joint(component.joint),
-                "bodies": [_body(body) for body in component.bodies],
-            }
-            for component in problem.tree.components
+        "lower": [joint.lower for joint in tree.joints],
+        "upper": [joint.upper for joint in tree.joints],
+        "components": [_component(component) for component in tree.components if component.joint is not None],
+        "pieces": [
+            {"body": body.name, "component": k, "corners": shape.vertices.tolist(), "radius": shape.radius}
+            for k, component in enumerate(tree.components)
+            for body in component.bodies
+            for shape in body.shapes
         ],
-        "left_aside": _left_aside(problem.tree),
+        "left_aside": _left_aside(tree),
         "start": problem.start.tolist(),
-        "goal_pose": problem.goal_pose.tolist(),
-        "goal_joints": list(problem.goal_joints),
-        "position_tolerance": problem.position_tolerance,
-        "angle_tolerance": problem.angle_tolerance,
-        "joint_tolerance": problem.joint_tolerance,
+        "goal": problem.goal_pose[:2].tolist(),
+        "goal_lower": [angle, *[low for low, _ in ends]],
+        "goal_upper": [angle, *[high for _, high in ends]],
+        "tolerances": [
+            problem.position_tolerance,
+            problem.angle_tolerance,
+            *[problem.joint_tolerance] * joints,
+        ],
     }
 
 
@@ -57,35 +72,31 @@ def _region(polygon: Polygon) -> dict[str, Any]:
     return {"outer": outer, "holes": holes}
 
 
-def _joint(joint: TreeJoint) -> dict[str, Any]:
+def _component(component: Component) -> dict[str, Any]:
+    """A component with a joint: its point p is at Rot(sign q + angle) p + q slide + offset in its parent."""
+    joint = component.joint
+    assert joint is not None
+    revolute = joint.kind == "revolute"
+    turned = PlanarPose(0.0, 0.0, joint.X_PJ.angle).apply(np.array(joint.axis))
     return {
-        "name": joint.name,
-        "kind": joint.kind,
-        "robot": joint.robot,
-        "index": joint.index,
-        "frame": [joint.X_PJ.x, joint.X_PJ.y, joint.X_PJ.angle],
-        "sign": int(joint.sign),
-        "direction": list(joint.axis),
-        "lower": joint.lower,
-        "upper": joint.upper,
+        "parent": component.parent,
+        "joint": joint.index,
+        "sign": int(joint.sign) if revolute else 0,
+        "angle": joint.X_PJ.angle,
+        "slide": [0.0, 0.0] if revolute else turned.tolist(),
+        "offset": [joint.X_PJ.x, joint.X_PJ.y],
     }
 
 
-def _body(body: Body) -> dict[str, Any]:
-    shapes = [{"vertices": shape.vertices.tolist(), "radius": shape.radius} for shape in body.shapes]
-    return {"name": body.name, "shapes": shapes}
+def _left_aside(tree: ComponentTree) -> list[list[Any]]:
+    """Pairs of pieces that may overlap: a joint connects their components, or their models leave them aside.
 
-
-def _left_aside(tree: ComponentTree) -> list[list[str]]:
-    """Pairs of bodies that may overlap: a joint connects their components, or their models leave them aside.
-
-    Bodies of one component never move against each other and are no pair.
+    Pieces of one component never move against each other and are no pair.
     """
-    owner = {body.name: k for k, component in enumerate(tree.components) for body in component.bodies}
-    pairs = []
-    for one, other in sorted(map(sorted, tree.unchecked_pairs)):
-        first, last = sorted((owner[one], owner[other]))
-        if first != last:
-            joined = tree.components[last].parent == first
-            pairs.append([one, other, "joint" if joined else "model"])
+    owned = [(k, body.name) for k, c in enumerate(tree.components) for body in c.bodies for _ in body.shapes]
+    unchecked, pairs = set(map(frozenset, tree.unchecked_pairs)), []
+    for (i, (one, name)), (j, (other, another)) in combinations(enumerate(owned), 2):
+        if one != other and frozenset((name, another)) in unchecked:
+            joined = one == tree.components[other].parent or other == tree.components[one].parent
+            pairs.append([i, j, "joint" if joined else "model"])
     return pairs

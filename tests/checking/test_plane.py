@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from shapely import LineString, MultiPoint, Point, Polygon
 
 from coop_drake.checking import plane
+from coop_drake.checking.infeasible import _inside
 from coop_drake.checking.plane import (
     BITS,
     FULL,
@@ -17,11 +18,9 @@ from coop_drake.checking.plane import (
     TURN,
     Region,
     apart,
+    cosine_and_sine,
     hull,
     numbers,
-    stretch,
-    turn,
-    within,
 )
 
 PLACE = st.tuples(st.integers(-9, 9), st.integers(-9, 9))
@@ -31,28 +30,23 @@ SEGMENT = st.lists(PLACE, min_size=2, max_size=2, unique=True)
 
 @pytest.fixture(autouse=True)
 def enough_work():
-    plane.work[0] = 10**9
+    plane.work_left[0] = 10**9
 
 
 def region(*rings):
-    made = Region({"outer": [[0, 0], [1, 0], [0, 1]], "holes": []})
-    made.rings = [list(ring) for ring in rings]
-    made.edges = [(r[k - 1], r[k]) for r in made.rings for k in range(len(r)) if r[k - 1] != r[k]]
-    made.boxes = [plane.box_of(edge) for edge in made.edges]
-    made.box = plane.box_of([point for ring in made.rings for point in ring])
-    return made
+    return Region([list(ring) for ring in rings])
 
 
 @given(st.floats(-1e3, 1e3))
 def test_sines_and_cosines_are_right_to_a_unit(angle):
     exact = numbers([angle], 1)[0]
-    c, s = turn(exact)
+    c, s = cosine_and_sine(exact)
     assert abs(c / ONE - cos(angle)) < 1e-13 > abs(s / ONE - sin(angle))
     assert abs(c * c + s * s - ONE * ONE) <= 4 * ONE
-    c2, s2 = turn(2 * exact)
+    c2, s2 = cosine_and_sine(2 * exact)
     assert abs(c2 * ONE - (c * c - s * s)) <= 8 * ONE
     assert abs(s2 * ONE - 2 * c * s) <= 8 * ONE
-    c3, s3 = turn(exact + TURN)
+    c3, s3 = cosine_and_sine(exact + TURN)
     assert max(abs(c3 - c), abs(s3 - s)) <= 4
 
 
@@ -78,8 +72,8 @@ def test_sets_are_apart_exactly_if_their_distance_is_larger(first, second, gap):
 
 @given(PLACES, PLACES, st.integers(-3, 2))
 @settings(deadline=None)
-def test_points_are_within_a_set_by_more_than_a_depth(points, corners, depth):
-    """A point outside may be refused though it is nearer by less than a unit, here a hundredth."""
+def test_corners_are_inside_a_piece_by_more_than_a_depth(points, corners, depth):
+    """A corner outside may be refused though it is nearer by less than a unit, here a hundredth."""
     points, corners = ([(100 * x, 100 * y) for x, y in places] for places in (points, corners))
     polygon, depth, expected = MultiPoint(corners).convex_hull, 100 * depth, True
     for point in map(Point, points):
@@ -88,7 +82,7 @@ def test_points_are_within_a_set_by_more_than_a_depth(points, corners, depth):
         if abs(inside - depth) < 2.0:
             return
         expected = expected and inside > depth
-    assert within(points, hull(corners), depth) == expected
+    assert _inside(hull(corners), points, depth) == expected
 
 
 @given(SEGMENT, st.lists(PLACE, min_size=3, max_size=7))
@@ -96,11 +90,11 @@ def test_points_are_within_a_set_by_more_than_a_depth(points, corners, depth):
 def test_the_stretch_in_a_convex_polygon_is_all_of_its_interior(edge, corners):
     ring = hull(corners)
     if len(ring) < 3:
-        assert stretch(edge, ring) == []
+        assert region(ring).stretches(edge) == []
         return
     inside = LineString(edge).intersection(Polygon(ring)).length
     inside = 0.0 if LineString(edge).relate_pattern(Polygon(ring), "F********") else inside
-    found = sum(high - low for low, high in stretch(edge, ring)) / FULL * LineString(edge).length
+    found = sum(high - low for low, high in region(ring).stretches(edge)) / FULL * LineString(edge).length
     assert found == pytest.approx(inside, abs=1e-9)
 
 
@@ -108,15 +102,14 @@ def test_the_stretch_in_a_convex_polygon_is_all_of_its_interior(edge, corners):
 @settings(deadline=None, max_examples=200)
 def test_stretches_in_a_region_hold_all_points_of_their_parity_that_are_on_no_edge(edge, outer, hole):
     made = region(outer, hole)
-    if not made.edges:
-        return
-    inside, outside = (made.stretches(edge, (0, 0), odd=odd) for odd in (True, False))
+    even = Region(made.rings, odd=False)
+    inside, outside = made.stretches(edge), even.stretches(edge)
     assert covered(inside + outside) >= FULL - 100
     for odd, stretches in ((True, inside), (False, outside)):
         for low, high in stretches:
             for place in {low, (low + high) // 2, high}:
                 x, y = (a * FULL + (b - a) * place for a, b in zip(*edge, strict=True))
-                assert made.odd(x, y, FULL) == odd
+                assert made.has_inside(x, y, FULL) == odd
                 assert all(off_edge((x, y), side) for side in made.edges)
 
 
@@ -133,6 +126,8 @@ def collinear_allowance(stretches):
 
 def off_edge(point, edge):
     (px, py), (qx, qy) = ((x * FULL, y * FULL) for x, y in edge)
+    if edge[0] == edge[1]:
+        return point != (px, py)
     across = (qx - px) * (point[1] - py) - (qy - py) * (point[0] - px)
     along = (qx - px) * (point[0] - px) + (qy - py) * (point[1] - py)
     return across != 0 or not 0 <= along <= (qx - px) ** 2 + (qy - py) ** 2

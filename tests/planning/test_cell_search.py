@@ -3,7 +3,6 @@
 import pytest
 
 from coop_drake.answers.problem import PlannerSettings
-from coop_drake.answers.proof import SlicesProof
 from coop_drake.planning.boxes.channel import Channel, NoChannel
 from coop_drake.planning.cells.events import ChannelSearched, Event, ExplorationBegan
 from coop_drake.planning.search.search import find_channel
@@ -26,7 +25,8 @@ def test_a_corridor_narrower_than_the_rod_is_refuted(strategy: str) -> None:
     answer, _ = find_channel(rod_problem(0.19, PlannerSettings(strategy=strategy)))
     assert isinstance(answer, NoChannel)
     assert answer.proved
-    assert isinstance(answer.proof, SlicesProof)
+    assert answer.proof is not None
+    assert answer.proof.kind == "slices"
 
 
 @pytest.mark.parametrize("strategy", ["cells", "paper"])

@@ -88,6 +88,6 @@ def test_pairs_of_bodies_cannot_be_left_aside_for_a_joint_that_they_do_not_share
     documents = answered(room_with_pillar(2))
     assert documents is not None
     question, answer = deepcopy(documents[0]), documents[1]
-    names = [component["bodies"][0]["name"] for component in question["components"][1:]]
-    question["left_aside"].append([*names, "joint"])
+    arms = [k for k, piece in enumerate(question["pieces"]) if piece["component"] > 0]
+    question["left_aside"].append([*arms[:2], "joint"])
     assert "share no joint" in refusal(question, answer)

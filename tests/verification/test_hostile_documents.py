@@ -13,7 +13,7 @@ from shapely import Polygon
 
 from benchmarks.adversaries.collisions import Document
 from benchmarks.adversaries.trial import answered, refusal
-from coop_drake.checking.check import main
+from coop_drake.checking.__main__ import main
 from tests.planning.test_degenerate_input import CLOSED_FLOORS, OPEN_FLOORS, question
 from tests.planning.test_questions import reaching
 from tests.support.certificates import bent_corridor, changed, room_with_pillar
@@ -85,7 +85,7 @@ def test_a_floor_of_very_many_corners_is_decided_or_called_too_much_work() -> No
     ring = np.column_stack((3.0 + 20.0 * np.cos(turn), 2.5 + 20.0 * np.sin(turn)))
     ask["floor"]["outer"] = ring.tolist()
     refused = refusal(ask, answer)
-    assert not refused or "more steps are needed than allowed" in refused
+    assert not refused or "more steps are needed than" in refused
 
 
 @pytest.mark.parametrize("floor", ODD_FLOORS.values(), ids=ODD_FLOORS)

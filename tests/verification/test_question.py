@@ -20,7 +20,7 @@ def metres(values):
 
 @pytest.fixture(autouse=True)
 def enough_work():
-    plane.work[0] = 10**9
+    plane.work_left[0] = 10**9
 
 
 @pytest.mark.parametrize("name", ["base", "elbow", "three"])
@@ -32,7 +32,7 @@ def test_bodies_are_where_the_tree_has_them(name):
     (angles,) = [[(value, value) for value in plane.numbers(z[2:].tolist(), len(z) - 2)]]
     expected, found = body_footprints(tree, z), {}
     for piece in asked.pieces:
-        points, error, _ = swept(piece.vertices, asked.steps(piece.component), angles)
+        points, error = swept(piece.corners, 0, piece.chain, angles)
         assert error < plane.ONE >> 60
         shape = MultiPoint((metres(points).astype(float) + z[:2]).tolist()).convex_hull
         found.setdefault(piece.body, []).append(shape.buffer(piece.radius / plane.ONE, quad_segs=64))
@@ -47,8 +47,10 @@ def test_floor_start_goal_and_limits_are_the_problems(tmp_path):
     problem = case("base")
     asked = Question(json.loads(save_question(problem, tmp_path / "question.json").read_text()))
     assert sum(map(len, asked.floor.rings)) == 29
-    np.testing.assert_allclose(metres(asked.start).astype(float), problem.start, rtol=0.0, atol=1e-15)
-    np.testing.assert_allclose(metres(asked.goal).astype(float), problem.goal_pose, rtol=0.0, atol=1e-15)
+    start = [*asked.start, *[low for low, _ in asked.start_box]]
+    goal = [*asked.goal, asked.goal_box[0][0]]
+    np.testing.assert_allclose(metres(start).astype(float), problem.start, rtol=0.0, atol=1e-15)
+    np.testing.assert_allclose(metres(goal).astype(float), problem.goal_pose, rtol=0.0, atol=1e-15)
     limits = np.stack((problem.tree.joint_lower, problem.tree.joint_upper), axis=1)
     np.testing.assert_allclose(metres(asked.limits).astype(float), limits, rtol=0.0, atol=1e-15)
 
@@ -58,7 +60,8 @@ def test_pairs_are_derived_by_the_checker_even_if_the_planner_forgets_them(monke
     monkeypatch.setattr(ComponentTree, "collision_pairs", ())
     question = question_of(problem)
     assert len(Question(question).pairs) == 14
-    assert question["left_aside"] == [
-        ["robot_0::link_1", "robot_0::link_2", "joint"],
-        ["robot_1::link_1", "robot_1::link_2", "joint"],
+    bodies = [piece["body"] for piece in question["pieces"]]
+    assert [(bodies[i], bodies[j], reason) for i, j, reason in question["left_aside"]] == [
+        ("robot_0::link_2", "robot_0::link_1", "joint"),
+        ("robot_1::link_2", "robot_1::link_1", "joint"),
     ]

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import BlockedGoalProof
+from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.slices import halves
-from coop_drake.planning.proofs.proof_making import blocked_goal_proof
+from coop_drake.planning.proofs.blocked_goal_proof import blocked_goal_proof
 from coop_drake.planning.proofs.witnesses import Witnesses
 from coop_drake.planning.questions.margins import shrunk
+from coop_drake.planning.questions.question_checks import goal_beyond_limits
 from coop_drake.planning.questions.relaxation import relaxed
 
 BUDGET = 128
 """Slices of joint intervals that are swept at most for each part of the team: milliseconds of work."""
 
 
-def blocked_goal(problem: PlanningProblem) -> tuple[BlockedGoalProof | None, int]:
+def blocked_goal(problem: PlanningProblem) -> tuple[InfeasibilityProof | None, int]:
     """Prove by under-sweeps that the team is in collision at its goal pose, whatever its free joints are.
 
     The object is tested first, then each robot alone, then the team: if some of the bodies collide, so
@@ -37,8 +38,11 @@ def blocked_goal(problem: PlanningProblem) -> tuple[BlockedGoalProof | None, int
         pairs = BodyPairs(swept)
         boxes, made = _blocked(question, CellMaker(swept, pairs, shrunk(question.workspace, 0.0)))
         slices += made
-        if boxes:
-            return blocked_goal_proof(chosen, boxes, Witnesses(problem.tree, swept, pairs)), slices
+        beyond = goal_beyond_limits(question) is not None
+        if boxes or beyond:
+            proof = blocked_goal_proof(question, boxes, Witnesses(problem.tree, swept, pairs))
+            if proof is not None:
+                return proof, slices
     return None, slices
 
 

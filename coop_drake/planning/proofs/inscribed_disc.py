@@ -10,7 +10,7 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import DiscProof
+from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.sweep_kernels import over_piece
@@ -28,7 +28,7 @@ INSIDE = 1.0 - 1e-9
 """Discs are shrunk by this factor, so that rounding leaves them inside the team [-]."""
 
 
-def disc_refuted(problem: PlanningProblem) -> DiscProof | None:
+def disc_refuted(problem: PlanningProblem) -> InfeasibilityProof | None:
     """Look for a disc inside one body whose centre cannot get from its start to its goal.
 
     That is so if start and goal lie in different connected parts of the positions at which the disc fits.
@@ -48,7 +48,7 @@ def disc_refuted(problem: PlanningProblem) -> DiscProof | None:
         goals = _places(problem, component, centre)
         reached = [to_polygon(region.section) for region in regions if region.holds(start)]
         if not any(polygon.intersects(goals) for polygon in reached):
-            found = disc_proof(component, centre, ring, piece, regions, start, goals)
+            found = disc_proof(problem.tree, component, centre, ring, piece, regions, start, goals)
             if found is not None:
                 return found
     return None

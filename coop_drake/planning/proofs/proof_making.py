@@ -13,21 +13,13 @@ from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import (
-    AngleBox,
-    BlockedGoalProof,
-    DiscProof,
-    InnerSweep,
-    OverCell,
-    OverSlice,
-    SlicesProof,
-)
+from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice, Witness
 from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.parts import parts_of
-from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.slices import Slices
-from coop_drake.planning.proofs.witnesses import LEAST_LOSS, Witnesses
+from coop_drake.planning.proofs.witnesses import LEAST_LOSS, Witnesses, slice_ends
+from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 
 Found = TypeVar("Found")
@@ -43,16 +35,14 @@ TOUCHING = 1e-6
 
 def slices_proof(
     question: PlanningProblem,
-    robots: Sequence[int],
     slices: Slices,
     regions: Mapping[int, Sequence[Region]],
     witnesses: Witnesses,
-) -> SlicesProof | None:
+) -> InfeasibilityProof | None:
     """Write an exploration's leaves and over-cells down as a proof.
 
     Args:
         question: The question that was explored, with the kept robots only.
-        robots: Indices of these robots in the whole team.
         slices: The subdivision.
         regions: Over-cells of every leaf by its id.
         witnesses: Makes what shows that all else is blocked.
@@ -83,14 +73,15 @@ def slices_proof(
             overlaps = () if cells[leaf] else witnesses.overlaps(intervals)
             sweeps = () if overlaps else witnesses.inner_sweeps(intervals, growth)
             labelled = tuple(map(OverCell, labels[leaf], cells[leaf]))
-            found.append(OverSlice(*_ends(intervals), overlaps, sweeps, labelled))
+            found.append(OverSlice(*witnesses.ends(intervals), (*overlaps, *sweeps), labelled))
         return found
 
     parts = _first(separated)
-    return None if parts is None else SlicesProof(tuple(robots), tuple(parts))
+    return None if parts is None else InfeasibilityProof("slices", 0, np.zeros(2), tuple(parts))
 
 
 def disc_proof(
+    tree: ComponentTree,
     component: int,
     centre: FloatArray,
     ring: FloatArray,
@@ -98,10 +89,11 @@ def disc_proof(
     regions: Sequence[Region],
     start: FloatArray,
     goals: BaseGeometry,
-) -> DiscProof | None:
+) -> InfeasibilityProof | None:
     """Write the regions between which a disc cannot pass down as a proof.
 
     Args:
+        tree: The whole team.
         component: The component that the disc lies in.
         centre: Its centre in the component's frame, shape (2,) [m].
         ring: Vertices of a polygon inside it, relative to its centre, shape (n, 2) [m].
@@ -119,29 +111,12 @@ def disc_proof(
         labels = [cell.dwithin(Point(start), TOUCHING) for cell in cells]
         if any(label and cell.dwithin(goals, TOUCHING) for cell, label in zip(cells, labels, strict=True)):
             return None
-        inside = InnerSweep(piece, (1.0 - LEAST_LOSS) * ring)
-        return OverSlice(*_ends(((-pi, pi),)), (), (inside,), tuple(map(OverCell, labels, cells)))
+        inside = Witness((piece,), component, (1.0 - LEAST_LOSS) * ring)
+        ends = slice_ends(tree, (-pi, pi), {})
+        return OverSlice(*ends, (inside,), tuple(map(OverCell, labels, cells)))
 
     found = _first(separated)
-    return None if found is None else DiscProof(component, centre, (found,))
-
-
-def blocked_goal_proof(
-    robots: Sequence[int], boxes: Sequence[Intervals], witnesses: Witnesses
-) -> BlockedGoalProof:
-    """Write boxes of angles at the goal, in all of which the team is in collision, down as a proof.
-
-    Args:
-        robots: Robots that are kept.
-        boxes: Boxes that cover the free joints' limits, with the goal's theta and joints on the other axes.
-        witnesses: Makes what shows that the team is in collision.
-    """
-    parts = []
-    for intervals in sorted(boxes):
-        overlaps = witnesses.overlaps(intervals)
-        sweeps = () if overlaps else witnesses.inner_sweeps(intervals, 0.0)
-        parts.append(AngleBox(*_ends(intervals), overlaps, sweeps))
-    return BlockedGoalProof(tuple(robots), tuple(parts))
+    return None if found is None else InfeasibilityProof("disc", component, centre, (found,))
 
 
 def _first(separated: Callable[[float], Found | None]) -> Found | None:
@@ -153,11 +128,6 @@ def _first(separated: Callable[[float], Found | None]) -> Found | None:
         if found is not None:
             return found
     return None
-
-
-def _ends(intervals: Intervals) -> tuple[FloatArray, FloatArray]:
-    bounds = np.array(intervals, dtype=float).reshape(-1, 2)
-    return bounds[:, 0].copy(), bounds[:, 1].copy()
 
 
 def _grown(regions: Sequence[Region], growth: float) -> list[Polygon]:

@@ -167,7 +167,7 @@ class Proofs:
         question, _ = relaxed(self._problem, chosen)
         exploration = self._exploration(chosen)
         witnesses = Witnesses(self._problem.tree, exploration.swept, exploration.pairs)
-        proof = slices_proof(question, chosen, exploration.slices, exploration.over_leaves(), witnesses)
+        proof = slices_proof(question, exploration.slices, exploration.over_leaves(), witnesses)
         if proof is None:
             return False
         reason = f"the over-approximations of {self._words(chosen)} separate start from goal"

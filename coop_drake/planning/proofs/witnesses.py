@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import shapely
 from shapely import Polygon
 
-from coop_drake.answers.proof import InnerSweep, Overlap
+from coop_drake.answers.proof import Witness
 from coop_drake.geometry.body_pairs import BodyPair, BodyPairs
-from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.geometry.swept_tree import Interval, Intervals, SweptTree
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 
@@ -32,18 +34,27 @@ class Witnesses:
         kept = {component.name for component in swept.tree.components}
         names = [c.name for c in tree.components for body in c.bodies for _ in body.shapes]
         self._numbers = [number for number, name in enumerate(names) if name in kept]
-        self._swept, self._pairs = swept, pairs
+        self._tree, self._swept, self._pairs = tree, swept, pairs
+        self._owners = [k for k, c in enumerate(tree.components) for body in c.bodies for _ in body.shapes]
 
-    def overlaps(self, intervals: Intervals) -> tuple[Overlap, ...]:
+    def ends(self, intervals: Intervals) -> tuple[FloatArray, FloatArray]:
+        """Ends of a slice of the whole team, shape (1 + n,): other joints move within their limits."""
+        kept = {joint.name: ends for joint, ends in zip(self._swept.tree.joints, intervals[1:], strict=True)}
+        return slice_ends(self._tree, intervals[0], kept)
+
+    def overlaps(self, intervals: Intervals) -> tuple[Witness, ...]:
         """A point that two pieces hold all over a slice; none if no pair is known to overlap."""
         pair = self._pairs.overlapping(intervals)
         if pair is None:
             return ()
         depth, pieces, point = max(self._common(pair, intervals), key=lambda common: common[0])
         numbers = tuple(sorted(self._numbers[k] for k in pieces))
-        return (Overlap(numbers, point),) if depth > 0.0 else ()
+        if depth <= 0.0:
+            return ()
+        common = common_component(self._tree, *(self._owners[number] for number in numbers))
+        return (Witness(numbers, common, point[None]),)
 
-    def inner_sweeps(self, intervals: Intervals, growth: float) -> tuple[InnerSweep, ...]:
+    def inner_sweeps(self, intervals: Intervals, growth: float) -> tuple[Witness, ...]:
         """Polygons that pieces cover at every configuration of a slice, without corners that do not matter.
 
         Args:
@@ -53,7 +64,7 @@ class Witnesses:
         loss = LEAST_LOSS + LOSS_PER_GROWTH * max(growth, 0.0)
         rings = [(number, self._swept.under(k, intervals)) for k, number in enumerate(self._numbers)]
         found = [(number, smaller(ring, loss)) for number, ring in rings if ring is not None]
-        return tuple(InnerSweep(number, ring) for number, ring in found if ring is not None)
+        return tuple(Witness((number,), 0, ring) for number, ring in found if ring is not None)
 
     def _common(
         self, pair: BodyPair, intervals: Intervals
@@ -69,6 +80,23 @@ class Witnesses:
                     point = np.array(shared.centroid.coords[0]) if shared.area > 0.0 else np.zeros(2)
                     found.append((float(shared.area), (i, j), point))
         return found or [(0.0, (0, 0), np.zeros(2))]
+
+
+def slice_ends(
+    tree: ComponentTree, angles: Interval, kept: Mapping[str, Interval]
+) -> tuple[FloatArray, FloatArray]:
+    """Ends, shape (1 + n,), of angles, of intervals of joints by name, and of the limits of all others."""
+    joints = [kept.get(joint.name, (joint.lower, joint.upper)) for joint in tree.joints]
+    lower, upper = np.array([angles, *joints], dtype=float).T
+    return lower.copy(), upper.copy()
+
+
+def common_component(tree: ComponentTree, first: int, second: int) -> int:
+    """Index of the nearest component that carries two components."""
+    while first != second:  # Parents stand before children.
+        later = max(first, second)
+        first, second = min(first, second), tree.components[later].parent or 0
+    return first
 
 
 def smaller(ring: FloatArray, loss: float) -> FloatArray | None:

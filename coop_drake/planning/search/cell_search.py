@@ -96,10 +96,9 @@ def _no_channel(
 ) -> NoChannel:
     """The answer of an exploration at margin zero that found no channel."""
     if outcome.verdict is Verdict.INFEASIBLE:
-        robots = sorted({joint.robot for joint in problem.tree.joints})
         swept = SweptTree(problem.tree)
         witnesses = Witnesses(problem.tree, swept, BodyPairs(swept))
-        proof = slices_proof(problem, robots, exploration.slices, exploration.over_leaves(), witnesses)
+        proof = slices_proof(problem, exploration.slices, exploration.over_leaves(), witnesses)
         if proof is None:
             return NoChannel(False, "a proof of infeasibility was found but cannot be written down")
         reason = f"the over-approximations of {outcome.slices} slices separate start from goal"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
 
 import numpy as np
 import shapely
@@ -14,14 +13,7 @@ from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.plan import Cell, Plan
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
-from coop_drake.answers.proof import (
-    AngleBox,
-    BlockedGoalProof,
-    DiscProof,
-    InfeasibilityProof,
-    OverCell,
-    OverSlice,
-)
+from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice
 from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.laws.gains import FixedGains, GainSet
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
@@ -30,8 +22,6 @@ from coop_drake.planning.cells.events import ChannelSearched, Event, SeenCell, S
 from coop_drake.planning.questions.margins import SMALLEST_MARGIN
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import FloatArray, PlanarPose
-
-SliceKind = TypeVar("SliceKind", AngleBox, OverSlice)
 
 USUAL_MARGINS = (SMALLEST_MARGIN, 0.4)
 """Margins that make sense for a team of the usual size, smallest and largest [m]."""
@@ -158,24 +148,21 @@ class Rescaling:
         return see
 
     def _proof(self, proof: InfeasibilityProof) -> InfeasibilityProof:
-        if isinstance(proof, DiscProof):
-            slices = tuple(self._slice(part, np.ones(1)) for part in proof.slices)
-            return replace(proof, centre=self.unit * proof.centre, slices=slices)
-        units = self._robot_units(proof.robots)
-        if isinstance(proof, BlockedGoalProof):
-            return replace(proof, slices=tuple(self._slice(part, units) for part in proof.slices))
-        cover = tuple(self._slice(part, units) for part in proof.slices)
-        return replace(proof, slices=cover)
+        slices = tuple(map(self._slice, proof.slices))
+        return replace(proof, point=self.unit * proof.point, slices=slices)
 
-    def _slice(self, part: SliceKind, units: FloatArray) -> SliceKind:
-        sweeps = tuple(replace(sweep, polygon=self.unit * sweep.polygon) for sweep in part.inner_sweeps)
-        overlaps = tuple(replace(overlap, point=self.unit * overlap.point) for overlap in part.overlaps)
-        moved = replace(
-            part, lower=part.lower * units, upper=part.upper * units, overlaps=overlaps, inner_sweeps=sweeps
-        )
-        if isinstance(moved, OverSlice):
-            return replace(moved, cells=self._cells(moved.cells))
-        return moved
+    def _slice(self, part: OverSlice) -> OverSlice:
+        witnesses = tuple(replace(one, polygon=self.unit * one.polygon) for one in part.witnesses)
+        lower, upper = self._ends(part.lower), self._ends(part.upper)
+        return OverSlice(lower, upper, witnesses, self._cells(part.cells))
+
+    def _ends(self, ends: FloatArray) -> FloatArray:
+        """Ends of a slice in metres; those that are limits are the limits, without rounding."""
+        found = ends * self._axis_units(range(len(self.problem.tree.joints)))
+        tree, usual = self.problem.tree, self.question().tree
+        for exact, limits in ((tree.joint_lower, usual.joint_lower), (tree.joint_upper, usual.joint_upper)):
+            found[1:] = np.where(ends[1:] == limits, exact, found[1:])
+        return found
 
     def _cells(self, cells: Sequence[OverCell]) -> tuple[OverCell, ...]:
         return tuple(OverCell(cell.reached, _scaled(cell.polygon, self.unit)) for cell in cells)
