@@ -22,6 +22,10 @@ def check_proof(question: Question, answer: Any, progress: Any) -> list[tuple[st
     boxes = [intervals(value["lower"], value["upper"], question.axes) for value in slices]
     neighbours = _facets(boxes, question.limits) + [(k, k) for k in range(len(boxes))]
     cells = [[(c["reached"], plane.read_region(c["polygon"])) for c in value["cells"]] for value in slices]
+    for a, b in neighbours:
+        for (i, (one, cell)), (j, (other, another)) in product(enumerate(cells[a]), enumerate(cells[b])):
+            finding = f"touches slices[{b}].cells[{j}], which has another label"
+            demand(one == other or not cell.touches(another), f"slices[{a}].cells[{i}]", finding)
     starts, goals = (question.start, question.start_box, False), (question.goal, question.goal_box, True)
     for k, value in enumerate(slices):
         where, wide = f"slices[{k}]", [(low - WIDENING, high + WIDENING) for low, high in boxes[k]]
@@ -34,10 +38,6 @@ def check_proof(question: Question, answer: Any, progress: Any) -> list[tuple[st
         forbidden = _forbidden(question, [Step(0, -1, offset=point), *chain], wide, value["witnesses"], where)
         edges += 0 if forbidden is None else _check_cover([cell for _, cell in cells[k]], forbidden, where)
         progress("checking slices", (k + 1) / len(slices))
-    for a, b in neighbours:
-        for (i, (one, cell)), (j, (other, another)) in product(enumerate(cells[a]), enumerate(cells[b])):
-            finding = f"touches slices[{b}].cells[{j}], which has another label"
-            demand(one == other or not cell.touches(another), f"slices[{a}].cells[{i}]", finding)
     return [
         ("slices tile a turn and the limits of the joints", len(slices)),
         ("pieces hold witnesses in all of a slice", sum(len(value["witnesses"]) for value in slices)),

@@ -181,7 +181,7 @@ def moved_target(document):
         (put("exponential", "transitions", 0, "gains", "funnel"), r"transitions\[0\].gains.funnel: is"),
         (
             moved(0.005, "transitions", -1, "goal_upper", 1),
-            r"transitions\[-1\].goal_lower: or goal_upper is beyond the tolerance",
+            r"transitions\[1\].goal_lower: leaves a cell or the tolerance",
         ),
         (without("cells", 0), r"transitions: .* expected \d entries, not \d"),
         (without("transitions", 0), r"transitions: .* is not allowed; expected \d entries, not \d"),

@@ -57,7 +57,9 @@ def blocked_goal_proof(
 class _Writer:
     def __init__(self, problem: PlanningProblem, witnesses: Witnesses) -> None:
         self._problem, self._witnesses, self._floor = problem, witnesses, problem.workspace
-        (x0, y0, x1, y1), most = self._floor.bounds, 2.0 * problem.tree.reach + 1.0
+        self._reach = problem.tree.reach
+        known = shapely.union(self._floor.envelope, Point(problem.goal_pose[:2]))
+        (x0, y0, x1, y1), most = known.bounds, 3.0 * self._reach
         self._everywhere = shapely.box(x0 - most, y0 - most, x1 + most, y1 + most)
         rings = (self._floor.exterior, *self._floor.interiors)
         self._walls = [pair for ring in rings for pair in zip(ring.coords[:-1], ring.coords[1:], strict=True)]
@@ -89,7 +91,7 @@ class _Writer:
         depth = max(map(self._depth, sweeps), default=0.0)
         if depth < LEAST_DEPTH:
             return None
-        (x, y), half = self._problem.goal_pose[:2], 0.5 * depth
+        (x, y), half = self._problem.goal_pose[:2], min(0.5 * depth, self._reach)
         left_out = shapely.box(x - half, y - half, x + half, y + half)
         cell = OverCell(True, Polygon(self._everywhere.exterior, [left_out.exterior]))
         return OverSlice(*self._witnesses.ends(intervals), sweeps, (cell,))
