@@ -57,7 +57,8 @@ class Judged:
 def kind_of(answer: Document) -> str:
     """The kind of an answer: a plan, or that of a proof; slices with joints are a kind of their own."""
     kind: str = answer.get("kind", "plan")
-    return "slices with joints" if kind == "slices" and answer["robots"] else kind
+    joints = {tuple(part["lower"][1:]) for part in answer.get("slices", ())}
+    return "slices with joints" if kind == "slices" and len(joints) > 1 else kind
 
 
 def answered(problem: PlanningProblem) -> tuple[Document, Document] | None:
