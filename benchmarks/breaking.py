@@ -1,9 +1,9 @@
-"""How much of each departure an axis bears: found by searching for the worst, beside what is certified."""
+"""How much of each departure axis and position bear: by a search for the worst, beside what is certified."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import ceil
+from math import ceil, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +11,18 @@ import numpy as np
 
 from benchmarks.rows import Row
 from benchmarks.sampled_axis import attacks, push_along, run_axis
+from benchmarks.sampled_position import worst_departures
 from benchmarks.tasks import Task
 from coop_drake.answers import Found
 from coop_drake.answers.budget import Budget
 from coop_drake.laws.axis_table import axis_table, track_row
 from coop_drake.planning.budget.axis_sets import Entry, axis_sets, conditions_of
+from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
 from coop_drake.tree.pose import FloatArray
 
 _LARGEST = {
     "delay": 0.1, "lag": 0.1, "angle_noise": 0.1, "rate_noise": 3.0, "model_error": 0.95,
-    "acceleration_error": 60.0,
+    "acceleration_error": 60.0, "position_noise": 0.1, "velocity_noise": 3.0,
 }  # fmt: skip
 """Departures beyond these are not tried, in the units of ``Budget``."""
 
@@ -32,9 +34,20 @@ _TRANSITIONS = (0, 3, 12)
 """Transitions of base whose axes are tried."""
 
 
+_OF_AXES = ("delay", "lag", "angle_noise", "rate_noise", "model_error", "acceleration_error")
+_OF_POSITION = ("delay", "lag", "position_noise", "velocity_noise", "model_error", "acceleration_error")
+
+_LOOP = PositionGains(150.0, 1.4 * sqrt(150.0), 400.0, 40.0, 1.4)
+_RADIUS = 0.018
+"""The position's loop for base under the preset ``mobile_base``, and its tube's radius [m]."""
+
+
 def breaking_tasks() -> list[Task]:
-    """All axes are tried together."""
-    return [Task("breaking/base", lambda rows: _rows())]
+    """All axes are tried together, and so are all departures of the position."""
+    return [
+        Task("breaking/base", lambda rows: _rows()),
+        Task("breaking/position", lambda rows: [_position_row(name) for name in _OF_POSITION]),
+    ]
 
 
 def _rows() -> list[Row]:
@@ -52,7 +65,7 @@ def _rows() -> list[Row]:
         rest = found.start[2:] if k == 0 else 0.5 * (transition.goal_lower + transition.goal_upper)
         for axis, row in enumerate(table):
             label = f"breaking/base/transition_{k}_axis_{axis}"
-            rows += [_row(f"{label}/{name}", row, float(rest[axis]), name) for name in _LARGEST]
+            rows += [_row(f"{label}/{name}", row, float(rest[axis]), name) for name in _OF_AXES]
     return rows
 
 
@@ -89,3 +102,25 @@ def _survives(row: FloatArray, rest: float, budget: Budget) -> bool:
                     return False
                 push_along(row, budget.period, size, motion, disturbances)
     return True
+
+
+def _position_row(name: str) -> Row:
+    def certified(budget: Budget) -> bool:
+        (tube,) = position_tubes([_LOOP], budget)
+        return tube is not None and tube.radius <= _RADIUS
+
+    measured = _largest(name, _tracks)
+    return Row(f"breaking/position/{name}", measured, "as budget", "certified", _largest(name, certified))
+
+
+def _tracks(budget: Budget) -> bool:
+    """Whether the position stays within the radius under the worst disturbances and steps of p_G."""
+    steps = _LOOP.speed * budget.period
+    sizes = np.array([steps, budget.position_noise, budget.velocity_noise, budget.acceleration_error])
+    delay = ceil(budget.delay / budget.period - 1e-6)
+    with np.errstate(over="ignore", invalid="ignore"):  # a loop that is not stable grows beyond all numbers
+        worst = [
+            np.abs(worst_departures(_LOOP, budget.period, delay, budget.lag, factor, sizes)).max()
+            for factor in (1.0 - budget.model_error, 1.0 + budget.model_error)
+        ]
+    return bool(max(worst) <= _RADIUS)

@@ -29,6 +29,8 @@ def plan(
 ) -> PlanningResult:
     """Find a plan for a scenario or a planning problem, or prove that none exists.
 
+    The plan holds under the budget that the scenario's ``deployment.budget`` requires.
+
     Args:
         question: A scenario, or a planning problem, which is planned with scheduled gains.
         gains: Name of one of the scenario's gain sets, or a file that holds one; None for the one that the
@@ -47,12 +49,16 @@ def plan(
     if isinstance(question, PlanningProblem):
         return plan_problem(question, ScheduledGains(), gain_set_name=_SCHEDULED, progress=progress)
     from coop_drake.plant import planning_problem
+    from coop_drake.plant.budgets import budget_of
     from coop_drake.scenario import with_gains
 
     scenario = with_gains(question, gains)
     name = scenario.selected_gains
     problem = planning_problem(scenario)
-    return plan_problem(problem, scenario.gain_sets[name], gain_set_name=name, progress=progress)
+    budget = budget_of(None, scenario, problem)
+    return plan_problem(
+        problem, scenario.gain_sets[name], gain_set_name=name, budget=budget, progress=progress
+    )
 
 
 def verify(

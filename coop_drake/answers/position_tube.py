@@ -21,6 +21,7 @@ class PositionTube:
         speed: Largest speed of p_G [m/s].
         radius: r, largest distance of the object's origin from its nominal position [m].
         rate: Largest departure of its velocity from the nominal one [m/s].
+        velocity: Largest speed of the object's origin [m/s].
         rest: Largest distance from the nominal position after both have come to rest [m].
         acceleration: Largest acceleration that a robot commands for the object's origin [m/s^2].
     """
@@ -30,5 +31,6 @@ class PositionTube:
     speed: _Exact
     radius: _NotNegative
     rate: _NotNegative
+    velocity: _NotNegative
     rest: _NotNegative
     acceleration: _NotNegative

@@ -16,7 +16,6 @@ from coop_drake.cli.task import Task, read_task
 
 if TYPE_CHECKING:
     from coop_drake.answers import Plan, PlanningResult
-    from coop_drake.answers.budget import Budget
 
 
 def plan_command(
@@ -32,37 +31,22 @@ def plan_command(
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "plan")
-        if plan_of(task, folder, reporter, _budget(budget, task)):
+        if plan_of(task, folder, reporter, budget):
             reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
             reporter.say(f"The plan is in {escape(str(folder.plan))}")
-
-
-def _budget(choice: str | None, task: Task) -> Budget | None:
-    """The departures that a plan shall tolerate; refused for gains that no budget can be shown for."""
-    if choice is None:
-        return None
-    from coop_drake.errors import ScenarioError
-    from coop_drake.laws import ScheduledGains
-    from coop_drake.plant.run_masses import moved_masses
-    from coop_drake.scenario.budget_file import read_budget
-
-    name = task.scenario.selected_gains
-    if not isinstance(task.scenario.gain_sets[name], ScheduledGains):
-        allowed = "a gain set of scheduled gains: the funnels of others never close, so that no budget holds"
-        raise ScenarioError(str(task.scenario.path), "gains.selected", name, allowed)
-    return read_budget(choice, task.scenario, task.problem.tree, lambda: moved_masses(task.scenario))
 
 
 def plan_of(
     task: Task,
     folder: ResultFolder | None,
     reporter: Reporter,
-    budget: Budget | None = None,
+    budget: str | None = None,
     *,
     simulated: bool = False,
 ) -> Plan | None:
     """Plan, and note the facts; without a plan say so, and set the exit code.
 
+    It holds under the ``budget`` that the option of this name says, or else the scenario's ``deployment``.
     The plan with its table of cells, or the proof that there is none, goes to the folder if one is given. If
     the plan will be ``simulated``, this is prepared at the same time.
     """
@@ -70,10 +54,14 @@ def plan_of(
     from coop_drake.memory import peak_memory_mb
     from coop_drake.planning.planner import plan
 
-    name = task.scenario.selected_gains
+    name, tolerated = task.scenario.selected_gains, None
+    if budget is not None or task.scenario.deployment.budget != "none":
+        from coop_drake.plant.budgets import budget_of  # Drake, which other plans do without
+
+        tolerated = budget_of(budget, task.scenario, task.problem)
     with reporter.stage("planning", "planning", cpu=True) as progress:
         gain_set = task.scenario.gain_sets[name]
-        work = partial(plan, task.problem, gain_set, gain_set_name=name, budget=budget)
+        work = partial(plan, task.problem, gain_set, gain_set_name=name, budget=tolerated)
         if simulated:
             prepare = partial(prepare_simulation, task.scenario)
             result = beside(lambda advance: work(progress=advance), prepare, progress)

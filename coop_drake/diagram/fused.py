@@ -247,6 +247,7 @@ def _check(scenario: Scenario, knowledge: Sequence[RobotKnowledge]) -> None:
         control_rate=deployment.control_rate,
         mass_error=deployment.mass_error,
         messages=deployment.messages,
+        budget=deployment.budget,
         seed=deployment.seed,
     )
     refused: tuple[str, object] | None = None

@@ -202,6 +202,8 @@ class Deployment:
         robots: What is wrong with single robots, by name; ``"*"`` for all that have no entry of their own.
         floor: Friction and slope of the floor.
         pushes: Forces from outside.
+        budget: Under which budget of these departures a plan must provably hold: ``none``, ``position`` for
+            the object's position alone, ``all`` for angles and joints, too; needs a control rate.
         seed: Seed of noise and losses.
     """
 
@@ -214,6 +216,7 @@ class Deployment:
     robots: dict[str, RobotDepartures] = field(default_factory=dict)
     floor: Floor = field(default_factory=Floor)
     pushes: tuple[Push, ...] = ()
+    budget: Literal["none", "position", "all"] = "none"
     seed: Annotated[int, Limits(at_least=0)] = 0
 
     completed = staticmethod(with_preset)
@@ -221,7 +224,7 @@ class Deployment:
     @property
     def ideal(self) -> bool:
         """Whether nothing is switched on, so that the equations of the control law hold exactly."""
-        return self == Deployment(seed=self.seed)
+        return self == Deployment(budget=self.budget, seed=self.seed)
 
     def of_robot(self, name: str) -> RobotDepartures:
         """Return what is wrong with a robot."""

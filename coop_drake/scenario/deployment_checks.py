@@ -34,6 +34,8 @@ def _without_rate(scenario: Scenario) -> Iterator[tuple[str, object, str]]:
         for name, value in asdict(getattr(deployment, section)).items():
             if value != 0.0:
                 yield f"{section}.{name}", value, "0 without deployment.control_rate"
+    if deployment.budget != "none":
+        yield "budget", deployment.budget, "none without deployment.control_rate"
     for robot, departures in deployment.robots.items():
         for name in _SAMPLED:
             if value := getattr(departures, name):

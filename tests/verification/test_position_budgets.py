@@ -53,7 +53,7 @@ def test_both_computations_agree(delay, lag, error):
     budget = replace(BUDGET, delay=delay, lag=lag, model_error=error)
     gains = PositionGains(120.0, 15.0, 200.0, 26.0, 0.6)
     (tube,) = position_tubes([gains], budget)
-    stated = np.array([tube.radius, tube.rate, tube.rest, tube.acceleration]) / (1.0 + SLACK)
+    stated = np.array([tube.radius, tube.rate, tube.velocity, tube.rest, tube.acceleration]) / (1.0 + SLACK)
     np.testing.assert_allclose(position_bounds(tube, 120.0, 15.0, budget), stated, rtol=2e-4)
 
 
@@ -68,7 +68,7 @@ def test_a_larger_budget_is_refused(name):
     assert "tube" in refusal(replace(plan(), budget=replace(plan().budget, **{name: LARGER[name]})))
 
 
-@pytest.mark.parametrize("name", ["radius", "rate", "rest", "acceleration"])
+@pytest.mark.parametrize("name", ["radius", "rate", "velocity", "rest", "acceleration"])
 def test_a_narrower_tube_is_refused(name):
     tube = replace(plan().tube, **{name: 0.99 * getattr(plan().tube, name)})
     assert refusal(replace(plan(), tube=tube)) == f"tube.{name}"
@@ -122,6 +122,15 @@ def test_a_goal_that_is_too_narrow_and_a_force_that_is_too_small_are_refused():
     assert refusal(weak) == "budget.base_force"
     with pytest.raises(DataError, match="moved_mass"):
         Budget(base_force=50.0)
+
+
+def test_an_object_that_may_be_faster_than_its_limit_is_refused():
+    slow = 0.9 * plan().tube.velocity
+    transitions = tuple(
+        replace(transition, gains=replace(transition.gains, speed_limit=slow))
+        for transition in plan().transitions
+    )
+    assert refusal(replace(plan(), transitions=transitions)) == "tube.velocity"
 
 
 def test_a_tube_without_a_budget_and_a_budget_without_a_tube_are_refused():

@@ -24,12 +24,19 @@ from coop_drake.geometry.passage import pole
 from coop_drake.geometry.tidy import tidy_cell
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
-from coop_drake.planning.execution.estimate import timed
+from coop_drake.planning.execution.estimate import plan_time, timed
 from coop_drake.planning.execution.transitions import find_route
 from coop_drake.tree.pose import FloatArray
 
-SPEEDS = (1.0, 0.6, 0.35, 0.2)
-"""Largest speeds of p_G that are tried, in this order [m/s]: slow motions have narrow tubes."""
+SPEEDS = (2.0, 1.4, 1.0, 0.7, 0.5, 0.35, 0.2)
+"""Largest speeds of p_G that are tried, in this order [m/s]: slow motions have narrow tubes, and take small
+forces."""
+
+SOFTER = (1.0, 0.6, 0.35)
+"""K over the largest of the gain set's that are tried [-]: a soft governor takes smaller forces."""
+
+QUICK = 1.0
+"""With at least this largest speed no softer governor is tried [m/s]: it would hardly be quicker."""
 
 TRACKING_STIFFNESSES = (50.0, 100.0, 150.0, 250.0, 400.0)
 """K_t that are tried [1/s^2]; the narrowest tube is taken. Stiffer loops follow the noise more than they
@@ -77,13 +84,26 @@ def fit_position(
     Returns:
         The plan with the tube and these regions; or what cannot be shown.
     """
-    stiffness = max(transition.gains.stiffness for transition in plan.transitions)
+    stiffest = max(transition.gains.stiffness for transition in plan.transitions)
+    tried = []
+    for share in SOFTER:
+        tried.append(_fastest(problem, plan, gain_set, budget, share * stiffest))
+        if isinstance(tried[-1], Plan) and tried[-1].tube is not None and tried[-1].tube.speed >= QUICK:
+            break
+    plans = [found for found in tried if isinstance(found, Plan)]
+    return min(plans, key=plan_time) if plans else tried[0]
+
+
+def _fastest(
+    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget, stiffness: float
+) -> Plan | PositionLimit:
+    """Return a plan with one K for all transitions, and the largest speed of p_G that holds."""
     uniform = _with_stiffness(plan, stiffness, gain_set)
     found: Plan | PositionLimit = PositionLimit(
         "the object's position is not stable under the delay, the lag and the model's error"
     )
     for tube in _tubes(stiffness, gain_set, budget):
-        found = _limit(tube, budget, problem) or _within(problem, uniform, tube)
+        found = _limit(tube, budget, problem, uniform) or _within(problem, uniform, tube)
         if isinstance(found, Plan):
             return timed(replace(found, budget=budget))
     return found  # of the slowest motion, which has the narrowest tube
@@ -103,8 +123,13 @@ def _tubes(stiffness: float, gain_set: ScheduledGains, budget: Budget) -> list[P
     return [min(tubes, key=lambda tube: tube.radius) for tubes in of_speed if tubes]
 
 
-def _limit(tube: PositionTube, budget: Budget, problem: PlanningProblem) -> PositionLimit | None:
-    """Return what the tube itself does not allow: too large a force, or a rest too far from the goal."""
+def _limit(tube: PositionTube, budget: Budget, problem: PlanningProblem, plan: Plan) -> PositionLimit | None:
+    """Return what the tube itself does not allow: a force, a speed, or a rest too far from the goal."""
+    fastest = plan.transitions[0].gains.speed_limit
+    if fastest is not None and tube.velocity > fastest:
+        return PositionLimit(
+            f"the object may be as fast as {tube.velocity:.2f} m/s; its limit is {fastest:.2f} m/s"
+        )
     if tube.rest > (1.0 - SMALLEST_SHARE) * problem.position_tolerance:
         allowed = (1.0 - SMALLEST_SHARE) * problem.position_tolerance
         return PositionLimit(

@@ -69,7 +69,7 @@ def position_tubes(gains: Sequence[PositionGains], budget: Budget) -> list[Posit
         gains: The choices.
         budget: The departures to be tolerated.
     """
-    worst: list[FloatArray | None] = [np.zeros(4) for _ in gains]
+    worst: list[FloatArray | None] = [np.zeros(5) for _ in gains]
     parts = MODEL_PARTS if budget.model_error > 0.0 else 1
     rest = budget.model_error / parts
     for part in range(parts):
@@ -83,14 +83,12 @@ def position_tubes(gains: Sequence[PositionGains], budget: Budget) -> list[Posit
 
 
 def _stated(gains: PositionGains, bounds: FloatArray) -> PositionTube:
-    radius, rate, rest, acceleration = (float((1.0 + SLACK) * value) for value in bounds)
-    return PositionTube(
-        gains.tracking_stiffness, gains.tracking_damping, gains.speed, radius, rate, rest, acceleration
-    )
+    loop = gains.tracking_stiffness, gains.tracking_damping, gains.speed
+    return PositionTube(*loop, *(float((1.0 + SLACK) * value) for value in bounds))
 
 
 def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, rest: float) -> FloatArray | None:
-    """Return radius, rate, rest and commanded acceleration, shape (4,), from the sums of responses (4, 4).
+    """Return radius, rate, velocity, rest and command, shape (5,), from the sums of responses (5, 4).
 
     Part of the error of the model is a disturbance of at most ``rest`` times the command itself, which the
     command's bound must allow for.
@@ -108,11 +106,13 @@ def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, rest:
     relative = (1.0 + budget.model_error) * command + nominal + budget.acceleration_error
     between = budget.period**2 / 8.0 * relative
     rests = quiet[0] + rest * settled * sums[0, 1]
-    return np.array([radius + between, rate + budget.period / 2.0 * relative, rests + between, command])
+    rate += budget.period / 2.0 * relative
+    velocity = gains.speed * sums[4, 2] + rate + budget.period / 2.0 * nominal
+    return np.array([radius + between, rate, velocity, rests + between, command])
 
 
 def _response_sums(gains: Sequence[PositionGains], budget: Budget, error: float) -> list[FloatArray | None]:
-    """Return for each choice the sums of |h|, rows: e, e', feedback, nominal acceleration; shape (4, 4).
+    """Return for each choice the sums of |h|, rows: e, e', feedback, nominal acceleration, p^'; shape (5, 4).
 
     Columns: for a unit of command in each period, for a unit of acceleration w, for a unit of speed of p_G;
     the last one is not used. A disturbance w within a period acts on the sample after it by (T - t) on e and
@@ -123,9 +123,10 @@ def _response_sums(gains: Sequence[PositionGains], budget: Budget, error: float)
     matrix, held, feedback, nominal = (np.array(part) for part in zip(*loops, strict=True))
     state = np.zeros((len(gains), matrix.shape[1], 4))
     state[:, :, 0], state[:, V, 1], state[:, E, 2], state[:, Q, 3] = held, 1.0, 1.0, -1.0
-    sums = np.zeros((len(gains), 4, 4))
+    sums = np.zeros((len(gains), 5, 4))
     for _ in range(ceil(HORIZON / T)):
-        h = np.stack((state[:, E], state[:, V], _applied(feedback, state), _applied(nominal, state)), axis=1)
+        led = _applied(feedback, state), _applied(nominal, state)
+        h = np.stack((state[:, E], state[:, V], *led, state[:, R]), axis=1)
         kick = np.abs(h[:, :, 1])
         sums[:, :, 0] += np.abs(h[:, :, 0])
         sums[:, :, 1] += 0.5 * T * (np.abs(h[:, :, 2] * T + h[:, :, 1]) + kick)

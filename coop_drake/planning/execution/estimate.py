@@ -12,6 +12,7 @@ from coop_drake.geometry.boundary import edges_of
 from coop_drake.laws import TransitionGains
 from coop_drake.laws.axis_table import axis_table, first_jumps
 from coop_drake.laws.governor import steady_clearance
+from coop_drake.laws.hand_over import SPEED_LIMIT
 from coop_drake.planning.execution.transport_kernels import cross_cell
 from coop_drake.planning.travel_time import transition_time
 from coop_drake.tree.pose import FloatArray
@@ -60,7 +61,7 @@ def estimated(plan: Plan) -> tuple[Plan, FloatArray]:
     crossings = [
         (
             np.ascontiguousarray(edges_of(plan.governed(index))),
-            plan.governor_row(index),
+            _governor_row(plan, index),
             axis_table(plan.funnel(index), transition.gains),
         )
         for index, transition in enumerate(plan.transitions)
@@ -85,6 +86,14 @@ def estimated(plan: Plan) -> tuple[Plan, FloatArray]:
             jumps[:] = 0.0
         transitions.append(replace(transition, estimated_time=seconds))
     return replace(plan, transitions=tuple(transitions)), peaks
+
+
+def _governor_row(plan: Plan, index: int) -> FloatArray:
+    """Return the governor's row; the largest speed of p_G counts as one of the object."""
+    row = plan.governor_row(index)
+    if plan.tube is not None:
+        row[SPEED_LIMIT] = min(row[SPEED_LIMIT], plan.tube.speed)
+    return row
 
 
 def _at_rest(position: FloatArray, axes: FloatArray) -> FloatArray:

@@ -15,7 +15,7 @@ from coop_drake.verification.checks import Check
 ROUNDING = 1e-9
 """Differences that rounding explains, relative and absolute [m, s]."""
 
-_BOUNDS = ("radius", "rate", "rest", "acceleration")
+_BOUNDS = ("radius", "rate", "velocity", "rest", "acceleration")
 
 
 def check_position(plan: Plan, position_tolerance: float) -> list[Check]:
@@ -66,6 +66,10 @@ def _check_tube(plan: Plan, tube: PositionTube, budget: Budget) -> None:
             if getattr(own, name) != getattr(gains[0], name):
                 finding = f"is {getattr(own, name):.6g}; a plan with a tube has one for all transitions"
                 raise RefusalError(f"transitions[{k}].gains.{name}", finding)
+    limit = gains[0].speed_limit  # check_speeds has seen that all transitions have the same
+    if limit is not None and not tube.velocity <= limit:
+        finding = f"is {tube.velocity:.6g} m/s; the gains' limit of speed is {limit:.6g} m/s"
+        raise RefusalError("tube.velocity", finding)
     found = position_bounds(tube, gains[0].stiffness, gains[0].damping, budget)
     for name, value in zip(_BOUNDS, found, strict=True):
         stated = getattr(tube, name)

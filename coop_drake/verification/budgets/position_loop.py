@@ -50,7 +50,7 @@ def oscillator(stiffness: float, damping: float, time: float) -> FloatArray:
 
 
 def position_bounds(tube: PositionTube, stiffness: float, damping: float, budget: Budget) -> FloatArray:
-    """Return the least radius, rate, rest and commanded acceleration that a tube must state, shape (4,).
+    """Return the least radius, rate, velocity, rest and command that a tube must state, shape (5,).
 
     Args:
         tube: The tube.
@@ -77,7 +77,8 @@ def position_bounds(tube: PositionTube, stiffness: float, damping: float, budget
     off += budget.period**2 / 8.0 * relative
     fast += budget.period / 2.0 * relative
     still = quiet[0] + rest * settled * sums[KICK, 0] + budget.period**2 / 8.0 * relative
-    return np.array([value.max() for value in (off, fast, still, command)])
+    speed = tube.speed * sums[STEP, 4] + fast + budget.period / 2.0 * nominal
+    return np.array([value.max() for value in (off, fast, speed, still, command)])
 
 
 def _sums(
@@ -88,7 +89,9 @@ def _sums(
     budget: Budget,
     errors: FloatArray,
 ) -> FloatArray:
-    """Return the sums of absolute responses, shape (4 runs, 4, parts): e, e', feedback, nominal acceleration.
+    """Return the sums of absolute responses, shape (4 runs, 5, parts).
+
+    They are those of e, e', feedback, nominal acceleration and nominal velocity.
 
     The second run's are those to a unit of acceleration at all times, the fourth run's those to a unit of
     speed of p_G; the third run's are not used.
@@ -98,13 +101,13 @@ def _sums(
     q, w, goal = np.zeros((3, 4, 1))  # the nominal motion and p_G, which only the last run moves
     v[KICK], p[PLACE], goal[STEP] = 1.0, 1.0, 1.0
     past = deque([(0.0 * p, 0.0 * v)] * delay, maxlen=delay + 1)
-    sums = np.zeros((4, 4, len(errors)))
+    sums = np.zeros((4, 5, len(errors)))
     for k in range(ceil(HORIZON / T)):
         past.append((p - q, v - w))
         old, old_rate = past[0]
         feedback = -tube.tracking_stiffness * old - tube.tracking_damping * old_rate
         nominal = -stiffness * (q - goal) - damping * w
-        found = np.stack(np.broadcast_arrays(p - q, v - w, feedback, nominal), axis=1)
+        found = np.stack(np.broadcast_arrays(p - q, v - w, feedback, nominal, w), axis=1)
         sums[[COMMAND, STEP]] += np.abs(found[[COMMAND, STEP]])
         sums[KICK] += _mean_size(found[KICK], found[KICK] + T * found[PLACE])
         command = feedback + nominal

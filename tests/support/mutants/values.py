@@ -81,6 +81,7 @@ _BEYOND = {
     "deployment.mass_error": (-1.5, "masses would be negative"),
     "limits": ({"nobody": {"base_speed": 1.0}}, "no robot has this name"),
     "deployment.control_rate": (-100.0, "time does not run backwards"),
+    "deployment.budget": ("half", "there is none of that name"),
     "deployment.messages.loss": (1.5, "it is a probability"),
     "deployment.messages.repeat": (2, "it is a probability"),
     "deployment.measurements.delay": (1e5, "nothing is measured a day late"),

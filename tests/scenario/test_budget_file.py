@@ -1,0 +1,83 @@
+"""Budgets of a scenario's own departures, asked for by an option or required by the scenario."""
+
+from dataclasses import replace
+from math import sqrt
+
+import pytest
+from typer.testing import CliRunner
+
+import coop_drake
+from coop_drake.answers import Found, Undecided, load_plan
+from coop_drake.cli import app
+from coop_drake.errors import ScenarioError
+from coop_drake.plant import planning_problem
+from coop_drake.plant.budgets import budget_of
+from coop_drake.plant.run_masses import moved_masses
+from coop_drake.scenario import Deployment, Measurements
+from tests.support.scenarios import write_scenario
+
+PRESET = {"preset": "mobile_base"}
+
+
+def scenario(folder, **deployment):
+    return write_scenario(folder / "room.scenario.yaml", deployment={**PRESET, **deployment})
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_the_budget_of_a_preset(tmp_path):
+    found = coop_drake.load_scenario(scenario(tmp_path))
+    problem = planning_problem(found)
+    budget = budget_of("deployment", found, problem)
+    assert budget_of(None, found, problem) is None
+    assert budget_of("position", found, problem) == replace(budget, axes=False)
+    assert moved_masses(found) == pytest.approx((8.5, 8.5))
+    assert (budget.base_force, budget.moved_mass) == (300.0, pytest.approx(8.5))
+    assert (budget.delay, budget.lag, budget.model_error) == (0.01, 0.005, 0.2)
+    assert budget.position_noise == pytest.approx(3.44 * 0.001 / sqrt(2.0))  # two robots of the same mass
+    levers = budget.velocity_noise / (3.44 * 0.01 / sqrt(2.0))
+    assert 1.5 < levers < 2.0  # the base's velocity, its yaw about 1.2 m away, the elbow 0.8 m away
+
+
+def test_a_required_budget_is_planned_for_without_an_option(tmp_path):
+    file = scenario(tmp_path, budget="position")
+    result = invoke("plan", file, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    plan = load_plan(tmp_path / "out" / "plan.json")
+    assert plan.tube is not None
+    assert plan.transitions[0].tolerance is None
+    shown = " ".join(invoke("verify", tmp_path / "out" / "plan.json", file).output.split())
+    assert "the object stays in its cells" in shown
+    assert "not part of the" in shown
+    assert isinstance(coop_drake.plan(coop_drake.load_scenario(file)), Found)
+
+
+def test_a_required_budget_that_does_not_hold_is_a_negative_answer(tmp_path):
+    file = scenario(tmp_path, budget="position", measurements={"position_noise": 0.02})
+    result = invoke("plan", file, "--out", tmp_path / "out")
+    said = " ".join(result.output.split())
+    assert result.exit_code == 4, result.output
+    assert "mm from the goal" in said
+    assert "The largest share of the budget under which a plan holds" in said
+    assert isinstance(coop_drake.plan(coop_drake.load_scenario(file)), Undecided)
+
+
+def test_a_budget_needs_a_control_rate_and_a_known_name(tmp_path):
+    for deployment, key in (({"budget": "all"}, "control_rate"), ({"budget": "half"}, "budget")):
+        file = write_scenario(tmp_path / "room.scenario.yaml", deployment=deployment)
+        result = invoke("plan", file, "--out", tmp_path / "out")
+        assert (result.exit_code, key in result.output) == (2, True)
+
+
+def test_a_team_with_nothing_but_a_budget_is_ideal():
+    assert Deployment(budget="position").ideal
+    assert not Deployment(budget="position", measurements=Measurements(delay=0.01)).ideal
+
+
+def test_there_is_no_budget_for_gains_whose_funnels_never_close(tmp_path):
+    found = coop_drake.load_scenario(scenario(tmp_path, budget="position"))
+    fixed = replace(found, gains=replace(found.gains, selected="table_2"))
+    with pytest.raises(ScenarioError, match="scheduled gains"):
+        budget_of(None, fixed, planning_problem(found))
