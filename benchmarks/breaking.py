@@ -37,7 +37,7 @@ _TRANSITIONS = (0, 3, 12)
 _OF_AXES = ("delay", "lag", "angle_noise", "rate_noise", "model_error", "acceleration_error")
 _OF_POSITION = ("delay", "lag", "position_noise", "velocity_noise", "model_error", "acceleration_error")
 
-_LOOP = PositionGains(150.0, 1.4 * sqrt(150.0), 400.0, 40.0, 1.4)
+_LOOP = PositionGains(150.0, 1.4 * sqrt(150.0), 400.0, 40.0, 1.3)
 _RADIUS = 0.018
 """The position's loop for base under the preset ``mobile_base``, and its tube's radius [m]."""
 

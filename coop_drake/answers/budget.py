@@ -29,6 +29,7 @@ class Budget:
         position_noise: Largest distance of the measured position of the object from the true one, as the mean
             over the robots by the masses that they move [m].
         velocity_noise: Largest error of its measured velocity, as such a mean [m/s].
+        single_noise: Largest of these errors of one robot over the mean's [-].
         model_error: Largest error of an acceleration over its command, as a wrong mass causes [-].
         acceleration_error: Largest error of the acceleration of an axis or of the object's origin besides:
             what robots that disagree, friction, and the coupling of axes leave [rad/s^2 or m/s^2].
@@ -46,6 +47,7 @@ class Budget:
     rate_noise: NotNegative = 0.0
     position_noise: NotNegative = 0.0
     velocity_noise: NotNegative = 0.0
+    single_noise: Annotated[float, Limits(at_least=1.0)] = 1.0
     model_error: Annotated[float, Limits(at_least=0.0, below=1.0)] = 0.0
     acceleration_error: NotNegative = 0.0
     report_age: NotNegative = 0.0

@@ -65,7 +65,8 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: Sequence[flo
         allowed = "a number, for a budget of the scenario's own departures"
         raise ScenarioError(str(scenario.path), "deployment.control_rate", None, allowed)
     measured, messages = deployment.measurements, deployment.messages
-    mean = PLANE_DEVIATIONS * hypot(*masses) / sum(masses)  # errors of several robots rarely add up
+    share = hypot(*masses) / sum(masses)  # errors of several robots rarely add up
+    mean = PLANE_DEVIATIONS * share
     lost = REPORTS_LOST * deployment.period if messages.loss > 0.0 else 0.0
     return Budget(
         control_rate=deployment.control_rate,
@@ -75,6 +76,7 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: Sequence[flo
         rate_noise=DEVIATIONS * measured.rate_noise,
         position_noise=mean * measured.position_noise,
         velocity_noise=mean * measured.rate_noise * _rate_levers(tree),
+        single_noise=1.0 / share,
         model_error=abs(deployment.mass_error),
         acceleration_error=DISAGREEMENT,
         report_age=messages.delay + lost,

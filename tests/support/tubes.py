@@ -18,6 +18,7 @@ BUDGET = Budget(
     lag=0.005,
     position_noise=0.0024,
     velocity_noise=0.04,
+    single_noise=1.4,
     model_error=0.2,
     acceleration_error=0.2,
     report_age=0.03,

@@ -59,7 +59,7 @@ def test_both_computations_agree(delay, lag, error):
 
 LARGER = {
     "delay": 0.03, "lag": 0.015, "position_noise": 0.003, "velocity_noise": 0.05, "model_error": 0.25,
-    "acceleration_error": 0.3, "control_rate": 120.0,
+    "acceleration_error": 0.3, "control_rate": 120.0, "single_noise": 2.0,
 }  # fmt: skip
 
 

@@ -28,7 +28,7 @@ from coop_drake.planning.execution.estimate import plan_time, timed
 from coop_drake.planning.execution.transitions import find_route
 from coop_drake.tree.pose import FloatArray
 
-SPEEDS = (2.0, 1.4, 1.0, 0.7, 0.5, 0.35, 0.2)
+SPEEDS = (2.0, 1.6, 1.3, 1.0, 0.7, 0.5, 0.35, 0.2)
 """Largest speeds of p_G that are tried, in this order [m/s]: slow motions have narrow tubes, and take small
 forces."""
 

@@ -108,7 +108,8 @@ def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, rest:
     rests = quiet[0] + rest * settled * sums[0, 1]
     rate += budget.period / 2.0 * relative
     velocity = gains.speed * sums[4, 2] + rate + budget.period / 2.0 * nominal
-    return np.array([radius + between, rate, velocity, rests + between, command])
+    own = command + (budget.single_noise - 1.0) * noise
+    return np.array([radius + between, rate, velocity, rests + between, own])
 
 
 def _response_sums(gains: Sequence[PositionGains], budget: Budget, error: float) -> list[FloatArray | None]:

@@ -78,7 +78,8 @@ def position_bounds(tube: PositionTube, stiffness: float, damping: float, budget
     fast += budget.period / 2.0 * relative
     still = quiet[0] + rest * settled * sums[KICK, 0] + budget.period**2 / 8.0 * relative
     speed = tube.speed * sums[STEP, 4] + fast + budget.period / 2.0 * nominal
-    return np.array([value.max() for value in (off, fast, speed, still, command)])
+    single = command + (budget.single_noise - 1.0) * noise  # of one robot, not of their mean
+    return np.array([value.max() for value in (off, fast, speed, still, single)])
 
 
 def _sums(
