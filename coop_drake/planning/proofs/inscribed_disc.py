@@ -16,6 +16,7 @@ from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.sweep_kernels import over_piece
 from coop_drake.planning.cells.cells import regions_of
 from coop_drake.planning.proofs.proof_making import disc_proof
+from coop_drake.planning.proofs.witnesses import LEAST_LOSS
 from coop_drake.planning.questions.relaxation import inscribed_disc
 from coop_drake.tree.component_tree import ComponentTree, ConvexShape
 from coop_drake.tree.pose import FloatArray
@@ -23,9 +24,6 @@ from coop_drake.tree.team_arrays import team_arrays
 
 _DIRECTIONS = normals(np.arange(0.0, 32.0) * (pi / 16.0))
 """Corners of a regular polygon inside the unit disc, shape (32, 2) [-]: its radius is 0.5 % too small."""
-
-INSIDE = 1.0 - 1e-9
-"""Discs are shrunk by this factor, so that rounding leaves them inside the team [-]."""
 
 
 def disc_refuted(problem: PlanningProblem) -> InfeasibilityProof | None:
@@ -42,7 +40,7 @@ def disc_refuted(problem: PlanningProblem) -> InfeasibilityProof | None:
     space = FreeSpace.over(problem.workspace)
     for piece, component, disc in _discs(problem.tree):
         centre, radius = disc.vertices[0], disc.radius
-        ring = radius * INSIDE * _DIRECTIONS
+        ring = radius * (1.0 - LEAST_LOSS) * _DIRECTIONS
         regions = regions_of(space.minus(ring), over=True)
         start = problem.tree.poses(problem.start)[component].apply(disc.vertices)[0]
         goals = _places(problem, component, centre)

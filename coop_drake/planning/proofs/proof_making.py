@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial, reduce
 from math import pi
 from typing import TypeVar
 
@@ -14,11 +15,13 @@ from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice, Witness
-from coop_drake.geometry.minkowski import to_polygon
+from coop_drake.errors import GeometryError
+from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.parts import parts_of
-from coop_drake.planning.cells.cells import Region
+from coop_drake.geometry.safeguards import shared
+from coop_drake.planning.cells.cells import Region, regions_of
 from coop_drake.planning.cells.slices import Slices
-from coop_drake.planning.proofs.witnesses import LEAST_LOSS, Witnesses, slice_ends
+from coop_drake.planning.proofs.witnesses import Witnesses, slice_ends
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 
@@ -39,7 +42,10 @@ def slices_proof(
     regions: Mapping[int, Sequence[Region]],
     witnesses: Witnesses,
 ) -> InfeasibilityProof | None:
-    """Write an exploration's leaves and over-cells down as a proof.
+    """Write an exploration's leaves down as a proof.
+
+    Its cells are made of the witnesses, which hold a little less than the pieces do: what is narrow may be
+    free for them.
 
     Args:
         question: The question that was explored, with the kept robots only.
@@ -57,8 +63,15 @@ def slices_proof(
     starts = set(slices.holding([float(angle) for angle in question.start[2:]]))
     goals = set(slices.holding([float(question.goal_pose[2]), *question.goal_joints]))
 
+    space = FreeSpace.over(question.workspace)
+
     def separated(growth: float) -> list[OverSlice] | None:
-        cells = {leaf: _grown(regions[leaf], growth) for leaf in leaves}
+        shown, cells = dict[int, tuple[Witness, ...]](), dict[int, list[Polygon]]()
+        for leaf in leaves:
+            intervals = slices.all[leaf].intervals
+            overlaps = () if regions[leaf] else witnesses.overlaps(intervals)
+            shown[leaf] = overlaps or witnesses.inner_sweeps(intervals, growth)
+            cells[leaf] = [] if overlaps else _grown(_not_forbidden(space, shown[leaf]), growth)
         labels = _reached(cells, joined, starts, Point(question.start[:2]))
         goal = Point(question.goal_pose[:2])
         if any(
@@ -67,14 +80,14 @@ def slices_proof(
             for cell, label in zip(cells[leaf], labels[leaf], strict=True)
         ):
             return None
-        found = []
-        for leaf in leaves:
-            intervals = slices.all[leaf].intervals
-            overlaps = () if cells[leaf] else witnesses.overlaps(intervals)
-            sweeps = () if overlaps else witnesses.inner_sweeps(intervals, growth)
-            labelled = tuple(map(OverCell, labels[leaf], cells[leaf]))
-            found.append(OverSlice(*witnesses.ends(intervals), (*overlaps, *sweeps), labelled))
-        return found
+        return [
+            OverSlice(
+                *witnesses.ends(slices.all[leaf].intervals),
+                shown[leaf],
+                tuple(map(OverCell, labels[leaf], cells[leaf])),
+            )
+            for leaf in leaves
+        ]
 
     parts = _first(separated)
     return None if parts is None else InfeasibilityProof("slices", 0, np.zeros(2), tuple(parts))
@@ -111,7 +124,7 @@ def disc_proof(
         labels = [cell.dwithin(Point(start), TOUCHING) for cell in cells]
         if any(label and cell.dwithin(goals, TOUCHING) for cell, label in zip(cells, labels, strict=True)):
             return None
-        inside = Witness((piece,), component, (1.0 - LEAST_LOSS) * ring)
+        inside = Witness((piece,), component, ring)
         ends = slice_ends(tree, (-pi, pi), {})
         return OverSlice(*ends, (inside,), tuple(map(OverCell, labels, cells)))
 
@@ -123,11 +136,23 @@ def _first(separated: Callable[[float], Found | None]) -> Found | None:
     for growth in GROWTHS:
         try:
             found = separated(growth)
-        except (ShapelyError, ValueError):
+        except (ShapelyError, GeometryError, ValueError):
             continue
         if found is not None:
             return found
     return None
+
+
+def _not_forbidden(space: FreeSpace, sweeps: Sequence[Witness]) -> list[Region]:
+    """Regions of all positions that polygons inside pieces do not forbid.
+
+    Raises:
+        GeometryError: There are no polygons: nothing is forbidden.
+    """
+    if not sweeps:
+        raise GeometryError("no piece is known to hold a polygon all over a slice")
+    sections = [space.minus(sweep.polygon) for sweep in sweeps]
+    return regions_of(reduce(partial(shared, over=True), sections), over=True)
 
 
 def _grown(regions: Sequence[Region], growth: float) -> list[Polygon]:

@@ -110,7 +110,8 @@ def smaller(ring: FloatArray, loss: float) -> FloatArray | None:
     """
     polygon = Polygon(ring)
     simple = polygon.simplify(0.5 * loss)
-    if not simple.is_valid or not simple.area > 0.0:
+    lost = shapely.distance(simple, shapely.points(ring)).max()  # It may be more where the ring begins.
+    if not simple.is_valid or not simple.area > 0.0 or lost > 0.5 * loss:
         simple = polygon
     middle, corners = np.array(simple.centroid.coords[0]), shapely.get_coordinates(simple)[:-1]
     size = float(np.hypot(*(corners - middle).T).max())
