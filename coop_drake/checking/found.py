@@ -5,8 +5,8 @@ from math import isqrt
 from typing import Any
 
 from coop_drake.checking import plane
-from coop_drake.checking.plane import ONE, Point, Region, demand, hull, numbers, points
-from coop_drake.checking.team import Interval, Question, holds, intervals, relative, settled, swept, unwrapped
+from coop_drake.checking.plane import ONE, Interval, Point, Region, demand, hull, numbers, points
+from coop_drake.checking.team import Question, holds, intervals, relative, settled, swept, unwrapped
 
 ROUNDING = 10**9
 """Lengths are stated to one part in so many; goal intervals are no narrower than 1 m or rad by this [-]."""

@@ -5,8 +5,8 @@ from math import prod
 from typing import Any
 
 from coop_drake.checking import plane, team
-from coop_drake.checking.plane import FULL, ONE, Point, Region, demand, hull, index, points, spend
-from coop_drake.checking.team import Interval, Question, Step, intervals, settled
+from coop_drake.checking.plane import FULL, ONE, Interval, Point, Region, demand, hull, index, points, spend
+from coop_drake.checking.team import Question, Step, intervals, settled
 
 WIDENING = ONE >> 40
 """Slices are widened by this on either side: ends of a turn in doubles are off by less [rad, m]."""

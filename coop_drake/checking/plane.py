@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import Any
 
 Point = tuple[int, int]
+Interval = tuple[int, int]
 
 BITS = 80
 ONE, FULL = 1 << BITS, 1 << 64
@@ -19,8 +20,7 @@ FINE_TURN = 0x6_487ED511_0B4611A6_2633145C_06E0E689_48127044
 TURN = FINE_TURN >> BITS
 """2 pi, rounded down to a multiple of 2^-160, and of 2^-80."""
 
-work_left = [0]
-"""Elementary steps that are still allowed."""
+work_left = [0]  # Elementary steps that are still allowed.
 
 
 class RefusedError(Exception):
@@ -158,9 +158,11 @@ class Region:
         square, after = (dx * dx + dy * dy, 2) if dx or dy else (1, FULL + 1)
         for ((px, py), (qx, qy)), its in zip(self.edges, self.boxes, strict=True):
             first, last = dx * (py - ay) - dy * (px - ax), dx * (qy - ay) - dy * (qx - ax)
-            if boxes_apart(its, box, 0) or min(first, last) > 0 or max(first, last) < 0:
+            across = (px - ax) * (qy - py) - (py - ay) * (qx - px)
+            beside = min(first, last) > 0 or max(first, last) < 0 or (first == last and across)
+            if beside or boxes_apart(its, box, 0):
                 continue
-            places = [((px - ax) * (qy - py) - (py - ay) * (qx - px)) * FULL // (last - first or 1)]
+            places = [across * FULL // (last - first or 1)]
             if first == last:  # On one line: all between the edge's ends is cut out.
                 places = [((x - ax) * dx + (y - ay) * dy) * FULL // square for x, y in ((px, py), (qx, qy))]
             cuts.append((min(places) - 1, max(places) + after))

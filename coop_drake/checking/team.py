@@ -4,9 +4,7 @@ from math import isqrt
 from typing import Any, NamedTuple
 
 from coop_drake.checking import plane
-from coop_drake.checking.plane import BITS, ONE, TURN, Point, demand, hull, index, numbers, points
-
-Interval = tuple[int, int]
+from coop_drake.checking.plane import BITS, ONE, TURN, Interval, Point, demand, hull, index, numbers, points
 
 
 class Step(NamedTuple):
@@ -55,8 +53,7 @@ def swept(corners: Any, grown: int, steps: list[Step], box: list[Interval]) -> t
             turns = [first + (last - first) * k // parts for k in range(parts + (first < last))]
             pairs = [(*plane.cosine_and_sine(turn), p, q) for turn in turns for p, q in corners]
             corners = [((c * p - s * q) >> BITS, (s * p + c * q) >> BITS) for c, s, p, q in pairs]
-            gap = (last - first) // parts + 1
-            grown += (reach >> (BITS - 2)) + 4 + (reach * gap * gap >> (2 * BITS + 3))
+            grown += (reach >> BITS - 2) + 4 + (reach * ((last - first) // parts + 1) ** 2 >> 2 * BITS + 3)
         ends = {(u * value // ONE + x, v * value // ONE + y) for value in (low, high)}
         plane.spend(2 * len(corners))
         corners, grown = hull((p + a, q + b) for p, q in corners for a, b in ends), grown + 2
@@ -119,16 +116,16 @@ class Question:
         for part in value["pieces"]:
             chain, corners = self.chains[index(part["component"], len(self.chains))], points(part["corners"])
             self.pieces.append(Piece(str(part["body"]), chain, hull(corners), *numbers([part["radius"]], 1)))
-            demand(self.pieces[-1].radius >= 0, "pieces", "have a negative radius")
+            demand(self.pieces[-1].radius >= 0, "question.pieces", "have a negative radius")
         for i, j, reason in value["left_aside"]:
             one, other = self.pieces[i].chain, self.pieces[j].chain
             known = reason == "model" or (reason == "joint" and (one[1:] == other or other[1:] == one))
-            demand(known, "left_aside", f"pieces {i} and {j} share no joint")
+            demand(known, "question.left_aside", f"pieces {i} and {j} share no joint")
         aside = {(i, j) for i, j, _ in value["left_aside"]}
         numbered = [(i, j) for j in range(len(self.pieces)) for i in range(j) if (i, j) not in aside]
         self.pairs = [(i, j) for i, j in numbered if self.pieces[i].chain != self.pieces[j].chain]
         (self.start, self.goal), angles = points([value["start"][:2], value["goal"]]), value["start"][2:]
         self.start_box = intervals(angles, angles, self.axes)
-        demand(holds(self.limits, self.start_box[1:]), "start", "is beyond the limits of a joint")
+        demand(holds(self.limits, self.start_box[1:]), "question.start", "is beyond the limits of a joint")
         self.goal_box = intervals(value["goal_lower"], value["goal_upper"], self.axes)
         self.room, *self.rooms = numbers(value["tolerances"], 1 + self.axes)

@@ -140,3 +140,9 @@ def test_regions_touch_if_they_share_a_point(first, second):
     polygons = Polygon(first), Polygon(second)
     if one.edges and other.edges and all(polygon.is_valid for polygon in polygons):
         assert one.touches(other) == polygons[0].intersects(polygons[1]) == other.touches(one)
+
+
+def test_a_point_beside_a_slanted_edge_lies_inside_though_it_is_in_the_edges_box():
+    slanted = region([(0, 0), (9, 0), (9, 9)])
+    assert slanted.stretches(((6, 2), (6, 2))) == [(0, FULL)]
+    assert slanted.stretches(((2, 2), (2, 2))) == slanted.stretches(((2, 3), (2, 3))) == []

@@ -11,6 +11,7 @@ from shapely import Polygon
 
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.document import Document
+from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof_file import read_proof, save_proof
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning import find_channel
@@ -18,6 +19,7 @@ from coop_drake.planning.proofs.proof_making import slices_proof
 from coop_drake.planning.proofs.proof_search import explorer
 from coop_drake.planning.proofs.witnesses import Witnesses
 from coop_drake.planning.questions.relaxation import relaxed
+from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape
 from coop_drake.verification import verify_file, verify_proof
 from tests.support.certificates import (
     GAINS,
@@ -233,3 +235,40 @@ def test_a_goal_is_not_blocked_where_the_team_fits(proofs):
     fits = bent_corridor(1.2)
     with pytest.raises(RefusalError, match=r"cells may hold the goal and have reached: True"):
         verify_proof(proofs["blocked goal"], fits)
+
+
+def object_alone(shapes, floor, start, goal):
+    component = Component("object", None, None, (Body("object", None, shapes),))
+    tree = ComponentTree((component,), frozenset())
+    return PlanningProblem(floor, tree, np.array(start), np.array(goal), ())
+
+
+def test_a_gap_that_closes_but_for_a_hair_belongs_to_a_cell_of_the_proof():
+    """Between the tips of two thin walls the polygons of the proof pass, those of the exploration do not."""
+    corners = np.array([[-0.3487, -0.2748], [0.2782, -0.1792], [-0.1691, 0.1523]])
+    walls = [
+        (8.13504, -1.12725), (4.72621, -0.67707), (5.04624, 1.74625), (5.04621, 1.74625), (4.72618, -0.67707),
+        (3.25109, -0.48226), (3.39017, 0.57091), (3.51988, 0.76344), (3.41056, 0.7253), (3.73178, 3.15767),
+        (5.20688, 2.96287), (5.15115, 2.54086), (5.15117, 2.54086), (5.2069, 2.96287), (8.61574, 2.51269),
+    ]  # fmt: skip
+    shape = ConvexShape(corners, 0.2057)
+    problem = object_alone((shape,), Polygon(walls), (4.4, 1.63, 1.0), (7.2, 0.83, 0.95))
+    assert verify_proof(proof_of(problem), problem)
+
+
+def test_a_goal_on_a_slanted_wall_is_blocked_where_one_piece_is_off_the_floor():
+    disc, capsule = ConvexShape(np.array([[-0.34, -0.17]]), 0.11), ConvexShape(np.array([[0.07, 0.3]]), 0.14)
+    floor = Polygon([(0, 0), (4, 1), (3, 5), (-1, 4)])
+    problem = object_alone((disc, capsule), floor, (2.0, 2.0, 0.0), (2.0, 0.5, 0.4))
+    proof = proof_of(problem)
+    assert proof.kind == "blocked goal"
+    assert verify_proof(proof, problem)
+
+
+@pytest.mark.parametrize("beyond", [0.0, 1e-9, -1e-9])
+def test_a_goal_that_touches_a_wall_is_undecided_and_the_touch_is_named(beyond):
+    square = ConvexShape(np.array([[-0.2, -0.2], [0.2, -0.2], [0.2, 0.2], [-0.2, 0.2]]))
+    problem = object_alone((square,), shapely.box(0, 0, 4, 3), (1.0, 1.0, 0.0), (3.8 + beyond, 1.5, 0.0))
+    answer, _ = find_channel(problem)
+    assert not answer.proved
+    assert "object all but touches a wall" in answer.reason

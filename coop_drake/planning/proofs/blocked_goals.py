@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from coop_drake.answers.problem import PlanningProblem
+import shapely
+
+from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
@@ -13,6 +15,9 @@ from coop_drake.planning.proofs.witnesses import Witnesses
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.questions.question_checks import goal_beyond_limits
 from coop_drake.planning.questions.relaxation import relaxed
+
+TOUCH = 1e-5
+"""Bodies that are nearer to a wall than this all but touch it [m]."""
 
 BUDGET = 128
 """Slices of joint intervals that are swept at most for each part of the team: milliseconds of work."""
@@ -44,6 +49,25 @@ def blocked_goal(problem: PlanningProblem) -> tuple[InfeasibilityProof | None, i
             if proof is not None:
                 return proof, slices
     return None, slices
+
+
+def touch_at_goal(problem: PlanningProblem) -> str | None:
+    """A sentence about a body that all but touches a wall at the goal pose, None if there is none.
+
+    Only bodies are looked at whose joints all have goals.
+    """
+    tree, goals = problem.tree, problem.goal_joints
+    poses = tree.poses(at_goal(problem.goal_pose, goals, 0.0))
+    for index, (component, pose) in enumerate(zip(tree.components, poses, strict=True)):
+        joints = [tree.components[k].joint for k in tree.ancestors[index]]
+        if any(joint is not None and goals[joint.index] is None for joint in joints):
+            continue
+        for body in component.bodies:
+            for shape in body.shapes:
+                hull = shapely.MultiPoint(pose.apply(shape.vertices)).convex_hull
+                if hull.distance(problem.workspace.boundary) - shape.radius < TOUCH:
+                    return f"at the goal pose {body.name} all but touches a wall, or touches it"
+    return None
 
 
 def _blocked(question: PlanningProblem, maker: CellMaker) -> tuple[list[Intervals], int]:

@@ -23,7 +23,7 @@ from coop_drake.planning.boxes.boxes import explored_channel
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
 from coop_drake.planning.cells.events import Watch
 from coop_drake.planning.cells.exploration import Verdict
-from coop_drake.planning.proofs.blocked_goals import blocked_goal
+from coop_drake.planning.proofs.blocked_goals import blocked_goal, touch_at_goal
 from coop_drake.planning.proofs.clearance_bound import clearance_bound
 from coop_drake.planning.proofs.proof_search import Proofs
 from coop_drake.planning.questions.question_checks import check_question, goal_beyond_limits
@@ -220,6 +220,8 @@ class _Search:
         reason = verdict.explanation(self._slices())
         if bound is not None:
             reason += f"; it is proved that no path keeps {self._unit * bound:g} m from the walls"
+        touch = touch_at_goal(self._problem)
+        reason += "" if touch is None else f"; {touch}"
         return NoChannel(False, reason, mixed=self._proofs.undecided())
 
     def _slices(self) -> int:
