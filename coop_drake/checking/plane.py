@@ -156,11 +156,13 @@ class Region:
         ((ax, ay), (bx, by)), box, cuts = segment, box_of(segment), [(FULL, FULL)]
         dx, dy = bx - ax, by - ay
         square, after = (dx * dx + dy * dy, 2) if dx or dy else (1, FULL + 1)
-        for ((px, py), (qx, qy)), its in zip(self.edges, self.boxes, strict=True):
+        near = [
+            edge for edge, its in zip(self.edges, self.boxes, strict=True) if not boxes_apart(its, box, 0)
+        ]
+        for (px, py), (qx, qy) in near:
             first, last = dx * (py - ay) - dy * (px - ax), dx * (qy - ay) - dy * (qx - ax)
             across = (px - ax) * (qy - py) - (py - ay) * (qx - px)
-            beside = min(first, last) > 0 or max(first, last) < 0 or (first == last and across)
-            if beside or boxes_apart(its, box, 0):
+            if min(first, last) > 0 or max(first, last) < 0 or (first == last and across):
                 continue
             places = [across * FULL // (last - first or 1)]
             if first == last:  # On one line: all between the edge's ends is cut out.
