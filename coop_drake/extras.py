@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.metadata import PackageNotFoundError, requires
-
 _EXTRAS = {
     "cma": "tune",
     "collada": "robots",
@@ -26,6 +24,8 @@ def install_advice(package: str) -> str | None:
     extra = _EXTRAS.get(package)
     if extra is None:
         return None
+    from importlib.metadata import PackageNotFoundError, requires  # Here: it takes as long as reading a file.
+
     try:
         lines = requires("coop-drake") or []
     except PackageNotFoundError:

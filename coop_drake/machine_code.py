@@ -66,10 +66,14 @@ def platform_stamp() -> str:
     version = _version_of_numba()
     status = version.stat()
     settings = {k: v for k, v in os.environ.items() if k.startswith("NUMBA_") and k != "NUMBA_CACHE_DIR"}
-    processor = llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
-    return repr(
-        (sys.version, processor, str(version), status.st_size, status.st_mtime_ns, sorted(settings.items()))
-    )
+    package = str(version), status.st_size, status.st_mtime_ns
+    return repr((sys.version, _processor(), *package, sorted(settings.items())))
+
+
+@cache
+def _processor() -> tuple[str, str]:
+    """LLVM's name of the processor, and what it can do."""
+    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
 
 
 def _version_of_numba() -> Path:
@@ -174,8 +178,8 @@ def _engine() -> Any:
     triple = _target()
     x86 = triple.startswith(("x86", "i386", "i686"))
     machine = llvm.Target.from_triple(triple).create_target_machine(
-        cpu=llvm.get_host_cpu_name(),
-        features=llvm.get_host_cpu_features().flatten(),
+        cpu=_processor()[0],
+        features=_processor()[1],
         reloc="static" if x86 else "default",
         codemodel="jitdefault",
         jit=True,

@@ -65,6 +65,7 @@ class AxisPpc(Block):
         self._tables = [law.table for law in laws]
         ports = VECTOR, VECTOR, VECTOR, VECTOR, VECTOR
         self._track = [prepared(track_axes, [table], NUMBER, *ports) for table in self._tables]
+        self._bounds = [prepared(write_bounds, [table], NUMBER, VECTOR) for table in self._tables]
         axes = laws[0].axes
         self._memory, self._nothing = JumpMemory(self._tables), EventStatus.DidNothing()
         self._object = self.DeclareVectorInputPort("object_state", 6)
@@ -97,9 +98,9 @@ class AxisPpc(Block):
 
     def _write_funnels(self, context: Context, output: BasicVector) -> None:
         cell = self._cell.Eval(context)
-        table = self._tables[index_of(cell, len(self._tables))]
+        write = self._bounds[index_of(cell, len(self._bounds))]
         lag = clock_of(self._clock, context)[0]
-        write_bounds(table, context.get_time() - cell[1] - lag, output.get_mutable_value())
+        write(context.get_time() - cell[1] - lag, output.get_mutable_value())
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         index, margin = self._ready.Eval(context)

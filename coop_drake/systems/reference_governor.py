@@ -100,8 +100,11 @@ class ReferenceGovernor(Block):
         super().__init__()
         if not cells:
             raise ValueError("ReferenceGovernor needs at least one cell")
-        self._cells = tuple(cells)
         self._govern = [cell.prepared_law() for cell in cells]
+        self._gains = [prepared(governed_gains, [cell.row], NUMBER) for cell in cells]
+        self._margin = [
+            prepared(cell_margin, [cell.clearance.edges], NUMBER, VECTOR, VECTOR) for cell in cells
+        ]
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
@@ -111,7 +114,7 @@ class ReferenceGovernor(Block):
 
     def _write_command(self, context: Context, output: BasicVector) -> None:
         current = self._current.Eval(context)
-        index, time = index_of(current, len(self._cells)), context.get_time() - current[1]
+        index, time = index_of(current, len(self._govern)), context.get_time() - current[1]
         state, governor = self._object.Eval(context), self._governor.Eval(context)
         command = output.get_mutable_value()
         self._govern[index](time, state, governor, command)
@@ -120,6 +123,6 @@ class ReferenceGovernor(Block):
 
     def _write_margin(self, context: Context, output: BasicVector) -> None:
         current, state = self._current.Eval(context), self._object.Eval(context)
-        cell = self._cells[index_of(current, len(self._cells))]
-        stiffness = governed_gains(cell.row, context.get_time() - current[1])[0]
-        output[0] = cell_margin(cell.clearance.edges, stiffness, state, self._governor.Eval(context))
+        index = index_of(current, len(self._margin))
+        stiffness = self._gains[index](context.get_time() - current[1])[0]
+        output[0] = self._margin[index](stiffness, state, self._governor.Eval(context))

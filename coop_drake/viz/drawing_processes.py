@@ -7,30 +7,32 @@ from __future__ import annotations
 
 import gc
 import os
-import pickle
 import signal
-import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from pathlib import Path
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from types import TracebackType
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from coop_drake.errors import ProcessError, transferable
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from coop_drake.answers.log import SimulationLog
     from coop_drake.answers.plan import Plan
     from coop_drake.answers.problem import PlanningProblem
     from coop_drake.scenario.model import Scenario
     from coop_drake.viz.figures import RunFigures
 
+_CONTEXT = get_context("fork") if sys.platform == "linux" else get_context("spawn")
+"""A copy has imported already what this process has; libraries of macOS may not be used in one."""
+
 _MOST = 2
 """Number of processes that draw figures; more draw no sooner beside the one that makes the recording."""
-
-_LENGTH = 8
-"""Bytes of the number that says how long a message is."""
 
 
 class DrawingProcesses:
@@ -40,7 +42,8 @@ class DrawingProcesses:
     """
 
     def __enter__(self) -> DrawingProcesses:
-        self._running = {"figures": _started("figures")}
+        self._running: dict[str, tuple[BaseProcess, Connection]] = {}
+        self._start("figures", _draw_figures)
         return self
 
     def begin(self, scenario: Scenario, problem: PlanningProblem, plan: Plan) -> None:
@@ -51,9 +54,9 @@ class DrawingProcesses:
             problem: Its planning problem.
             plan: The plan that will be simulated.
         """
-        # Now: two processors have enough to do while a plan is searched for.
-        self._running["recording"] = _started("recording")
-        self._send(scenario, problem.workspace, problem.tree, plan)
+        # Now: this process has imported Drake, and two processors had enough to do before.
+        self._start("recording", _draw_recording)
+        self._send((scenario, problem.workspace, problem.tree, plan))
 
     def draw(self, log: SimulationLog, folder: Path) -> None:
         """Begin to draw the run into a folder.
@@ -62,7 +65,7 @@ class DrawingProcesses:
             log: The log of the run.
             folder: Receives ``transport.html`` and the figures.
         """
-        self._send(log, folder)
+        self._send((log, folder))
 
     def wait(self) -> None:
         """Wait until all is written.
@@ -71,95 +74,85 @@ class DrawingProcesses:
             ProcessError: A process was ended.
             Exception: Whatever went wrong in a process.
         """
-        for subject, process in self._running.items():
-            assert process.stdin is not None
-            assert process.stdout is not None
-            with suppress(BrokenPipeError):
-                process.stdin.close()
-            error = process.stdout.read()
-            code = process.wait()
-            if error:
-                raise pickle.loads(error)
-            if code:
+        for subject, (process, connection) in self._running.items():
+            error = None
+            with suppress(EOFError, ConnectionError):
+                error = connection.recv()
+            process.join()
+            if error is not None:
+                raise error
+            if code := process.exitcode:
                 raise ProcessError(f"the process that draws the {subject} ended with code {code}")
 
-    def _send(self, *message: Any) -> None:
-        content = pickle.dumps(message)
-        for process in self._running.values():
-            assert process.stdin is not None
-            with suppress(BrokenPipeError):  # `wait` says why it has ended.
-                process.stdin.write(len(content).to_bytes(_LENGTH, "big") + content)
-                process.stdin.flush()
+    def _start(self, subject: str, draw: Callable[[Connection], None]) -> None:
+        own, other = _CONTEXT.Pipe()
+        # A copy holds this process's ends of all pipes, and must close them to see when this process ends.
+        ends = [own, *(connection for _, connection in self._running.values())]
+        process = _CONTEXT.Process(target=_work, args=(draw, other, ends), daemon=True)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # It stays so in the process.
+        try:
+            process.start()
+            self._running[subject] = process, own
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        other.close()
+
+    def _send(self, message: object) -> None:
+        for _, connection in self._running.values():
+            with suppress(ConnectionError):  # `wait` says why it has ended.
+                connection.send(message)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        for process in self._running.values():
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-            for pipe in (process.stdin, process.stdout):
-                with suppress(BrokenPipeError):
-                    pipe.close()  # type: ignore[union-attr]
+        for process, connection in self._running.values():
+            connection.close()
+            process.kill()
+            with suppress(ProcessLookupError):  # What it has started, too.
+                os.killpg(process.pid or 0, signal.SIGKILL)
+            process.join()
 
 
-def _started(subject: str) -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
-        [sys.executable, "-P", "-m", "coop_drake.viz.drawing_processes", subject],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},  # It finds what this one finds.
-        start_new_session=True,
-    )
-
-
-def main(subject: str) -> None:
-    """Draw a subject of the run that standard input describes; nothing where it ends before the run does."""
+def _work(draw: Callable[[Connection], None], messages: Connection, ends: Iterable[Connection]) -> NoReturn:
+    """Draw in a process of its own, and send back what goes wrong."""
+    os.setsid()
+    for end in ends:
+        end.close()
     try:
-        draw = {"figures": _draw_figures, "recording": _draw_recording}[subject]
-        draw(_Messages(sys.stdin.buffer))
+        draw(messages)
     except Exception as error:
-        sys.stdout.buffer.write(pickle.dumps(transferable(error)))
-        sys.stdout.flush()
+        messages.send(transferable(error))
         os._exit(1)
     os._exit(0)  # To take down Drake and matplotlib object by object takes time.
 
 
-class _Messages:
-    """What the command sends: the question with its plan, then the log and the folder."""
-
-    def __init__(self, pipe: IO[bytes]) -> None:
-        self._pipe = pipe
-
-    def next(self) -> Any:
-        """Return the next message; end this process where the command ends before it sends one."""
-        length = self._pipe.read(_LENGTH)
-        # It is read as a whole before anything is imported for it: the sender waits.
-        content = self._pipe.read(int.from_bytes(length, "big"))
-        if not content:
-            os._exit(0)
-        return pickle.loads(content)
+def _next(messages: Connection) -> Any:
+    """Return the next message; end without a word where the command ends before it sends one."""
+    try:
+        return messages.recv()
+    except EOFError:
+        os._exit(0)
 
 
-def _draw_recording(messages: _Messages) -> None:
-    scenario, _, _, plan = messages.next()
+def _draw_recording(messages: Connection) -> None:
     from coop_drake.viz.recording import Recording
 
+    scenario, _, _, plan = _next(messages)
     recording = Recording(scenario, plan)
-    log, folder = messages.next()
+    log, folder = _next(messages)
     recording.write(log, folder / "transport.html")
 
 
-def _draw_figures(messages: _Messages) -> None:
+def _draw_figures(messages: Connection) -> None:
     from coop_drake.viz.figures import RunFigures
 
-    _, workspace, tree, plan = messages.next()
+    _, workspace, tree, plan = _next(messages)
     figures = RunFigures(workspace, tree, plan)
-    _draw_in_two(figures, *messages.next())
+    gc.freeze()  # Else each collection of garbage would look at all that was imported.
+    _draw_in_two(figures, *_next(messages))
 
 
 def _draw_in_two(figures: RunFigures, log: SimulationLog, folder: Path) -> None:
-    gc.freeze()  # Else each collection of garbage would look at all that was imported.
     waiting, numbers = os.pipe()
     os.write(numbers, bytes(reversed(range(len(figures.names(log))))))  # The summary takes longest.
     os.close(numbers)
@@ -173,7 +166,3 @@ def _taken(waiting: int) -> Iterator[int]:
     """Numbers that no other process has taken from a pipe."""
     while number := os.read(waiting, 1):
         yield number[0]
-
-
-if __name__ == "__main__":
-    main(sys.argv[1])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import signal
 
 import pytest
 
@@ -38,7 +37,7 @@ def test_both_write_what_they_draw_and_end(drawing, tmp_path):
     processes.wait()
     names = {path.name for path in tmp_path.iterdir()}
     assert {"transport.html", "fig04_start_and_goal.png", "fig05_path.png", "summary.png"} <= names
-    assert not any(alive(process.pid) for process in processes._running.values())
+    assert not any(alive(process.pid) for process, _ in processes._running.values())
 
 
 def test_what_goes_wrong_in_a_process_is_raised_here(drawing, tmp_path):
@@ -52,7 +51,7 @@ def test_what_goes_wrong_in_a_process_is_raised_here(drawing, tmp_path):
 
 def test_a_process_that_is_ended_is_named(drawing, tmp_path):
     processes, log = drawing
-    os.killpg(processes._running["recording"].pid, signal.SIGKILL)
+    processes._running["recording"][0].kill()
     processes.draw(log, tmp_path)
     with pytest.raises(ProcessError, match="the process that draws the recording ended with code -9"):
         processes.wait()
@@ -60,10 +59,11 @@ def test_a_process_that_is_ended_is_named(drawing, tmp_path):
 
 def test_both_end_with_the_block_and_with_the_command(tmp_path):
     with DrawingProcesses() as processes:
-        (group,) = (process.pid for process in processes._running.values())
-        assert alive(group)
-    assert not alive(group)
+        ((process, _),) = processes._running.values()
+        assert process.is_alive()
+    assert not process.is_alive()
     with DrawingProcesses() as processes:
-        (process,) = processes._running.values()
-        process.stdin.close()  # As the end of the command closes it.
-        assert process.wait(timeout=30) == 0
+        ((process, connection),) = processes._running.values()
+        connection.close()  # As the end of the command closes it.
+        process.join(timeout=30)
+        assert process.exitcode == 0
