@@ -92,7 +92,7 @@ def _measures(
     plant = replace(task.scenario.plant, grasps=grasps)
     with reporter.stage("simulating") as progress:
         log = simulate(replace(task.scenario, plant=plant), plan, maps, progress=progress)
-    measures = simulation_facts(plan, log)
+    measures = simulation_facts(plan, log, task.problem)
     # JSON has no infinities: where nothing can touch, there is no smallest clearance.
     return {
         key: None if isinstance(value, float) and not isfinite(value) else value

@@ -89,11 +89,21 @@ def carry_out(
     reporter.say(
         f"Results are in {escape(str(folder.path))}; open {escape(str(folder.recording))} in a browser"
     )
+    _warn_of_unknown_limits(reporter)
     if log.violation:
         reporter.complain(log.violation)
     elif not log.reached:
         reporter.complain(f"the goal was not reached within {log.times[-1]:.1f} s of simulated time")
     return ExitCode.DONE if log.reached and not log.violation else ExitCode.FAILED_RUN
+
+
+def _warn_of_unknown_limits(reporter: Reporter) -> None:
+    """Say of which bases and joints no limit of speed is known; nobody may care how fast these turn."""
+    speeds = reporter.facts["peak_speeds"]
+    unknown = [s["name"] for s in speeds if s["limit"] is None and not s["name"].startswith("turn rate")]
+    if unknown:
+        names = escape(", ".join(unknown))
+        reporter.say(f"[yellow]No limit is known for the {names}; `limits` in the scenario states one[/]")
 
 
 def _simulate(
@@ -110,7 +120,7 @@ def _simulate(
 
     with reporter.stage("simulating", "simulation") as progress:
         log = simulate(task.scenario, plan, maps, blocks=blocks, progress=progress, observer=observer)
-    reporter.facts.update(simulation_facts(plan, log), peak_memory_mb=peak_memory_mb())
+    reporter.facts.update(simulation_facts(plan, log, task.problem), peak_memory_mb=peak_memory_mb())
     return log
 
 

@@ -6,11 +6,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from math import pi, remainder
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from coop_drake.answers import Plan, PlanningResult
+    from coop_drake.answers import Plan, PlanningProblem, PlanningResult
     from coop_drake.answers.log import SimulationLog
     from coop_drake.fields import HarmonicMap
 
@@ -56,7 +57,14 @@ _MORE_ROWS: tuple[tuple[str, str, str], ...] = (
 def summary_rows(facts: Mapping[str, Any], *, verbose: bool = False) -> list[tuple[str, str]]:
     """Return label and value of every row whose fact is known; of more rows if ``verbose``."""
     rows = (*_ROWS, *_MORE_ROWS) if verbose else _ROWS
-    return [(label, form.format(facts[key])) for label, key, form in rows if facts.get(key) is not None]
+    known = [(label, form.format(facts[key])) for label, key, form in rows if facts.get(key) is not None]
+    speeds = [speed for speed in facts.get("peak_speeds", ()) if verbose or "turn rate" not in speed["name"]]
+    return known + [(f"peak {speed['name']}", _beside_limit(speed)) for speed in speeds]
+
+
+def _beside_limit(speed: Mapping[str, Any]) -> str:
+    limit = "no limit known" if speed["limit"] is None else f"limit {speed['limit']:g}"
+    return f"{speed['peak']:.2f} {speed['unit']}, {limit}"
 
 
 def answer_of(result: PlanningResult) -> str:
@@ -98,10 +106,11 @@ def map_facts(maps: Sequence[HarmonicMap]) -> dict[str, Any]:
     }
 
 
-def simulation_facts(plan: Plan, log: SimulationLog) -> dict[str, Any]:
+def simulation_facts(plan: Plan, log: SimulationLog, problem: PlanningProblem) -> dict[str, Any]:
     """Return how the run went: errors at its end, smallest margins and peaks over all accepted steps."""
     import numpy as np
 
+    from coop_drake.answers.speeds import peak_speeds
     from coop_drake.simulation import communication
 
     x, y, theta = log.object_pose[-1] - plan.goal_pose
@@ -134,4 +143,5 @@ def simulation_facts(plan: Plan, log: SimulationLog) -> dict[str, Any]:
         "peak_base_torque_nm": float(np.abs(log.base_wrenches[..., 2]).max()),
         "peak_joint_torque_nm": float(np.abs(log.joint_torques).max(initial=0.0)),
         "peak_speed_m_s": float(np.hypot(log.object_twist[:, 0], log.object_twist[:, 1]).max()),
+        "peak_speeds": [asdict(speed) for speed in peak_speeds(log, problem)],
     }

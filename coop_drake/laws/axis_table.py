@@ -34,17 +34,18 @@ __all__ = [
     "write_row",
 ]
 
-LAW_COLUMNS = 17
+LAW_COLUMNS = 18
 """Columns of a table: slice and goal interval [rad or m], lambda [1/s], 1 where the funnel is quintic and 0
 where it is not, kappa [rad^2/s^2 or m^2/s^2], k1, k2 and mu [1/s], the smallest distance to a bound over the
 funnel's width [-], the time T in which the commands of the last cell fade [s], the largest V with which the
 cell may be entered, the time after which it may be left [s], and within what an axis must be to leave it at
 rest: the distance from the middle of the goal interval [rad or m] and the rate [rad/s or m/s]; both are 0
-where V alone decides. The last column is the limit of the axis's rate, infinity for none [rad/s or m/s]."""
+where V alone decides. The last columns are the limit of the axis's rate, infinity for none [rad/s or m/s],
+and gamma, the rate at which the axis may approach it [1/s]."""
 
 SLICE_LOWER, SLICE_UPPER, GOAL_LOWER, GOAL_UPPER, DECAY_RATE, QUINTIC = range(6)
 LOG_GAIN, POSITION_GAIN, RATE_GAIN, RAMP_RATE, SATURATION, FADING_TIME, ENERGY_BOUND = range(6, 13)
-LEAVING_TIME, REST_REACH, REST_RATE, RATE_LIMIT = range(13, LAW_COLUMNS)
+LEAVING_TIME, REST_REACH, REST_RATE, RATE_LIMIT, LIMIT_GAIN = range(13, LAW_COLUMNS)
 """The columns by name, in this order."""
 
 
@@ -78,7 +79,7 @@ def write_row(
     scheduled: tuple[float, float, float],
     gains: tuple[float, float, float, float, float],
     quintic: bool,
-    rate_limit: float,
+    rate_limit: tuple[float, float],
 ) -> None:
     """Write one row of a table, of an axis that leaves the cell by its V.
 
@@ -88,12 +89,13 @@ def write_row(
         scheduled: lambda, kappa and the largest V, as ``scheduled_axis`` returns them.
         gains: k1, k2 and mu [1/s], the smallest distance to a bound over the width [-], and T [s].
         quintic: Whether the funnel is quintic.
-        rate_limit: Largest rate of the axis, infinity for none [rad/s or m/s].
+        rate_limit: Largest rate of the axis, infinity for none [rad/s or m/s], and gamma [1/s].
     """
     row[SLICE_LOWER], row[SLICE_UPPER], row[GOAL_LOWER], row[GOAL_UPPER] = intervals
     row[DECAY_RATE], row[LOG_GAIN], row[ENERGY_BOUND] = scheduled
     row[POSITION_GAIN], row[RATE_GAIN], row[RAMP_RATE], row[SATURATION], row[FADING_TIME] = gains
-    row[QUINTIC], row[RATE_LIMIT] = 1.0 if quintic else 0.0, rate_limit
+    row[QUINTIC] = 1.0 if quintic else 0.0
+    row[RATE_LIMIT], row[LIMIT_GAIN] = rate_limit
     row[LEAVING_TIME], row[REST_REACH], row[REST_RATE] = row[FADING_TIME], 0.0, 0.0
 
 
@@ -167,7 +169,7 @@ def track_axes(
     """Write the desired accelerations of the object's angle and of one robot's joints.
 
     Each is that of ``track_row``, plus the jump at the switch times ``fading``, with the damping by which
-    the axis keeps its rate limit, with gamma = k2. While a jump delta fades,
+    the axis keeps its rate limit. While a jump delta fades,
     V' <= -kappa k1 s^2 - k2 (x' - v)^2 + |delta| f |x' - v| <= delta^2 f^2 / (4 k2): V grows by at most
     delta^2 T / (8 k2) in all, so that no axis leaves its funnel whatever the jump.
 
@@ -196,7 +198,7 @@ def limited_row(row: FloatArray, acceleration: float, rate: float) -> float:
         acceleration: What the funnel's law and the hand-over ask for [rad/s^2 or m/s^2].
         rate: x' [rad/s or m/s].
     """
-    return damped(acceleration, rate, row[RATE_LIMIT], row[RATE_GAIN])
+    return damped(acceleration, rate, row[RATE_LIMIT], row[LIMIT_GAIN])
 
 
 @compiled

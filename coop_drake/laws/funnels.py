@@ -140,3 +140,28 @@ def funnel_bounds(funnel: Funnel, time: float) -> FunnelBounds:
         )
     ]
     return FunnelBounds(*np.array(rows).T)
+
+
+def check_intervals(
+    slice_lower: FloatArray, slice_upper: FloatArray, goal_lower: FloatArray, goal_upper: FloatArray
+) -> None:
+    """Refuse funnels without an interior; rounding of a bound that the two intervals share is tolerated.
+
+    Args:
+        slice_lower: Lower ends of the slice, shape (m,) [rad or m].
+        slice_upper: Upper ends of the slice, shape (m,).
+        goal_lower: Lower ends of the goal intervals, shape (m,).
+        goal_upper: Upper ends of the goal intervals, shape (m,).
+
+    Raises:
+        ValueError: Names the axis.
+    """
+    rounding = 1e-9 * (1.0 + np.abs(slice_lower) + np.abs(slice_upper))
+    good = (slice_lower < slice_upper) & (goal_lower < goal_upper)
+    good &= (goal_lower >= slice_lower - rounding) & (goal_upper <= slice_upper + rounding)
+    if not np.all(good):
+        axis = int(np.argmin(good))
+        raise ValueError(
+            f"axis {axis}: goal interval [{goal_lower[axis]}, {goal_upper[axis]}] must be inside "
+            f"slice [{slice_lower[axis]}, {slice_upper[axis]}], and both longer than a point"
+        )

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.funnels import CLOSING, STEEPEST, axis_bounds
+from coop_drake.laws.funnels import CLOSING, STEEPEST, axis_bounds, check_intervals
 from coop_drake.laws.gains import FixedGains, GainSet, ScheduledGains, TransitionGains
 from coop_drake.laws.hand_over import shortest_hand_over
 from coop_drake.laws.ppc import ramped_gain, track_axis
@@ -50,6 +50,7 @@ class Schedule(NamedTuple):
         log_acceleration: Largest kappa |a s| when a transition is entered at rest [rad/s^2 or m/s^2].
         position_gain: k1 [1/s].
         rate_gain: k2 [1/s].
+        limit_gain: gamma, the rate at which an axis may approach the limit of its rate [1/s].
         ramp_rate: mu [1/s].
         saturation: Smallest distance to a funnel bound, over the funnel's width [-].
         hand_over_time: T, in which the commands of the last cell fade [s].
@@ -77,6 +78,7 @@ class Schedule(NamedTuple):
     log_acceleration: float
     position_gain: float
     rate_gain: float
+    limit_gain: float
     ramp_rate: float
     saturation: float
     hand_over_time: float
@@ -101,6 +103,7 @@ def _fixed(gains: FixedGains) -> Schedule:
         min_angle_rate=angle, max_angle_rate=angle, min_joint_rate=joint, max_joint_rate=joint,
         max_log_gain=float(gains.log_gain), log_stiffness=inf, log_acceleration=inf,
         position_gain=float(gains.position_gain), rate_gain=float(gains.rate_gain),
+        limit_gain=float(gains.limit_gain),
         ramp_rate=float(gains.ramp_rate), saturation=float(gains.saturation),
         hand_over_time=float(gains.hand_over_time),
         energy_factor=float(gains.energy_factor), energy_allowance=float(gains.energy_allowance),
@@ -132,7 +135,8 @@ def _by_age(gains: ScheduledGains) -> Schedule:
         max_angle_rate=rates[1], min_joint_rate=rates[0], max_joint_rate=rates[1],
         max_log_gain=float(gains.max_log_gain), log_stiffness=gains.log_fraction * rate_gain * rate_gain,
         log_acceleration=float(gains.log_acceleration), position_gain=gains.position_fraction * rate_gain,
-        rate_gain=rate_gain, ramp_rate=gains.ramp_fraction * rate_gain, saturation=float(gains.saturation),
+        rate_gain=rate_gain, limit_gain=rate_gain, ramp_rate=gains.ramp_fraction * rate_gain,
+        saturation=float(gains.saturation),
         hand_over_time=max(float(gains.hand_over_time), hand_over),
         energy_factor=float(gains.energy_factor), energy_allowance=float(gains.energy_allowance),
         entry_energy=0.5 * gains.entry_rate * gains.entry_rate,
@@ -256,7 +260,7 @@ def transition_gains(
     Raises:
         ValueError: A slice or a goal interval is empty, or a goal interval leaves its slice; names the axis.
     """
-    _check_intervals(slice_lower, slice_upper, goal_lower, goal_upper)
+    check_intervals(slice_lower, slice_upper, goal_lower, goal_upper)
     schedule = schedule_of(gain_set)
     stiffness, damping, governor_gain = scheduled_governor(schedule, float(clearance))
     if isinstance(gain_set, FixedGains):  # as given, not by way of the root of K
@@ -282,19 +286,5 @@ def transition_gains(
         energy_bound=rows[:, 2].copy(),
         speed_limit=speed_limit,
         rate_limit=rate_limit,
+        limit_gain=None if rate_limit is None else schedule.limit_gain,
     )
-
-
-def _check_intervals(
-    slice_lower: FloatArray, slice_upper: FloatArray, goal_lower: FloatArray, goal_upper: FloatArray
-) -> None:
-    """Refuse funnels without an interior; rounding of a bound that the two intervals share is tolerated."""
-    rounding = 1e-9 * (1.0 + np.abs(slice_lower) + np.abs(slice_upper))
-    good = (slice_lower < slice_upper) & (goal_lower < goal_upper)
-    good &= (goal_lower >= slice_lower - rounding) & (goal_upper <= slice_upper + rounding)
-    if not np.all(good):
-        axis = int(np.argmin(good))
-        raise ValueError(
-            f"axis {axis}: goal interval [{goal_lower[axis]}, {goal_upper[axis]}] must be inside "
-            f"slice [{slice_lower[axis]}, {slice_upper[axis]}], and both longer than a point"
-        )

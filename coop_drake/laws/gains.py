@@ -77,6 +77,7 @@ class TransitionGains:
             decides.
         speed_limit: Largest speed of the object's origin; null for none [m/s].
         rate_limit: Largest rate of every axis; null for none, shape (1 + n,) [rad/s or m/s].
+        limit_gain: gamma, the rate at which an axis may approach its limit; null without limits [1/s].
     """
 
     stiffness: Gain
@@ -95,6 +96,7 @@ class TransitionGains:
     rest: RestCondition | None = None
     speed_limit: Gain | None = None
     rate_limit: Bounds | None = None
+    limit_gain: Gain | None = None
 
     def governor_row(self, before: "TransitionGains") -> FloatArray:
         """Return the governor's gains as compiled code reads them, see ``governed_gains``, shape (9,).
@@ -121,9 +123,11 @@ class TransitionGains:
             rate_limit=None if self.rate_limit is None else self.rate_limit[axes],
         )
 
-    def rate_limit_of(self, axis: int) -> float:
-        """Return the largest rate of an axis, infinity for none [rad/s or m/s]."""
-        return inf if self.rate_limit is None else float(self.rate_limit[axis])
+    def rate_limit_of(self, axis: int) -> tuple[float, float]:
+        """Return the largest rate of an axis, infinity for none [rad/s or m/s], and gamma [1/s]."""
+        if self.rate_limit is None or self.limit_gain is None:
+            return inf, 0.0
+        return float(self.rate_limit[axis]), self.limit_gain
 
 
 @dataclass(frozen=True)
@@ -144,6 +148,8 @@ class FixedGains:
         log_gain: kappa [rad^2/s^2 or m^2/s^2].
         position_gain: k1 [1/s].
         rate_gain: k2 [1/s].
+        limit_gain: gamma, the rate at which an axis may approach a limit of its rate, if there is one; the
+            paper has no such limits [1/s].
         ramp_rate: mu, the rate at which k1 is ramped in; 0 for k1 at once [1/s].
         saturation: Smallest distance to a funnel bound with which the law computes, over the width [-]. By
             default so small that it only bounds the trial steps of an integrator.
@@ -162,6 +168,7 @@ class FixedGains:
     log_gain: Positive = 1.0
     position_gain: Positive = 1.0
     rate_gain: Positive = 1.0
+    limit_gain: Positive = 25.0
     ramp_rate: NotNegative = 0.0
     saturation: Saturation = 1e-7
     hand_over_time: NotNegative = 0.0

@@ -27,6 +27,10 @@ ATTRACTION_RATE = 30.0
 for integration steps of 0.02 s. With a larger rate the robots' copies of p_G would drift apart by
 rounding."""
 
+AHEAD = 2.0
+"""The clearance that drives p_G, over that at which the largest speed is steady, is at most this [-]: with 1
+an object would take longer to reach a speed that it reaches without a limit."""
+
 VELOCITY_STEP = 2.0**-26
 """The loop computes the energy from a velocity rounded to a multiple of this [m/s], some 1.5e-8 m/s. Each
 robot finds the object's velocity from its own joints, with its own rounding errors; after this rounding all
@@ -130,18 +134,19 @@ def steady_clearance(speed: float, stiffness: float, damping: float, governor_ga
 
 
 @compiled
-def driving_margin(margin: float, clearance: float, most: float, stiffness: float) -> float:
-    """Return Delta E as it would be with a clearance of at most ``most``: what drives p_G [m^2/s^2].
+def driving_margin(margin: float, clearance: float, steady: float, stiffness: float) -> float:
+    """Return Delta E as it would be with a clearance of at most ``AHEAD`` steady ones, which drives p_G.
 
-    p_G so runs no further ahead of the object than its largest speed needs. That the object stays in its
-    cell rests on Delta E itself, and p_G stands still where that is zero.
+    p_G so runs not much further ahead of the object than its largest speed needs. That the object stays in
+    its cell rests on Delta E itself, and p_G stands still where that is zero [m^2/s^2].
 
     Args:
         margin: Delta E [m^2/s^2].
         clearance: d, signed distance of p_G to the boundary of the safe set [m].
-        most: Largest clearance that counts, infinity for any [m].
+        steady: ``steady_clearance`` of the largest speed, infinity for none [m].
         stiffness: K [1/s^2].
     """
+    most = AHEAD * steady
     if clearance <= most:
         return margin
     return margin - energy_margin(0.0, clearance, stiffness) + energy_margin(0.0, most, stiffness)

@@ -14,6 +14,8 @@ _ARM_HEIGHT = 0.4
 """Height of arms and grasps over the floor, as in the shipped models [m]."""
 _BEND = 1.87
 """Limit of the joints on both sides, as in the shipped models [rad]."""
+_JOINT_RATE = 2.0
+"""Largest rate of the joints [rad/s]: that of usual arms on mobile bases."""
 
 
 def object_model(length: float, width: float, mass: float = 1.0) -> str:
@@ -70,7 +72,7 @@ def _joint(number: int, before: float) -> str:
       <child>link_{number}</child>
       <axis>
         <xyz>0 0 1</xyz>
-        <limit><lower>{-_BEND}</lower><upper>{_BEND}</upper></limit>
+        <limit><lower>{-_BEND}</lower><upper>{_BEND}</upper><velocity>{_JOINT_RATE}</velocity></limit>
       </axis>
     </joint>"""
 

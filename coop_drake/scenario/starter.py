@@ -17,6 +17,9 @@ _WALL = 0.2
 _DOOR_CLEARANCE = 0.2
 """Distance between the team and each side of the door, if no width is given [m]."""
 
+_BASE_SPEED, _TURN_RATE = 1.0, 2.0
+"""Largest speed [m/s] and turn rate [rad/s] of the bases: those of usual mobile bases."""
+
 Pose = tuple[float, float, float]
 
 
@@ -119,6 +122,9 @@ def starter_text(starter: Starter) -> str:
         "goal:",
         f"  object: {_pose(goal)}  # joints are free",
         "  tolerances: {position: 0.01, angle: 0.02}",
+        "",
+        "limits:",
+        f'  "*": {{base_speed: {_BASE_SPEED:g}, base_turn_rate: {_TURN_RATE:g}}}  # m/s, rad/s',
     ]
     return "\n".join(lines) + "\n"
 

@@ -11,18 +11,20 @@ from shapely import Polygon, box
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
+from coop_drake.answers.speeds import base_speeds
 from coop_drake.drawing.colours import GREY
 from coop_drake.drawing.player import player_style
 from coop_drake.errors import CoopDrakeError
 from coop_drake.scenario import Scenario
 from coop_drake.templates import rendered
+from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.arrows import LONGEST
 from coop_drake.viz.cells import CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR
 from coop_drake.viz.paint import hex_colour
 from coop_drake.viz.trail import TRAIL_COLOUR
 
 _RATE = 10.0
-"""Clearances shown per second [1/s]: digits that change faster cannot be read."""
+"""Clearances and speeds shown per second [1/s]: digits that change faster cannot be read."""
 
 
 def page_content(
@@ -51,6 +53,8 @@ def page_content(
         "of_cells": len(plan.cells),
         "rate": _RATE,
         "clearance": log.workspace_clearance[rows].round(3).tolist(),
+        "speed": np.hypot(*log.object_twist[rows, :2].T).round(3).tolist(),
+        "base_speed": np.interp(times, *_fastest_base(log)).round(3).tolist(),
         "reached": log.reached and not log.violation,
         "verdict": log.violation or (end if log.reached else "the goal was not reached"),
         "side": _emptier_side(scenario.workspace.polygon),
@@ -66,6 +70,12 @@ def page_content(
             ("dot", GREY, f"grasps, in their robots' colours; arrows end at {LONGEST:g} m"),
         ],
     }
+
+
+def _fastest_base(log: SimulationLog) -> tuple[FloatArray, FloatArray]:
+    """Return times [s] and the speed of the fastest base then [m/s]."""
+    times, speeds = base_speeds(log)
+    return (times, speeds[..., 0].max(axis=1)) if len(times) else (np.zeros(1), np.zeros(1))
 
 
 def with_overlay(page: str, content: dict[str, Any]) -> str:

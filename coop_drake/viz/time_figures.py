@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
 from coop_drake.answers.log import SimulationLog
+from coop_drake.answers.speeds import base_speeds
 from coop_drake.drawing.canvas import legend_above
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, OBJECT, ORANGE, SKY, robot_colour
 from coop_drake.tree.component_tree import ComponentTree
@@ -59,10 +60,11 @@ def summary_figure(log: SimulationLog) -> Figure:
     """Draw the invariants' margins, which must stay above zero, and the bases' forces over time."""
     caption = (
         "Summary. Distance of the team to the walls, between bodies, and of the object to its cell's "
-        "boundary; energy margin of the governor; force of every base. Margins must stay above zero."
+        "boundary; energy margin of the governor; speed of object and bases; force of every base. Margins "
+        "must stay above zero."
     )
-    labels = ["clearance [m]", "energy margin ΔE [m²/s²]", "base force [N]"]
-    figure, (clearances, energy, forces) = time_axes(log, caption, labels)
+    labels = ["clearance [m]", "energy margin ΔE [m²/s²]", "speed [m/s]", "base force [N]"]
+    figure, (clearances, energy, speeds, forces) = time_axes(log, caption, labels)
     for clearance, colour, label in (
         (log.workspace_clearance, BLUE, "team to walls"),
         (log.body_clearance, GREEN, "between bodies"),
@@ -71,19 +73,35 @@ def summary_figure(log: SimulationLog) -> Figure:
         clearances.plot(log.times, clearance, color=colour, linewidth=1.0, label=label)
     clearances.axhline(0.0, color=INK, linewidth=0.8)
     legend_above(clearances)
-    energy.plot(log.times, log.energy_margin, color=OBJECT, linewidth=1.0)
-    if log.energy_margin.min() > 0.0:
-        energy.set_yscale("log")
-        energy.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        energy.yaxis.set_minor_formatter(NullFormatter())
-    else:
-        energy.set_yscale("symlog", linthresh=1e-3)
-        energy.axhline(0.0, color=INK, linewidth=0.8)
+    _draw_energy(energy, log)
+    _draw_speeds(speeds, log)
     for robot, name in enumerate(log.robot_names):
         force = np.hypot(log.base_wrenches[:, robot, 0], log.base_wrenches[:, robot, 1])
         forces.plot(log.times, force, color=robot_colour(robot), linewidth=1.0, label=name)
     legend_above(forces)
     return figure
+
+
+def _draw_energy(ax: Axes, log: SimulationLog) -> None:
+    """Draw the energy margin on an axis that shows small values well."""
+    ax.plot(log.times, log.energy_margin, color=OBJECT, linewidth=1.0)
+    if log.energy_margin.min() > 0.0:
+        ax.set_yscale("log")
+        ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        ax.yaxis.set_minor_formatter(NullFormatter())
+    else:
+        ax.set_yscale("symlog", linthresh=1e-3)
+        ax.axhline(0.0, color=INK, linewidth=0.8)
+
+
+def _draw_speeds(ax: Axes, log: SimulationLog) -> None:
+    """Draw the speeds of the object and of all bases, whose colours the next panel explains."""
+    times, moved = base_speeds(log)
+    for robot in range(len(log.robot_names)):
+        ax.plot(times, moved[:, robot, 0], color=robot_colour(robot), linewidth=1.0)
+    object_speed = np.hypot(log.object_twist[:, 0], log.object_twist[:, 1])
+    ax.plot(log.times, object_speed, color=OBJECT, linewidth=1.4, label="object; bases as below")
+    legend_above(ax)
 
 
 def curves_figure(log: SimulationLog, caption: str, values: FloatArray, *labels: str) -> Figure:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from coop_drake.laws.funnels import decay_factor
-from coop_drake.laws.governor import driving_margin, energy_margin, steady_clearance
+from coop_drake.laws.governor import AHEAD, driving_margin, energy_margin, steady_clearance
 from coop_drake.laws.speed_limit import FUNNEL_SHARE, damped, funnel_rate, slowed_decay_rate, speed_damping
 
 limits, gains = st.floats(0.05, 5.0), st.floats(0.5, 60.0)
@@ -65,9 +65,10 @@ def test_a_slowed_funnel_moves_at_a_share_of_the_limit(quintic):
 
 
 def test_what_drives_the_governor_counts_no_more_clearance_than_the_limit_needs():
-    most = steady_clearance(0.3, 100.0, 14.0, 12.0)
+    steady = steady_clearance(0.3, 100.0, 14.0, 12.0)
+    most = AHEAD * steady
     energy = 0.02
     wide, narrow = energy_margin(energy, 2.0, 100.0), energy_margin(energy, 0.5 * most, 100.0)
-    assert driving_margin(wide, 2.0, most, 100.0) == pytest.approx(energy_margin(energy, most, 100.0))
-    assert driving_margin(narrow, 0.5 * most, most, 100.0) == narrow
+    assert driving_margin(wide, 2.0, steady, 100.0) == pytest.approx(energy_margin(energy, most, 100.0))
+    assert driving_margin(narrow, 0.5 * most, steady, 100.0) == narrow
     assert driving_margin(wide, 2.0, np.inf, 100.0) == wide

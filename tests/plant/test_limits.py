@@ -13,6 +13,9 @@ from coop_drake.tree.levers import point_levers, turn_levers
 from tests.support.edited_scenario import check_refusal, shipped, write_edited, write_with_robot
 from tests.support.robot_models import Arm, urdf_arm
 
+STATED = '\nlimits:\n  "*": {base_speed: 7, base_turn_rate: 8}'
+"""What the shipped scenario says."""
+
 
 def arm(*more):
     return Arm(joints=tuple(("revolute", "0 0 1", limit) for limit in more))
@@ -28,8 +31,9 @@ def limits_of(path):
 
 def test_velocity_limits_of_sdf_are_read_and_those_without_are_unknown(tmp_path):
     path = write_with_robot(
-        tmp_path, arm(limit(0.7), "", limit(-1)).text(), "sdf", ("robot_0: [0.0]", "robot_0: [0.0, 0.0, 0.0]")
-    )
+        tmp_path, arm(limit(0.7), "", limit(-1)).text(), "sdf",
+        ("robot_0: [0.0]", "robot_0: [0.0, 0.0, 0.0]"), (STATED, ""),
+    )  # fmt: skip
     limits = limits_of(path)
     assert limits.joint_rates.tolist()[:3] == [0.7, np.inf, np.inf]
     assert np.isinf(limits.base_speeds).all()
@@ -53,7 +57,7 @@ def test_velocity_limits_of_urdf_are_read(tmp_path):
 def test_the_scenario_replaces_what_models_say(said, rates, tmp_path):
     path = write_with_robot(
         tmp_path, arm(limit(0.7), limit(0.6)).text(), "sdf", ("robot_0: [0.0]", "robot_0: [0.0, 0.0]"),
-        ("\ngains:", f"\nlimits: {{robot_0: {said}, '*': {{base_speed: 2}}}}\ngains:"),
+        (STATED, f"\nlimits: {{robot_0: {said}, '*': {{base_speed: 2}}}}"),
     )  # fmt: skip
     limits = limits_of(path)
     assert limits.joint_rates.tolist()[:2] == rates
@@ -86,23 +90,23 @@ def test_a_negative_limit_of_urdf_is_refused_before_drake_ends_the_process(tmp_p
     ],
 )
 def test_impossible_limits_of_a_scenario_are_refused(said, key, allowed, tmp_path):
-    check_refusal(tmp_path, ("\ngains:", f"\nlimits: {said}\ngains:"), key, ..., allowed)
+    check_refusal(tmp_path, (STATED, f"\nlimits: {said}"), key, ..., allowed)
 
 
 def test_as_many_limits_as_joints_are_expected(tmp_path):
-    path = write_edited(tmp_path, ("\ngains:", '\nlimits: {"*": {joint_rates: [1, 2]}}\ngains:'))
+    path = write_edited(tmp_path, (STATED, '\nlimits: {"*": {joint_rates: [1, 2]}}'))
     with pytest.raises(ScenarioError, match=r"limits\.\*\.joint_rates: .* a list of 1, for robot_0::"):
         planning_problem(load_scenario(path))
 
 
 def test_kept_limits_are_the_same_and_change_the_question(tmp_path):
-    path = write_edited(tmp_path, ("\ngains:", '\nlimits: {"*": {base_speed: 0.5}}\ngains:'))
+    path = write_edited(tmp_path, (STATED, '\nlimits: {"*": {base_speed: 0.5}}'))
     scenario = load_scenario(path)
     problem = planning_problem(scenario)
     keep_problem(scenario, problem, tmp_path)
     again = kept_problem(read_scenario(path), tmp_path)
     assert repr(again.limits) == repr(problem.limits)
-    other = planning_problem(load_scenario(write_edited(tmp_path, ("\ngains:", "\ngains:"))))
+    other = planning_problem(load_scenario(write_edited(tmp_path, (STATED, ""))))
     assert problem_digest(again) == problem_digest(problem) != problem_digest(other)
 
 

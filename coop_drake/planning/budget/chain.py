@@ -19,6 +19,7 @@ from coop_drake.planning.budget.axis_sets import (
     whole_periods,
 )
 from coop_drake.planning.budget.axis_tube import AxisConditions
+from coop_drake.planning.budget.rate_room import comes_near_limit
 from coop_drake.tree.pose import FloatArray
 
 REST_FACTOR = 1.5
@@ -130,6 +131,8 @@ def _link(
                 break
         if not sets.distance > 0.0:
             return Limit(k, axis, "may leave its funnel")
+        if comes_near_limit(row, sets, conditions, entry):
+            return Limit(k, axis, "may come so near the limit of its rate that it is damped")
         reach, rate = rest_needed(row, sets, conditions[0])
         half = (0.5 - EROSION) * (row[GOAL_UPPER] - row[GOAL_LOWER])
         if not (1.0 + SLACK) * reach < half:

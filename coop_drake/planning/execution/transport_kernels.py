@@ -127,8 +127,8 @@ def _rates(
     result[2] -= braking * state[2]
     result[3] -= braking * state[3]
     result[4], result[5] = 0.0, 0.0
-    most = steady_clearance(row[SPEED_LIMIT], stiffness, damping, gain)
-    driving = driving_margin(margin, clearance, most, stiffness)
+    steady = steady_clearance(row[SPEED_LIMIT], stiffness, damping, gain)
+    driving = driving_margin(margin, clearance, steady, stiffness)
     if driving > 0.0:
         ahead = max(LOOKAHEAD * clearance, SHORTEST_LOOKAHEAD)
         vx, vy = _steer(path, state[4], state[5], ahead, slowdown_radius(FIELD_SPEED, gain))

@@ -213,7 +213,9 @@ def cross_box(
             schedule.position_gain, schedule.rate_gain, schedule.ramp_rate, schedule.saturation,
             schedule.hand_over_time,
         )  # fmt: skip
-        write_row(table[a], ends, scheduled, gains_of_axes, schedule.quintic, limits[1 + a])
+        write_row(
+            table[a], ends, scheduled, gains_of_axes, schedule.quintic, (limits[1 + a], schedule.limit_gain)
+        )
     time = 0.0
     while time <= time_limit:
         if tolerance > 0.0:

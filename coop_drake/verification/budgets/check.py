@@ -17,6 +17,7 @@ from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.budgets.axis_law import Axes
 from coop_drake.verification.budgets.entering import entering
+from coop_drake.verification.budgets.rate_room import check_rate_room
 from coop_drake.verification.budgets.staying import Closed, staying, tails
 from coop_drake.verification.budgets.tubes import Disturbed, tubes
 from coop_drake.verification.checks import Check
@@ -115,6 +116,7 @@ def _check_transition(plan: Plan, k: int, stated: Tolerance, where: str) -> Floa
     samples = begins + follows + 1
     rests = plan.start[2:] if k == 0 else _middles(plan, k - 1)
     made = tubes(disturbed, int(samples.max()), middle, reach, before, rests[members])
+    check_rate_room(plan.transitions[k], budget, made, members, disturbed.delay, where)
     box, most = _ends(made, begins, samples, disturbed)
     x, v = stated.settled[members], stated.settled_rate[members]
     needed, last = staying(disturbed, Closed(begins * T, follows, box, x, v))

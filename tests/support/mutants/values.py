@@ -38,6 +38,7 @@ _GAINS = [
     "entry_rate",
     "position_gain",
     "rate_gain",
+    "limit_gain",
     "energy_factor",
     "energy_allowance",
 ]

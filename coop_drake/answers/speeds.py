@@ -1,0 +1,68 @@
+"""The speeds of the bases and joints in a run, beside their limits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from coop_drake.answers.log import SimulationLog
+from coop_drake.answers.problem import PlanningProblem
+from coop_drake.tree.pose import FloatArray
+
+SHORTEST = 0.005
+"""Speeds of bases are means over at least this time [s]: between rows that are nearer to each other, rounding
+of their poses would count."""
+
+
+@dataclass(frozen=True)
+class PeakSpeed:
+    """The largest speed of one base or joint in a run.
+
+    Attributes:
+        name: What moved.
+        peak: Its largest speed.
+        limit: Its limit, None where none is known.
+        unit: ``m/s`` or ``rad/s``.
+    """
+
+    name: str
+    peak: float
+    limit: float | None
+    unit: str
+
+
+def base_speeds(log: SimulationLog) -> tuple[FloatArray, FloatArray]:
+    """Return how fast bases moved and turned, from their poses.
+
+    Returns:
+        The ends of intervals of ``SHORTEST`` or longer, shape (R,) [s]; in each of them mean speed [m/s] and
+        mean magnitude of the turn rate [rad/s] of every base, shape (R, N, 2).
+    """
+    rows, last = [0], 0
+    for row in range(1, len(log.times)):
+        if log.times[row] - log.times[last] >= SHORTEST:
+            rows.append(row)
+            last = row
+    times, poses = log.times[rows], log.base_poses[rows]
+    moved = np.diff(poses, axis=0)
+    turned = np.diff(np.unwrap(poses[..., 2], axis=0), axis=0)
+    steps = np.diff(times)[:, None]
+    return times[1:], np.stack((np.hypot(moved[..., 0], moved[..., 1]) / steps, np.abs(turned) / steps), -1)
+
+
+def peak_speeds(log: SimulationLog, problem: PlanningProblem) -> list[PeakSpeed]:
+    """Return the largest speeds of a run: of every base, then of every joint in q's order."""
+    peaks, limits, found = base_speeds(log)[1].max(axis=0, initial=0.0), problem.limits, []
+    for k, name in enumerate(log.robot_names):
+        found.append(_peak(f"speed of {name}", peaks[k, 0], limits.base_speeds[k], "m/s"))
+        found.append(_peak(f"turn rate of {name}", peaks[k, 1], limits.turn_rates[k], "rad/s"))
+    rates = np.abs(log.joint_rates).max(axis=0, initial=0.0)
+    for joint, rate, limit in zip(problem.tree.joints, rates, limits.joint_rates, strict=True):
+        found.append(_peak(f"rate of {joint.name}", rate, limit, f"{joint.unit}/s"))
+    return found
+
+
+def _peak(name: str, peak: float, limit: float, unit: str) -> PeakSpeed:
+    return PeakSpeed(name, float(peak), float(limit) if limit < inf else None, unit)

@@ -1,0 +1,41 @@
+"""Whether an axis under a budget comes so near the limit of its rate that the limit may damp it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from coop_drake.laws.axis_table import LIMIT_GAIN, RATE_LIMIT
+from coop_drake.planning.budget.axis_sets import AxisSets, Entry
+from coop_drake.planning.budget.axis_tube import ACCELERATION, V_REACH, AxisConditions, V
+from coop_drake.tree.pose import FloatArray
+
+
+def comes_near_limit(
+    row: FloatArray, sets: AxisSets, conditions: Sequence[AxisConditions], entry: Entry
+) -> bool:
+    """Return whether a x' <= gamma (L^2 - x'^2) / 2 may fail for what an axis measures and is commanded.
+
+    Sets are those of the law without a limit; they hold with it where the damping is zero at all times.
+
+    Args:
+        row: The axis, a row of an ``axis_table``.
+        sets: Its sets.
+        conditions: What disturbs it.
+        entry: The set in which it entered.
+    """
+    limit, first = row[RATE_LIMIT], conditions[0]
+    if not limit < np.inf:
+        return False
+    factor = min(one.model_factor - one.model_error for one in conditions)
+    early = max(abs(entry.rate_lower), abs(entry.rate_upper)) + first.delay * first.period * entry.history
+    pairs = [(sets.settled_rate, sets.last)]
+    for tube in sets.tubes:
+        rates = np.abs(tube[:, V]) + tube[:, V_REACH]
+        seen = np.concatenate((np.full(first.delay, early), rates))[: len(rates)]  # what was measured before
+        pairs += zip(seen.tolist(), tube[:, ACCELERATION].tolist(), strict=True)
+    measured, accelerations = np.array(pairs).T
+    measured += first.rate_noise
+    room = 0.5 * row[LIMIT_GAIN] * (limit * limit - measured * measured)
+    return bool((measured * accelerations / factor > room).any())

@@ -1,0 +1,51 @@
+"""Whether axes under a budget stay so far below the limits of their rates that these never act."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coop_drake.answers.budget import Budget, Tolerance
+from coop_drake.answers.plan import Transition
+from coop_drake.errors import RefusalError
+from coop_drake.tree.pose import FloatArray
+
+
+def check_rate_room(
+    transition: Transition, budget: Budget, made: FloatArray, members: FloatArray, delay: int, where: str
+) -> None:
+    """Refuse sets in which an acceleration times the rate may exceed gamma (limit^2 - rate^2) / 2.
+
+    The sets are those of the law without limits.
+
+    Args:
+        transition: The transition, with its stated sets.
+        budget: The budget.
+        made: Tubes of all parts, shape (samples, 6, b), see ``tubes``.
+        members: Axis of each part, shape (b,).
+        delay: Age of a measurement in periods.
+        where: The transition's place.
+
+    Raises:
+        RefusalError: Names the axis.
+    """
+    limits, stated = transition.gains.rate_limit, transition.tolerance
+    gain = transition.gains.limit_gain
+    if limits is None or gain is None or stated is None:
+        return
+    moving = np.abs(made[:, 2]) + made[:, 3]
+    early = np.tile(_entry_rates(stated, budget, delay)[members], (delay, 1))
+    seen = np.concatenate((early, moving))[: len(moving)] + budget.rate_noise
+    last = stated.settled_rate + budget.rate_noise
+    commanded = made[:, 4] / (1.0 - budget.model_error)  # what the model makes of it may be this much more
+    for axis, limit in enumerate(limits):
+        of = members == axis
+        rates = np.append(seen[:, of].ravel(), last[axis])
+        asked = np.append(commanded[:, of].ravel(), commanded[-1, of].max())
+        if not (rates * asked <= 0.5 * gain * (limit**2 - rates**2)).all():
+            raise RefusalError(f"{where}[{axis}]", f"an axis may be damped by its limit of {limit:.6g}")
+
+
+def _entry_rates(stated: Tolerance, budget: Budget, delay: int) -> FloatArray:
+    """The largest rates of which measurements speak at the entry, shape (1 + n,)."""
+    fastest: FloatArray = np.maximum(np.abs(stated.entry_rate_lower), np.abs(stated.entry_rate_upper))
+    return fastest + delay * budget.period * stated.entry_history
