@@ -24,7 +24,7 @@ from __future__ import annotations
 from math import hypot, sqrt
 
 import numpy as np
-from scipy.linalg import expm
+import scipy  # It imports its parts when they are first used: only this motion needs them.
 
 from coop_drake.compiled import compiled
 from coop_drake.laws.governor import ATTRACTION_RATE, governed_acceleration, tracking_energy
@@ -39,7 +39,7 @@ def nominal_flow(stiffness: float, damping: float, period: float) -> FloatArray:
         damping: zeta [1/s].
         period: T, for which p_G is at rest [s].
     """
-    flow: FloatArray = expm(period * np.array([[0.0, 1.0], [-stiffness, -damping]]))
+    flow: FloatArray = scipy.linalg.expm(period * np.array([[0.0, 1.0], [-stiffness, -damping]]))
     return flow
 
 

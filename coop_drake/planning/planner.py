@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from shapely.errors import ShapelyError
 
@@ -13,10 +14,12 @@ from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import GainSet, ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
-from coop_drake.planning.budget.tolerant import BeyondBudget, tolerant_plan
 from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.planning.search.search import find_path
 from coop_drake.progress import Progress
+
+if TYPE_CHECKING:
+    from coop_drake.planning.budget.tolerant import BeyondBudget
 
 FINER_ATTEMPTS = 2
 """Number of further searches after a path that cannot be executed, each with half the margin."""
@@ -62,9 +65,9 @@ def plan(
                 break
             question = replace(question, settings=replace(question.settings, margin=0.5 * answer.margin))
         else:
-            if isinstance(made, BeyondBudget):
-                return Undecided(made.describe(), report)
-            return Found(made, report)
+            if isinstance(made, Plan):
+                return Found(made, report)
+            return Undecided(made.describe(), report)
     return Undecided(stall, report)
 
 
@@ -80,6 +83,8 @@ def _made(
         return quickest_plan(problem, found, gain_set, gain_set_name=name, progress=progress)
     if not isinstance(gain_set, ScheduledGains):
         raise ValueError(f"a budget needs scheduled gains; the gain set {name!r} is fixed")
+    from coop_drake.planning.budget.tolerant import tolerant_plan  # Here: it imports scipy.
+
     return tolerant_plan(problem, found, gain_set, gain_set_name=name, budget=budget, progress=progress)
 
 
