@@ -87,10 +87,10 @@ def _intervals(plan: Plan, sample: Sample) -> dict[str, float]:
 
 def _readiness(plan: Plan, sample: Sample) -> dict[str, float]:
     following = sample.cell + 1
-    cell, gains = plan.cells[following], plan.transitions[following].gains
+    gains = plan.transitions[following].gains
     stiffness = governed_gains(plan.governor_row(following), 0.0)[0]
     margin = cell_margin(
-        BoundaryDistance(cell.tidied).edges,
+        BoundaryDistance(plan.governed(following)).edges,
         stiffness,
         np.concatenate([sample.z[:3], sample.rates[:3]]),
         sample.governor_position,

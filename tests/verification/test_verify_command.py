@@ -50,7 +50,8 @@ def test_an_infeasible_scenario_says_where_its_proof_is(planned, tmp_path):
     result = invoke("plan", scenario, "--out", tmp_path)
     assert result.exit_code == 3
     assert "The proof is in" in result.stdout
-    assert [path.name for path in tmp_path.iterdir()] == ["certificate.json"]
+    written = sorted(path.name for path in tmp_path.iterdir())
+    assert written == [".coop_drake_results.json", "certificate.json"]
 
 
 def test_refused_files_say_what_and_where(planned, tmp_path):

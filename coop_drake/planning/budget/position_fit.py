@@ -52,7 +52,7 @@ farther away."""
 KEPT = 0.6
 """A target is kept if its clearance in the regions is this share of the largest there [-]."""
 
-SMALLEST_SHARE = 0.1
+SMALLEST_SHARE = 0.05
 """Share of the goal's tolerance that must be left for the nominal motion to arrive in [-]."""
 
 GAP = 1e-6
