@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 from math import ceil, sqrt
 from pathlib import Path
 from typing import Any
@@ -10,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from benchmarks.rows import Row
-from benchmarks.sampled_axis import attacks, push_along, run_axis
+from benchmarks.sampled_axis import attacks, push_towards, run_axis
 from benchmarks.sampled_position import worst_departures
 from benchmarks.tasks import Task
 from coop_drake.answers import Found
 from coop_drake.answers.budget import Budget
 from coop_drake.laws.axis_table import axis_table, track_row
-from coop_drake.planning.budget.axis_sets import Entry, axis_sets, conditions_of
+from coop_drake.planning.budget.axis_sets import Entry, axis_sets, conditions_of, whole_periods
 from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
 from coop_drake.tree.pose import FloatArray
 
@@ -27,8 +28,12 @@ _LARGEST = {
 """Departures beyond these are not tried, in the units of ``Budget``."""
 
 _HALVINGS = 9
-_SEARCHES = 3
-"""Times that a disturbance is turned to push along the motion that it caused [-]."""
+_SEARCHES = 4
+"""Times that disturbances are turned to push to one side, about the motion that they caused [-]."""
+
+_SECONDS = 2.0
+_TARGETS = (0.03, 0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 1.0)
+"""For how long an axis is followed [s], and the shares of this time at which it is pushed out [-]."""
 
 _TRANSITIONS = (0, 3, 12)
 """Transitions of base whose axes are tried."""
@@ -88,19 +93,27 @@ def _largest(name: str, holds: Callable[[Budget], bool]) -> float:
 
 def _survives(row: FloatArray, rest: float, budget: Budget) -> bool:
     size = np.array([budget.angle_noise, budget.rate_noise, budget.acceleration_error])
-    jump = -track_row(row, 0.0, rest, 0.0)[0]
-    samples, delay = ceil(2.0 / budget.period), ceil(budget.delay / budget.period - 1e-6)
+    jump, period = -track_row(row, 0.0, rest, 0.0)[0], budget.period
+    samples, delay = ceil(_SECONDS / period), whole_periods(budget.delay, period)
     motion = np.zeros((samples, 3))
-    for disturbances in attacks(row, budget.period, size, samples, 0):
-        for sign in (-1.0, 1.0):
+
+    def kept(disturbances: FloatArray, factor: float) -> bool:
+        start = (rest, 0.0, 0.0)
+        return run_axis(row, period, delay, budget.lag, start, jump, disturbances, factor, 1, motion)
+
+    for factor in (1.0 - budget.model_error, 1.0, 1.0 + budget.model_error):
+        if not all(kept(disturbances, factor) for disturbances in attacks(row, period, size, samples, 0)):
+            return False
+        for share, side in product(_TARGETS, (-1.0, 1.0)):
+            disturbances, target = np.zeros((samples, 3)), (int(share * samples), side)
             for _ in range(_SEARCHES):
-                factor = 1.0 + sign * budget.model_error
-                start = (rest, 0.0, 0.0)
-                if not run_axis(
-                    row, budget.period, delay, budget.lag, start, jump, disturbances, factor, 1, motion
-                ):
+                if not kept(disturbances, factor):
                     return False
-                push_along(row, budget.period, size, motion, disturbances)
+                push_towards(
+                    row, period, delay, budget.lag, size, factor, 1, target, motion, disturbances
+                )  # fmt: skip
+            if not kept(disturbances, factor):
+                return False
     return True
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.laws.axis_table import FADING_TIME, bounds_of, track_row
 from coop_drake.laws.hand_over import fading
+from coop_drake.laws.slopes import slope_bounds
 from coop_drake.tree.pose import FloatArray
 
 
@@ -75,28 +76,54 @@ def run_axis(
 
 
 @compiled
-def push_along(
-    row: FloatArray, period: float, size: FloatArray, motion: FloatArray, disturbances: FloatArray
+def push_towards(
+    row: FloatArray,
+    period: float,
+    delay: int,
+    lag: float,
+    size: FloatArray,
+    model_factor: float,
+    late: int,
+    target: tuple[int, float],
+    motion: FloatArray,
+    disturbances: FloatArray,
 ) -> None:
-    """Turn every disturbance so that it accelerates the axis in the direction of its last motion's rate.
+    """Turn every disturbance so that it pushes the axis to one side at one sample, about its last motion.
+
+    The law is linearised about the motion, and the adjoint equations say, backwards in time, how the position
+    at that sample changes with each disturbance before.
 
     Args:
         row: The axis.
         period: T [s].
+        delay: Age of a measurement in periods.
+        lag: Time constant of x'' [s].
         size: Sizes of the three disturbances, shape (3,).
+        model_factor: As in ``run_axis``, and so is ``late``.
+        late: Periods for which the axis does not answer to measurements.
+        target: The sample, and 1 to push upwards or -1 to push downwards.
         motion: The last motion, as ``run_axis`` writes it.
         disturbances: Receives the disturbances, shape (samples, 3).
     """
-    for k in range(disturbances.shape[0]):
-        lower, upper, lower_rate, upper_rate, _, _ = bounds_of(row, k * period)
-        share = (motion[k, 0] - lower) / (upper - lower)
-        carried = lower_rate + share * (upper_rate - lower_rate)
-        sign = 1.0 if motion[k, 1] >= carried else -1.0
-        disturbances[k, 0], disturbances[k, 1], disturbances[k, 2] = (
-            -sign * size[0],
-            -sign * size[1],
-            sign * size[2],
-        )
+    last, side = target
+    left = exp(-period / lag) if lag > 0.0 else 0.0
+    in_v = lag * (1.0 - left)
+    in_x = lag * (period - in_v)
+    x, v, p = side, 0.0, 0.0
+    answers = np.zeros((last + delay + 1, 2))
+    for k in range(last - 1, -1, -1):
+        pushed = (0.5 * period * period - in_x) * x + (period - in_v) * v + (1.0 - left) * p
+        x, v, p = x, period * x + v, in_x * x + in_v * v + left * p
+        slope = by_rate = 0.0
+        if k >= late:
+            seen_x, seen_v = motion[max(k - delay, 0), 0], motion[max(k - delay, 0), 1]
+            slopes = slope_bounds(row, k * period, seen_x, 1e-9, seen_v)
+            slope, by_rate = model_factor * slopes[0], model_factor * slopes[2]
+        answers[k, 0], answers[k, 1] = slope * pushed, by_rate * pushed
+        x, v = x + answers[k + delay, 0], v + answers[k + delay, 1]
+        disturbances[k, 0] = size[0] if answers[k, 0] >= 0.0 else -size[0]
+        disturbances[k, 1] = size[1] if answers[k, 1] >= 0.0 else -size[1]
+        disturbances[k, 2] = size[2] if pushed >= 0.0 else -size[2]
 
 
 def attacks(row: FloatArray, period: float, size: FloatArray, samples: int, seed: int) -> list[FloatArray]:

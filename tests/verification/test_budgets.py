@@ -164,9 +164,9 @@ def test_a_budget_that_is_too_large_is_answered_with_one_that_holds(folder, tmp_
     result = invoke("plan", scenario, "--budget", tmp_path / "budget.yaml", "--out", tmp_path)
     assert result.exit_code == 4, result.output
     said = " ".join(result.output.split())
-    assert "No plan was found that holds under this budget: in transition" in said
-    assert "The largest share of the budget under which a plan holds is" in said
-    assert "%: control_rate 200, delay" in said
+    assert "No plan was found that holds under this budget. One holds under at most" in said
+    assert "% of it: control_rate 200, delay" in said
+    assert ". Under more, in transition" in said
 
 
 @pytest.mark.parametrize(

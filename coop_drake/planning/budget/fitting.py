@@ -17,7 +17,7 @@ from coop_drake.planning.budget.chain import SLACK, Limit, Link, follow_chain
 from coop_drake.planning.execution.estimate import timed
 from coop_drake.tree.pose import FloatArray
 
-AGE_FACTORS = (1.0, 1.5, 2.2)
+AGE_FACTORS = (1.0, 1.5)
 """Gains are tried for so many times the age of the gain set's commands [-]: slow ones bear more delay, quick
 ones more noise and larger forces. All transitions have the same factor, so that K falls slowly."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 from shapely.errors import ShapelyError
 
 from coop_drake.answers.budget import Budget
@@ -19,11 +18,11 @@ from coop_drake.planning.budget.position_fit import PositionLimit, fit_position
 from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.progress import Progress
 
-BISECTIONS = 7
-"""Halvings of the interval in which the largest budget is sought: it is found within a hundredth."""
+SHARE_STEP = 0.01
+"""The largest share of a budget is found within this [-]."""
 
-SMALLEST = 0.5**BISECTIONS
-"""The smallest multiple of a budget that is tried [-]."""
+USUAL_OVERLAP = 0.06
+"""This overlap is tried, too, where boxes with the wider ones that a budget needs do not exist [rad or m]."""
 
 
 @dataclass(frozen=True)
@@ -31,9 +30,9 @@ class BeyondBudget:
     """No plan was found that holds under a budget.
 
     Attributes:
-        limit: What cannot be shown for the plan that bears most, in words.
+        limit: What cannot be shown, just above ``share``, for the plan that bears most, in words.
         budget: The budget that was asked for.
-        share: The largest multiple of it under which a plan holds, 0 where none was found.
+        share: The largest share of it under which a plan holds, 0 where none was found.
     """
 
     limit: str
@@ -41,14 +40,12 @@ class BeyondBudget:
     share: float
 
     def describe(self) -> str:
-        """Return which budget does not hold, what limits it, and the largest scaled budget that holds."""
-        said = f"No plan was found that holds under this budget: {self.limit}."
+        """Return the largest share of the budget that holds, and what limits it, in full sentences."""
+        said = "No plan was found that holds under this budget."
         if self.share == 0.0:
-            return f"{said} Nor does one hold under {SMALLEST:.2%} of the budget."
+            return f"{said} Even under {SHARE_STEP:.0%} of it, {self.limit}."
         scaled = self.budget.scaled(self.share).describe()
-        return (
-            f"{said} The largest share of the budget under which a plan holds is {self.share:.1%}: {scaled}."
-        )
+        return f"{said} One holds under at most {self.share:.0%} of it: {scaled}. Under more, {self.limit}."
 
 
 def tolerant_plan(
@@ -94,10 +91,29 @@ def tolerant_plan(
         if isinstance(fitted, Plan):
             return fitted
         tried.append((plan, fitted))
-    factors = [_largest_factor(problem, plan, gain_set, budget) for plan, _ in tried]
-    best = int(np.argmax(factors))
-    plan, limit = tried[best]
-    return BeyondBudget(_sentence(plan, limit), budget, factors[best])
+    return _beyond(problem, tried, gain_set, budget)
+
+
+def _beyond(
+    problem: PlanningProblem,
+    tried: list[tuple[Plan, Limit | PositionLimit]],
+    gain_set: ScheduledGains,
+    budget: Budget,
+) -> BeyondBudget:
+    """Find the largest share of the budget that holds for one of the plans, by bisection."""
+    best, said = 0.0, _sentence(*tried[0])
+    for plan, limit in tried:
+        low, high, share = best, 1.0, best + SHARE_STEP
+        while high - low > SHARE_STEP:
+            found = _fitted(problem, plan, gain_set, budget.scaled(share))
+            if isinstance(found, Plan):
+                low = share
+            else:
+                high, limit = share, found
+            share = 0.5 * (low + high)
+        if low > best:
+            best, said = low, _sentence(plan, limit)
+    return BeyondBudget(said, budget, best)
 
 
 def _overlaps(gain_set: ScheduledGains, budget: Budget) -> list[float]:
@@ -105,7 +121,8 @@ def _overlaps(gain_set: ScheduledGains, budget: Budget) -> list[float]:
     if not budget.axes:
         return [0.0]
     least = sufficient_overlap(gain_set, budget)
-    return [overlap for overlap in OVERLAPS if overlap >= least]
+    wider = [overlap for overlap in OVERLAPS if overlap >= least]
+    return [*wider, *([USUAL_OVERLAP] if least > USUAL_OVERLAP else [])]
 
 
 def _fitted(
@@ -120,25 +137,13 @@ def _fitted(
     return fit_position(problem, plan, gain_set, budget)
 
 
-def _largest_factor(problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget) -> float:
-    """Return the largest multiple of a budget that holds, at most 1, by bisection; 0 if none was found."""
-    low, high = 0.0, 1.0
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        if isinstance(_fitted(problem, plan, gain_set, budget.scaled(middle)), Plan):
-            low = middle
-        else:
-            high = middle
-    return low
-
-
 def _sentence(plan: Plan, limit: Limit | PositionLimit) -> str:
     """Say where a budget does not hold, with the names of the robot and of the joint."""
     if isinstance(limit, PositionLimit):
         return limit.reason
     name = "the object's angle"
     if limit.axis > 0:
-        robot, _, joint = plan.joint_names[limit.axis - 1].rpartition("/")
+        robot, _, joint = plan.joint_names[limit.axis - 1].rpartition("::")
         name = f"the joint {joint} of {robot}" if robot else f"the joint {joint}"
     last = len(plan.transitions) - 1
     return f"in transition {limit.transition} of 0 to {last}, {name} {limit.reason}"
