@@ -8,17 +8,9 @@ from dataclasses import dataclass, replace
 from coop_drake.answers.budget import Budget
 from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, LEAVING_TIME, REST_RATE, REST_REACH
 from coop_drake.laws.readiness import EROSION
-from coop_drake.planning.budget.axis_sets import (
-    AxisSets,
-    Entry,
-    axis_sets,
-    conditions_of,
-    next_entry,
-    rest_needed,
-    settling_time,
-    whole_periods,
-)
+from coop_drake.planning.budget.axis_sets import AxisSets, Entry, axis_sets, conditions_of, whole_periods
 from coop_drake.planning.budget.axis_tube import AxisConditions
+from coop_drake.planning.budget.leaving import next_entry, rest_needed, settling_time
 from coop_drake.planning.budget.rate_room import comes_near_limit
 from coop_drake.tree.pose import FloatArray
 

@@ -11,7 +11,13 @@ from coop_drake.tree.pose import FloatArray
 
 
 def check_rate_room(
-    transition: Transition, budget: Budget, made: FloatArray, members: FloatArray, delay: int, where: str
+    transition: Transition,
+    budget: Budget,
+    made: FloatArray,
+    last: FloatArray,
+    members: FloatArray,
+    delay: int,
+    where: str,
 ) -> None:
     """Refuse sets in which an acceleration times the rate may exceed gamma (limit^2 - rate^2) / 2.
 
@@ -21,6 +27,7 @@ def check_rate_room(
         transition: The transition, with its stated sets.
         budget: The budget.
         made: Tubes of all parts, shape (samples, 6, b), see ``tubes``.
+        last: Largest |acceleration| of each part after its tube's end, shape (b,).
         members: Axis of each part, shape (b,).
         delay: Age of a measurement in periods.
         where: The transition's place.
@@ -35,12 +42,12 @@ def check_rate_room(
     moving = np.abs(made[:, 2]) + made[:, 3]
     early = np.tile(_entry_rates(stated, budget, delay)[members], (delay, 1))
     seen = np.concatenate((early, moving))[: len(moving)] + budget.rate_noise
-    last = stated.settled_rate + budget.rate_noise
-    commanded = made[:, 4] / (1.0 - budget.model_error)  # what the model makes of it may be this much more
+    settled = stated.settled_rate + budget.rate_noise
+    commanded = np.vstack([made[:, 4], last]) / (1.0 - budget.model_error)  # the model may make less of it
     for axis, limit in enumerate(limits):
         of = members == axis
-        rates = np.append(seen[:, of].ravel(), last[axis])
-        asked = np.append(commanded[:, of].ravel(), commanded[-1, of].max())
+        rates = np.append(seen[:, of].ravel(), np.full(int(of.sum()), settled[axis]))
+        asked = commanded[:, of].ravel()
         if not (rates * asked <= 0.5 * gain * (limit**2 - rates**2)).all():
             raise RefusalError(f"{where}[{axis}]", f"an axis may be damped by its limit of {limit:.6g}")
 
