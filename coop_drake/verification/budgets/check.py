@@ -116,10 +116,10 @@ def _check_transition(plan: Plan, k: int, stated: Tolerance, where: str) -> Floa
     samples = begins + follows + 1
     rests = plan.start[2:] if k == 0 else _middles(plan, k - 1)
     made = tubes(disturbed, int(samples.max()), middle, reach, before, rests[members])
-    check_rate_room(plan.transitions[k], budget, made, last, members, disturbed.delay, where)
     box, most = _ends(made, begins, samples, disturbed)
     x, v = stated.settled[members], stated.settled_rate[members]
     needed, last = staying(disturbed, Closed(begins * T, follows, box, x, v))
+    check_rate_room(plan.transitions[k], budget, made, last, members, disturbed.delay, where)
     half = 0.5 * (axes.goal[1] - axes.goal[0])
     distance, fastest = half[members] - x - 0.125 * T * T * last, last.copy()
     for i, n in enumerate(samples):
