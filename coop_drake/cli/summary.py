@@ -21,6 +21,9 @@ _ROWS: tuple[tuple[str, str, str], ...] = (
     ("cells", "cells", "{}"),
     ("planning took", "planning_wall_seconds", "{:.2f} s"),
     ("estimated transport", "estimated_seconds", "{:.1f} s"),
+    ("its budget holds for", "budget_holds_for", "{}"),
+    ("departure of the object under it", "tube_radius_m", "{:.4f} m at most"),
+    ("base force for the position under it", "tube_force_n", "{:.1f} N at most"),
     ("it took", "simulated_seconds", "{:.2f} s"),
     ("smallest clearance to walls", "min_workspace_clearance_m", "{:.4f} m"),
     ("smallest clearance between bodies", "min_body_clearance_m", "{:.4f} m"),
@@ -86,7 +89,14 @@ def planning_facts(result: PlanningResult) -> dict[str, Any]:
 
 def plan_facts(plan: Plan) -> dict[str, Any]:
     """Return the size of a plan and what it promises."""
+    budgeted: dict[str, Any] = {}
+    if plan.budget is not None and plan.tube is not None:
+        covered = "position, angles and joints" if plan.budget.axes else "the position, not angles and joints"
+        budgeted = {"budget_holds_for": covered, "tube_radius_m": plan.tube.radius}
+        if plan.budget.moved_mass is not None:
+            budgeted["tube_force_n"] = plan.budget.moved_mass * plan.tube.acceleration
     return {
+        **budgeted,
         "cells": len(plan.cells),
         "narrowest_neck_m": min(transition.neck for transition in plan.transitions),
         "estimated_seconds": sum(transition.estimated_time for transition in plan.transitions),

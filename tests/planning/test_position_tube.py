@@ -15,6 +15,7 @@ from coop_drake.laws import ScheduledGains
 from coop_drake.laws.nominal import nominal_flow
 from coop_drake.planning.budget.position_fit import PositionLimit, fit_position
 from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
+from coop_drake.planning.execution.transitions import with_gains
 from coop_drake.plant import planning_problem
 from tests.support.small_loop import small_problem
 from tests.support.tubes import BUDGET, tubed_problem
@@ -82,6 +83,13 @@ def test_the_plan_keeps_its_nominal_motion_as_far_from_the_walls_as_the_tube_is_
         assert cell.tidied.contains(transition.governed)
         assert transition.governed.boundary.distance(cell.tidied.boundary) >= plan.tube.radius
     assert len({transition.gains.stiffness for transition in plan.transitions}) == 1
+
+
+def test_a_plan_with_other_gains_has_no_tube():
+    _, plan = tubed_problem()
+    other = with_gains(plan, ScheduledGains(), "other")
+    assert (other.budget, other.tube) == (None, None)
+    assert other.governed(0).equals(plan.cells[0].tidied)
 
 
 LIMITS = {

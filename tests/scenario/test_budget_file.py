@@ -45,12 +45,13 @@ def test_a_required_budget_is_planned_for_without_an_option(tmp_path):
     file = scenario(tmp_path, budget="position")
     result = invoke("plan", file, "--out", tmp_path / "out")
     assert result.exit_code == 0, result.output
+    assert "the position, not angles and joints" in " ".join(result.output.split())
     plan = load_plan(tmp_path / "out" / "plan.json")
     assert plan.tube is not None
     assert plan.transitions[0].tolerance is None
-    shown = " ".join(invoke("verify", tmp_path / "out" / "plan.json", file).output.split())
-    assert "the object stays in its cells" in shown
-    assert "not part of the" in shown
+    shown = invoke("verify", tmp_path / "out" / "plan.json", file, "--json").stdout
+    assert "the object stays in its cells under the budget" in shown
+    assert "angles and joints are not part of the budget" in shown
     assert isinstance(coop_drake.plan(coop_drake.load_scenario(file)), Found)
 
 
