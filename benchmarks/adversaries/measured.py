@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import process_time
 
 import numpy as np
@@ -15,11 +15,15 @@ from benchmarks.adversaries.trial import Judged, answered, judged_source, kind_o
 from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.rows import Row
 from benchmarks.tasks import Rows, Task
+from coop_drake.answers import PlannerSettings
 
 __all__ = ["adversary_tasks", "random_answers"]
 
 SEEDS = {11: 167, 12: 167, 13: 166}
 """Seeds of random questions, with how many are answered and checked for each."""
+
+SLICES = 500
+"""Budget of slices of a random question, so that one which stays undecided takes seconds [-]."""
 
 LIMIT = 1200.0
 """CPU time that a source or a seed may take [s]."""
@@ -57,7 +61,7 @@ def random_answers(seed: int, count: int) -> list[Timed]:
     found = []
     for problem in filter(None, (random_question([seed, k]) for k in range(count))):
         times = [process_time()]
-        documents = answered(problem)
+        documents = answered(replace(problem, settings=PlannerSettings(max_slices=SLICES)))
         times.append(process_time())
         refused = "" if documents is None else refusal(*documents)
         planning, checking = np.diff([*times, process_time()]).tolist()

@@ -15,12 +15,12 @@ def check(question: Any, answer: Any, progress: Any = lambda phase, share: None)
     """Check an answer to a question, both as ``json.load`` gives them; ``progress`` gets phase and fraction.
 
     Returns the statements that hold, each with how often it was checked. Raises ``RefusedError`` if one does
-    not or is not shown within 10^8 elementary steps, about a minute, or a document is not as the format says.
+    not or is not shown in 2 * 10^8 elementary steps, a minute, or a document is not as the format says.
     """
-    plane.work_left[0] = 10**8
+    plane.work_left[0] = 2 * 10**8
     formats = {("coop_drake plan", 3): check_plan, ("coop_drake proof of infeasibility", 3): check_proof}
     try:
         found = formats[answer["format"], answer["version"]](Question(question), answer, progress)
         return [(statement, count) for statement, count in found if count > 0]
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError) as error:
         raise RefusedError(f"document: {type(error).__name__}: {str(error)[:200]}") from error

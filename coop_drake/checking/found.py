@@ -67,6 +67,7 @@ def _check_free(question: Question, box: list[Interval], region: Region, where: 
     """
 
     def clear(wall: Any, moved: list[Point], gap: int) -> bool:
+        plane.spend(5 * len(moved))
         near = [(wx - x, wy - y) for wx, wy in wall for x, y in moved]
         return plane.boxes_apart(region.box, plane.box_of(near), gap) or region.side(hull(near), gap) < 0
 

@@ -23,6 +23,7 @@ def check_proof(question: Question, answer: Any, progress: Any) -> list[tuple[st
     neighbours = _facets(boxes, question.limits) + [(k, k) for k in range(len(boxes))]
     cells = [[(c["reached"], plane.read_region(c["polygon"])) for c in value["cells"]] for value in slices]
     for a, b in neighbours:
+        spend(len(cells[a]) * len(cells[b]))
         for (i, (one, cell)), (j, (other, another)) in product(enumerate(cells[a]), enumerate(cells[b])):
             finding = f"touches slices[{b}].cells[{j}], which has another label"
             demand(one == other or not cell.touches(another), f"slices[{a}].cells[{i}]", finding)
@@ -62,7 +63,7 @@ def _forbidden(question: Question, frame: list[Step], box: list[Interval], witne
     the mean of K's corners, a point of the piece, is off the floor, and if p + K meets a wall e: p is in the
     interior of the Minkowski sum of e and -K.
     """
-    forbidden, overlap, floor = list[Region](), False, question.floor
+    forbidden, floor = list[Region](), question.floor
     for witness in witnesses:
         pieces = [question.pieces[index(k, len(question.pieces))] for k in witness["pieces"]]
         polygon, paired = hull(points(witness["polygon"])), tuple(witness["pieces"]) in question.pairs
@@ -72,13 +73,12 @@ def _forbidden(question: Question, frame: list[Step], box: list[Interval], witne
             motion = team.relative(seen, piece.chain)
             inside = settled(polygon, 2 - piece.radius, motion, box, [piece.corners], _inside)
             demand(inside, f"{where}.witnesses", f"may leave the inside of {piece.body}")
-        spend(300 * len(floor.edges))
+        spend(100 * len(floor.edges) + len(question.pairs))
         x0, y0 = (sum(values) // len(polygon) for values in zip(*polygon, strict=True))
         off_floor = Region([[(x - x0, y - y0) for x, y in ring] for ring in floor.rings], odd=False)
         sums = [hull((wx - x, wy - y) for wx, wy in wall for x, y in polygon) for wall in floor.edges]
         forbidden += [off_floor, *[Region([corners]) for corners in sums]]
-        overlap = overlap or paired
-    return None if overlap else forbidden
+    return None if any(len(witness["pieces"]) == 2 for witness in witnesses) else forbidden
 
 
 def _inside(piece: list[Point], corners: list[Point], depth: int) -> bool:
@@ -137,10 +137,10 @@ def _facets(boxes: list[list[Interval]], limits: list[Interval]) -> list[tuple[i
     again = [(k, [(last, last + b[0][1] - first), *b[1:]]) for k, b in enumerate(boxes) if b[0][0] == first]
     placed = sorted([*enumerate(boxes), *again], key=lambda entry: entry[1])
     for n, (i, one) in enumerate(placed):
+        spend(4 * len(placed))
         for j, other in placed[n + 1 :]:
             if other[0][0] > one[0][1]:
                 break
-            spend(4)
             shared = [min(one[a][1], other[a][1]) - max(one[a][0], other[a][0]) for a in wide]
             demand(min(shared) <= 0, f"slices[{i}], slices[{j}]", "overlap")
             pairs += [(i, j)] if min(shared) == 0 and shared.count(0) == 1 else []

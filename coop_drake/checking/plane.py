@@ -79,6 +79,7 @@ def cosine_and_sine(angle: int) -> Point:
 def hull(corners: Iterable[Point]) -> list[Point]:
     """Corners of the convex hull, counter-clockwise, no three on a line (monotone chain)."""
     ordered, found = sorted(set(corners)), list[Point]()
+    spend(10 + 5 * len(ordered))
     for chain in (ordered, ordered[::-1]):
         half = list[Point]()
         for x, y in chain:
@@ -103,11 +104,12 @@ def boxes_apart(a: Sequence[int], b: Sequence[int], gap: int) -> bool:
     return a[0] - b[2] > gap or b[0] - a[2] > gap or a[1] - b[3] > gap or b[1] - a[3] > gap
 
 
-def apart(first: Iterable[Point], second: Sequence[Point], gap: int) -> bool:
+def apart(first: Sequence[Point], second: Sequence[Point], gap: int) -> bool:
     """Whether two convex sets are further apart than a gap: so far is the origin from all their differences.
 
     It is if it is so far to the right of an edge of their hull, or beyond the hull's nearest corner.
     """
+    demand(len(first) * len(second) <= 10**6, "corners", "are too many for two convex sets")
     corners = hull((p - x, q - y) for p, q in first for x, y in second)
     for (x, y), (p, q) in pairwise([corners[-1], *corners]):
         right = (p - x) * y - (q - y) * x
@@ -138,7 +140,7 @@ class Region:
 
     def side(self, convex: Sequence[Point], gap: int) -> int:
         """1 if a convex set lies inside, -1 if outside, further than a gap from all edges; 0 otherwise."""
-        spend(len(self.edges))
+        spend(len(self.edges) + 10)
         box, pairs = box_of(convex), zip(self.edges, self.boxes, strict=True)
         if self.odd and boxes_apart(self.box, box, gap):
             return -1
@@ -156,9 +158,8 @@ class Region:
         ((ax, ay), (bx, by)), box, cuts = segment, box_of(segment), [(FULL, FULL)]
         dx, dy = bx - ax, by - ay
         square, after = (dx * dx + dy * dy, 2) if dx or dy else (1, FULL + 1)
-        near = [
-            edge for edge, its in zip(self.edges, self.boxes, strict=True) if not boxes_apart(its, box, 0)
-        ]
+        pairs = zip(self.edges, self.boxes, strict=True)
+        near = [edge for edge, its in pairs if not boxes_apart(its, box, 0)]
         for (px, py), (qx, qy) in near:
             first, last = dx * (py - ay) - dy * (px - ax), dx * (qy - ay) - dy * (qx - ax)
             across = (px - ax) * (qy - py) - (py - ay) * (qx - px)

@@ -44,8 +44,8 @@ def swept(corners: Any, grown: int, steps: list[Step], box: list[Interval]) -> t
     less than 4 r / 2^80 + 3 units, each place by less than 2. Returns a hull, and how much it is grown.
     """
     for axis, sign, angle, (u, v), (x, y) in steps:
-        low, high = box[axis]
-        first, last = sorted((sign * low + angle, sign * high + angle))
+        demand(len(corners) <= 10**4, "corners", "are too many for a convex set that moves")
+        first, last = sorted(sign * value + angle for value in box[axis])
         reach, parts = isqrt(max([x * x + y * y for x, y in corners])) + 1, 4 if first < last else 1
         if last - first > TURN:
             corners, grown = [(0, 0)], grown + reach
@@ -54,8 +54,7 @@ def swept(corners: Any, grown: int, steps: list[Step], box: list[Interval]) -> t
             pairs = [(*plane.cosine_and_sine(turn), p, q) for turn in turns for p, q in corners]
             corners = [((c * p - s * q) >> BITS, (s * p + c * q) >> BITS) for c, s, p, q in pairs]
             grown += (reach >> BITS - 2) + 4 + (reach * ((last - first) // parts + 1) ** 2 >> 2 * BITS + 3)
-        ends = {(u * value // ONE + x, v * value // ONE + y) for value in (low, high)}
-        plane.spend(2 * len(corners))
+        ends = {(u * value // ONE + x, v * value // ONE + y) for value in box[axis]}
         corners, grown = hull((p + a, q + b) for p, q in corners for a, b in ends), grown + 2
     return corners, grown
 
@@ -102,9 +101,9 @@ class Question:
     """What is asked; the page on certificates in the documentation says what the document's entries mean."""
 
     def __init__(self, value: Any) -> None:
-        demand(
-            (value["format"], value["version"]) == ("coop_drake question", 2), "version", "of question: not 2"
-        )
+        asked, parts = (value["format"], value["version"]), (value["components"], value["pieces"])
+        fit = asked == ("coop_drake question", 2) and max(map(len, parts)) <= 1000
+        demand(fit, "question", "is not of version 2, or has more than 1000 components or pieces")
         self.floor, self.chains = plane.read_region(value["floor"]), [[Step(0, 1)]]
         self.limits = intervals(value["lower"], value["upper"], len(value["lower"]))
         self.axes, self.pieces = 1 + len(self.limits), list[Piece]()
