@@ -56,7 +56,7 @@ def check_speeds(plan: Plan, problem: PlanningProblem) -> Check | None:
         int(np.isfinite(values).sum())
         for values in (limits.base_speeds, limits.turn_rates, limits.joint_rates)
     )
-    return Check("limits of speed are kept by the gains", count, least, "of a limit is left at least")
+    return Check("limits of speed are kept by the gains", count, least, "of one left")
 
 
 def _check_limits(stated: SpeedStatement, limits: TeamLimits) -> None:

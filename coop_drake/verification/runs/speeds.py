@@ -36,7 +36,7 @@ def check_run_speeds(rows: Rows, problem: PlanningProblem) -> Check | None:
         rows.require(found <= allowed, name, text, found, allowed)
         count += int(np.isfinite(allowed).sum())
         least = min(least, float((1.0 - found / allowed).min(initial=1.0)))
-    return Check("bases and joints kept their limits of speed", count, least, "of a limit was left at least")
+    return Check("bases and joints kept their limits of speed", count, least, "of one left")
 
 
 def _motion(point: FloatArray, stages: tuple[Stage, ...], rows: Rows) -> tuple[FloatArray, FloatArray]:
