@@ -108,8 +108,10 @@ def _joining(pairs: IntArray, clearance: FloatArray, count: int, start: int, end
         joined_to[first] = second
         one, other = start, end
         while joined_to[one] != one:
+            joined_to[one] = joined_to[joined_to[one]]
             one = joined_to[one]
         while joined_to[other] != other:
+            joined_to[other] = joined_to[joined_to[other]]
             other = joined_to[other]
         if one == other:
             last = k + 1

@@ -94,7 +94,9 @@ class PassageFinder:
         for k, end in enumerate(ends):
             away = np.linalg.norm(medial.nodes - end, axis=1)
             away[clearance_there <= 0.0] = np.inf
-            near = np.argsort(away, kind="stable")[:LINKS]
+            least = min(LINKS, len(away)) - 1
+            close = np.flatnonzero(away <= np.partition(away, least)[least])
+            near = close[np.argsort(away[close], kind="stable")][:LINKS]
             nodes = np.union1d(near[np.isfinite(away[near])], np.flatnonzero(away <= clearance_there))
             clearance = np.array([self._distance.along(end, graph.nodes[node]) for node in nodes])
             seen = clearance > 0.0
