@@ -122,17 +122,15 @@ def _source_task(name: str, ask: Ask, rounds: int, tally: list[Judged]) -> Task:
 
 def _totals(tally: Sequence[Judged]) -> Rows:
     """For each kind of answer, and for each kind of alteration of it, the sums over all sources."""
-    groups = dict.fromkeys(("all kinds of answers", kind) for kind in sorted({one.answer for one in tally}))
-    groups |= dict.fromkeys((f"alterations of {one.answer}", one.kind) for one in tally)
-    return [
-        row
-        for topic, kind in sorted(groups)
-        for row in _counts(
-            f"adversaries/{topic}/{kind}",
-            [o for o in tally if (o.answer, o.kind) == (topic.removeprefix("alterations of "), kind)]
-            or [o for o in tally if o.answer == kind],
-        )
-    ]
+    rows = list[Row]()
+    for answer in dict.fromkeys(one.answer for one in tally):
+        found = [one for one in tally if one.answer == answer]
+        rows += _counts(f"adversaries/all sources/{answer}", found)
+        for kind in dict.fromkeys(one.kind for one in found):
+            rows += _counts(
+                f"adversaries/altered {answer}/{kind}", [one for one in found if one.kind == kind]
+            )
+    return rows
 
 
 def _counts(name: str, found: Iterable[Judged]) -> list[Row]:
