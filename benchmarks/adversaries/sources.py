@@ -29,8 +29,8 @@ SLICES: dict[str, Ask] = {
 }
 JOINTS: dict[str, Ask] = {
     "three_closed": partial(corridor_problem, 0.95, 1.5, 3),
-    **{f"hinge {seed}": partial(bend_question, seed, "revolute") for seed in (3, 5, 7)},
-    **{f"slide {seed}": partial(bend_question, seed, "prismatic") for seed in (0, 1, 3, 4, 5, 7)},
+    **{f"hinge {seed}": partial(bend_question, seed, "revolute") for seed in (0, 2, 3, 5)},
+    **{f"slide {seed}": partial(bend_question, seed, "prismatic") for seed in (0, 1, 3, 4, 5)},
 }
 DISCS: dict[str, Ask] = {
     "narrow": partial(corridor_problem, 0.45),

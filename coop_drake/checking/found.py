@@ -9,7 +9,7 @@ from coop_drake.checking.plane import ONE, Interval, Point, Region, demand, hull
 from coop_drake.checking.team import Question, holds, intervals, relative, settled, swept, unwrapped
 
 ROUNDING = 10**9
-"""Lengths are stated to one part in so many; goal intervals are no narrower than 1 m or rad by this [-]."""
+"""Stated lengths may be off by one part in this; goal intervals are at least 1 m or rad over it [-]."""
 
 
 def check_plan(question: Question, answer: Any, progress: Any) -> list[tuple[str, int]]:

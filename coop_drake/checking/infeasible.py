@@ -1,4 +1,4 @@
-"""A proof holds: forbidden sets and cells cover all configurations, labels part start from goal."""
+"""A proof holds: forbidden sets and cells cover all configurations, labels separate start from goal."""
 
 from itertools import product
 from math import prod

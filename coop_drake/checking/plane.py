@@ -14,7 +14,7 @@ Interval = tuple[int, int]
 
 BITS = 80
 ONE, FULL = 1 << BITS, 1 << 64
-"""One metre, radian or factor; the end of a segment, whose places are integers from 0 on."""
+"""The number 1 in units of 2^-80; the end of a segment, whose places are integers from 0 at its beginning."""
 
 FINE_TURN = 0x6_487ED511_0B4611A6_2633145C_06E0E689_48127044
 TURN = FINE_TURN >> BITS
@@ -107,7 +107,7 @@ def boxes_apart(a: Sequence[int], b: Sequence[int], gap: int) -> bool:
 def apart(first: Sequence[Point], second: Sequence[Point], gap: int) -> bool:
     """Whether two convex sets are further apart than a gap: so far is the origin from all their differences.
 
-    It is if it is so far to the right of an edge of their hull, or beyond the hull's nearest corner.
+    It is if it is so far to the right of an edge's line, or all corners are so far out towards the nearest.
     """
     demand(len(first) * len(second) <= 10**6, "corners", "are too many for two convex sets")
     corners = hull((p - x, q - y) for p, q in first for x, y in second)

@@ -1,4 +1,4 @@
-"""The command line: one command for each stretch of the chain, for people and for machines."""
+"""The command line: one command for each step from scenario to recording, for people and for machines."""
 
 from coop_drake.cli.app import app, main
 

@@ -16,12 +16,12 @@ class KernelClock:
 
     @property
     def wall_seconds(self) -> float:
-        """By the clock on the wall [s]."""
+        """Elapsed wall-clock time [s]."""
         return KERNEL_TIMES.wall_seconds - self._wall
 
     @property
     def cpu_seconds(self) -> float:
-        """By the processor [s]."""
+        """Elapsed processor time [s]."""
         return KERNEL_TIMES.cpu_seconds - self._cpu
 
 

@@ -24,7 +24,7 @@ _ROWS: tuple[tuple[str, str, str], ...] = (
     ("its budget holds for", "budget_holds_for", "{}"),
     ("departure of the object under it", "tube_radius_m", "{:.4f} m at most"),
     ("base force for the position under it", "tube_force_n", "{:.1f} N at most"),
-    ("it took", "simulated_seconds", "{:.2f} s"),
+    ("simulated transport", "simulated_seconds", "{:.2f} s"),
     ("smallest clearance to walls", "min_workspace_clearance_m", "{:.4f} m"),
     ("smallest clearance between bodies", "min_body_clearance_m", "{:.4f} m"),
     ("peak speed of the object", "peak_speed_m_s", "{:.2f} m/s"),

@@ -83,7 +83,7 @@ def funnel_margin(energy: float, energy_bound: float) -> float:
     """Return (bound - V) / max(V, bound), positive where V lets an axis enter its next funnel.
 
     Args:
-        energy: V of the axis at the mouth of the next funnel, with the next gains.
+        energy: V of the axis at the beginning of the next funnel, with the next gains [rad^2/s^2 or m^2/s^2].
         energy_bound: Largest V with which that funnel may be entered, in the same unit.
     """
     return (energy_bound - energy) / max(energy, energy_bound)

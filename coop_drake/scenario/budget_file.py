@@ -8,6 +8,7 @@ from pathlib import Path
 
 from coop_drake.answers.budget import Budget
 from coop_drake.errors import ScenarioError
+from coop_drake.scenario.deployment import Floor
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.reading import read_file
 from coop_drake.tree import ComponentTree
@@ -48,7 +49,8 @@ def read_budget(
         masses: Returns what each robot moves, itself and its share of the object [kg].
 
     Raises:
-        ScenarioError: There is no such file, it is wrong, or the scenario has no control rate.
+        ScenarioError: There is no such file, it is wrong, or the scenario has no control rate or has
+            departures that no budget counts.
     """
     if choice in (FROM_DEPLOYMENT, FROM_DEPLOYMENT_POSITION):
         return _of_deployment(scenario, tree, masses(), axes=choice == FROM_DEPLOYMENT)
@@ -64,6 +66,7 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: Sequence[flo
     if deployment.control_rate is None or deployment.period is None:
         allowed = "a number, for a budget of the scenario's own departures"
         raise ScenarioError(str(scenario.path), "deployment.control_rate", None, allowed)
+    _refuse_uncounted(scenario)
     measured, messages = deployment.measurements, deployment.messages
     share = hypot(*masses) / sum(masses)  # errors of several robots rarely add up
     mean = PLANE_DEVIATIONS * share
@@ -84,6 +87,28 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: Sequence[flo
         moved_mass=max(masses),
         axes=axes,
     )
+
+
+def _refuse_uncounted(scenario: Scenario) -> None:
+    """Refuse departures for which no budget provides, so that no plan is called tolerant of them."""
+    deployment = scenario.deployment
+    measured, actuators = deployment.measurements, deployment.actuators
+    uncounted = {
+        "measurements.loss": measured.loss,
+        "measurements.late": measured.late,
+        "actuators.base_torque": actuators.base_torque,
+        "actuators.joint_effort": actuators.joint_effort,
+        "messages.repeat": deployment.messages.repeat,
+        "robots": deployment.robots,
+        "floor": None if deployment.floor == Floor() else deployment.floor,
+        "pushes": deployment.pushes,
+    }
+    for key, value in uncounted.items():
+        if value:
+            allowed = (
+                "nothing where a budget is asked for: none counts this; state a budget in a file instead"
+            )
+            raise ScenarioError(str(scenario.path), f"deployment.{key}", value, allowed)
 
 
 def _rate_levers(tree: ComponentTree) -> float:

@@ -24,8 +24,8 @@ class AxisPpc(Block):
     input   ``robot_state``          2 (3 + n)  z_k and its rate, z_k = (x, y, yaw of Bk, q_k)         W
     input   ``current_cell``         2          index of the current cell, time of its entry [-, s]
     input   ``ready``                2          the robot's own report: cell index, margin [-]
-    input   ``clock``                3          the funnels' clock: its lag since then [s], its pace [-] and
-                                                the derivative of the pace [1/s]; only where ``paced``
+    input   ``clock``                3          the funnels' clock: its lag since entry [s], its pace [-]
+                                                and its derivative [1/s]; only where ``paced``
     output  ``axis_acceleration``    1 + n      desired angular acceleration of the object [rad/s^2],  W
                                                 of the joints [rad/s^2 or m/s^2]
     output  ``funnels``              2 (1 + n)  lower, then upper funnel bounds now [rad or m]

@@ -33,7 +33,7 @@ class LossyMeasurement(Block):
         late: Probability that one which is not lost arrives late [-].
         late_by: How much later, rounded up to whole periods, at least one [s].
         offset: Time of the first measurement [s].
-        seed: Of the dice.
+        seed: Seed of the random losses.
 
     Raises:
         ValueError: The period is not positive, the delay negative, or a probability not in [0, 1].

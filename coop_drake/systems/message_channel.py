@@ -32,7 +32,7 @@ class MessageChannel(Block):
         delay: Time that a report travels, rounded up to whole periods [s].
         loss: Probability that a report is lost [-].
         repeat: Probability that a report which is not lost arrives twice [-].
-        seed: Of the dice.
+        seed: Seed of the random losses and delays.
 
     Raises:
         ValueError: The period is not positive, the delay negative, or a probability not in [0, 1].

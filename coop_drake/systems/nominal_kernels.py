@@ -59,7 +59,7 @@ def step_nominal(
     """Write p^, p^' and p_G a period later.
 
     Args:
-        row: The governor's row, see ``governed_gains``, shape (8,); K does not change at a hand-over.
+        row: The governor's row, see ``governed_gains``, shape (9,); K does not change at a hand-over.
         edges: Edges of the governed region, shape (edges, 4) [m].
         flat: The cell's map, as ``VelocityField.kernel_arguments`` has it.
         field: What the velocity field adds to the map.

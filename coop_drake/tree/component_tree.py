@@ -60,7 +60,9 @@ class TreeJoint:
     - to the control laws: ``laws/robot_dynamics.py`` (velocities and forces);
     - to the planner: ``answers/problem.py`` (room beyond limits), ``planning/cells/split_rules.py``
       (``finest_widths``), ``planning/search/rescaling.py`` and ``diagnosis/team_changes.py``;
-    - independently of all these to ``checking/team.py`` and to ``verification/question.py``.
+    - to the budget of a deployment: ``scenario/budget_file.py`` (errors of velocities);
+    - independently of all these to ``checking/team.py``, and in ``verification/`` to ``question.py``,
+      ``solids.py``, ``speeds.py`` and ``runs/placement.py``, ``mechanics.py`` and ``speeds.py``.
 
     Attributes:
         name: Scoped name, for example ``robot_0::elbow``.

@@ -61,7 +61,7 @@ def test_a_required_budget_that_does_not_hold_is_a_negative_answer(tmp_path):
     said = " ".join(result.output.split())
     assert result.exit_code == 4, result.output
     assert "mm from the goal" in said
-    assert "The largest share of the budget under which a plan holds" in said
+    assert "No plan was found that holds under this budget. One holds under at most" in said
     assert isinstance(coop_drake.plan(coop_drake.load_scenario(file)), Undecided)
 
 
@@ -82,3 +82,23 @@ def test_there_is_no_budget_for_gains_whose_funnels_never_close(tmp_path):
     fixed = replace(found, gains=replace(found.gains, selected="table_2"))
     with pytest.raises(ScenarioError, match="scheduled gains"):
         budget_of(None, fixed, planning_problem(found))
+
+
+@pytest.mark.parametrize(
+    ("key", "departures"),
+    [
+        ("measurements.loss", {"measurements": {"loss": 0.1}}),
+        ("measurements.late", {"measurements": {"late": 0.1, "late_by": 0.005}}),
+        ("actuators.base_torque", {"actuators": {"base_torque": 50.0}}),
+        ("actuators.joint_effort", {"actuators": {"joint_effort": 50.0}}),
+        ("messages.repeat", {"messages": {"repeat": 0.1}}),
+        ("robots", {"robots": {"*": {"odometry_scale": 0.01}}}),
+        ("floor", {"floor": {"slope": 0.01}}),
+        ("pushes", {"pushes": [{"body": "object", "force": [1.0, 0.0], "time": 1.0, "duration": 1.0}]}),
+    ],
+)
+def test_a_departure_that_no_budget_counts_is_refused(key, departures, tmp_path):
+    found = coop_drake.load_scenario(scenario(tmp_path, budget="position", **departures))
+    with pytest.raises(ScenarioError, match="none counts this") as refused:
+        budget_of(None, found, planning_problem(found))
+    assert refused.value.key == f"deployment.{key}"

@@ -15,14 +15,15 @@ from coop_drake.planning.budget.rate_room import comes_near_limit
 from coop_drake.tree.pose import FloatArray
 
 REST_FACTOR = 1.5
-"""A cell is left with so many times the departures that a settled axis has at most [-]: the larger, the
-sooner, and the larger is the set in which the next cell is entered."""
+"""Departure from rest with which a cell may be left, over the largest one of a settled axis [-]. A larger
+factor leaves the cell earlier, but makes the entry set of the next cell larger."""
 
 QUICK_RATE = 0.2
-"""Or with this rate, anywhere in the eroded goal interval, if that is more [rad/s or m/s]."""
+"""Rate below which a cell may be left at first, anywhere in the eroded goal interval, if that is larger
+[rad/s or m/s]: most transitions hold with it, and waiting for less costs time."""
 
 STRICTEST = 2
-"""The last of three conditions under which a cell may be left."""
+"""Largest ``strictness``: the number of the last of three conditions under which a cell may be left [-]."""
 
 ENTRY_PARTS = (1, 3)
 """Parts into which the positions at an entry are cut, tried in this order [-]."""

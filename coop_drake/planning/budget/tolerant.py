@@ -68,7 +68,7 @@ def tolerant_plan(
         progress: Called with a phase and the fraction of it that is done.
 
     Raises:
-        GeometryError: As ``quickest_plan``, and so are the others.
+        GeometryError: As ``quickest_plan`` raises it; so are the others.
         PlanError: No plan can be made.
         StallError: No plan can be executed.
     """

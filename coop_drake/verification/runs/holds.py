@@ -12,7 +12,7 @@ RATE = 10.0
 """Rate with which the clock slows down and runs again [1/s]."""
 
 SETTLED = 2.0
-"""So long after a change the clock stands still or runs, up to ``ROUNDING`` of a step [s]."""
+"""Time after a change of ``held`` until the clock stands still or runs freely, within ``ROUNDING`` [s]."""
 
 PAUSE = 1.0
 """So long after a hold no cell is left [s]."""
