@@ -30,7 +30,7 @@ from coop_drake.cli.kernel_cache import keep_kernels_somewhere
 from coop_drake.cli.maps import maps_command
 from coop_drake.cli.new import new_command
 from coop_drake.cli.plan import plan_command
-from coop_drake.cli.reporter import ExitCode
+from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.reproduce import reproduce_command
 from coop_drake.cli.robot import robot_command
 from coop_drake.cli.run import run_command
@@ -99,8 +99,8 @@ def main() -> None:
     keep_kernels_somewhere()
     try:
         code = app(arguments, standalone_mode=False)
-    except typer.Abort:
-        raise KeyboardInterrupt from None
+        if code == ExitCode.INTERRUPTED and not Reporter.complained:  # before or after the command itself
+            raise KeyboardInterrupt
     except _UsageError as error:  # type: ignore[misc]
         error.show()
         if "--json" in arguments:

@@ -66,7 +66,10 @@ class Reporter:
         facts: What ``--json`` writes, by name.
         code: The exit code of the command.
         verbose: As given.
+        complained: Whether any command of this process has shown an error.
     """
+
+    complained = False
 
     def __init__(self, *, machine: bool, quiet: bool, verbose: bool = False) -> None:
         self.verbose = verbose
@@ -158,6 +161,7 @@ class Reporter:
     def complain(self, text: str, **details: Any) -> None:
         """Show an error on standard error, and remember it and its details for the JSON object."""
         self.facts.update(error=text, **details)
+        Reporter.complained = True
         self._errors.print(f"[bold red]Error:[/] {escape(text)}", soft_wrap=True)
 
     def close(self) -> None:

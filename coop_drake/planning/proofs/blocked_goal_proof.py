@@ -115,6 +115,8 @@ class _Writer:
     def _depth(self, witness: Witness) -> float:
         """How deep the goal's position is in the positions that a polygon forbids, zero outside [m]."""
         goal = self._problem.goal_pose[:2]
+        if self._floor.is_empty:
+            return float("inf")
         middle = Point(goal + witness.polygon.mean(axis=0))
         depths = [0.0 if self._floor.covers(middle) else self._floor.distance(middle)]
         held = Polygon(goal + witness.polygon)
