@@ -117,9 +117,9 @@ def test_people_see_bars_and_a_table_and_quiet_shows_nothing(room, tmp_path):
     assert shown.exit_code == 0
     assert "planning" in shown.stdout
     assert "cells" in shown.stdout
-    assert "narrowest passage" not in shown.stdout
+    assert "smallest path clearance in a cell" not in shown.stdout
     more = invoke("plan", room, "--out", tmp_path, "--verbose")
-    assert "narrowest passage" in more.stdout
+    assert "smallest path clearance in a cell" in more.stdout
     assert invoke("plan", room, "--out", tmp_path, "--quiet").output == ""
 
 

@@ -45,7 +45,7 @@ class Request:
         criteria: NAME or NAME=WEIGHT.
         limits: Such as time<=16.
         vary: Names of gains that may change; empty for all.
-        budget: Runs to try.
+        runs: Runs to try.
         seed: Seed of the search.
         workers: Processes; None for one a core.
     """
@@ -53,7 +53,7 @@ class Request:
     criteria: tuple[str, ...]
     limits: tuple[str, ...]
     vary: tuple[str, ...]
-    budget: int
+    runs: int
     seed: int
     workers: int | None
 
@@ -96,7 +96,7 @@ def _search(
     """Search in worker processes, and show how far the search has come."""
     allowed = [limit.bound(objective.before) for limit in objective.limits if limit.criterion == "time"]
     longest = _PATIENCE * max([objective.before["time"], *allowed])
-    count = min(request.workers or os.cpu_count() or 1, request.budget)
+    count = min(request.workers or os.cpu_count() or 1, request.runs)
     with (
         reporter.stage("searching", "search") as progress,
         Workers(task.scenario.path, runner.plan, runner.maps, longest=longest, count=count) as workers,
@@ -106,7 +106,7 @@ def _search(
             parameters,
             objective,
             workers.try_all,
-            budget=request.budget,
+            runs=request.runs,
             seed=request.seed,
             progress=progress,
         )

@@ -35,7 +35,7 @@ _ROWS: tuple[tuple[str, str, str], ...] = (
 """Label, fact and format of every row of the closing table, in its order; unknown facts have no row."""
 _MORE_ROWS: tuple[tuple[str, str, str], ...] = (
     ("slices made", "slices", "{}"),
-    ("narrowest passage", "narrowest_neck_m", "{:.3f} m"),
+    ("smallest path clearance in a cell", "narrowest_neck_m", "{:.3f} m"),
     ("gains", "gains", "{}"),
     ("first plan certified after", "first_plan_cpu_seconds", "{:.2f} s"),
     ("mapping took", "mapping_wall_seconds", "{:.2f} s"),

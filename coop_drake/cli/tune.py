@@ -38,7 +38,7 @@ def tune_command(
         list[str] | None,
         typer.Option("--vary", metavar="GAIN", help="Gains that may change; all by default."),
     ] = None,
-    budget: Annotated[int, typer.Option("--budget", metavar="N", min=1, help="Runs to try.")] = 120,
+    runs: Annotated[int, typer.Option("--runs", metavar="N", min=1, help="Runs to try.")] = 120,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the search.")] = 0,
     workers: Annotated[
         int | None, typer.Option("--workers", metavar="N", min=1, help="Processes; one a core by default.")
@@ -59,7 +59,7 @@ def tune_command(
             tuple(criteria or ("peak_force",)),
             tuple(limits if limits is not None else ("time<=1x",)),
             tuple(vary or ()),
-            budget,
+            runs,
             seed,
             workers,
         )

@@ -1,18 +1,18 @@
 """Speed limits of the object and of the axes, kept by extra damping near a limit.
 
-With the acceleration a that the other laws ask for, and the velocity v, the damping lambda >= 0 is the least
+With the acceleration a that the other laws ask for, and the velocity v, the damping sigma >= 0 is the least
 for which
 
-    (a - lambda v) . v <= gamma (L^2 - |v|^2) / 2.
+    (a - sigma v) . v <= g (L^2 - |v|^2) / 2.
 
-Then h = (L^2 - |v|^2) / 2 obeys h' >= -gamma h: a speed that begins below its limit L stays below it. At half
-the limit and less, the law leaves room for accelerations of gamma L and more.
+Then h = (L^2 - |v|^2) / 2 obeys h' >= -g h: a speed that begins below its limit L stays below it. At half
+the limit and less, the law leaves room for accelerations of g L and more.
 
-Extra damping takes energy from the object: E of (16) falls by lambda |p'|^2 besides, and Delta E of (15)
-stays positive as it does without a limit. An axis in its funnel gets -lambda x' (x' - v) besides in V' of
+Extra damping takes energy from the object: E of (16) falls by sigma |p'|^2 besides, and Delta E of (15)
+stays positive as it does without a limit. An axis in its funnel gets -sigma x' (x' - v) besides in V' of
 ``track_axis``, which is not positive where x' has the direction of v and is at least as large. While x' is
 smaller, the law without a limit asks for k2 (v - x') + v' - kappa a s, and no damping is needed as long as
-gamma >= k2 and v' - kappa a s <= gamma (L - v): V decays as it does without a limit where the funnel is slow
+g >= k2 and v' - kappa a s <= g (L - v): V decays as it does without a limit where the funnel is slow
 against L. ``FUNNEL_SHARE`` sees to that.
 """
 
@@ -32,13 +32,13 @@ bound that follows it."""
 
 @compiled
 def speed_damping(power: float, speed_squared: float, limit: float, gain: float) -> float:
-    """Return lambda, the extra damping that keeps a speed below its limit [1/s].
+    """Return sigma, the extra damping that keeps a speed below its limit [1/s].
 
     Args:
         power: a . v [m^2/s^3 or rad^2/s^3].
         speed_squared: |v|^2 [m^2/s^2 or rad^2/s^2].
         limit: L; infinity for none [m/s or rad/s].
-        gain: gamma, the rate at which a speed may approach its limit [1/s].
+        gain: g, the rate at which a speed may approach its limit [1/s].
     """
     excess = power - 0.5 * gain * (limit * limit - speed_squared)
     return excess / speed_squared if excess > 0.0 and speed_squared > 0.0 else 0.0
@@ -46,13 +46,13 @@ def speed_damping(power: float, speed_squared: float, limit: float, gain: float)
 
 @compiled
 def damped(acceleration: float, rate: float, limit: float, gain: float) -> float:
-    """Return a - lambda x' of one axis [rad/s^2 or m/s^2].
+    """Return a - sigma x' of one axis [rad/s^2 or m/s^2].
 
     Args:
         acceleration: a [rad/s^2 or m/s^2].
         rate: x' [rad/s or m/s].
         limit: L; infinity for none [rad/s or m/s].
-        gain: gamma [1/s].
+        gain: g [1/s].
     """
     return acceleration - speed_damping(acceleration * rate, rate * rate, limit, gain) * rate
 

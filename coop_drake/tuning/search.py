@@ -61,13 +61,13 @@ def search(
     objective: Objective,
     try_all: TryAll,
     *,
-    budget: int,
+    runs: int,
     seed: int,
     progress: Callable[[str, float], None] | None = None,
 ) -> Search:
     """Search gains with a smaller score.
 
-    The result depends on the seed and the budget, not on the number of processes: every generation is
+    The result depends on the seed and the number of runs, not on the number of processes: every generation is
     simulated as a whole before the next is made. Ctrl-C ends the search and keeps the trials so far.
 
     Args:
@@ -75,26 +75,26 @@ def search(
         parameters: Gains that may change.
         objective: Gives the score of a trial.
         try_all: Simulates gain sets; yields their trials in the same order.
-        budget: Largest number of trials, besides ``before``.
+        runs: Largest number of trials, besides ``before``.
         seed: Seed of the search.
-        progress: Called with the best score so far and the fraction of the budget that is spent.
+        progress: Called with the best score so far and the fraction of the runs that are done.
 
     Raises:
         TuningError: The package ``cma`` is not installed.
     """
     found = Search(objective)
     found.add(before)
-    strategy = _strategy(to_fractions(before.gains, parameters), budget, seed)
+    strategy = _strategy(to_fractions(before.gains, parameters), runs, seed)
     try:
-        while len(found.trials) <= budget and not strategy.stop():
-            asked = strategy.ask()[: budget + 1 - len(found.trials)]
+        while len(found.trials) <= runs and not strategy.stop():
+            asked = strategy.ask()[: runs + 1 - len(found.trials)]
             scores = []
             for trial in try_all(
                 [with_fractions(before.gains, parameters, fractions) for fractions in asked]
             ):
                 scores.append(found.add(trial))
                 if progress is not None:
-                    progress(f"best score {min(found.scores):.3f}", (len(found.trials) - 1) / budget)
+                    progress(f"best score {min(found.scores):.3f}", (len(found.trials) - 1) / runs)
             if len(scores) == strategy.popsize:
                 strategy.tell(asked, scores)
     except KeyboardInterrupt:
@@ -115,14 +115,14 @@ def load_optimizer() -> Any:
         raise TuningError(message) from error
 
 
-def _strategy(start: np.ndarray, budget: int, seed: int) -> Any:
+def _strategy(start: np.ndarray, runs: int, seed: int) -> Any:
     """Return the strategy, ready for its first generation."""
     random = np.random.default_rng(seed)
     options = {
         "bounds": [0.0, 1.0],
         "seed": np.nan,  # A number would seed numpy's global generator; `randn` is used instead.
         "randn": lambda *shape: random.standard_normal(shape),
-        "maxfevals": budget,
+        "maxfevals": runs,
         "verbose": -9,
     }
     return load_optimizer().CMAEvolutionStrategy(start, _FIRST_STEP, options)

@@ -31,12 +31,10 @@ def at_once(gain_sets):
     return [bowl(gains) for gains in reversed(gain_sets)][::-1]
 
 
-def searched(try_all=one_by_one, *, budget=60, seed=0, names=("age_phase", "funnel_acceleration")):
+def searched(try_all=one_by_one, *, runs=60, seed=0, names=("age_phase", "funnel_acceleration")):
     before = bowl(ScheduledGains())
     objective = Objective({"peak_force": 1.0}, (), before.outcome.values)
-    return search(
-        before, tunable_parameters(before.gains, names), objective, try_all, budget=budget, seed=seed
-    )
+    return search(before, tunable_parameters(before.gains, names), objective, try_all, runs=runs, seed=seed)
 
 
 @pytest.mark.parametrize("gain_set", SETS, ids=lambda gains: type(gains).__name__)
@@ -67,7 +65,7 @@ def test_a_gain_that_cannot_be_turned_is_refused():
 
 
 @pytest.mark.parametrize("names", [("age_phase", "funnel_acceleration"), ()])
-def test_gains_get_better_and_the_budget_is_kept(names):
+def test_gains_get_better_and_the_number_of_runs_is_kept(names):
     found = searched(names=names)
     assert len(found.trials) == 61
     assert found.scores[0] == 1.0
@@ -87,9 +85,9 @@ def test_the_same_seed_gives_the_same_gains_however_runs_are_spread():
     np.testing.assert_array_equal(np.random.get_state()[1], state)  # noqa: NPY002
 
 
-@pytest.mark.parametrize("budget", [1, 7])
-def test_a_budget_below_a_generation_is_spent_and_no_more(budget):
-    assert len(searched(budget=budget).trials) == 1 + budget
+@pytest.mark.parametrize("runs", [1, 7])
+def test_fewer_runs_than_a_generation_are_made_and_no_more(runs):
+    assert len(searched(runs=runs).trials) == 1 + runs
 
 
 def test_ctrl_c_ends_the_search_with_what_was_found():

@@ -30,7 +30,7 @@ def called(*arguments):
 
 
 def test_a_gain_set_comes_out_that_the_scenario_takes(room, tmp_path):
-    result = called(room, "--budget", 2, "--workers", 1, "--vary", "age_phase", "--out", tmp_path, "--json")
+    result = called(room, "--runs", 2, "--workers", 1, "--vary", "age_phase", "--out", tmp_path, "--json")
     assert result.exit_code == 0, result.output
     facts = json.loads(result.stdout.splitlines()[-1])
     assert facts["trials"] == 2
