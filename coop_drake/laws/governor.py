@@ -28,8 +28,8 @@ for integration steps of 0.02 s. With a larger rate the robots' copies of p_G wo
 rounding."""
 
 AHEAD = 2.0
-"""The clearance that drives p_G, over that at which the largest speed is steady, is at most this [-]: with 1
-an object would take longer to reach a speed that it reaches without a limit."""
+"""Under a speed limit p_G moves as if the clearance were at most this times ``steady_clearance`` [-]. With 1
+the object would approach its largest speed more slowly than without a limit."""
 
 VELOCITY_STEP = 2.0**-26
 """The loop computes the energy from a velocity rounded to a multiple of this [m/s], some 1.5e-8 m/s. Each

@@ -14,10 +14,11 @@ from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, index_of
 from coop_drake.systems.funnel_clock import CLOCK_SIZE
 
 REQUEST_SIZE = 2
-"""Size of a request: 1 to be held, else 0 [-], and the number of the message [-], by which it is new."""
+"""Size of a request: 1 to be held, else 0 [-], and the number of the message [-], new for a new one."""
 
 RELEASE = 0.5
-"""A request ends when all energies are below this share of the limit [-], so that noise makes no second."""
+"""A request ends when all energies are below this share of the limit [-], so that noise does not
+begin a second one at once."""
 
 
 class HoldMonitor(Block):

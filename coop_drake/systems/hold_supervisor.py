@@ -22,13 +22,13 @@ class HoldSupervisor(Block):
     output  ``hold``              1     1 where the team is held, else 0 [-]
     output  ``paused``            1     1 while the funnels' clock does not run as usual, else 0: the
                                         cell must not be left [-]
-    output  ``causes``            1 + N of the order, then of each robot: 0 for no cause, 1 where it is
-                                        told, 2 where a robot asks, 3 where it is not heard [-]
+    output  ``causes``            1 + N first the order (0, or 1 where the team is told to hold), then each
+                                        robot: 0 for no cause, 2 where it asks, 3 where it is not heard [-]
     ======= ===================== ===== ================================================================
 
     State: one discrete group, updated at the start of every step, or every ``period``: the time at which the
-    last hold ended, the causes, and for each robot the number of its last message and the time at which it
-    was first heard.
+    last hold ended, the causes, and for each robot the number of its last message and the time at which
+    that message arrived.
 
     Args:
         robots: Number of robots N.

@@ -83,7 +83,8 @@ def follow_tube(
         row: The axis, a row of an ``axis_table``.
         conditions: What disturbs it.
         entry: x and v at the entry, the most that they may depart from these, the largest |x''| and command
-            at the entry, and the largest |x''| in the time before of which measurements still speak.
+            at the entry, and the largest |x''| before the entry, as far back as the oldest measurement
+            that is used after it.
         jump: What is added to the command and fades, see ``rest_jump``.
         tube: Receives the tube, shape (samples, ``COLUMNS``).
     """

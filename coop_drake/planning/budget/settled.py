@@ -77,8 +77,8 @@ def settle(
         row: The axis, a row of an ``axis_table``.
         conditions: What disturbs it.
         time: t0, not before the funnel is closed [s].
-        entry: The most that x, v and x'' may depart from the middle, from rest and from zero at t0 and in the
-            time before of which measurements then speak.
+        entry: The most that x, v and x'' may depart from the middle, from rest and from zero at t0, and
+            before t0 as far back as the oldest measurement that is used after it.
         followed: The most that x and v may depart from t0 until the end of the tube.
         samples: Number of samples from t0 to the end of the tube, see ``tail_samples``.
     """
