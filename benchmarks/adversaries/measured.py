@@ -19,7 +19,7 @@ from coop_drake.answers import PlannerSettings
 
 __all__ = ["adversary_tasks", "random_answers"]
 
-SEEDS = {11: 167, 12: 167, 13: 166}
+SEEDS = {11: 172, 12: 172, 13: 171}
 """Seeds of random questions, with how many are answered and checked for each."""
 
 SLICES = 500
