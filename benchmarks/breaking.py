@@ -17,7 +17,8 @@ from benchmarks.tasks import Task
 from coop_drake.answers import Found
 from coop_drake.answers.budget import Budget
 from coop_drake.laws.axis_table import axis_table, track_row
-from coop_drake.planning.budget.axis_sets import Entry, axis_sets, conditions_of, whole_periods
+from coop_drake.laws.sampling import whole_periods
+from coop_drake.planning.budget.axis_sets import Entry, axis_sets, conditions_of
 from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
 from coop_drake.tree.pose import FloatArray
 

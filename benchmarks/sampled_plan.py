@@ -12,7 +12,7 @@ from coop_drake.compiled import compiled
 from coop_drake.laws.axis_table import FADING_TIME, LEAVING_TIME, axis_table, bounds_of, rest_jump, track_row
 from coop_drake.laws.hand_over import fading
 from coop_drake.laws.readiness import axis_ready
-from coop_drake.planning.budget.axis_sets import whole_periods
+from coop_drake.laws.sampling import whole_periods
 from coop_drake.tree.pose import FloatArray
 
 HELD, SLOWEST = 0.5, 6.0

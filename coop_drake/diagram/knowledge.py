@@ -13,9 +13,10 @@ from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.laws.disturbance import observer_gains
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
+from coop_drake.laws.sampling import whole_periods
 from coop_drake.plant import RobotPlant, TeamPlant, build_robot_plant
 from coop_drake.scenario import Scenario
-from coop_drake.systems import GovernedCell, NominalMotion, whole_periods
+from coop_drake.systems import GovernedCell, NominalMotion
 
 REPORT_PERIODS = 2
 """Periods in which p_G moves on in the old cell after a report was received [-]: the one in which the switch

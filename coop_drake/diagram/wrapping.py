@@ -20,8 +20,9 @@ from pydrake.systems.primitives import (
 )
 
 from coop_drake.diagram.radio import build_radio, seed_of
+from coop_drake.laws.sampling import whole_periods
 from coop_drake.scenario import Deployment, PoseBias, RobotDepartures, Silence
-from coop_drake.systems import Interruption, LossyMeasurement, whole_periods
+from coop_drake.systems import Interruption, LossyMeasurement
 from coop_drake.tree.pose import FloatArray
 
 Holding: TypeAlias = DiscreteTimeDelay | ZeroOrderHold | LossyMeasurement

@@ -41,7 +41,7 @@ funnel's width [-], the time T in which the commands of the last cell fade [s], 
 cell may be entered, the time after which it may be left [s], and within what an axis must be to leave it at
 rest: the distance from the middle of the goal interval [rad or m] and the rate [rad/s or m/s]; both are 0
 where V alone decides. The last columns are the limit of the axis's rate, infinity for none [rad/s or m/s],
-and gamma, the rate at which the axis may approach it [1/s]."""
+and g, the rate at which the axis may approach it [1/s]."""
 
 SLICE_LOWER, SLICE_UPPER, GOAL_LOWER, GOAL_UPPER, DECAY_RATE, QUINTIC = range(6)
 LOG_GAIN, POSITION_GAIN, RATE_GAIN, RAMP_RATE, SATURATION, FADING_TIME, ENERGY_BOUND = range(6, 13)
@@ -89,7 +89,7 @@ def write_row(
         scheduled: lambda, kappa and the largest V, as ``scheduled_axis`` returns them.
         gains: k1, k2 and mu [1/s], the smallest distance to a bound over the width [-], and T [s].
         quintic: Whether the funnel is quintic.
-        rate_limit: Largest rate of the axis, infinity for none [rad/s or m/s], and gamma [1/s].
+        rate_limit: Largest rate of the axis, infinity for none [rad/s or m/s], and g [1/s].
     """
     row[SLICE_LOWER], row[SLICE_UPPER], row[GOAL_LOWER], row[GOAL_UPPER] = intervals
     row[DECAY_RATE], row[LOG_GAIN], row[ENERGY_BOUND] = scheduled

@@ -50,7 +50,7 @@ class Schedule(NamedTuple):
         log_acceleration: Largest kappa |a s| when a transition is entered at rest [rad/s^2 or m/s^2].
         position_gain: k1 [1/s].
         rate_gain: k2 [1/s].
-        limit_gain: gamma, the rate at which an axis may approach the limit of its rate [1/s].
+        limit_gain: g, the rate at which an axis may approach the limit of its rate [1/s].
         ramp_rate: mu [1/s].
         saturation: Smallest distance to a funnel bound, over the funnel's width [-].
         hand_over_time: T, in which the commands of the last cell fade [s].

@@ -77,7 +77,7 @@ class TransitionGains:
             decides.
         speed_limit: Largest speed of the object's origin; null for none [m/s].
         rate_limit: Largest rate of every axis; null for none, shape (1 + n,) [rad/s or m/s].
-        limit_gain: gamma, the rate at which an axis may approach its limit; null without limits [1/s].
+        limit_gain: g, the rate at which an axis may approach its limit; null without limits [1/s].
     """
 
     stiffness: Gain
@@ -124,7 +124,7 @@ class TransitionGains:
         )
 
     def rate_limit_of(self, axis: int) -> tuple[float, float]:
-        """Return the largest rate of an axis, infinity for none [rad/s or m/s], and gamma [1/s]."""
+        """Return the largest rate of an axis, infinity for none [rad/s or m/s], and g [1/s]."""
         if self.rate_limit is None or self.limit_gain is None:
             return inf, 0.0
         return float(self.rate_limit[axis]), self.limit_gain
@@ -148,7 +148,7 @@ class FixedGains:
         log_gain: kappa [rad^2/s^2 or m^2/s^2].
         position_gain: k1 [1/s].
         rate_gain: k2 [1/s].
-        limit_gain: gamma, the rate at which an axis may approach a limit of its rate, if there is one; the
+        limit_gain: g, the rate at which an axis may approach a limit of its rate, if there is one; the
             paper has no such limits [1/s].
         ramp_rate: mu, the rate at which k1 is ramped in; 0 for k1 at once [1/s].
         saturation: Smallest distance to a funnel bound with which the law computes, over the width [-]. By

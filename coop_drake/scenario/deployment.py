@@ -12,9 +12,10 @@ list.
 """
 
 from dataclasses import dataclass, field
-from math import ceil, sqrt
+from math import sqrt
 from typing import Annotated, Literal
 
+from coop_drake.laws.sampling import whole_periods
 from coop_drake.scenario.limits import ALL_ROBOTS
 from coop_drake.scenario.presets import Preset, with_preset
 from coop_drake.typed_data import Limits, NotNegative, Positive
@@ -232,9 +233,9 @@ class Deployment:
 
     @property
     def whole_delay(self) -> float:
-        """Delay of measurements, rounded up to whole periods as ``whole_periods`` of the systems does [s]."""
+        """Delay of measurements, rounded up to whole periods [s]."""
         period = self.period
-        return 0.0 if period is None else ceil(self.measurements.delay / period - 1e-9) * period
+        return 0.0 if period is None else whole_periods(self.measurements.delay, period) * period
 
     @property
     def held_age(self) -> float:

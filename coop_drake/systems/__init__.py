@@ -12,7 +12,7 @@ from coop_drake.systems.hold_monitor import REQUEST_SIZE, HoldMonitor
 from coop_drake.systems.hold_supervisor import HoldSupervisor
 from coop_drake.systems.interruption import Interruption
 from coop_drake.systems.lossy_measurement import LossyMeasurement
-from coop_drake.systems.message_channel import MessageChannel, clear_channel, whole_periods
+from coop_drake.systems.message_channel import MessageChannel, clear_channel
 from coop_drake.systems.nominal_governor import NominalGovernor, NominalMotion
 from coop_drake.systems.object_estimator import ObjectEstimator
 from coop_drake.systems.ready_monitor import ReadyMonitor
@@ -59,5 +59,4 @@ __all__ = [
     "build_selector",
     "build_separate_sensor",
     "clear_channel",
-    "whole_periods",
 ]

@@ -7,8 +7,8 @@ from random import Random
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 
+from coop_drake.laws.sampling import whole_periods
 from coop_drake.systems.block import Block
-from coop_drake.systems.message_channel import whole_periods
 from coop_drake.tree.pose import FloatArray
 
 

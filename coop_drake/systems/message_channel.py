@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 from pydrake.systems.primitives import LinearSystem
 
+from coop_drake.laws.sampling import whole_periods
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import READY_SIZE
 
@@ -92,8 +93,3 @@ def clear_channel(period: float) -> LinearSystem:
     hold = LinearSystem(A=no, B=passed, C=passed, D=no, time_period=period)
     hold.configure_default_state(_NOTHING)
     return hold
-
-
-def whole_periods(time: float, period: float) -> int:
-    """Return the number of periods that a time takes, rounded up unless it is whole up to rounding errors."""
-    return int(np.ceil(time / period - 1e-9))

@@ -3,7 +3,8 @@ import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-from coop_drake.systems import MessageChannel, clear_channel, whole_periods
+from coop_drake.laws.sampling import whole_periods
+from coop_drake.systems import MessageChannel, clear_channel
 from tests.support.system_checks import assert_every_input_is_required, evaluate, port_sizes
 
 PERIOD = 0.1

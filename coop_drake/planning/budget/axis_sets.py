@@ -18,6 +18,7 @@ from coop_drake.laws.axis_table import (
     track_row,
 )
 from coop_drake.laws.funnels import CLOSING
+from coop_drake.laws.sampling import whole_periods
 from coop_drake.planning.budget.axis_tube import (
     ACCELERATION,
     COLUMNS,
@@ -112,11 +113,6 @@ def conditions_of(budget: Budget) -> tuple[AxisConditions, ...]:
         )
         for i in range(parts)
     )
-
-
-def whole_periods(time: float, period: float) -> int:
-    """Return a time in periods, rounded up; a millionth more does not count as another period."""
-    return ceil(time / period - 1e-6)
 
 
 def axis_sets(row: FloatArray, conditions: Sequence[AxisConditions], entry: Entry, parts: int) -> AxisSets:

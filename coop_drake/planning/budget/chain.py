@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 from coop_drake.answers.budget import Budget
 from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, LEAVING_TIME, REST_RATE, REST_REACH
 from coop_drake.laws.readiness import EROSION
-from coop_drake.planning.budget.axis_sets import AxisSets, Entry, axis_sets, conditions_of, whole_periods
+from coop_drake.laws.sampling import whole_periods
+from coop_drake.planning.budget.axis_sets import AxisSets, Entry, axis_sets, conditions_of
 from coop_drake.planning.budget.axis_tube import AxisConditions
 from coop_drake.planning.budget.leaving import next_entry, rest_needed, settling_time
 from coop_drake.planning.budget.rate_room import comes_near_limit
@@ -104,7 +105,7 @@ def _stricter(link: Link, conditions: AxisConditions) -> Link:
     """Return a transition whose cell is left under the next stricter condition."""
     table, strictness = link.table.copy(), link.strictness + 1
     for row, sets in zip(table, link.sets, strict=True):
-        reach, rate = rest_needed(row, sets, conditions)
+        reach, rate = rest_needed(sets, conditions)
         row[REST_REACH], row[REST_RATE] = min(REST_FACTOR * reach, row[REST_REACH]), REST_FACTOR * rate
     if strictness == STRICTEST:
         times = [settling_time(row, sets, conditions) for row, sets in zip(table, link.sets, strict=True)]
@@ -126,7 +127,7 @@ def _link(
             return Limit(k, axis, "may leave its funnel")
         if comes_near_limit(row, sets, conditions, entry):
             return Limit(k, axis, "may come so near the limit of its rate that it is damped")
-        reach, rate = rest_needed(row, sets, conditions[0])
+        reach, rate = rest_needed(sets, conditions[0])
         half = (0.5 - EROSION) * (row[GOAL_UPPER] - row[GOAL_LOWER])
         if not (1.0 + SLACK) * reach < half:
             return Limit(k, axis, "may never come to rest in its goal interval")

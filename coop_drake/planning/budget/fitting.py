@@ -12,7 +12,8 @@ from coop_drake.answers.plan import Plan, Transition
 from coop_drake.laws import Funnel, ScheduledGains, transition_gains
 from coop_drake.laws.axis_table import LEAVING_TIME, REST_RATE, REST_REACH, axis_table
 from coop_drake.laws.gains import RestCondition
-from coop_drake.planning.budget.axis_sets import AxisSets, Entry, whole_periods
+from coop_drake.laws.sampling import whole_periods
+from coop_drake.planning.budget.axis_sets import AxisSets, Entry
 from coop_drake.planning.budget.chain import SLACK, Limit, Link, follow_chain
 from coop_drake.planning.execution.estimate import timed
 from coop_drake.tree.pose import FloatArray

@@ -21,7 +21,7 @@ SETTLED_FACTOR = 1.5
 """An axis counts as settled while it departs from rest by so many times what it does in the end [-]."""
 
 
-def rest_needed(row: FloatArray, sets: AxisSets, conditions: AxisConditions) -> tuple[float, float]:
+def rest_needed(sets: AxisSets, conditions: AxisConditions) -> tuple[float, float]:
     """Return distance and rate within which a settled axis is measured [rad or m, rad/s or m/s]."""
     return sets.settled + conditions.position_noise, sets.settled_rate + conditions.rate_noise
 

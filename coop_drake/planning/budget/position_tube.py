@@ -24,6 +24,7 @@ from scipy.linalg import expm
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.position_tube import PositionTube
+from coop_drake.laws.sampling import whole_periods
 from coop_drake.tree.pose import FloatArray
 
 MODEL_PARTS = 5
@@ -119,7 +120,7 @@ def _response_sums(gains: Sequence[PositionGains], budget: Budget, error: float)
     the last one is not used. A disturbance w within a period acts on the sample after it by (T - t) on e and
     by 1 on e'; |h_e (T - t) + h_v| is convex in t, so that its chord is above it.
     """
-    T, delay = budget.period, ceil(budget.delay / budget.period - 1e-6)
+    T, delay = budget.period, whole_periods(budget.delay, budget.period)
     loops = [_loop(own, T, delay, budget.lag, error) for own in gains]
     matrix, held, feedback, nominal = (np.array(part) for part in zip(*loops, strict=True))
     state = np.zeros((len(gains), matrix.shape[1], 4))

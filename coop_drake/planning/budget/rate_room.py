@@ -15,7 +15,7 @@ from coop_drake.tree.pose import FloatArray
 def comes_near_limit(
     row: FloatArray, sets: AxisSets, conditions: Sequence[AxisConditions], entry: Entry
 ) -> bool:
-    """Return whether a x' <= gamma (L^2 - x'^2) / 2 may fail for what an axis measures and is commanded.
+    """Return whether a x' <= g (L^2 - x'^2) / 2 may fail for what an axis measures and is commanded.
 
     Sets are those of the law without a limit; they hold with it where the damping is zero at all times.
 

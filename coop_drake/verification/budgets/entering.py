@@ -35,7 +35,7 @@ def entering(
         stated: What the transition states.
     """
     T, middle = budget.period, 0.5 * (transition.goal_lower + transition.goal_upper)
-    since = ceil(budget.delay / T - 1e-6) + ceil(budget.report_age / T - 1e-6) + 1
+    since = ceil(budget.delay / T - 1e-9) + ceil(budget.report_age / T - 1e-9) + 1
     stay = ceil(max(transition.gains.hand_over_time, rest.after) / T - 1e-6)
     result = np.empty((6, middle.size))
     for axis in range(middle.size):

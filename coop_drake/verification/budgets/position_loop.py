@@ -97,7 +97,7 @@ def _sums(
     The second run's are those to a unit of acceleration at all times, the fourth run's those to a unit of
     speed of p_G; the third run's are not used.
     """
-    T, delay = budget.period, ceil(budget.delay / budget.period - 1e-6)
+    T, delay = budget.period, ceil(budget.delay / budget.period - 1e-9)
     p, v, s = np.zeros((3, 4, len(errors)))
     q, w, goal = np.zeros((3, 4, 1))  # the nominal motion and p_G, which only the last run moves
     v[KICK], p[PLACE], goal[STEP] = 1.0, 1.0, 1.0

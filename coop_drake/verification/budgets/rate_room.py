@@ -19,7 +19,7 @@ def check_rate_room(
     delay: int,
     where: str,
 ) -> None:
-    """Refuse sets in which an acceleration times the rate may exceed gamma (limit^2 - rate^2) / 2.
+    """Refuse sets in which an acceleration times the rate may exceed g (limit^2 - rate^2) / 2.
 
     The sets are those of the law without limits.
 

@@ -39,7 +39,7 @@ class Disturbed:
     @property
     def delay(self) -> int:
         """Age of a measurement in whole periods."""
-        return ceil(self.budget.delay / self.budget.period - 1e-6)
+        return ceil(self.budget.delay / self.budget.period - 1e-9)
 
     @property
     def carry(self) -> tuple[FloatArray, FloatArray]:
