@@ -13,7 +13,7 @@ from coop_drake.answers import Plan
 from coop_drake.answers.budget import Budget
 from coop_drake.laws import ScheduledGains
 from coop_drake.laws.nominal import nominal_flow
-from coop_drake.planning.budget.position_fit import PositionLimit, fit_position
+from coop_drake.planning.budget.position_fit import UnprovedPosition, fit_position
 from coop_drake.planning.budget.position_tube import PositionGains, position_tubes
 from coop_drake.planning.execution.transitions import with_gains
 from coop_drake.plant import planning_problem
@@ -104,7 +104,7 @@ def test_what_does_not_hold_is_said(name):
     scenario, plan = small_problem()
     budget, said = LIMITS[name]
     found = fit_position(planning_problem(scenario), plan, ScheduledGains(), budget)
-    assert isinstance(found, PositionLimit)
+    assert isinstance(found, UnprovedPosition)
     assert re.search(said, found.reason)
 
 
@@ -123,5 +123,5 @@ def test_a_cell_that_is_too_narrow_is_named():
     cell = replace(plan.cells[1], tidied=box(x - 0.005, y - 0.005, x + 3.0, y + 0.005))
     narrow = replace(plan, cells=(plan.cells[0], cell, *plan.cells[2:]))
     found = fit_position(planning_problem(scenario), narrow, ScheduledGains(), BUDGET)
-    assert isinstance(found, PositionLimit)
+    assert isinstance(found, UnprovedPosition)
     assert "in transition 0 the object may depart" in found.reason

@@ -14,7 +14,12 @@ from coop_drake.laws.axis_table import LEAVING_TIME, REST_RATE, REST_REACH, axis
 from coop_drake.laws.gains import RestCondition
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.planning.budget.axis_sets import AxisSets, Entry
-from coop_drake.planning.budget.chain import SLACK, Limit, Link, follow_chain
+from coop_drake.planning.budget.transitions import (
+    SLACK,
+    ProvedTransition,
+    UnprovedTransition,
+    follow_transitions,
+)
 from coop_drake.planning.execution.estimate import timed
 from coop_drake.tree.pose import FloatArray
 
@@ -31,7 +36,7 @@ TYPICAL = (1.0, 1.5, 4.0)
 axes that move far."""
 
 
-def fit_budget(plan: Plan, gain_set: ScheduledGains, budget: Budget) -> Plan | Limit:
+def fit_budget(plan: Plan, gain_set: ScheduledGains, budget: Budget) -> Plan | UnprovedTransition:
     """Choose gains for every transition so that a budget holds, the quickest that do.
 
     Args:
@@ -47,11 +52,11 @@ def fit_budget(plan: Plan, gain_set: ScheduledGains, budget: Budget) -> Plan | L
         transitions = _with_gains(plan, replace(gain_set, command_age=factor * gain_set.age))
         again = replace(plan, transitions=transitions)
         tables = [axis_table(again.funnel(k), one.gains) for k, one in enumerate(transitions)]
-        links = follow_chain(tables, plan.start[2:], budget)
-        if not isinstance(links, Limit):
-            fitted = tuple(_stated(*pair, factor) for pair in zip(transitions, links, strict=True))
+        proved = follow_transitions(tables, plan.start[2:], budget)
+        if not isinstance(proved, UnprovedTransition):
+            fitted = tuple(_stated(*pair, factor) for pair in zip(transitions, proved, strict=True))
             return timed(replace(plan, transitions=fitted, budget=budget))
-        first = first or links
+        first = first or proved
     assert first is not None  # there is a factor
     return first
 
@@ -66,7 +71,7 @@ def sufficient_overlap(gain_set: ScheduledGains, budget: Budget) -> float:
             gains = replace(gain_set, command_age=factor * gain_set.age)
             forth, back = (_typical(gains, overlap, way) for way in (False, True))
             start = np.full(len(TYPICAL), 0.5 * overlap)
-            if not isinstance(follow_chain([forth, back, forth], start, budget), Limit):
+            if not isinstance(follow_transitions([forth, back, forth], start, budget), UnprovedTransition):
                 return overlap
     return OVERLAPS[-1]
 
@@ -114,14 +119,14 @@ def _with_gains(plan: Plan, gain_set: ScheduledGains) -> tuple[Transition, ...]:
     return tuple(transitions)
 
 
-def _stated(transition: Transition, link: Link, factor: float) -> Transition:
+def _stated(transition: Transition, passed: ProvedTransition, factor: float) -> Transition:
     """Return a transition with what it states: its condition of rest, and the sets of its axes."""
-    table = link.table
+    table = passed.table
     rest = RestCondition(
         float(table[0, LEAVING_TIME]), table[:, REST_REACH].copy(), table[:, REST_RATE].copy()
     )
     gains = replace(transition.gains, rest=rest)
-    return replace(transition, gains=gains, tolerance=_tolerance(factor, link.entries, link.sets))
+    return replace(transition, gains=gains, tolerance=_tolerance(factor, passed.entries, passed.sets))
 
 
 def _tolerance(factor: float, entries: Sequence[Entry], every: Sequence[AxisSets]) -> Tolerance:

@@ -61,8 +61,8 @@ GAP = 1e-6
 
 
 @dataclass(frozen=True)
-class PositionLimit:
-    """Where the position does not hold under a budget.
+class UnprovedPosition:
+    """Why a budget cannot be shown to hold for the position.
 
     Attributes:
         reason: What cannot be shown, in words.
@@ -73,7 +73,7 @@ class PositionLimit:
 
 def fit_position(
     problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget
-) -> Plan | PositionLimit:
+) -> Plan | UnprovedPosition:
     """Choose gains and regions with which the object's position holds under a budget, the quickest that do.
 
     Args:
@@ -97,14 +97,14 @@ def fit_position(
 
 def _fastest(
     problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget, stiffness: float
-) -> Plan | PositionLimit:
+) -> Plan | UnprovedPosition:
     """Return a plan with one K for all transitions, and the largest speed of p_G that holds."""
     uniform = _with_stiffness(plan, stiffness, gain_set)
-    found: Plan | PositionLimit = PositionLimit(
+    found: Plan | UnprovedPosition = UnprovedPosition(
         "the object's position is not stable under the delay, the lag and the model's error"
     )
     for tube in _tubes(stiffness, gain_set, budget):
-        found = _limit(tube, budget, problem, uniform) or _within(problem, uniform, tube)
+        found = _not_allowed(tube, budget, problem, uniform) or _within(problem, uniform, tube)
         if isinstance(found, Plan):
             return timed(replace(found, budget=budget))
     return found  # of the slowest motion, which has the narrowest tube
@@ -124,23 +124,25 @@ def _tubes(stiffness: float, gain_set: ScheduledGains, budget: Budget) -> list[P
     return [min(tubes, key=lambda tube: tube.radius) for tubes in of_speed if tubes]
 
 
-def _limit(tube: PositionTube, budget: Budget, problem: PlanningProblem, plan: Plan) -> PositionLimit | None:
+def _not_allowed(
+    tube: PositionTube, budget: Budget, problem: PlanningProblem, plan: Plan
+) -> UnprovedPosition | None:
     """Return what the tube itself does not allow: a force, a speed, or a rest too far from the goal."""
     fastest = plan.transitions[0].gains.speed_limit
     if fastest is not None and tube.velocity > fastest:
-        return PositionLimit(
+        return UnprovedPosition(
             f"the object may be as fast as {tube.velocity:.2f} m/s; its limit is {fastest:.2f} m/s"
         )
     if tube.rest > (1.0 - SMALLEST_SHARE) * problem.position_tolerance:
         allowed = (1.0 - SMALLEST_SHARE) * problem.position_tolerance
-        return PositionLimit(
+        return UnprovedPosition(
             f"the object may rest {1e3 * tube.rest:.1f} mm from the goal; the goal's tolerance allows "
             f"{1e3 * allowed:.1f} mm"
         )
     if budget.base_force is not None and budget.moved_mass is not None:
         force = budget.moved_mass * tube.acceleration
         if force > budget.base_force:
-            return PositionLimit(f"a base may need {force:.0f} N to move the object's position")
+            return UnprovedPosition(f"a base may need {force:.0f} N to move the object's position")
     return None
 
 
@@ -154,7 +156,7 @@ def _with_stiffness(plan: Plan, stiffness: float, gain_set: ScheduledGains) -> P
     return replace(plan, transitions=transitions)
 
 
-def _within(problem: PlanningProblem, plan: Plan, tube: PositionTube) -> Plan | PositionLimit:
+def _within(problem: PlanningProblem, plan: Plan, tube: PositionTube) -> Plan | UnprovedPosition:
     """Return a plan whose regions, targets and paths leave room for the tube; or where there is none."""
     strips = [
         cell.tidied.buffer(-(tube.radius + GAP), join_style="mitre", mitre_limit=MITRE_LIMIT)
@@ -182,8 +184,8 @@ def _within(problem: PlanningProblem, plan: Plan, tube: PositionTube) -> Plan | 
     return replace(plan, transitions=tuple(transitions), tube=tube)
 
 
-def _no_room(k: int, tube: PositionTube) -> PositionLimit:
-    return PositionLimit(
+def _no_room(k: int, tube: PositionTube) -> UnprovedPosition:
+    return UnprovedPosition(
         f"in transition {k} the object may depart from its nominal motion by {1e3 * tube.radius:.1f} mm, "
         "more than the cell leaves"
     )

@@ -12,9 +12,9 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
-from coop_drake.planning.budget.chain import Limit
 from coop_drake.planning.budget.fitting import OVERLAPS, fit_budget, sufficient_overlap
-from coop_drake.planning.budget.position_fit import PositionLimit, fit_position
+from coop_drake.planning.budget.position_fit import UnprovedPosition, fit_position
+from coop_drake.planning.budget.transitions import UnprovedTransition
 from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.progress import Progress
 
@@ -72,7 +72,7 @@ def tolerant_plan(
         PlanError: No plan can be made.
         StallError: No plan can be executed.
     """
-    tried: list[tuple[Plan, Limit | PositionLimit]] = []
+    tried: list[tuple[Plan, UnprovedTransition | UnprovedPosition]] = []
     for overlap in _overlaps(gain_set, budget):
         try:
             plan = quickest_plan(
@@ -96,23 +96,23 @@ def tolerant_plan(
 
 def _beyond(
     problem: PlanningProblem,
-    tried: list[tuple[Plan, Limit | PositionLimit]],
+    tried: list[tuple[Plan, UnprovedTransition | UnprovedPosition]],
     gain_set: ScheduledGains,
     budget: Budget,
 ) -> BeyondBudget:
     """Find the largest share of the budget that holds for one of the plans, by bisection."""
     best, said = 0.0, _sentence(*tried[0])
-    for plan, limit in tried:
+    for plan, unproved in tried:
         low, high, share = best, 1.0, best + SHARE_STEP
         while high - low > SHARE_STEP:
             found = _fitted(problem, plan, gain_set, budget.scaled(share))
             if isinstance(found, Plan):
                 low = share
             else:
-                high, limit = share, found
+                high, unproved = share, found
             share = 0.5 * (low + high)
         if low > best:
-            best, said = low, _sentence(plan, limit)
+            best, said = low, _sentence(plan, unproved)
     return BeyondBudget(said, budget, best)
 
 
@@ -127,23 +127,23 @@ def _overlaps(gain_set: ScheduledGains, budget: Budget) -> list[float]:
 
 def _fitted(
     problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget
-) -> Plan | Limit | PositionLimit:
+) -> Plan | UnprovedTransition | UnprovedPosition:
     """Return a plan with gains, sets and regions under which its budget holds; or where it does not."""
     if budget.axes:
         fitted = fit_budget(plan, gain_set, budget)
-        if isinstance(fitted, Limit):
+        if isinstance(fitted, UnprovedTransition):
             return fitted
         plan = fitted
     return fit_position(problem, plan, gain_set, budget)
 
 
-def _sentence(plan: Plan, limit: Limit | PositionLimit) -> str:
+def _sentence(plan: Plan, unproved: UnprovedTransition | UnprovedPosition) -> str:
     """Say where a budget does not hold, with the names of the robot and of the joint."""
-    if isinstance(limit, PositionLimit):
-        return limit.reason
+    if isinstance(unproved, UnprovedPosition):
+        return unproved.reason
     name = "the object's angle"
-    if limit.axis > 0:
-        robot, _, joint = plan.joint_names[limit.axis - 1].rpartition("::")
+    if unproved.axis > 0:
+        robot, _, joint = plan.joint_names[unproved.axis - 1].rpartition("::")
         name = f"the joint {joint} of {robot}" if robot else f"the joint {joint}"
     last = len(plan.transitions) - 1
-    return f"in transition {limit.transition} of 0 to {last}, {name} {limit.reason}"
+    return f"in transition {unproved.transition} of 0 to {last}, {name} {unproved.reason}"

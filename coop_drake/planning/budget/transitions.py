@@ -24,7 +24,8 @@ QUICK_RATE = 0.2
 [rad/s or m/s]: most transitions hold with it, and waiting for less costs time."""
 
 STRICTEST = 2
-"""Largest ``strictness``: the number of the last of three conditions under which a cell may be left [-]."""
+"""Largest ``ProvedTransition.strictness``: the number of the last condition under which a cell may be left
+[-]."""
 
 ENTRY_PARTS = (1, 3)
 """Parts into which the positions at an entry are cut, tried in this order [-]."""
@@ -34,8 +35,8 @@ SLACK = 1e-3
 
 
 @dataclass(frozen=True)
-class Limit:
-    """Where a budget does not hold.
+class UnprovedTransition:
+    """The first transition for which a budget cannot be shown to hold.
 
     Attributes:
         transition: Index of the transition.
@@ -49,7 +50,7 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Link:
+class ProvedTransition:
     """One transition for which a budget holds.
 
     Attributes:
@@ -65,7 +66,9 @@ class Link:
     strictness: int = 0
 
 
-def follow_chain(tables: Sequence[FloatArray], start: FloatArray, budget: Budget) -> list[Link] | Limit:
+def follow_transitions(
+    tables: Sequence[FloatArray], start: FloatArray, budget: Budget
+) -> list[ProvedTransition] | UnprovedTransition:
     """Follow all axes under a budget through transitions.
 
     Where a transition does not hold, the condition under which the cell before it is left becomes stricter.
@@ -75,47 +78,47 @@ def follow_chain(tables: Sequence[FloatArray], start: FloatArray, budget: Budget
         start: Where they rest at the beginning, shape (axes,) [rad or m].
         budget: The departures to be tolerated.
     """
-    conditions, links = conditions_of(budget), list[Link]()
-    while len(links) < len(tables):
-        k = len(links)
-        found = _link(k, tables[k].copy(), _entries(links, start, budget, conditions[0]), conditions)
-        if isinstance(found, Link):
-            links.append(found)
-        elif not links or links[-1].strictness == STRICTEST:
+    conditions, proved = conditions_of(budget), list[ProvedTransition]()
+    while len(proved) < len(tables):
+        k = len(proved)
+        found = _proved(k, tables[k].copy(), _entries(proved, start, budget, conditions[0]), conditions)
+        if isinstance(found, ProvedTransition):
+            proved.append(found)
+        elif not proved or proved[-1].strictness == STRICTEST:
             return found
         else:
-            links[-1] = _stricter(links[-1], conditions[0])
-    return links
+            proved[-1] = _stricter(proved[-1], conditions[0])
+    return proved
 
 
 def _entries(
-    links: Sequence[Link], start: FloatArray, budget: Budget, conditions: AxisConditions
+    proved: Sequence[ProvedTransition], start: FloatArray, budget: Budget, conditions: AxisConditions
 ) -> list[Entry]:
     """Return the sets in which the axes enter the next transition."""
-    if not links:
+    if not proved:
         return [Entry(float(x), float(x)) for x in start]
-    before, periods = links[-1], whole_periods(budget.report_age, budget.period)
+    before, periods = proved[-1], whole_periods(budget.report_age, budget.period)
     return [
         _widened(next_entry(row, sets, entry, conditions, periods))
         for row, sets, entry in zip(before.table, before.sets, before.entries, strict=True)
     ]
 
 
-def _stricter(link: Link, conditions: AxisConditions) -> Link:
+def _stricter(passed: ProvedTransition, conditions: AxisConditions) -> ProvedTransition:
     """Return a transition whose cell is left under the next stricter condition."""
-    table, strictness = link.table.copy(), link.strictness + 1
-    for row, sets in zip(table, link.sets, strict=True):
+    table, strictness = passed.table.copy(), passed.strictness + 1
+    for row, sets in zip(table, passed.sets, strict=True):
         reach, rate = rest_needed(sets, conditions)
         row[REST_REACH], row[REST_RATE] = min(REST_FACTOR * reach, row[REST_REACH]), REST_FACTOR * rate
     if strictness == STRICTEST:
-        times = [settling_time(row, sets, conditions) for row, sets in zip(table, link.sets, strict=True)]
+        times = [settling_time(row, sets, conditions) for row, sets in zip(table, passed.sets, strict=True)]
         table[:, LEAVING_TIME] = max(*times, float(table[0, LEAVING_TIME]))
-    return replace(link, table=table, strictness=strictness)
+    return replace(passed, table=table, strictness=strictness)
 
 
-def _link(
+def _proved(
     k: int, table: FloatArray, entries: Sequence[Entry], conditions: Sequence[AxisConditions]
-) -> Link | Limit:
+) -> ProvedTransition | UnprovedTransition:
     """Return the sets of all axes of a transition, and write the condition of rest into its table."""
     every = []
     for axis, (row, entry) in enumerate(zip(table, entries, strict=True)):
@@ -124,16 +127,16 @@ def _link(
             if sets.distance > 0.0:
                 break
         if not sets.distance > 0.0:
-            return Limit(k, axis, "may leave its funnel")
+            return UnprovedTransition(k, axis, "may leave its funnel")
         if comes_near_limit(row, sets, conditions, entry):
-            return Limit(k, axis, "may come so near the limit of its rate that it is damped")
+            return UnprovedTransition(k, axis, "may come so near the limit of its rate that it is damped")
         reach, rate = rest_needed(sets, conditions[0])
         half = (0.5 - EROSION) * (row[GOAL_UPPER] - row[GOAL_LOWER])
         if not (1.0 + SLACK) * reach < half:
-            return Limit(k, axis, "may never come to rest in its goal interval")
+            return UnprovedTransition(k, axis, "may never come to rest in its goal interval")
         row[REST_REACH], row[REST_RATE] = half, max(REST_FACTOR * rate, QUICK_RATE)
         every.append(sets)
-    return Link(table, entries, every)
+    return ProvedTransition(table, entries, every)
 
 
 def _widened(entry: Entry) -> Entry:
