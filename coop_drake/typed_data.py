@@ -33,10 +33,7 @@ SCALARS = {bool: "true or false", int: "a whole number", float: "a finite number
 class DataError(ValueError):
     """A place where data departs from its type.
 
-    Args:
-        key: Dotted path of the key, for example ``start.joints.robot_0[1]``; empty for the whole.
-        value: What stands there.
-        allowed: What may stand there.
+    ``key``: dotted path of the key, for example ``start.joints.robot_0[1]``; empty for the whole.
     """
 
     def __init__(self, key: str, value: object, allowed: str) -> None:

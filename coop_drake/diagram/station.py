@@ -44,9 +44,6 @@ def build_station(scenario: Scenario) -> TransportStation:
     output  ``query_object``            abstract   geometry, for visualization
     ======= =========================== ========== =========================================================
 
-    Args:
-        scenario: The scenario.
-
     Raises:
         ScenarioError: The models do not make a team.
     """
@@ -73,9 +70,6 @@ def build_driven_station(scenario: Scenario) -> TransportStation:
     ======= ============================ ========== ========================================================
 
     Where efforts are held between samples, the inputs are those of :func:`build_station`.
-
-    Args:
-        scenario: The scenario.
 
     Raises:
         ScenarioError: The models do not make a team.

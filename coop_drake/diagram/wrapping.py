@@ -38,14 +38,7 @@ number; efforts in newtons would ask for a thousandth of a newton, and for very 
 
 
 class Wrapping:
-    """Adds to a builder the blocks that a deployment asks for round one robot's controller.
-
-    Args:
-        builder: Receives them.
-        deployment: What is switched on.
-        robot: Index k of the robot.
-        name: Its name.
-    """
+    """Adds to a builder the blocks that a deployment asks for round one robot's controller."""
 
     def __init__(self, builder: DiagramBuilder, deployment: Deployment, robot: int, name: str) -> None:
         self._builder, self._deployment, self._robot = builder, deployment, robot

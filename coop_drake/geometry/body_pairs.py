@@ -36,9 +36,6 @@ class BodyPair:
 class BodyPairs:
     """Conservative answers about all of ``ComponentTree.collision_pairs``, cached by the joints between.
 
-    Args:
-        swept: Sweeps of the tree's pieces.
-
     Attributes:
         pairs: All pairs of bodies.
         pieces: All pairs of their pieces, each with its stages to the common component, shape (k, 4).

@@ -17,10 +17,7 @@ _REQUIRED = {"none": None, "position": FROM_DEPLOYMENT_POSITION, "all": FROM_DEP
 def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) -> Budget | None:
     """Return the budget of a plan, None where none is asked for.
 
-    Args:
-        choice: What ``plan --budget`` says; None for what the scenario requires in ``deployment.budget``.
-        scenario: The scenario.
-        problem: Its planning problem.
+    ``choice``: what ``plan --budget`` says; None for what the scenario requires in ``deployment.budget``.
 
     Raises:
         ScenarioError: The budget cannot be read, or no budget can be shown for the scenario's gains.

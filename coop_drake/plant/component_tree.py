@@ -31,9 +31,6 @@ def read_component_tree(team: TeamPlant) -> ComponentTree:
     that leads from base to end effector in its file has sign = -1. Bodies without visual and collision
     geometry are left out.
 
-    Args:
-        team: The team's plant.
-
     Raises:
         ScenarioError: A body with visual but no collision geometry, or a shape without a bounded footprint.
     """

@@ -16,10 +16,6 @@ from coop_drake.tree.component_tree import ComponentTree
 def read_limits(team: TeamPlant, tree: ComponentTree) -> TeamLimits:
     """Read velocity limits of the joints, and where the bases' frames are.
 
-    Args:
-        team: The team as one tree.
-        tree: Its component tree.
-
     Raises:
         ScenarioError: A joint cannot move because its velocity limit is zero.
     """

@@ -50,10 +50,7 @@ def body_clearance(first: Body, X_WC: PlanarPose, second: Body, X_WD: PlanarPose
 def collisions(tree: ComponentTree, z: FloatArray, workspace: Polygon) -> Iterator[tuple[str, str, float]]:
     """Yield ``(body, what it hits, clearance)`` for every body that leaves the floor or touches another.
 
-    Args:
-        tree: The team.
-        z: (x, y, theta, q...), shape (3 + n,).
-        workspace: W.
+    ``z``: (x, y, theta, q...), shape (3 + n,).
     """
     poses = tree.poses(z)
     for X_WC, component in zip(poses, tree.components, strict=True):

@@ -19,9 +19,6 @@ from coop_drake.verification.runs import BodyMass, RunSetup
 def run_setup(scenario: Scenario) -> RunSetup:
     """Read a scenario's settings and masses, against which a log is checked.
 
-    Args:
-        scenario: The scenario.
-
     Raises:
         ScenarioError: The models do not make a team.
     """
@@ -49,9 +46,6 @@ def run_setup(scenario: Scenario) -> RunSetup:
 
 def moved_masses(scenario: Scenario) -> tuple[float, ...]:
     """Return the mass that every robot of a scenario moves: its own and its share of the object's [kg].
-
-    Args:
-        scenario: The scenario.
 
     Raises:
         ScenarioError: The models do not make a team.

@@ -14,10 +14,6 @@ _SAMPLED = ("sample_offset", "switch_delay", "silence")
 def check_deployment(scenario: Scenario, robots: Sequence[str]) -> None:
     """Refuse departures that need what the scenario has not.
 
-    Args:
-        scenario: The scenario.
-        robots: Names of the robots.
-
     Raises:
         ScenarioError: With file, key, value and what is allowed there.
     """

@@ -43,9 +43,6 @@ def communication(log: SimulationLog) -> MessageStatistics:
     A robot reports when it becomes ready to leave the current cell, and when it is no longer ready. After a
     switch to the next cell no report is needed, because every robot then counts as not ready. The cell
     planner announces each cell but the first to every robot.
-
-    Args:
-        log: The run.
     """
     ready = log.ready_margins >= 0.0
     entered = np.diff(log.cell_index, prepend=-1) != 0

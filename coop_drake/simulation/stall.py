@@ -35,10 +35,7 @@ def patience(plan: Plan, cell: int) -> float:
 def blocking_margin(plan: Plan, sample: Sample, position_tolerance: float) -> str:
     """Return the condition that is furthest from being met in the current cell, as a phrase with its margin.
 
-    Args:
-        plan: The plan.
-        sample: The present instant.
-        position_tolerance: How close to the goal counts as arrived [m].
+    ``position_tolerance``: how close to the goal counts as arrived [m].
     """
     if sample.held:
         return f"the hold ends: {_causes_of(sample)}"
@@ -59,12 +56,7 @@ def _causes_of(sample: Sample) -> str:
 
 
 def narrowest_funnel(plan: Plan, sample: Sample) -> str:
-    """Return the axis that is nearest to a bound of its funnel, as a phrase with its margin and its rate.
-
-    Args:
-        plan: The plan.
-        sample: The present instant.
-    """
+    """Return the axis that is nearest to a bound of its funnel, as a phrase with its margin and its rate."""
     axes = sample.z[2:]
     margins = np.minimum(axes - sample.funnel_lower, sample.funnel_upper - axes)
     i = int(np.argmin(margins))

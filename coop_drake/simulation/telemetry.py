@@ -77,9 +77,7 @@ class Sample:
 class Telemetry:
     """Evaluates the ports of a closed loop, of named or of fused blocks.
 
-    Args:
-        loop: The closed loop.
-        root: Context of the whole diagram; every reading is of its present content.
+    ``root``: context of the whole diagram; every reading is of its present content.
     """
 
     def __init__(self, loop: ClosedLoop, root: Context) -> None:
@@ -126,11 +124,7 @@ class Telemetry:
 
 
 class _PortRow:
-    """The values of many ports in one row.
-
-    Args:
-        root: Context of the whole diagram.
-    """
+    """The values of many ports in one row."""
 
     def __init__(self, root: Context) -> None:
         self._root = root

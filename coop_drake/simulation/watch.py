@@ -77,11 +77,7 @@ class Watch:
         self._end(why, lambda plan, last: f"it waits until {blocking_margin(plan, last, self._tolerance)}")
 
     def fail(self, why: str) -> None:
-        """End a run that cannot be integrated further; the message names the axis nearest to a bound.
-
-        Args:
-            why: What happened.
-        """
+        """End a run that cannot be integrated further; the message names the axis nearest to a bound."""
         self._end(why, lambda plan, last: f"next to break was the funnel of {narrowest_funnel(plan, last)}")
 
     def _end(self, why: str, explanation: Callable[[Plan, Sample], str]) -> None:

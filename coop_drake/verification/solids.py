@@ -55,9 +55,7 @@ class Solid:
 def team_solids(tree: ComponentTree, robots: Collection[int] | None = None) -> tuple[Solid, ...]:
     """List every convex piece of a team.
 
-    Args:
-        tree: The team.
-        robots: Robots whose joints are kept, None for all; what hangs from a joint of another is left out.
+    ``robots``: robots whose joints are kept, None for all; what hangs from a joint of another is left out.
     """
     solids = []
     for index, component in enumerate(tree.components):
@@ -81,12 +79,7 @@ def component_stages(tree: ComponentTree, index: int) -> tuple[Stage, ...]:
 def colliding_pairs(
     tree: ComponentTree, solids: Collection[Solid]
 ) -> tuple[tuple[Solid, Solid, int, int], ...]:
-    """Pairs of solids that must never overlap, with how many stages of each lead to what carries both.
-
-    Args:
-        tree: The team.
-        solids: The solids that are kept.
-    """
+    """Pairs of solids that must never overlap, with how many stages of each lead to what carries both."""
     members: dict[tuple[int, int], list[Solid]] = {}
     for solid in solids:
         members.setdefault((solid.component, solid.body), []).append(solid)

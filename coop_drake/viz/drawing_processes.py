@@ -49,10 +49,7 @@ class DrawingProcesses:
     def begin(self, scenario: Scenario, problem: PlanningProblem, plan: Plan) -> None:
         """Let the processes prepare what the plan shows.
 
-        Args:
-            scenario: The scenario.
-            problem: Its planning problem.
-            plan: The plan that will be simulated.
+        ``plan``: the plan that will be simulated.
         """
         # Now: this process has imported Drake, and two processors had enough to do before.
         self._start("recording", _draw_recording)
@@ -61,9 +58,7 @@ class DrawingProcesses:
     def draw(self, log: SimulationLog, folder: Path) -> None:
         """Begin to draw the run into a folder.
 
-        Args:
-            log: The log of the run.
-            folder: Receives ``transport.html`` and the figures.
+        ``folder``: receives ``transport.html`` and the figures.
         """
         self._send((log, folder))
 

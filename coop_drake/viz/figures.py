@@ -29,13 +29,7 @@ def write_figures(
 
 
 class RunFigures:
-    """The figures of a run. The one that shows the plan alone is drawn at once.
-
-    Args:
-        workspace: The floor.
-        tree: The team.
-        plan: The plan that is followed.
-    """
+    """The figures of a run. The one that shows the plan alone is drawn at once."""
 
     def __init__(self, workspace: Polygon, tree: ComponentTree, plan: Plan) -> None:
         self._workspace, self._tree = workspace, tree

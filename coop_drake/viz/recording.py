@@ -35,12 +35,7 @@ def recording_html(
 
 
 class Recording:
-    """The scene of a plan, which becomes a page with the log of one run.
-
-    Args:
-        scenario: Floor and team.
-        plan: The plan that is followed.
-    """
+    """The scene of a plan, which becomes a page with the log of one run."""
 
     def __init__(self, scenario: Scenario, plan: Plan) -> None:
         self._scenario, self._plan = scenario, plan

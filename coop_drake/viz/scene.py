@@ -28,11 +28,6 @@ _SHADOW_HEIGHT = 0.003
 class TransportScene:
     """All that recordings and live views of a transport show, with the team at the plan's start.
 
-    Args:
-        scenario: Floor and team.
-        plan: Its cells.
-        meshcat: Where to draw.
-
     Attributes:
         meshcat: Where it is drawn.
         team: The team.

@@ -33,9 +33,7 @@ _GRASP = 0.07
 class TeamView:
     """A team in Meshcat, in any configuration; it has a plant of its own, apart from the simulation's.
 
-    Args:
-        scenario: The scenario that describes the team.
-        meshcat: Where it is drawn.
+    ``scenario``: the scenario that describes the team.
 
     Attributes:
         team: Its plant.

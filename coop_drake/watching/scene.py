@@ -102,11 +102,7 @@ def scene_page(
 
 
 class _Shown:
-    """The animation: which objects are visible during which keyframes.
-
-    Args:
-        frames: Number of keyframes.
-    """
+    """The animation: which objects are visible during which keyframes."""
 
     def __init__(self, frames: int) -> None:
         self.animation = Animation(default_framerate=_RATE)

@@ -40,11 +40,7 @@ class _Part:
 class StrongBranching:
     """Halves cells on trial for one exploration.
 
-    Args:
-        problem: Start and goal, where paths begin and end.
-        slices: The subdivision.
-        maker: Makes the cells of slices.
-        halves: Over-cells of halves.
+    ``problem``: start and goal, where paths begin and end.
     """
 
     def __init__(self, problem: PlanningProblem, slices: Slices, maker: CellMaker, halves: Halves) -> None:

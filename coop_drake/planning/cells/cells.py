@@ -73,12 +73,7 @@ class Region:
         return np.where(inside, nearest, -nearest)
 
     def meets(self, other: Region, *, otherwise: bool = True) -> bool:
-        """Whether both sets share more than their boundary.
-
-        Args:
-            other: The other set.
-            otherwise: The answer if geometry fails.
-        """
+        """Whether both sets share more than their boundary; ``otherwise`` if geometry fails."""
         a, b = self.bounds, other.bounds
         if a[0] > b[2] or b[0] > a[2] or a[1] > b[3] or b[1] > a[3]:
             return False
@@ -93,10 +88,7 @@ class CellMaker:
     only, so they need spaces that are too small (``FreeSpace.under``) and bodies that are too large
     (``SweptTree.over``).
 
-    Args:
-        swept: Sweeps of the team's pieces.
-        pairs: Self-collision of the team.
-        workspace: Where the team may be; the margin is already taken off [m].
+    ``workspace``: where the team may be; the margin is already taken off [m].
     """
 
     def __init__(self, swept: SweptTree, pairs: BodyPairs, workspace: Polygon | MultiPolygon) -> None:
@@ -197,8 +189,6 @@ def _shared(first: CrossSection | None, second: CrossSection | None, over: bool)
 def regions_of(section: CrossSection, *, over: bool) -> list[Region]:
     """Connected parts of a section, in a fixed order.
 
-    Args:
-        section: A region.
-        over: Whether the section is an over-approximation of the free positions; else an under-approximation.
+    ``over``: whether the section is an over-approximation of the free positions; else an under-approximation.
     """
     return sorted(map(Region.of, components(section, over=over)), key=lambda region: region.bounds)

@@ -23,12 +23,7 @@ class Half:
 
 
 class Halves:
-    """Keeps the halves of every slice until the slice is split.
-
-    Args:
-        slices: The subdivision.
-        maker: Makes the cells of slices.
-    """
+    """Keeps the halves of every slice until the slice is split."""
 
     def __init__(self, slices: Slices, maker: CellMaker) -> None:
         self._slices, self._maker = slices, maker

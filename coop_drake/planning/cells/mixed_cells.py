@@ -18,11 +18,7 @@ def mixed_cells(
 ) -> tuple[MixedCell, ...]:
     """Cells of a path that are not proved free, the widest first.
 
-    Args:
-        problem: The question that was explored.
-        slices: The subdivision.
-        finest: Resolution of every axis.
-        path: Cells from start to goal that were found last.
+    ``path``: cells from start to goal that were found last.
     """
     robots = tuple(sorted({joint.robot for joint in problem.tree.joints}))
     cells = []

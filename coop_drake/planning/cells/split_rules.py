@@ -39,12 +39,6 @@ LARGEST_CONTACT_SWEEP_RATIO = 2.0
 class SplitOrder:
     """Chooses the splits of one exploration.
 
-    Args:
-        problem: The question.
-        slices: The subdivision.
-        maker: Makes the cells of slices.
-        halves: Over-cells of halves.
-
     Attributes:
         finest: Resolution of every axis [rad or m].
     """

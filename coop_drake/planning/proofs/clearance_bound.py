@@ -27,9 +27,6 @@ def clearance_bound(problem: PlanningProblem) -> tuple[float | None, int]:
     The proofs are for the object with at most one robot. The start and the goal may stand closer to a wall:
     near them the clearance is not required.
 
-    Args:
-        problem: The question.
-
     Returns:
         The clearance [m], None if none was refuted, and the slices made for the proofs.
     """

@@ -52,9 +52,7 @@ class Proofs:
     The inscribed disc is tested first. Then the whole question is explored in turns with those relaxations to
     two robots at most for which sampling finds no path. A refutation of any of them refutes the question.
 
-    Args:
-        problem: The question.
-        watch: Called with the events of every exploration.
+    ``watch``: called with the events of every exploration.
 
     Attributes:
         refutation: The proof, once there is one.
@@ -183,10 +181,7 @@ def explorer(
 ) -> Exploration:
     """An exploration of cells at margin zero, the only one that can prove infeasibility.
 
-    Args:
-        problem: The question.
-        watch: Called with every event.
-        what: The question in words.
+    ``watch``: called with every event.
     """
     swept = SweptTree(problem.tree)
     space = shrunk(problem.workspace, 0.0)

@@ -86,9 +86,7 @@ def smoothed(
 def estimated_duration(problem: PlanningProblem, path: FloatArray) -> float:
     """Rough duration of a transport along a path, to compare candidates [s].
 
-    Args:
-        problem: The question.
-        path: Configurations, theta unwrapped, shape (m, 3 + n).
+    ``path``: configurations, theta unwrapped, shape (m, 3 + n).
     """
     scale, team = configuration_scale(problem.tree), team_arrays(problem.tree)
     samples = densified(path, scale, SPACING)

@@ -35,9 +35,6 @@ class Subsystem:
 class SubsystemHierarchy:
     """The subsystems of one question, from a disc to the whole team; made once for all samplers.
 
-    Args:
-        problem: The question.
-
     Attributes:
         robots: All robots, ascending.
         disc: The largest disc inside one piece of the object.

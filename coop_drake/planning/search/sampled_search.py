@@ -70,9 +70,6 @@ class SampledSearch:
 
     What it finds is proved by the boxes, whatever was sampled. If it finds nothing, that is no proof.
 
-    Args:
-        problem: The question.
-
     Attributes:
         slices: Boxes tried so far.
         object_blocked: Number of attempts in a row in which no path was found even for the object alone.
@@ -150,9 +147,7 @@ class SampledSearch:
     def with_margin(self, first: BoxSequence, progress: Callable[[float, float], None]) -> BoxSequence:
         """Move the best path away from the walls, and cover it at the largest margin that it keeps.
 
-        Args:
-            first: Boxes at margin zero.
-            progress: Called with a margin [m] and the fraction of the path that is covered.
+        ``progress``: called with a margin [m] and the fraction of the path that is covered.
 
         Returns:
             Boxes at a margin; at margin zero if no other margin is kept.
@@ -190,9 +185,7 @@ class SampledSearch:
     def covered_path(self, found: BoxSequence, spare: BoxSequence) -> CoveredPath:
         """The path of some boxes, whose polygons are made on request.
 
-        Args:
-            found: The boxes.
-            spare: Boxes to use if the polygons of the others cannot be made.
+        ``spare``: boxes to use if the polygons of the others cannot be made.
         """
 
         def channel() -> Channel:

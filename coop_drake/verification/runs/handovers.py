@@ -19,9 +19,7 @@ def check_handovers(rows: Rows, *, exact: bool) -> tuple[Check, Check]:
     An ideal team leaves a cell in the first row in which all robots are ready, unless it is held. Otherwise
     reports travel, and every robot must have reported to be ready at some time in the cell.
 
-    Args:
-        rows: The log.
-        exact: Whether the team is ideal.
+    ``exact``: whether the team is ideal.
 
     Raises:
         RefusalError: Names array, index and time.
