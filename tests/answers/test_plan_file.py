@@ -57,7 +57,7 @@ def test_saving_again_gives_the_same_bytes(plan, saved, tmp_path):
 
 
 @given(st.floats(allow_nan=False, allow_infinity=False, min_value=0.0), st.floats(-3.0, 3.0))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_numbers_survive_to_the_last_bit(plan, tmp_path_factory, length, joint):
     path = tmp_path_factory.mktemp("plans") / "plan.json"
     moved = replace(plan.transitions[0], length=length)

@@ -29,7 +29,7 @@ def test_tasks_are_chosen_by_topic_and_by_parts_of_their_names():
 
 def test_tasks_that_need_the_machine_for_themselves_come_last_and_see_the_rows_of_the_others():
     seen, known = [], []
-    both = threading.Barrier(2, timeout=10)
+    both = threading.Barrier(2, timeout=300)
 
     def shared(rows):
         both.wait()

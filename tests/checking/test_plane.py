@@ -62,7 +62,6 @@ def test_numbers_are_doubles_to_a_multiple_of_a_unit(value):
 
 
 @given(PLACES, PLACES, st.integers(0, 4))
-@settings(deadline=None)
 def test_sets_are_apart_exactly_if_their_distance_is_larger(first, second, gap):
     distance = MultiPoint(first).convex_hull.distance(MultiPoint(second).convex_hull)
     if abs(distance - gap) > 1e-9 or gap == 0:
@@ -71,7 +70,6 @@ def test_sets_are_apart_exactly_if_their_distance_is_larger(first, second, gap):
 
 
 @given(PLACES, PLACES, st.integers(-3, 2))
-@settings(deadline=None)
 def test_corners_are_inside_a_piece_by_more_than_a_depth(points, corners, depth):
     """A corner outside may be refused though it is nearer by less than a unit, here a hundredth."""
     points, corners = ([(100 * x, 100 * y) for x, y in places] for places in (points, corners))
@@ -86,7 +84,6 @@ def test_corners_are_inside_a_piece_by_more_than_a_depth(points, corners, depth)
 
 
 @given(SEGMENT, st.lists(PLACE, min_size=3, max_size=7))
-@settings(deadline=None)
 def test_the_stretch_in_a_convex_polygon_is_all_of_its_interior(edge, corners):
     ring = hull(corners)
     if len(ring) < 3:
@@ -99,7 +96,7 @@ def test_the_stretch_in_a_convex_polygon_is_all_of_its_interior(edge, corners):
 
 
 @given(SEGMENT, st.lists(PLACE, min_size=3, max_size=6), st.lists(PLACE, min_size=3, max_size=5))
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 def test_stretches_in_a_region_hold_all_points_of_their_parity_that_are_on_no_edge(edge, outer, hole):
     made = region(outer, hole)
     even = Region(made.rings, odd=False)
@@ -134,7 +131,6 @@ def off_edge(point, edge):
 
 
 @given(st.lists(PLACE, min_size=3, max_size=5), st.lists(PLACE, min_size=3, max_size=5))
-@settings(deadline=None)
 def test_regions_touch_if_they_share_a_point(first, second):
     one, other = region(first), region(second)
     polygons = Polygon(first), Polygon(second)

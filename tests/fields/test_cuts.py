@@ -38,7 +38,7 @@ def test_aisles_are_crowded_until_the_shelves_are_cut_free():
 
 
 @given(floors_with_ends())
-@settings(max_examples=40, deadline=None, derandomize=True)
+@settings(max_examples=40)
 def test_nothing_but_strips_is_lost_and_the_widest_passage_stays(floor_with_ends):
     floor, (start, end) = floor_with_ends
     goal = Point(end)

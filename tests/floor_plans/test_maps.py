@@ -96,7 +96,7 @@ def test_the_room_of_the_start_is_meant_and_diagonal_cells_do_not_connect(tmp_pa
         read_floor_plan(path, EXACT, (0.5, 0.5))
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.lists(st.lists(st.booleans(), min_size=9, max_size=9), min_size=9, max_size=9),
     st.floats(-pi, pi),

@@ -21,7 +21,7 @@ def shapely_distance(polygon, points):
 
 
 @given(floors(), st.integers(0, 2**32 - 1))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_signed_distance_equals_that_of_shapely(floor, seed):
     x0, y0, x1, y1 = floor.bounds
     points = np.random.default_rng(seed).uniform((x0 - 1, y0 - 1), (x1 + 1, y1 + 1), (200, 2))
@@ -48,7 +48,7 @@ def test_points_level_with_vertices_are_judged_like_the_others():
 
 
 @given(floors(), st.integers(0, 2**32 - 1))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_clearance_along_a_segment_equals_that_of_shapely(floor, seed):
     x0, y0, x1, y1 = floor.bounds
     ends = np.random.default_rng(seed).uniform((x0, y0), (x1, y1), (50, 2, 2))

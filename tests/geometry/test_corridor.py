@@ -24,7 +24,7 @@ def test_a_path_that_stands_still_keeps_a_disc():
 
 
 @given(floors_with_ends())
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_the_passage_keeps_its_clearance(floor_with_ends):
     floor, (start, end) = floor_with_ends
     passage = PassageFinder(floor).find(start, end)

@@ -46,7 +46,7 @@ def test_a_passage_from_a_point_to_itself_has_no_length():
 
 
 @given(floors_with_ends())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_passage_keeps_its_clearance_and_is_no_wider_than_its_ends(floor_with_ends):
     floor, (start, end) = floor_with_ends
     passage = PassageFinder(floor).find(start, end)
@@ -60,7 +60,7 @@ def test_a_passage_keeps_its_clearance_and_is_no_wider_than_its_ends(floor_with_
 
 
 @given(floors_with_ends())
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_no_passage_is_much_wider_than_the_one_found(floor_with_ends):
     floor, (start, end) = floor_with_ends
     passage = PassageFinder(floor).find(start, end)
@@ -72,7 +72,7 @@ def test_no_passage_is_much_wider_than_the_one_found(floor_with_ends):
 
 
 @given(floors())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_the_pole_has_nearly_the_most_room(floor):
     centre, room = pole(floor)
     assert room == pytest.approx(BoundaryDistance(floor)(centre))

@@ -17,7 +17,7 @@ def vertices(polygon):
 
 
 @given(floors(), st.floats(1e-4, 0.05))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_nothing_is_gained_and_no_more_than_the_tolerance_is_lost(floor, tolerance):
     simple = simplify_inward(floor, tolerance)
     assert simple.is_valid

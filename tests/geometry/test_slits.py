@@ -47,7 +47,7 @@ def test_a_room_without_holes_stays_as_it_is():
 
 
 @given(floors_with_ends())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_no_hole_is_left_and_the_passage_stays_inside(floor_with_ends):
     floor, (start, end) = floor_with_ends
     passage = PassageFinder(floor).find(start, end)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from shapely import LineString, MultiPoint, Point, Polygon
 from shapely.affinity import rotate
@@ -14,14 +14,12 @@ ROUND_PIVOT = np.array([[-0.3, -0.2], [0.6, -0.2], [0.5, 0.3], [-0.2, 0.25]])
 RINGS = st.sampled_from((RECTANGLE, ROUND_PIVOT, RECTANGLE + 0.3))
 ANGLES = st.floats(-4.0, 4.0)
 HALVES = st.floats(0.0, 3.5)
-COMPILING = settings(deadline=None)  # the first call may compile
 
 
 def turned(ring: np.ndarray, angle: float) -> Polygon:
     return rotate(Polygon(ring), angle, origin=(0.0, 0.0), use_radians=True)
 
 
-@COMPILING
 @given(RINGS, ANGLES, HALVES, st.floats(-1.0, 1.0))
 def test_every_turned_copy_lies_in_the_over_sweep(
     ring: np.ndarray, centre: float, half: float, share: float
@@ -31,7 +29,6 @@ def test_every_turned_copy_lies_in_the_over_sweep(
     assert sweep.covers(turned(ring, centre + share * half))
 
 
-@COMPILING
 @given(RINGS, ANGLES, HALVES, st.floats(-1.0, 1.0))
 def test_the_under_sweep_lies_in_every_turned_copy(
     ring: np.ndarray, centre: float, half: float, share: float
@@ -49,7 +46,6 @@ def test_many_turns_leave_no_more_than_one() -> None:
         assert np.hypot(*sweep.T).max() < 0.2
 
 
-@COMPILING
 @given(st.integers(3, 24), st.integers(1, 12), st.floats(-0.2, 0.2), st.sampled_from((0.0, 0.1, 0.25)))
 def test_lines_that_coincide_but_for_rounding_are_taken_at_the_innermost(
     corners: int, steps: int, turn: float, aside: float
@@ -64,7 +60,6 @@ def test_lines_that_coincide_but_for_rounding_are_taken_at_the_innermost(
             assert turned(ring, 0.25 * np.pi + share * half).covers(Polygon(sweep))
 
 
-@COMPILING
 @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), ANGLES, HALVES, st.floats(-1.0, 1.0))
 def test_a_point_sweeps_an_arc(x: float, y: float, centre: float, half: float, share: float) -> None:
     sweep = MultiPoint(over_revolute(np.array([[x, y]]), centre, half)).convex_hull
@@ -95,7 +90,6 @@ def test_turning_by_pi_or_more_leaves_nothing_beside_the_pivot() -> None:
     assert np.hypot(*full.T).max() <= radius
 
 
-@COMPILING
 @given(RINGS, st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(0.0, 1.0))
 def test_prismatic_sweeps_are_exact(ring: np.ndarray, dx: float, dy: float, share: float) -> None:
     first, last = np.array([-0.05, 0.02]), np.array([dx, dy])
@@ -122,7 +116,6 @@ def test_grown_and_inscribed_bracket_a_capsule(turn: float) -> None:
     assert outer.area - inner.area < 0.02 * turn
 
 
-@COMPILING
 @given(st.lists(st.tuples(st.floats(-0.2, 0.2), st.floats(-0.2, 0.2)), min_size=1, max_size=5))
 def test_common_disc_lies_in_the_disc_about_every_centre(points: list[tuple[float, float]]) -> None:
     common = common_disc(np.array(points), 0.25, 0.2)

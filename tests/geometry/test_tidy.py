@@ -31,7 +31,7 @@ def test_cusps_slivers_idle_vertices_and_pillars_go_and_the_clearance_stays():
 
 
 @given(floors_with_ends())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_tidy_cell_is_inside_whole_and_joins_the_ends(floor_with_ends):
     safe, ends = floor_with_ends
     tidied = tidy_cell(safe, ends)
@@ -44,7 +44,7 @@ def test_a_tidy_cell_is_inside_whole_and_joins_the_ends(floor_with_ends):
 
 
 @given(floors_with_ends())
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_same_cell_gives_the_same_bits(floor_with_ends):
     safe, ends = floor_with_ends
     assert tidy_cell(safe, ends).wkb == tidy_cell(safe, ends).wkb

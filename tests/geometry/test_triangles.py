@@ -14,7 +14,7 @@ TWO_CRATES = HALL.difference(box(1, 1, 2, 3)).difference(box(2.2, 1, 3, 3))
 
 
 @given(floors_with_ends())
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20)
 def test_triangles_fill_the_polygon_and_their_diagonals_join_them(floor_with_ends):
     floor, _ = floor_with_ends
     mesh = triangulate(floor)

@@ -97,7 +97,7 @@ def worst_margin(duration, heading, share):
     return min(margins)
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(st.floats(-np.pi, np.pi), st.floats(0.0, 1.0))
 def test_delta_e_stays_while_k_falls(heading, share):
     """At the start the whole of what the clearance allows is used, by distance and by speed."""
@@ -110,7 +110,7 @@ def test_delta_e_would_not_stay_if_k_fell_at_once():
     assert worst_margin(1e-3, 0.0, 0.0) < -0.5
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 @given(st.floats(0.05, 0.95), st.floats(-0.2, 0.2), st.floats(-40.0, 40.0))
 def test_an_axis_stays_in_its_funnel_whatever_the_jump(start, speed, jump):
     """V grows by at most jump^2 T / (8 k2) while the jump fades."""

@@ -27,7 +27,7 @@ def test_the_flow_solves_the_equation_of_motion(damping):
     np.testing.assert_allclose(flow, state, rtol=1e-8)
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(gains, coordinates, coordinates, coordinates, coordinates)
 def test_the_excursion_never_grows_while_the_reference_rests(gains, x, y, vx, vy):
     stiffness, damping = gains
@@ -41,7 +41,7 @@ def test_the_excursion_never_grows_while_the_reference_rests(gains, x, y, vx, vy
         before = after
 
 
-@settings(max_examples=60, deadline=None, derandomize=True)
+@settings(max_examples=60)
 @given(coordinates, coordinates, st.floats(-0.1, 0.5), st.floats(0.05, 2.0))
 def test_a_step_is_no_longer_than_allowed_and_keeps_its_direction(vx, vy, room, speed):
     dx, dy = limited_step(vx, vy, 0.005, speed, room)

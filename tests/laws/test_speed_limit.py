@@ -14,7 +14,7 @@ limits, gains = st.floats(0.05, 5.0), st.floats(0.5, 60.0)
 parts = st.floats(-30.0, 30.0)
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(st.tuples(parts, parts), st.tuples(parts, parts), limits, gains)
 def test_damping_is_the_least_that_keeps_the_condition(acceleration, velocity, limit, gain):
     a, v = np.array(acceleration), np.array(velocity)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coop_drake.geometry.body_pairs import BodyPairs
@@ -16,7 +16,7 @@ from coop_drake.planning.sampling.obstacle_grid import FAR, grid_inside, lay_gri
 from coop_drake.tree.team_arrays import place, team_arrays
 from tests.support.trees import configurations, footprint, room, slices_of, trees
 
-SLOW = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+SLOW = settings(max_examples=15)
 ROUNDING = 2e-3
 
 

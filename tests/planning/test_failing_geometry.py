@@ -112,7 +112,7 @@ BROKEN = [
 ]
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.sampled_from(BROKEN), st.integers(1, 9), st.sampled_from((0.19, 0.3)))
 def test_no_exploration_errs_however_often_regions_cannot_be_cut_or_parted(
     broken, every: int, corridor: float

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from coop_drake.planning.execution.speed_shares import fill
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=100)
 @given(st.integers(1, 4), st.integers(1, 6), st.integers(0, 10_000))
 def test_shares_keep_all_bounds_and_none_could_grow(rows, count, seed):
     generator = np.random.default_rng(seed)

@@ -122,7 +122,7 @@ def test_a_goal_at_the_edge_of_its_slice_keeps_the_interval_inside():
 
 
 @given(st.lists(st.floats(0.05, 2.0), min_size=2, max_size=5))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_any_corridor_becomes_a_sound_plan(widths):
     plan = plan_of(*corridor(tuple(widths), turn=0.2))
     check_plan(plan, "plan")

@@ -62,7 +62,7 @@ NAMES = ("sphere", "box", "cylinder", "capsule", "ellipsoid", "convex", "mesh")
 angles = st.floats(-3.2, 3.2)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(name=st.sampled_from(NAMES), roll=angles, pitch=angles, yaw=angles, x=st.floats(-2, 2))
 def test_footprint_is_the_shadow_and_a_hair(tetrahedron, name, roll, pitch, yaw, x):
     shape, surface = solids(tetrahedron)[name]

@@ -44,7 +44,7 @@ def stars(draw):
     return centre + np.column_stack([radii * np.cos(angle), radii * np.sin(angle)])
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(outline=stars())
 def test_parts_are_convex_and_make_up_the_outline(outline):
     polygon = Polygon(outline)
@@ -64,7 +64,7 @@ def test_parts_are_few(outline, count):
     assert len(convex_parts(Polygon(outline))) == count
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(outline=stars(), height=st.floats(0.05, 0.5))
 def test_mass_properties_are_those_of_the_triangles(outline, height):
     """Oracle: triangles from the centre, each a lamina with known second moments."""

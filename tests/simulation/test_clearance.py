@@ -35,7 +35,7 @@ def pieces(tree, z):
     }
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(CONFIGURATION)
 def test_distances_agree_with_shapely(z):
     walls, bodies = CLEARANCE(np.array(z))

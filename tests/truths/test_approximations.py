@@ -2,7 +2,7 @@
 
 import numpy as np
 import shapely
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import MultiPolygon, Point, Polygon
 from shapely.affinity import scale
@@ -15,7 +15,7 @@ from tests.support.free_positions import FreePositions, nudges
 from tests.support.shapes import floors
 from tests.support.trees import body_footprints, configurations, room, slices_of, trees
 
-SLOW = settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+SLOW = settings(max_examples=40)
 MANY_SLICES = settings(SLOW, max_examples=170)
 ANGLES, POSITIONS = 4, 1_500  # 170 slices x 4 angles x 1,500 positions: a million configurations
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from coop_drake.laws import Funnel, funnel_bounds
 
-law = settings(max_examples=200, deadline=None, derandomize=True)
+law = settings(max_examples=200)
 shapes = st.sampled_from(["exponential", "quintic"])
 rates = st.floats(0.1, 20.0)
 times = st.floats(0.0, 30.0)

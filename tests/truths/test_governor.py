@@ -16,7 +16,7 @@ table_2 = (50.0, 5.0, 5.0)
 scheduled = [(k, np.sqrt(k), 0.8 * np.sqrt(k)) for k in (50.0, 400.0)]
 
 
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20)
 @given(
     st.sampled_from([table_2, *scheduled]),
     st.sampled_from([0.0, 0.001]),
@@ -50,7 +50,7 @@ def test_the_margin_never_becomes_negative(gains, smoothing, start, target, head
     assert run.position[-1] == pytest.approx(target, abs=0.01)
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
+@settings(max_examples=10)
 @given(st.floats(0.01, 0.4), st.floats(0.01, 0.4), st.floats(0.0, 1.0), st.sampled_from([0.0, 0.001]))
 def test_every_hand_over_is_reached_and_leaves_margin(half_height, half_overlap, heading, smoothing):
     """Two corridors of any width overlap in a box: its pole is reached with margin to spare.

@@ -9,7 +9,7 @@ from tests.support.point_mass import carry_out, straight_fields
 from tests.support.random_plan import random_plan
 
 
-@settings(max_examples=12, deadline=None, derandomize=True)
+@settings(max_examples=12)
 @given(st.integers(0, 2**32 - 1))
 def test_every_hand_over_of_a_random_plan_is_safe_and_comes(seed):
     plan = random_plan(np.random.default_rng(seed), ("a::one", "b::one"))

@@ -11,7 +11,7 @@ from tests.support.robot_matrices import turned
 lengths = st.floats(-1.0, 1.0)
 vectors = st.tuples(lengths, lengths).map(np.array)
 accelerations = st.tuples(*[st.floats(-50.0, 50.0)] * 3).map(np.array)
-law = settings(max_examples=200, deadline=None, derandomize=True)
+law = settings(max_examples=200)
 
 
 @law

@@ -24,7 +24,7 @@ def energy_and_terms(x, v, bounds, kappa, k1):
     return 0.5 * kappa * s**2 + 0.5 * (v - wanted) ** 2, s, v - wanted
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=200)
 @given(
     funnels(), st.floats(0.0, 3.0), inside, speeds, log_gains, gains, gains, st.sampled_from([0.0, 2.0, 8.0])
 )
@@ -66,7 +66,7 @@ def test_the_energy_decays_as_predicted(funnel, time, fraction, v, kappa, gain, 
     assert numeric == pytest.approx(predicted, rel=1e-5, abs=noise + 1e-6 * value)
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(
     st.sampled_from(["exponential", "quintic"]),
     st.floats(0.2, 0.5),

@@ -65,5 +65,5 @@ def test_both_end_with_the_block_and_with_the_command(tmp_path):
     with DrawingProcesses() as processes:
         ((process, connection),) = processes._running.values()
         connection.close()  # As the end of the command closes it.
-        process.join(timeout=30)
+        process.join(timeout=300)
         assert process.exitcode == 0
