@@ -32,9 +32,13 @@ class TriangleMesh:
 
 
 def wall_polygons(workspace: Polygon, thickness: float) -> list[Polygon]:
-    """Return what stands on the floor: a rim of the given thickness [m] around it, and every hole filled."""
+    """Return what stands on the floor: a rim of the given thickness [m] around it, and every hole filled.
+
+    Where the rims at both sides of a wall leave a gap of less than two thicknesses, the wall is one piece.
+    """
     outer = Polygon(workspace.exterior)
-    rim = outer.buffer(thickness, join_style="mitre", mitre_limit=2.0).difference(outer)
+    around = outer.buffer(2.0 * thickness, join_style="mitre", mitre_limit=2.0)
+    rim = around.buffer(-thickness, join_style="mitre", mitre_limit=2.0).difference(outer)
     return parts_of(rim) + [Polygon(hole) for hole in workspace.interiors]
 
 

@@ -1,4 +1,4 @@
-"""What a recording shows beside the scene: headline, time, cell, key of colours, and its player."""
+"""What a recording shows beside the scene: headline, verdict, time, cell, key of colours, and its player."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.arrows import LONGEST
 from coop_drake.viz.cells import CELL_COLOUR, GOAL_COLOUR, GOAL_POSE_COLOUR
 from coop_drake.viz.paint import hex_colour
+from coop_drake.viz.stage import FILL, floor_corners
 from coop_drake.viz.trail import TRAIL_COLOUR
 
 _RATE = 10.0
@@ -44,7 +45,6 @@ def page_content(
     times = np.arange(0.0, duration + 0.5 / _RATE, 1.0 / _RATE)
     rows = np.maximum(np.searchsorted(log.times, times, side="right") - 1, 0)
     first = np.flatnonzero(np.diff(log.cell_index, prepend=-1))
-    end = f"arrived after {log.times[-1]:.1f} s"
     return {
         "headline": f"{scenario.name}: {len(colours)} robots carry one object",
         "duration": duration,
@@ -56,12 +56,14 @@ def page_content(
         "speed": np.hypot(*log.object_twist[rows, :2].T).round(3).tolist(),
         "base_speed": np.interp(times, *_fastest_base(log)).round(3).tolist(),
         "reached": log.reached and not log.violation,
-        "verdict": log.violation or (end if log.reached else "the goal was not reached"),
+        "verdict": verdict_of(log),
+        "corners": floor_corners(scenario.workspace.polygon, scenario.visualization.wall_height),
+        "fill": FILL,
         "side": _emptier_side(scenario.workspace.polygon),
         "key": [
             ("area", CELL_COLOUR, "cell: the object's centre stays in here"),
             ("area", GOAL_COLOUR, "goal region: from here the next cell is entered"),
-            ("area", GOAL_POSE_COLOUR, "where the object is to stand"),
+            ("area", GOAL_POSE_COLOUR, "goal: the frame that the object fits into"),
             ("line", TRAIL_COLOUR, "trail of the object's centre"),
             *(
                 ("arrow", hex_colour(colour), f"force of {robot} on the object, {of_a_metre:g} N a metre")
@@ -70,6 +72,20 @@ def page_content(
             ("dot", GREY, f"grasps, in their robots' colours; arrows end at {LONGEST:g} m"),
         ],
     }
+
+
+def verdict_of(log: SimulationLog) -> str:
+    """Return in a sentence how the run ended, and how near anything came to a wall or to another body."""
+    if log.violation:
+        end = log.violation
+    elif log.reached:
+        end = f"arrived after {log.times[-1]:.1f} s"
+    else:
+        end = f"the goal was not reached within {log.times[-1]:.1f} s"
+    return (
+        f"{end}; smallest clearance {log.workspace_clearance.min():.3f} m to walls, "
+        f"{log.body_clearance.min():.3f} m between bodies"
+    )
 
 
 def _fastest_base(log: SimulationLog) -> tuple[FloatArray, FloatArray]:

@@ -42,7 +42,7 @@ class TransportScene:
         self.team = TeamView(scenario, meshcat)
         self.of_a_metre = force_of_a_metre(self.team.team)
         set_arrows(meshcat, self.team.colours)
-        set_goal(meshcat, self._footprint(plan.goal_pose))
+        set_goal(meshcat, self._footprint(plan.goal_pose), *self.team.object_heights())
         shadow = flat_mesh(parts_of(self._footprint(np.zeros(3))), _SHADOW_HEIGHT)
         self.team.fix_to_object("shadow", shadow, rgba(INK, 0.3))
         self.team.show(plan.start)

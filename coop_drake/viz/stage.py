@@ -33,7 +33,10 @@ _WALL_THICKNESS = 0.08
 """Thickness of walls around the floor [m]."""
 
 _SHELF_LENGTH = 0.8
-"""Length from which on an obstacle on the floor is drawn as shelves, else as a pillar [m]."""
+"""Length from which on a convex obstacle on the floor is drawn as shelves, else as a pillar [m]."""
+
+_CONVEX = 0.99
+"""Part of its convex hull from which on an obstacle counts as convex; others are walls inside the floor."""
 
 _BOARDS = (0.12, 0.55, 1.0)
 """Tops of a shelf's boards, relative to the height of walls."""
@@ -47,8 +50,8 @@ _FIELD_OF_VIEW = 30.0
 _ELEVATION = radians(56.0)
 """How steeply the camera looks down [rad]: bodies behind walls are seen over them."""
 
-_FILL = 0.86
-"""Part of the picture that the floor fills; the headline and the player take the rest."""
+FILL = 0.95
+"""Part of the picture that the floor fills; headline and player lie outside of the picture."""
 
 _LIGHTS = {"AmbientLight": 2.7, "FillLight": 1.6, "PointLightNegativeX": 0.0, "PointLightPositiveX": 0.0}
 """Intensities of Meshcat's lights: from everywhere alike, so that the floor has no shadows."""
@@ -60,12 +63,18 @@ _SKY, _HORIZON = [1.0, 1.0, 1.0], [0.90, 0.92, 0.95]
 def place_camera(meshcat: Meshcat, workspace: Polygon, height: float) -> None:
     """Look at the whole workspace from above at an angle, in a narrow field of view."""
     position, target = camera_pose(
-        workspace, height, elevation=_ELEVATION, fill=_FILL, field_of_view=radians(_FIELD_OF_VIEW)
+        workspace, height, elevation=_ELEVATION, fill=FILL, field_of_view=radians(_FIELD_OF_VIEW)
     )
     distance = float(np.linalg.norm(position - target))
     camera = Meshcat.PerspectiveCamera(fov=_FIELD_OF_VIEW, near=0.01 * distance, far=10.0 * distance)
     meshcat.SetCamera(camera)
     meshcat.SetCameraPose(position, target)
+
+
+def floor_corners(workspace: Polygon, height: float) -> list[list[float]]:
+    """Return corners [m] of a prism that holds the floor and all that stands on it up to a height [m]."""
+    outline = shapely.get_coordinates(workspace.convex_hull)[:-1].tolist()
+    return [[x, y, z] for x, y in outline for z in (0.0, height)]
 
 
 def set_stage(meshcat: Meshcat, workspace: Polygon, wall_height: float) -> None:
@@ -76,10 +85,12 @@ def set_stage(meshcat: Meshcat, workspace: Polygon, wall_height: float) -> None:
     _set_light(meshcat)
     set_mesh(meshcat, "/stage/floor", flat_mesh(parts_of(workspace), 0.0), rgba(FLOOR_IN_SPACE))
     meshcat.SetLineSegments("/stage/grid", *_grid(workspace, 0.002), 1.0, rgba(GRID))
-    walls = wall_polygons(Polygon(workspace.exterior), _WALL_THICKNESS)
+    holes = [Polygon(ring) for ring in workspace.interiors]
+    inside = [hole for hole in holes if hole.area < _CONVEX * hole.convex_hull.area]
+    walls = wall_polygons(Polygon(workspace.exterior), _WALL_THICKNESS) + inside
     wall = rgba(WALL_IN_SPACE, _WALL_OPACITY)
     set_mesh(meshcat, "/stage/walls", slab_mesh(walls, 0.0, wall_height), wall)
-    for index, hole in enumerate(Polygon(ring) for ring in workspace.interiors):
+    for index, hole in enumerate(hole for hole in holes if hole not in inside):
         if _length(hole) < _SHELF_LENGTH:
             path, mesh, colour = f"/stage/pillars/{index:02d}", slab_mesh([hole], 0.0, wall_height), PILLAR
         else:

@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.geometry import (
-    GeometryId,
-    Meshcat,
-    MeshcatVisualizer,
-    MeshcatVisualizerParams,
-    Rgba,
-    Role,
-    Sphere,
-)
+from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams, Rgba, Role, Sphere
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.framework import DiagramBuilder
 
-from coop_drake.drawing.colours import robot_colour
 from coop_drake.drawing.solids import TriangleMesh
 from coop_drake.plant import TeamPlant, build_team_plant, set_configuration
 from coop_drake.scenario import Scenario
 from coop_drake.tree.pose import FloatArray
-from coop_drake.viz.paint import rgba, set_mesh
+from coop_drake.viz.paint import set_mesh
+from coop_drake.viz.team_colours import illustrations, paint_robots
 
 _SEE_THROUGH = 0.6
 """Opacity of the object, below which its cell is to be seen."""
@@ -37,13 +29,14 @@ class TeamView:
 
     Attributes:
         team: Its plant.
-        colours: Of every robot: that of its base in the model, or one of the palette.
+        colours: Of every robot; no two have the same one, up to five robots.
     """
 
     def __init__(self, scenario: Scenario, meshcat: Meshcat) -> None:
         self._meshcat = meshcat
         builder = DiagramBuilder()
         self.team: TeamPlant = build_team_plant(scenario, builder)
+        self.colours = paint_robots(self.team)
         roles = [Role.kIllustration] + ([Role.kProximity] if scenario.visualization.show_collision else [])
         self._prefixes = [f"/team/{role.name[1:].lower()}" for role in roles]
         for role, prefix in zip(roles, self._prefixes, strict=True):
@@ -52,7 +45,6 @@ class TeamView:
         self._diagram = builder.Build()
         self._context = self._diagram.CreateDefaultContext()
         self._plant_context = self.team.plant.GetMyMutableContextFromRoot(self._context)
-        self.colours = [self._colour(robot.base_body, k) for k, robot in enumerate(self.team.robots)]
         self.show(np.zeros(3 + len(self.team.joint_names)))
         self._bodies = self._shown_bodies()
         self._set_grasps()
@@ -86,6 +78,19 @@ class TeamView:
         set_mesh(self._meshcat, path, mesh, colour)
         self._meshcat.SetTransform(path, X_WB.inverse())
 
+    def object_heights(self) -> tuple[float, float]:
+        """Return the heights of the object's lowest and highest point above the floor [m]."""
+        set_configuration(self.team, self._plant_context, np.zeros(3 + len(self.team.joint_names)))
+        X_WB, heights = self.team.object_body.EvalPoseInWorld(self._plant_context), []
+        inspector = self.team.scene_graph.model_inspector()
+        for geometry in illustrations(self.team, self.team.object_body):
+            box = inspector.GetObbInGeometryFrame(geometry)
+            if box is not None:
+                X_WO = X_WB @ inspector.GetPoseInFrame(geometry) @ box.pose()
+                middle, half = X_WO.translation()[2], np.abs(X_WO.rotation().matrix()[2]) @ box.half_width()
+                heights += [float(middle - half), float(middle + half)]
+        return (min(heights), max(heights)) if heights else (0.0, 0.0)
+
     @property
     def _object_path(self) -> str:
         return f"{self._prefixes[0]}/{_path_of(self.team.object_body.scoped_name().get_full())}"
@@ -105,27 +110,13 @@ class TeamView:
         meshcat, body, inside = self._meshcat, self.team.object_body, self._plant_context
         path = self._object_path
         inspector = self.team.scene_graph.model_inspector()
-        for geometry in self._geometries(body):
+        for geometry in illustrations(self.team, body):
             own = f"{path}/{_path_of(inspector.GetName(geometry))}"
             meshcat.SetProperty(own, "modulated_opacity", _SEE_THROUGH)
         for robot, colour in zip(self.team.robots, self.colours, strict=True):
             own = f"{path}/grasps/{robot.name}"
             meshcat.SetObject(own, Sphere(_GRASP), colour)
             meshcat.SetTransform(own, robot.gripper_frame.CalcPose(inside, body.body_frame()))
-
-    def _geometries(self, body: RigidBody) -> list[GeometryId]:
-        frame = self.team.plant.GetBodyFrameIdOrThrow(body.index())
-        ids = self.team.scene_graph.model_inspector().GetGeometries(frame, Role.kIllustration)
-        return sorted(ids, key=lambda one: one.get_value())
-
-    def _colour(self, base: RigidBody, index: int) -> Rgba:
-        inspector = self.team.scene_graph.model_inspector()
-        for geometry in self._geometries(base):
-            properties = inspector.GetIllustrationProperties(geometry)
-            if properties is not None and properties.HasProperty("phong", "diffuse"):
-                colour: Rgba = properties.GetProperty("phong", "diffuse")
-                return Rgba(colour.r(), colour.g(), colour.b(), 1.0)
-        return rgba(robot_colour(index))
 
 
 def _path_of(name: str) -> str:

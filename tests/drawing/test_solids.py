@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from shapely import Polygon, box
+from shapely import Point, Polygon, box
 
 from coop_drake.drawing.solids import (
     flat_mesh,
@@ -36,6 +36,12 @@ def test_walls_stand_beside_the_floor_never_on_it():
     walls = wall_polygons(FLOOR, 0.1)
     assert sum(wall.intersection(FLOOR).area for wall in walls) == pytest.approx(0.0, abs=1e-12)
     assert sum(wall.area for wall in walls) > FLOOR.exterior.length * 0.1
+
+
+def test_a_thin_wall_between_two_rooms_is_drawn_whole():
+    rooms = box(0, 0, 3, 2) | box(3.2, 0, 6, 2) | box(2, 0.8, 4, 1.2)
+    within = [wall for wall in wall_polygons(rooms, 0.08) if wall.contains(Point(3.1, 1.5))]
+    assert len(within) == 1
 
 
 def test_ring_lines_run_once_round_every_ring():

@@ -15,7 +15,7 @@ from coop_drake.scenario import load_scenario
 from coop_drake.viz import inline_frame, recording_html, write_recording
 from coop_drake.viz.overlay import page_content, with_overlay
 from tests.support.cases import case
-from tests.support.recorded import paths, played, track
+from tests.support.recorded import messages, paths, played, track
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 
 MODELS = Path(__file__).parents[2] / "models"
@@ -119,8 +119,39 @@ def test_the_page_says_how_it_ended():
     plan, log = synthetic_plan(problem), synthetic_log(problem)
     facts = {"duration": 12.0, "colours": [Rgba(0, 0, 1), Rgba(1, 0, 0)], "of_a_metre": 5.0}
     lost = dataclasses.replace(log, violation="too near at t = 12 s", reached=False)
-    assert page_content(scenario, plan, log, **facts)["verdict"] == "arrived after 12.0 s"
-    assert page_content(scenario, plan, lost, **facts)["verdict"] == "too near at t = 12 s"
+    assert page_content(scenario, plan, log, **facts)["verdict"].startswith(
+        "arrived after 12.0 s; smallest clearance "
+    )
+    said = page_content(scenario, plan, lost, **facts)["verdict"]
+    walls, bodies = log.workspace_clearance.min(), log.body_clearance.min()
+    assert (
+        said
+        == f"too near at t = 12 s; smallest clearance {walls:.3f} m to walls, {bodies:.3f} m between bodies"
+    )
+    late = dataclasses.replace(log, reached=False)
+    said = page_content(scenario, plan, late, **facts)["verdict"]
+    assert said.startswith("the goal was not reached within 12.0 s; smallest clearance ")
+
+
+def test_the_goals_frame_is_as_high_as_the_object(text):
+    """The shipped object is a box 0.2 m high whose middle is 0.4 m above the floor."""
+    told = [message for message in messages(text) if message.get("path") == "/plan/goal_pose/frame"]
+    packed = told[0]["object"]["geometries"][0]["data"]["attributes"]["position"]["array"]
+    heights = np.frombuffer(packed.data, dtype=np.float32).reshape(-1, 3)[:, 2]
+    np.testing.assert_allclose([heights.min(), heights.max()], [0.3, 0.5], atol=1e-6)
+
+
+def test_cells_are_outlined_through_the_bodies_above_them(text):
+    through = {
+        message["path"]
+        for message in messages(text)
+        if message["type"] == "set_property"
+        and (message["property"], message["value"]) == ("material.depthTest", False)
+    }
+    assert through >= {
+        "/plan/cells/000/outline/<object>",
+        "/plan/goal_regions/000/outline/<object>",
+    }
 
 
 def test_an_arrow_is_as_long_as_the_force_is_strong(text):

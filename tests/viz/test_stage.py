@@ -1,4 +1,4 @@
-"""Obstacles on the floor: long ones are shelves, short ones pillars."""
+"""Obstacles on the floor: long ones are shelves, short ones pillars, and those not convex are walls."""
 
 from __future__ import annotations
 
@@ -28,6 +28,15 @@ def test_a_long_obstacle_is_a_shelf_and_a_short_one_a_pillar(standing):
     )
     assert len(kinds) == 2
     assert {kind.split("/")[0] for kind in kinds} == {"shelves", "pillars"}
+
+
+def test_an_obstacle_that_is_not_convex_is_a_wall():
+    corner = Polygon([(1, 1), (3, 1), (3, 1.2), (1.2, 1.2), (1.2, 3), (1, 3)])
+    meshcat = Meshcat()
+    set_stage(meshcat, FLOOR - corner - PILLAR, 0.5)
+    assert not meshcat.HasPath("/stage/shelves/00")
+    assert meshcat.HasPath("/stage/pillars/00")
+    assert not meshcat.HasPath("/stage/pillars/01")
 
 
 def test_floor_grid_and_walls_stand_on_every_stage(standing):
