@@ -19,8 +19,8 @@ from benchmarks.tasks import Task
 from coop_drake.answers import PlanningProblem
 from coop_drake.planning import find_channel
 from coop_drake.planning.boxes.channel import Channel
-from coop_drake.planning.cells.exploration import Verdict
-from coop_drake.planning.proofs.proof_search import Proofs, explorer
+from coop_drake.planning.cells.exploration import Exploration, Verdict
+from coop_drake.planning.proofs.proof_search import Proofs
 
 __all__ = ["VARIANTS", "Answered", "ablation_rows", "ablation_tasks", "answer"]
 
@@ -119,7 +119,7 @@ def _proved(problem: PlanningProblem) -> Came:
 
 
 def _explored(problem: PlanningProblem) -> Came:
-    outcome = explorer(problem).run(problem.settings.max_slices)
+    outcome = Exploration(problem).run(problem.settings.max_slices)
     return _word(outcome.verdict), outcome.slices, None
 
 

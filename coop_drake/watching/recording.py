@@ -9,9 +9,7 @@ import numpy as np
 from manifold3d import CrossSection, FillRule
 
 from coop_drake.answers.problem import PlanningProblem, at_goal
-from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.parts import polygon_rings
-from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.boxes.channel import Channel
 from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.planning.cells.cells import Region
@@ -89,10 +87,8 @@ def record_search(
     if strategy == "portfolio":
         return _record_portfolio(problem, margin, progress)
     events: list[Event] = []
-    swept = SweptTree(problem.tree)
     algorithm = Exploration if strategy == "cells" else PaperExploration
-    free = marginal_workspace(problem, margin)
-    exploration = algorithm(problem, free, swept, BodyPairs(swept), events.append)
+    exploration = algorithm(problem, marginal_workspace(problem, margin), events.append)
     budget = problem.settings.max_slices
 
     def count(slices: int) -> None:

@@ -4,18 +4,14 @@ from dataclasses import replace
 
 import pytest
 
-from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.cells import printed_algorithms as paper
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.cells.printed_algorithms import PaperExploration
-from coop_drake.planning.questions.margins import shrunk
 from tests.planning.test_search import rod_problem
 
 
 def explored(problem, budget=400):
-    swept = SweptTree(problem.tree)
-    exploration = PaperExploration(problem, shrunk(problem.workspace, 0.0), swept, BodyPairs(swept))
+    exploration = PaperExploration(problem)
     return exploration, exploration.run(budget)
 
 

@@ -1,5 +1,3 @@
-from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.cells.events import (
     ChannelSearched,
     Event,
@@ -9,16 +7,12 @@ from coop_drake.planning.cells.events import (
     SliceSplit,
 )
 from coop_drake.planning.cells.exploration import Exploration, ExplorationResult
-from coop_drake.planning.questions.margins import shrunk
 from tests.planning.test_search import rod_problem
 
 
 def watched(corridor: float, budget: int) -> tuple[list[Event], ExplorationResult, Exploration]:
     problem, events = rod_problem(corridor), []
-    swept = SweptTree(problem.tree)
-    exploration = Exploration(
-        problem, shrunk(problem.workspace, 0.0), swept, BodyPairs(swept), watch=events.append
-    )
+    exploration = Exploration(problem, watch=events.append)
     return events, exploration.run(budget), exploration
 
 
@@ -50,7 +44,6 @@ def test_the_last_events_are_the_channel_and_the_verdict() -> None:
 
 def test_watching_changes_nothing() -> None:
     problem = rod_problem(0.3)
-    swept = SweptTree(problem.tree)
-    alone = Exploration(problem, shrunk(problem.workspace, 0.0), swept, BodyPairs(swept))
+    alone = Exploration(problem)
     _, outcome, _ = watched(0.3, 500)
     assert alone.run(500).slices == outcome.slices

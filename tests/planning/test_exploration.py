@@ -6,8 +6,7 @@ import pytest
 
 from coop_drake.planning.boxes.boxes import explored_channel
 from coop_drake.planning.cells.cell_graph import Kind
-from coop_drake.planning.cells.exploration import Verdict
-from coop_drake.planning.proofs.proof_search import explorer
+from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.questions.relaxation import relaxed
 from tests.planning.test_search import rod_problem
 from tests.support.cases import case
@@ -16,7 +15,7 @@ from tests.support.soundness import assert_channel_is_sound
 
 def test_exploration_alone_finds_a_sound_channel() -> None:
     problem = rod_problem(0.5)
-    exploration = explorer(problem)
+    exploration = Exploration(problem)
     outcome = exploration.run(2000)
     assert outcome.verdict is Verdict.FOUND
     assert all(cell.kind is Kind.FREE for cell in outcome.path)
@@ -28,7 +27,7 @@ def test_exploration_alone_finds_a_sound_channel() -> None:
 
 
 def test_free_cells_of_the_graph_join_both_ends_of_a_channel() -> None:
-    exploration = explorer(rod_problem(0.5))
+    exploration = Exploration(rod_problem(0.5))
     outcome = exploration.run(2000)
     graph = nx.Graph()
     for cells in exploration.graph.by_slice.values():
@@ -42,7 +41,7 @@ def test_free_cells_of_the_graph_join_both_ends_of_a_channel() -> None:
 def test_no_relaxation_of_a_feasible_case_is_infeasible(name: str, robots: tuple[int, ...]) -> None:
     question, joints = relaxed(case(name), robots)
     assert len(joints) == len(question.tree.joints) == len(question.goal_joints)
-    outcome = explorer(question).run(150)
+    outcome = Exploration(question).run(150)
     assert outcome.verdict in (Verdict.FOUND, Verdict.BUDGET)
 
 

@@ -11,11 +11,10 @@ from shapely.errors import GEOSException
 
 from coop_drake.answers.problem import PlannerSettings
 from coop_drake.geometry.minkowski import SAFE_SIDE, FreeSpace
-from coop_drake.planning.cells.exploration import Verdict
+from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.search.search import NoChannel, find_channel
 from tests.geometry.test_minkowski import as_shapely, exact_difference
 from tests.planning.test_search import rod_problem
-from tests.support.explorations import exploration_of
 from tests.support.trees import room
 
 SQUARE = np.array([[-0.3, -0.2], [0.4, -0.2], [0.4, 0.3], [-0.3, 0.3]])
@@ -86,7 +85,7 @@ def test_no_exploration_errs_however_often_clipping_fails(failure, every: int, c
     problem = rod_problem(corridor)
     with pytest.MonkeyPatch.context() as broken:
         broken.setattr(FreeSpace, "_clipped", now_and_then(failure, every))
-        outcome = exploration_of(problem).run(250)
+        outcome = Exploration(problem).run(250)
     assert outcome.verdict is not (Verdict.FOUND if corridor < 0.2 else Verdict.INFEASIBLE)
 
 
@@ -124,7 +123,7 @@ def test_no_exploration_errs_however_often_regions_cannot_be_cut_or_parted(
         patched.setattr(
             CrossSection, name, lambda *sections: (failure if next(calls) % every == 0 else works)(*sections)
         )
-        outcome = exploration_of(problem).run(200)
+        outcome = Exploration(problem).run(200)
     assert outcome.verdict is not (Verdict.FOUND if corridor < 0.2 else Verdict.INFEASIBLE)
 
 

@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 from manifold3d import CrossSection
 
-from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.cells.cell_graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.events import ChannelSearched, Event, SliceAdded, SliceSplit
 from coop_drake.planning.cells.exploration import ExplorationResult, Verdict
 from coop_drake.planning.cells.printed_algorithms import PaperExploration, refine
 from coop_drake.planning.cells.slices import Slices
-from coop_drake.planning.questions.margins import shrunk
 from tests.planning.test_search import rod_problem
 from tests.support.cases import team_tree, transport
 
@@ -25,10 +23,8 @@ def explored(
     corridor: float, budget: int = 400, **changes: object
 ) -> tuple[PaperExploration, ExplorationResult, list[Event]]:
     problem = replace(rod_problem(corridor), **changes)
-    swept, events = SweptTree(problem.tree), []
-    exploration = PaperExploration(
-        problem, shrunk(problem.workspace, 0.0), swept, BodyPairs(swept), events.append
-    )
+    events = []
+    exploration = PaperExploration(problem, watch=events.append)
     return exploration, exploration.run(budget), events
 
 
@@ -57,8 +53,8 @@ def test_a_path_is_found_among_under_cells_of_adjacent_slices() -> None:
 
 def test_each_search_halves_one_slice_along_its_longest_interval() -> None:
     problem = transport(1.2)
-    swept, events = SweptTree(problem.tree), []
-    PaperExploration(problem, shrunk(problem.workspace, 0.0), swept, BodyPairs(swept), events.append).run(120)
+    events = []
+    PaperExploration(problem, watch=events.append).run(120)
     intervals: dict[int, Intervals] = {}
     halved = searched = False  # Before the first search the slices of start and goal are halved.
     for event in events:

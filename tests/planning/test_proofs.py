@@ -7,11 +7,11 @@ import pytest
 from shapely import Point, Polygon, box
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.planning.cells.exploration import Verdict
+from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.proofs.blocked_goals import blocked_goal
 from coop_drake.planning.proofs.clearance_bound import clearance_bound
 from coop_drake.planning.proofs.inscribed_disc import disc_refuted
-from coop_drake.planning.proofs.proof_search import Proofs, explorer
+from coop_drake.planning.proofs.proof_search import Proofs
 from coop_drake.planning.questions.relaxation import inscribed_disc, relaxed
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
@@ -35,7 +35,7 @@ def covered(problem: PlanningProblem, lower: np.ndarray, upper: np.ndarray) -> b
 @pytest.mark.parametrize("robots", [(), (1,)])
 def test_an_ended_proof_covers_every_angle(robots: tuple[int, ...]) -> None:
     question, _ = relaxed(case("closed"), robots)
-    exploration = explorer(question)
+    exploration = Exploration(question)
     assert exploration.run(1500).verdict is Verdict.INFEASIBLE
     leaves = [exploration.slices.all[index].intervals for index in exploration.over_leaves()]
     lower, upper = np.moveaxis(np.array(leaves), 2, 0)
@@ -44,7 +44,7 @@ def test_an_ended_proof_covers_every_angle(robots: tuple[int, ...]) -> None:
 
 def test_the_whole_of_a_team_is_refuted_along_the_few_axes_that_matter() -> None:
     """Six dimensions, no relaxation: theta and the joint of the robot that is in the way come first."""
-    exploration = explorer(transport(0.95, robots=3))
+    exploration = Exploration(transport(0.95, robots=3))
     outcome = exploration.run(1000)
     assert outcome.verdict is Verdict.INFEASIBLE
     assert outcome.slices < 600
@@ -59,7 +59,7 @@ def test_bodies_in_each_others_way_are_parted_along_their_own_axis() -> None:
     )
     start, goal = np.array([0.0, 0.0, 0.0, -0.6]), np.array([0.5, 0.0, 0.0])
     problem = PlanningProblem(box(-3.0, -3.0, 3.0, 3.0), tree, start, goal, (0.6,))
-    assert explorer(problem).run(200).verdict is Verdict.INFEASIBLE
+    assert Exploration(problem).run(200).verdict is Verdict.INFEASIBLE
 
 
 def test_a_relaxation_refutes_the_whole() -> None:

@@ -15,7 +15,6 @@ from coop_drake.planning.proofs.inscribed_disc import disc_refuted
 from coop_drake.planning.questions.relaxation import relaxed
 from coop_drake.planning.search.search import find_channel
 from tests.support.cases import case
-from tests.support.explorations import exploration_of
 from tests.support.planted import Planted, planted
 
 SLICES = 16
@@ -42,7 +41,7 @@ def assert_no_relaxation_loses(problem: PlanningProblem, path: np.ndarray) -> No
     robots = sorted({joint.robot for joint in problem.tree.joints})
     for chosen in [some for count in range(len(robots) + 1) for some in combinations(robots, count)]:
         question, joints = relaxed(problem, chosen)
-        exploration = exploration_of(question)
+        exploration = Exploration(question)
         assert exploration.run(SLICES).verdict is not Verdict.INFEASIBLE
         axes = [2, *[3 + joint for joint in joints]]
         assert all(is_covered(exploration, z[:2], z[axes]) for z in path)

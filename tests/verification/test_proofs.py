@@ -15,8 +15,8 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof_file import read_proof, save_proof
 from coop_drake.errors import PlanError, RefusalError
 from coop_drake.planning import find_channel
+from coop_drake.planning.cells.exploration import Exploration
 from coop_drake.planning.proofs.proof_making import slices_proof
-from coop_drake.planning.proofs.proof_search import explorer
 from coop_drake.planning.proofs.witnesses import Witnesses
 from coop_drake.planning.questions.relaxation import relaxed
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape
@@ -158,7 +158,7 @@ def test_a_cut_through_free_space_is_refused():
     """Where there is a way, no choice of labels makes a proof: over-cells of an unfinished exploration."""
     feasible = bent_corridor(1.2)
     question, _ = relaxed(feasible, ())
-    exploration = explorer(question)
+    exploration = Exploration(question)
     exploration.run(24)
     witnesses = Witnesses(feasible.tree, exploration.swept, exploration.pairs)
     leaves = exploration.over_leaves()

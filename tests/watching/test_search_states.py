@@ -6,8 +6,6 @@ from itertools import pairwise
 
 import pytest
 
-from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.planning.cells.events import (
     ChannelSearched,
@@ -18,7 +16,6 @@ from coop_drake.planning.cells.events import (
     SliceSplit,
 )
 from coop_drake.planning.cells.exploration import Exploration
-from coop_drake.planning.questions.margins import shrunk
 from coop_drake.watching import search_states
 from tests.planning.test_search import rod_problem
 from tests.watching.rods import NARROW, WIDE, rod_recording
@@ -27,10 +24,7 @@ from tests.watching.rods import NARROW, WIDE, rod_recording
 @pytest.mark.parametrize("corridor", [WIDE, NARROW])
 def test_events_replayed_give_the_leaves_cells_and_channel_of_the_exploration(corridor):
     problem, events = rod_problem(corridor), []
-    swept = SweptTree(problem.tree)
-    exploration = Exploration(
-        problem, shrunk(problem.workspace, 0.0), swept, BodyPairs(swept), watch=events.append
-    )
+    exploration = Exploration(problem, watch=events.append)
     outcome = exploration.run(500)
     last = search_states(events, 7)[-1]
     assert sorted(last.leaves) == exploration.slices.leaves()

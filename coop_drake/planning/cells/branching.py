@@ -11,8 +11,7 @@ from coop_drake.geometry.safeguards import shared
 from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.cells.cell_graph import GraphCell
 from coop_drake.planning.cells.cells import CellMaker, Region
-from coop_drake.planning.cells.halves import Halves
-from coop_drake.planning.cells.slices import Slices, holds, share_facet
+from coop_drake.planning.cells.slices import Slices, halves, holds, share_facet
 
 
 @dataclass(frozen=True)
@@ -43,8 +42,8 @@ class StrongBranching:
     ``problem``: start and goal, where paths begin and end.
     """
 
-    def __init__(self, problem: PlanningProblem, slices: Slices, maker: CellMaker, halves: Halves) -> None:
-        self._slices, self._maker, self._halves = slices, maker, halves
+    def __init__(self, problem: PlanningProblem, slices: Slices, maker: CellMaker) -> None:
+        self._slices, self._maker = slices, maker
         self._times_blocking: Counter[int] = Counter()
         start, goal = problem.start, problem.goal_pose
         self._start = [float(angle) for angle in start[2:]], start[:2]
@@ -54,9 +53,9 @@ class StrongBranching:
         """Halve the cell at a place of a path along an axis, on trial."""
         cell = path[place]
         parts = [
-            _Part(number, half.intervals, region)
-            for number, half in enumerate(self._halves.of(cell.slice, axis))
-            for region in half.regions
+            _Part(number, half, region)
+            for number, half in enumerate(halves(self._slices.all[cell.slice].intervals, axis))
+            for region in self._maker.over_cells(half)
             if region.meets(cell.region)
         ]
         first = [self._enters(part, path, place - 1) for part in parts]

@@ -102,6 +102,7 @@ class CellMaker:
         self._axes = [swept.pieces[members[0]].axes if members else () for members in self._members]
         self._under: dict[tuple[object, ...], CrossSection | None] = {}
         self._over: dict[tuple[object, ...], CrossSection | None] = {}
+        self._cells: dict[Intervals, list[Region]] = {}
 
     def _positions(self, workspace: Polygon | MultiPolygon) -> CrossSection:
         """A box that holds every position at which the team can be inside the workspace."""
@@ -112,9 +113,10 @@ class CellMaker:
 
     def over_cells(self, intervals: Intervals) -> list[Region]:
         """Regions outside which no configuration of the nominal slice is free."""
-        if self._pairs.overlapping(intervals) is not None:
-            return []
-        return regions_of(self._common(intervals, over=True), over=True)
+        if intervals not in self._cells:  # Trial splits ask for halves that may become slices.
+            free = self._pairs.overlapping(intervals) is None
+            self._cells[intervals] = regions_of(self._common(intervals, over=True), over=True) if free else []
+        return self._cells[intervals]
 
     def under_cells(self, expanded: Intervals) -> list[Region]:
         """Regions in which every configuration of the expanded slice is free."""

@@ -1,21 +1,25 @@
-"""One exploration of the configuration space at one margin: Algorithm 1 with our order of splits."""
+"""Explorations of the configuration space at one margin; Algorithm 1 with our order of splits."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cell_graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.events import (
     ChannelSearched,
+    Event,
     ExplorationBegan,
     ExplorationEnded,
     ExplorationResumed,
@@ -24,10 +28,8 @@ from coop_drake.planning.cells.events import (
     Watch,
     seen,
 )
-from coop_drake.planning.cells.halves import Halves
-from coop_drake.planning.cells.mixed_cells import mixed_cells
 from coop_drake.planning.cells.slices import Slices, holds
-from coop_drake.planning.cells.split_rules import SplitOrder
+from coop_drake.planning.cells.split_rules import SplitOrder, finest_widths
 from coop_drake.planning.travel_time import SETTLING_TIME
 
 TIME_PER_INVERSE_BREADTH = 0.03
@@ -78,91 +80,128 @@ class ExplorationResult:
     slices: int
 
 
-class Exploration:
-    """Slices, cells and their graph for one question at one margin.
+class Subdivision(ABC):
+    """Slices and their cells for one question at one margin, halved until there is an answer.
 
     Args:
         problem: The question.
-        workspace: Floor with the margin taken off [m].
-        swept: Sweeps of the problem's tree.
-        pairs: Self-collision of the problem's tree.
+        workspace: Floor with the margin taken off [m]; None for the floor itself.
         watch: Called with every event, in order.
         question: What is explored, in words, for the events.
+        printed: Whether slices begin and adjoin as the paper prints it, see ``Slices``.
     """
 
     def __init__(
         self,
         problem: PlanningProblem,
-        workspace: Polygon | MultiPolygon,
-        swept: SweptTree,
-        pairs: BodyPairs,
+        workspace: Polygon | MultiPolygon | None = None,
         watch: Watch | None = None,
         question: str = "the whole team",
+        *,
+        printed: bool = False,
     ) -> None:
         self._problem, self._watch = problem, watch
         self._question, self._paused = question, False
-        self.swept, self.pairs = swept, pairs
-        self.slices = Slices(problem.tree, problem.settings.slice_overlap)
-        self.maker = CellMaker(swept, pairs, workspace)
-        self.graph = CellGraph(self.slices)
-        self._halves = Halves(self.slices, self.maker)
-        self.order = SplitOrder(problem, self.slices, self.maker, self._halves)
-        self._starts: dict[int, list[GraphCell]] = {}
-        self._goals: dict[int, list[int]] = {}
-        if watch is not None:
-            robots = sorted({joint.robot for joint in problem.tree.joints})
-            watch(ExplorationBegan(question, tuple(robots)))
-        for index in self.slices.leaves():
-            self._add(index, self.maker.over_cells(self.slices.all[index].intervals))
+        self.swept = SweptTree(problem.tree)
+        self.pairs = BodyPairs(self.swept)
+        self.slices = Slices(problem.tree, problem.settings.slice_overlap, printed=printed)
+        self.maker = CellMaker(self.swept, self.pairs, problem.workspace if workspace is None else workspace)
+        self.finest = finest_widths(problem)
+        self._robots = tuple(sorted({joint.robot for joint in problem.tree.joints}))
+        self._tell(ExplorationBegan(question, self._robots))
 
     def run(self, budget: int, progress: Callable[[int], None] | None = None) -> ExplorationResult:
         """Search and split until there is an answer or the budget of slices is spent.
 
-        The path of least weight through FREE and undecided cells is searched, and slices on it are halved in
-        the order of ``SplitOrder``. If no path exists at all, the question is infeasible. Call again with a
-        larger budget to continue where the exploration stopped.
+        Call again with a larger budget to continue where the exploration stopped.
 
         Args:
             budget: Compound slices that may exist in all.
             progress: Called with the number of slices after every round of splits.
         """
-        if self._watch is not None and self._paused:
-            self._watch(ExplorationResumed(self._question))
+        if self._paused:
+            self._tell(ExplorationResumed(self._question))
         self._paused = True
-        outcome = self._explored(budget, progress)
-        if self._watch is not None:
-            self._watch(ExplorationEnded(outcome.verdict.value, outcome.slices))
-        return outcome
-
-    def _explored(self, budget: int, progress: Callable[[int], None] | None) -> ExplorationResult:
-        while True:
-            path = self._cheapest_path()
-            if self._watch is not None:
-                cost = sum(cell.weight for cell in path or ())
-                self._watch(ChannelSearched(seen(path or ()), cost))
-            made = len(self.slices.all)
-            if path is None:
-                return ExplorationResult(Verdict.INFEASIBLE, (), made)
-            if all(cell.kind is Kind.FREE for cell in path):
-                return ExplorationResult(Verdict.FOUND, tuple(path), made)
-            if made >= budget:
-                return ExplorationResult(Verdict.BUDGET, tuple(path), made)
-            splits = self.order.splits(path)
-            if not splits:
-                return ExplorationResult(Verdict.RESOLUTION, tuple(path), made)
-            for index, axis in splits:
-                self._split(index, axis)
+        while (outcome := self._round(budget)) is None:
             if progress is not None:
                 progress(len(self.slices.all))
+        self._tell(ExplorationEnded(outcome.verdict.value, outcome.slices))
+        return outcome
+
+    @abstractmethod
+    def _round(self, budget: int) -> ExplorationResult | None:
+        """Search once and split; None if the exploration goes on."""
+
+    @abstractmethod
+    def over_leaves(self) -> dict[int, list[Region]]:
+        """Over-cells of every leaf by its id; an empty list where the whole leaf is blocked."""
+
+    def boxes(self, path: Sequence[GraphCell]) -> list[tuple[Intervals, Region]]:
+        """Expanded intervals and region of every cell of a free path."""
+        return [(self.slices.expanded(self.slices.all[cell.slice].intervals), cell.region) for cell in path]
+
+    def undecided(self, path: Sequence[GraphCell]) -> tuple[MixedCell, ...]:
+        """Cells of a path that are not proved free, the widest first."""
+        cells, finest = [], np.array(self.finest)
+        for cell in path:
+            if cell.kind is not Kind.FREE:
+                lower, upper = np.array(self.slices.all[cell.slice].intervals).T.copy()
+                fraction = float(((upper - lower) / np.array(self.slices.axis_widths)).max())
+                done = bool((upper - lower <= finest).all())
+                polygon = to_polygon(cell.region.section)
+                cells.append(MixedCell(self._robots, lower, upper, polygon, fraction, done))
+        return tuple(sorted(cells, key=lambda cell: -cell.width_fraction))
+
+    def _tell(self, event: Event) -> None:
+        if self._watch is not None:
+            self._watch(event)
+
+    def _searched(self, path: Sequence[GraphCell]) -> None:
+        self._tell(ChannelSearched(seen(path), sum(cell.weight for cell in path)))
+
+    def _result(self, verdict: Verdict, path: Sequence[GraphCell]) -> ExplorationResult:
+        return ExplorationResult(verdict, tuple(path), len(self.slices.all))
+
+
+class Exploration(Subdivision):
+    """A subdivision whose path of least weight is searched, and halved in the order of ``SplitOrder``.
+
+    The path leads through FREE and undecided cells. If no path exists at all, the question is infeasible.
+    """
+
+    def __init__(
+        self,
+        problem: PlanningProblem,
+        workspace: Polygon | MultiPolygon | None = None,
+        watch: Watch | None = None,
+        question: str = "the whole team",
+    ) -> None:
+        super().__init__(problem, workspace, watch, question)
+        self.graph = CellGraph(self.slices)
+        self.order = SplitOrder(problem, self.slices, self.maker)
+        self._starts: dict[int, list[GraphCell]] = {}
+        self._goals: dict[int, list[int]] = {}
+        for index in self.slices.leaves():
+            self._add(index)
+
+    def _round(self, budget: int) -> ExplorationResult | None:
+        path = self._cheapest_path()
+        self._searched(path or ())
+        if path is None:
+            return self._result(Verdict.INFEASIBLE, ())
+        if all(cell.kind is Kind.FREE for cell in path):
+            return self._result(Verdict.FOUND, path)
+        if len(self.slices.all) >= budget:
+            return self._result(Verdict.BUDGET, path)
+        splits = self.order.splits(path)
+        for index, axis in splits:
+            self._split(index, axis)
+        return None if splits else self._result(Verdict.RESOLUTION, path)
 
     def _cheapest_path(self) -> list[GraphCell] | None:
         starts = [cell for index in sorted(self._starts) for cell in self._starts[index]]
         goals = {cell for cells in self._goals.values() for cell in cells}
         return self.graph.cheapest(starts, goals)
-
-    def boxes(self, path: Sequence[GraphCell]) -> list[tuple[Intervals, Region]]:
-        """Expanded intervals and region of every cell of a free path."""
-        return [(self.slices.expanded(self.slices.all[cell.slice].intervals), cell.region) for cell in path]
 
     def over_leaves(self) -> dict[int, list[Region]]:
         """Over-cells of every leaf by its id; an empty list where the whole leaf is blocked."""
@@ -171,22 +210,17 @@ class Exploration:
             for index in self.slices.leaves()
         }
 
-    def undecided(self, path: Sequence[GraphCell]) -> tuple[MixedCell, ...]:
-        """Cells of a path that are not proved free, the widest first."""
-        return mixed_cells(self._problem, self.slices, self.order.finest, path)
-
     def _split(self, index: int, axis: int) -> None:
-        if self._watch is not None:
-            self._watch(SliceSplit(index, axis))
+        self._tell(SliceSplit(index, axis))
         self.graph.remove(index)
         self._starts.pop(index, None)
         self._goals.pop(index, None)
-        parts = self._halves.taken(index, axis)
-        for half, part in zip(self.slices.split(index, axis), parts, strict=True):
-            self._add(half, part.regions)
+        for half in self.slices.split(index, axis):
+            self._add(half)
 
-    def _add(self, index: int, mixed: Sequence[Region]) -> None:
+    def _add(self, index: int) -> None:
         intervals = self.slices.all[index].intervals
+        mixed = self.maker.over_cells(intervals)
         free = self.maker.under_cells(self.slices.expanded(intervals)) if mixed else []
         guide = self.maker.guide_cells(intervals) if mixed else []
         final = not self.order.splittable(intervals)
@@ -196,8 +230,7 @@ class Exploration:
         members += [(Kind.MIXED, region, weight) for region in mixed]
         self.graph.add(index, members)
         self._note_ends(index, intervals)
-        if self._watch is not None:
-            self._watch(SliceAdded(index, intervals, seen(self.graph.by_slice[index])))
+        self._tell(SliceAdded(index, intervals, seen(self.graph.by_slice[index])))
 
     def _note_ends(self, index: int, intervals: Intervals) -> None:
         """Record which cells of a new leaf hold the start and which hold the goal."""

@@ -2,92 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from shapely import MultiPolygon, Polygon
 
-from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.cells.cell_graph import CellGraph, GraphCell, Kind
-from coop_drake.planning.cells.cells import CellMaker, Region
-from coop_drake.planning.cells.events import (
-    ChannelSearched,
-    ExplorationBegan,
-    ExplorationEnded,
-    ExplorationResumed,
-    SliceAdded,
-    SliceSplit,
-    Watch,
-    seen,
-)
-from coop_drake.planning.cells.exploration import ExplorationResult, Verdict
-from coop_drake.planning.cells.mixed_cells import mixed_cells
-from coop_drake.planning.cells.slices import Slices
-from coop_drake.planning.cells.split_rules import finest_widths
+from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.events import SliceAdded, SliceSplit, Watch, seen
+from coop_drake.planning.cells.exploration import ExplorationResult, Subdivision, Verdict
 from coop_drake.tree.pose import FloatArray
 
 End = tuple[list[float | None], FloatArray]
 
 
-class PaperExploration:
+class PaperExploration(Subdivision):
     """Under- and over-approximation cells of one subdivision, refined as the paper prints it.
 
     Every round halves one slice: the longest simple slice of the first two compound slices on the path of
     over-approximation cells whose under-approximation cells do not connect. The paper does not say when the
     algorithm gives up (erratum EA1); here it stops when the slice to halve is below the resolution.
 
-    Args:
-        problem: The question.
-        workspace: The floor [m].
-        swept: Sweeps of the problem's tree.
-        pairs: Self-collision of the problem's tree.
-        watch: Called with every event, in order.
-
     Attributes:
-        slices: The subdivision; it begins with one slice of everything.
-        under: Under-approximation cells of its leaves.
-        over: Over-approximation cells of its leaves.
+        under: Under-approximation cells of the leaves.
+        over: Over-approximation cells of the leaves.
     """
 
     def __init__(
         self,
         problem: PlanningProblem,
-        workspace: Polygon | MultiPolygon,
-        swept: SweptTree,
-        pairs: BodyPairs,
+        workspace: Polygon | MultiPolygon | None = None,
         watch: Watch | None = None,
     ) -> None:
-        self._problem, self._watch = problem, watch
+        super().__init__(problem, workspace, watch, printed=True)
         self._start: End = [float(angle) for angle in problem.start[2:]], problem.start[:2]
         self._goal: End = [float(problem.goal_pose[2]), *problem.goal_joints], problem.goal_pose[:2]
-        self._maker = CellMaker(swept, pairs, workspace)
-        self._finest = finest_widths(problem)
-        self.slices = Slices(problem.tree, problem.settings.slice_overlap, printed=True)
         self.under, self.over = CellGraph(self.slices), CellGraph(self.slices)
-        if watch is not None:
-            robots = sorted({joint.robot for joint in problem.tree.joints})
-            watch(ExplorationBegan("the whole team", tuple(robots)))
-        self._paused = False
         self._add(0)
 
-    def run(self, budget: int, progress: Callable[[int], None] | None = None) -> ExplorationResult:
-        """Run Algorithm 1 until it returns or the budget of slices is spent; call again to continue."""
-        if self._watch is not None and self._paused:
-            self._watch(ExplorationResumed("the whole team"))
-        self._paused = True
-        while True:
-            outcome = self._once(budget)
-            if outcome is not None:
-                if self._watch is not None:
-                    self._watch(ExplorationEnded(outcome.verdict.value, outcome.slices))
-                return outcome
-            if progress is not None:
-                progress(len(self.slices.all))
-
-    def _once(self, budget: int) -> ExplorationResult | None:
-        """One pass of Algorithm 1's loop; None if the loop continues."""
+    def _round(self, budget: int) -> ExplorationResult | None:
+        """One pass of Algorithm 1's loop."""
         start = self._find_enclosing(self._start, budget)
         if isinstance(start, ExplorationResult):
             return start
@@ -97,14 +51,14 @@ class PaperExploration:
         (over_start, under_start), (over_goal, under_goal) = start, goal
         path = self._connect(self.under, under_start, under_goal)
         if path:
-            return self._outcome(Verdict.FOUND, path)
+            return self._result(Verdict.FOUND, path)
         path = self._connect(self.over, over_start, over_goal)
         if not path:
-            return self._outcome(Verdict.INFEASIBLE, path)
+            return self._result(Verdict.INFEASIBLE, path)
         if len(self.slices.all) >= budget:
-            return self._outcome(Verdict.BUDGET, path)
+            return self._result(Verdict.BUDGET, path)
         failing = refine(path, [under_start], [under_goal], self.under)
-        return None if self._subdivide_longest(failing) else self._outcome(Verdict.RESOLUTION, path)
+        return None if self._subdivide_longest(failing) else self._result(Verdict.RESOLUTION, path)
 
     def _find_enclosing(self, end: End, budget: int) -> tuple[GraphCell, GraphCell] | ExplorationResult:
         """Subdivide until one slice has an over-cell and an under-cell that hold an end; return both."""
@@ -117,21 +71,21 @@ class PaperExploration:
                 if cell.region.holds(position)
             ]
             if not held:
-                return self._outcome(Verdict.INFEASIBLE, [])
+                return self._result(Verdict.INFEASIBLE, [])
             for over in held:
                 for under in self.under.by_slice[over.slice]:
                     if under.region.holds(position):
                         return over, under
             if len(self.slices.all) >= budget:
-                return self._outcome(Verdict.BUDGET, held[:1])
+                return self._result(Verdict.BUDGET, held[:1])
             if not self._subdivide_longest([held[0].slice]):
-                return self._outcome(Verdict.RESOLUTION, held[:1])
+                return self._result(Verdict.RESOLUTION, held[:1])
 
     def _connect(self, graph: CellGraph, first: GraphCell, last: GraphCell) -> list[GraphCell]:
         """Path through the cells of one kind that prefers large slices; empty if there is no path."""
         path = graph.cheapest([first], {last.index}) or []
-        if self._watch is not None and (path or graph is self.over):
-            self._watch(ChannelSearched(seen(path), sum(cell.weight for cell in path)))
+        if path or graph is self.over:
+            self._searched(path)
         return path
 
     def _subdivide_longest(self, indices: Sequence[int]) -> bool:
@@ -145,10 +99,9 @@ class PaperExploration:
             for axis, (lower, upper) in enumerate(self.slices.all[index].intervals)
         }
         index, axis = max(widths, key=lambda key: widths[key])
-        if widths[index, axis] <= self._finest[axis]:
+        if widths[index, axis] <= self.finest[axis]:
             return False
-        if self._watch is not None:
-            self._watch(SliceSplit(index, axis))
+        self._tell(SliceSplit(index, axis))
         self.under.remove(index)
         self.over.remove(index)
         for half in self.slices.split(index, axis):
@@ -157,29 +110,17 @@ class PaperExploration:
 
     def _add(self, index: int) -> None:
         part = self.slices.all[index]
-        over = self._maker.over_cells(part.intervals)
-        under = self._maker.under_cells(self.slices.expanded(part.intervals)) if over else []
+        over = self.maker.over_cells(part.intervals)
+        under = self.maker.under_cells(self.slices.expanded(part.intervals)) if over else []
         weight = 1.0 + part.depth
         self.over.add(index, [(Kind.MIXED, region, weight) for region in over])
         self.under.add(index, [(Kind.FREE, region, weight) for region in under])
-        if self._watch is not None:
-            cells = [*self.under.by_slice[index], *self.over.by_slice[index]]
-            self._watch(SliceAdded(index, part.intervals, seen(cells)))
-
-    def _outcome(self, verdict: Verdict, path: Sequence[GraphCell]) -> ExplorationResult:
-        return ExplorationResult(verdict, tuple(path), len(self.slices.all))
-
-    def boxes(self, path: Sequence[GraphCell]) -> list[tuple[Intervals, Region]]:
-        """Expanded intervals and region of every cell of a path of under-approximation cells."""
-        return [(self.slices.expanded(self.slices.all[cell.slice].intervals), cell.region) for cell in path]
+        cells = [*self.under.by_slice[index], *self.over.by_slice[index]]
+        self._tell(SliceAdded(index, part.intervals, seen(cells)))
 
     def over_leaves(self) -> dict[int, list[Region]]:
         """Over-cells of every leaf by its id; an empty list where the whole leaf is blocked."""
         return {index: [cell.region for cell in self.over.by_slice[index]] for index in self.slices.leaves()}
-
-    def undecided(self, path: Sequence[GraphCell]) -> tuple[MixedCell, ...]:
-        """Cells of a path that are not free, the widest first."""
-        return mixed_cells(self._problem, self.slices, self._finest, path)
 
 
 def refine(

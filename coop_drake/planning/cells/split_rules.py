@@ -21,7 +21,6 @@ from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.cells.branching import StrongBranching, TrialSplit
 from coop_drake.planning.cells.cell_graph import GraphCell, Kind
 from coop_drake.planning.cells.cells import CellMaker
-from coop_drake.planning.cells.halves import Halves
 from coop_drake.planning.cells.slices import Slices
 from coop_drake.tree.levers import axis_levers
 
@@ -37,23 +36,19 @@ LARGEST_CONTACT_SWEEP_RATIO = 2.0
 
 
 class SplitOrder:
-    """Chooses the splits of one exploration.
+    """Chooses the splits of one exploration."""
 
-    Attributes:
-        finest: Resolution of every axis [rad or m].
-    """
-
-    def __init__(self, problem: PlanningProblem, slices: Slices, maker: CellMaker, halves: Halves) -> None:
+    def __init__(self, problem: PlanningProblem, slices: Slices, maker: CellMaker) -> None:
         self._slices, self._maker = slices, maker
         self._levers = axis_levers(problem.tree)
-        self._branching = StrongBranching(problem, slices, maker, halves)
-        self.finest = finest_widths(problem)
+        self._branching = StrongBranching(problem, slices, maker)
+        self._finest = finest_widths(problem)
 
     def splittable(self, intervals: Intervals) -> list[int]:
         """Axes of a slice that are wider than the resolution."""
         return [
             axis
-            for axis, ((lower, upper), finest) in enumerate(zip(intervals, self.finest, strict=True))
+            for axis, ((lower, upper), finest) in enumerate(zip(intervals, self._finest, strict=True))
             if upper - lower > finest
         ]
 

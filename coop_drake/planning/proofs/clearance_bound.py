@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError
-from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.questions.margins import marginal_workspace
 from coop_drake.planning.questions.relaxation import relaxed
@@ -36,12 +34,11 @@ def clearance_bound(problem: PlanningProblem) -> tuple[float | None, int]:
         refuted = False
         for chosen in parts:
             question, _ = relaxed(problem, chosen)
-            swept = SweptTree(question.tree)
             try:
                 workspace = marginal_workspace(problem, INSIDE_OCTAGON * clearance)
             except GeometryError:
                 return bound, slices
-            outcome = Exploration(question, workspace, swept, BodyPairs(swept)).run(BUDGET)
+            outcome = Exploration(question, workspace).run(BUDGET)
             slices += outcome.slices
             refuted = outcome.verdict is Verdict.INFEASIBLE
             if refuted:

@@ -9,8 +9,7 @@ from itertools import combinations
 from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
-from coop_drake.geometry.body_pairs import BodyPairs
-from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.events import Watch
 from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Verdict
@@ -18,7 +17,6 @@ from coop_drake.planning.proofs.inscribed_disc import disc_refuted
 from coop_drake.planning.proofs.proof_making import slices_proof
 from coop_drake.planning.proofs.relaxation_test import RelaxationTest
 from coop_drake.planning.proofs.witnesses import Witnesses
-from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.questions.relaxation import relaxed
 
 WHOLE_DIVISOR = 2
@@ -152,7 +150,7 @@ class Proofs:
     def _exploration(self, chosen: tuple[int, ...]) -> Exploration:
         if chosen not in self._explorations:
             question, _ = relaxed(self._problem, chosen)
-            self._explorations[chosen] = explorer(question, self._watch, what=self._words(chosen))
+            self._explorations[chosen] = Exploration(question, None, self._watch, self._words(chosen))
         return self._explorations[chosen]
 
     def _words(self, chosen: tuple[int, ...]) -> str:
@@ -171,18 +169,3 @@ class Proofs:
         reason = f"the over-approximations of {self._words(chosen)} separate start from goal"
         self.refutation = Refutation(reason, chosen, proof)
         return True
-
-
-def explorer(
-    problem: PlanningProblem,
-    watch: Watch | None = None,
-    *,
-    what: str = "the whole team",
-) -> Exploration:
-    """An exploration of cells at margin zero, the only one that can prove infeasibility.
-
-    ``watch``: called with every event.
-    """
-    swept = SweptTree(problem.tree)
-    space = shrunk(problem.workspace, 0.0)
-    return Exploration(problem, space, swept, BodyPairs(swept), watch, what)

@@ -11,7 +11,7 @@ from coop_drake.planning.boxes.boxes import Box, explored_channel, make_channel
 from coop_drake.planning.boxes.channel import Channel, NoChannel
 from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.events import Watch
-from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Verdict
+from coop_drake.planning.cells.exploration import Exploration, ExplorationResult, Subdivision, Verdict
 from coop_drake.planning.cells.printed_algorithms import PaperExploration
 from coop_drake.planning.proofs.proof_making import slices_proof
 from coop_drake.planning.proofs.witnesses import Witnesses
@@ -21,8 +21,6 @@ from coop_drake.progress import Progress
 MARGIN_BUDGET_DIVISOR = 8
 """An exploration at a margin may make this fraction of the slices, one in eight: most of them fail, and a
 plan at margin zero exists already."""
-
-AnyExploration = Exploration | PaperExploration
 
 
 def search_by_cells(
@@ -54,7 +52,7 @@ def search_by_cells(
 
 def _explore(
     problem: PlanningProblem, margin: float, progress: Progress | None, watch: Watch | None
-) -> tuple[AnyExploration, ExplorationResult]:
+) -> tuple[Subdivision, ExplorationResult]:
     """Explore at a margin, with all slices at margin zero and with a fraction of them at others."""
     budget = problem.settings.max_slices
     exploration = _exploration(problem, margin, watch)
@@ -65,13 +63,12 @@ def _explore(
     return exploration, exploration.run(budget // MARGIN_BUDGET_DIVISOR if margin > 0.0 else budget, report)
 
 
-def _exploration(problem: PlanningProblem, margin: float, watch: Watch | None) -> AnyExploration:
-    swept = SweptTree(problem.tree)
+def _exploration(problem: PlanningProblem, margin: float, watch: Watch | None) -> Subdivision:
     workspace = marginal_workspace(problem, margin)
     if problem.settings.strategy == "paper":
-        return PaperExploration(problem, workspace, swept, BodyPairs(swept), watch)
+        return PaperExploration(problem, workspace, watch)
     words = f"the whole team at margin {margin:.3f} m" if margin > 0.0 else "the whole team"
-    return Exploration(problem, workspace, swept, BodyPairs(swept), watch, words)
+    return Exploration(problem, workspace, watch, words)
 
 
 def _boxes_at_margin(problem: PlanningProblem, found: list[tuple[Intervals, Region]]) -> list[Box]:
@@ -91,13 +88,10 @@ def _boxes_at_margin(problem: PlanningProblem, found: list[tuple[Intervals, Regi
     ]
 
 
-def _no_channel(
-    problem: PlanningProblem, exploration: AnyExploration, outcome: ExplorationResult
-) -> NoChannel:
+def _no_channel(problem: PlanningProblem, exploration: Subdivision, outcome: ExplorationResult) -> NoChannel:
     """The answer of an exploration at margin zero that found no channel."""
     if outcome.verdict is Verdict.INFEASIBLE:
-        swept = SweptTree(problem.tree)
-        witnesses = Witnesses(problem.tree, swept, BodyPairs(swept))
+        witnesses = Witnesses(problem.tree, exploration.swept, exploration.pairs)
         proof = slices_proof(problem, exploration.slices, exploration.over_leaves(), witnesses)
         if proof is None:
             return NoChannel(False, "a proof of infeasibility was found but cannot be written down")
