@@ -61,14 +61,28 @@ def track_axis(
     Returns:
         x'' [rad/s^2 or m/s^2] and V [rad^2/s^2 or m^2/s^2].
     """
-    lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration = bounds
-    log_gain, k1, k1_dot, k2, saturation = gains
-    w, w_dot = upper - lower, upper_rate - lower_rate
+    w, saturation = bounds[1] - bounds[0], gains[4]
     near, far = saturation * w, (1.0 - saturation) * w
-    dl = min(max(position - lower, near), far)
-    du = min(max(upper - position, near), far)
+    dl = min(max(position - bounds[0], near), far)
+    du = min(max(bounds[1] - position, near), far)
+    return track_distances(dl, du, np.log(dl / du), rate, bounds, gains)
+
+
+@compiled
+def track_distances(
+    dl: float,
+    du: float,
+    s: float,
+    rate: float,
+    bounds: tuple[float, float, float, float, float, float],
+    gains: tuple[float, float, float, float, float],
+) -> tuple[float, float]:
+    """Return ``track_axis`` for saturated distances dl and du [rad or m] and s = ln(dl / du)."""
+    lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration = bounds
+    log_gain, k1, k1_dot, k2, _ = gains
+    w, w_dot = upper - lower, upper_rate - lower_rate
     dl_dot, du_dot = rate - lower_rate, upper_rate - rate
-    s, s_dot = np.log(dl / du), dl_dot / dl - du_dot / du
+    s_dot = dl_dot / dl - du_dot / du
     a = w / (dl * du)
     v = (lower_rate * du + upper_rate * dl - k1 * s * dl * du) / w
     v_dot = (

@@ -38,10 +38,7 @@ def product_bounds(a: float, b: float, c: float, d: float) -> tuple[float, float
 def slope_bounds(
     row: FloatArray, time: float, position: float, reach: float, rate: float
 ) -> tuple[float, float, float, float]:
-    """Return bounds of dL/dx and dL/dx' over an interval of positions, all formulas being monotone in |s|.
-
-    Where the interval leaves the part of the funnel in which distances do not saturate, dL/dx is 0, and the
-    bounds hold that too.
+    """Return ``slopes_between`` of one axis over an interval of positions.
 
     Args:
         row: The axis, a row of an ``axis_table``.
@@ -49,19 +46,56 @@ def slope_bounds(
         position: Middle of the interval [rad or m].
         reach: Half of its length [rad or m].
         rate: x' at which dL/dx is taken; dL/dx' does not depend on it [rad/s or m/s].
+    """
+    bounds, gains = bounds_of(row, time), gains_of(row, time)
+    w, lower = bounds[1] - bounds[0], bounds[0]
+    first, last = (position - reach - lower) / w, (position + reach - lower) / w
+    low, high = saturated(first, gains[4]), saturated(last, gains[4])
+    ends = (first, low, log(low / (1.0 - low))), (last, high, log(high / (1.0 - high)))
+    return slopes_between(bounds, gains, ends[0], ends[1], rate)
+
+
+@compiled
+def gains_of(row: FloatArray, time: float) -> tuple[float, float, float, float, float]:
+    """Return the gains of one axis as ``track_axis`` takes them: kappa, k1, k1', k2 and the saturation."""
+    k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
+    return row[LOG_GAIN], k1, k1_dot, row[RATE_GAIN], row[SATURATION]
+
+
+@compiled
+def saturated(place: float, saturation: float) -> float:
+    """Return the place dl / w in a funnel, one that is too near to a bound or outside being moved inside."""
+    return min(max(place, saturation), 1.0 - saturation)
+
+
+@compiled
+def slopes_between(
+    bounds: tuple[float, float, float, float, float, float],
+    gains: tuple[float, float, float, float, float],
+    first: tuple[float, float, float],
+    last: tuple[float, float, float],
+    rate: float,
+) -> tuple[float, float, float, float]:
+    """Return bounds of dL/dx and dL/dx' over an interval of positions, all formulas being monotone in |s|.
+
+    Where the interval leaves the part of the funnel in which distances do not saturate, dL/dx is 0, and the
+    bounds hold that too.
+
+    Args:
+        bounds: The funnel's bounds, as ``axis_bounds`` returns them.
+        gains: See ``gains_of``.
+        first: Lower end of the interval: dl / w, the same where distances saturate, and s = ln(dl / du) [-].
+        last: Its upper end, too.
+        rate: x' at which dL/dx is taken; dL/dx' does not depend on it [rad/s or m/s].
 
     Returns:
         Lower and upper bound of dL/dx [1/s^2], lower and upper bound of dL/dx' [1/s].
     """
-    lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration = bounds_of(row, time)
-    k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
-    k2, kappa, saturation = row[RATE_GAIN], row[LOG_GAIN], row[SATURATION]
+    lower, upper, lower_rate, upper_rate, lower_acceleration, upper_acceleration = bounds
+    kappa, k1, k1_dot, k2, saturation = gains
     w = upper - lower
     closing, bending = (upper_rate - lower_rate) / w, (upper_acceleration - lower_acceleration) / w
-    first, last = (position - reach - lower) / w, (position + reach - lower) / w
-    low = min(max(first, saturation), 1.0 - saturation)
-    high = min(max(last, saturation), 1.0 - saturation)
-    s_low, s_high = log(low / (1.0 - low)), log(high / (1.0 - high))
+    (_, low, s_low), (_, high, s_high) = first, last
     across = s_low <= 0.0 <= s_high
     pulls = s_low * (2.0 * low - 1.0), s_high * (2.0 * high - 1.0)
     pull_near, pull_far = 0.0 if across else min(pulls), max(pulls)
@@ -79,6 +113,6 @@ def slope_bounds(
     steady = k2 * closing - closing * closing + bending
     x_lower = steady - spring[1] - log_far - 2.0 * k1 / w * turned[1]
     x_upper = steady - spring[0] - log_near - 2.0 * k1 / w * turned[0]
-    if first < saturation or last > 1.0 - saturation:
+    if first[0] < saturation or last[0] > 1.0 - saturation:
         x_lower, x_upper = min(x_lower, 0.0), max(x_upper, 0.0)
     return x_lower, x_upper, closing - k2 - k1 * (1.0 - pull_near), closing - k2 - k1 * (1.0 - pull_far)

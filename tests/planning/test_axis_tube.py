@@ -11,7 +11,7 @@ from coop_drake.laws import Funnel, ScheduledGains, transition_gains
 from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
 from coop_drake.planning.budget.axis_sets import Entry, axis_sets, conditions_of
 from coop_drake.planning.budget.axis_tube import DISTANCE, V_REACH, X_REACH, V, X
-from coop_drake.planning.budget.law_fit import fit_law
+from coop_drake.planning.budget.law_fit import fit_law, law_memory
 
 BUDGETS = {
     "sampled": Budget(acceleration_error=0.5),
@@ -40,7 +40,7 @@ def test_the_law_is_its_line_within_the_rest(reach):
     for time in (0.0, 0.3, 2.0):
         lower, upper = bounds_of(row, time)[:2]
         x, v = lower + 0.4 * (upper - lower), 0.2
-        slope, by_rate, rest, spread = fit_law(row, time, x, reach, v)
+        slope, by_rate, rest, spread = fit_law(row, time, x, reach, v, law_memory())
         middle = track_row(row, time, x, v)[0]
         for a, b in generator.uniform(-1.0, 1.0, (200, 2)) * [reach, 0.3]:
             change = track_row(row, time, x + a, v + b)[0] - middle

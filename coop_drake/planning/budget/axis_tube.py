@@ -19,7 +19,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.laws.axis_table import FADING_TIME, bounds_of, track_row
 from coop_drake.laws.hand_over import fading
-from coop_drake.planning.budget.law_fit import fit_law
+from coop_drake.planning.budget.law_fit import fit_law, law_memory
 from coop_drake.tree.pose import FloatArray
 
 X, X_REACH, V, V_REACH, ACCELERATION, DISTANCE = range(6)
@@ -92,12 +92,12 @@ def follow_tube(
     responses, p, weight, nominal, reaches = _before(conditions, entry, n)
     before, jump = (entry[4], entry[5]), conditions.model_factor * jump
     p_nominal, p_reach = 0.0, entry[4]
-    lagging = lag_factors(T, conditions.lag)
+    lagging, memory = lag_factors(T, conditions.lag), law_memory()
     for k in range(n):
         i = k + delay
         seen = nominal[0, k], nominal[1, k], reaches[0, k], reaches[1, k]
         faded = fading(k * T, row[FADING_TIME]) * jump
-        u, slope, by_rate, weight[k], most = _command(row, conditions, k, seen, before, faded)
+        u, slope, by_rate, weight[3 + k], most = _command(row, conditions, k, seen, before, faded, memory)
         fastest = max(abs(p_nominal) + p_reach, most)
         now = nominal[0, i], reaches[0, i], nominal[1, i], reaches[1, i]
         _note(tube[k], row, k * T, T, now, fastest)
@@ -119,19 +119,19 @@ def _before(
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return responses, those of p, what they respond to, the undisturbed motion, and its largest departures.
 
-    Responses to the disturbances of n commands, then to the departures of x, v and x'' at the entry; all with
+    Responses to the departures of x, v and x'' at the entry, then to the disturbances of n commands; all with
     the values of the periods before the entry, of which measurements speak at first.
     """
     T, delay, ring = conditions.period, conditions.delay, conditions.delay + 1
     responses, p, weight = np.zeros((2, ring, n + 3)), np.zeros(n + 3), np.zeros(n + 3)
-    weight[n], weight[n + 1], weight[n + 2] = entry[2], entry[3], entry[4]
-    p[n + 2] = 1.0
+    weight[0], weight[1], weight[2] = entry[2], entry[3], entry[4]
+    p[2] = 1.0
     nominal, reaches = np.zeros((2, n + ring)), np.empty((2, n + ring))
     for q in range(ring):
         nominal[0, delay - q], nominal[1, delay - q] = entry[0] - q * T * entry[1], entry[1]
         reaches[0, delay - q], reaches[1, delay - q] = entry[2] + q * T * entry[3], entry[3]
         at = (ring - q) % ring
-        responses[0, at, n], responses[0, at, n + 1], responses[1, at, n + 1] = 1.0, -q * T, 1.0
+        responses[0, at, 0], responses[0, at, 1], responses[1, at, 1] = 1.0, -q * T, 1.0
     return responses, p, weight, nominal, reaches
 
 
@@ -143,6 +143,7 @@ def _command(
     seen: tuple[float, float, float, float],
     before: tuple[float, float],
     faded: float,
+    memory: FloatArray,
 ) -> tuple[float, float, float, float, float]:
     """Return the undisturbed command, its two slopes, the size of its disturbance and its largest magnitude.
 
@@ -154,6 +155,7 @@ def _command(
         before: Largest command at the entry, and largest |x''| before it, by which measurements from before
             the entry are uncertain.
         faded: What is left of the jump of the command at the switch.
+        memory: For ``fit_law``.
     """
     ago = max(conditions.delay - k, 0) * conditions.period
     x_noise = conditions.position_noise + 0.5 * ago * ago * before[1]
@@ -161,7 +163,7 @@ def _command(
     reach, fast = seen[2] + x_noise, seen[3] + v_noise
     time, factor = k * conditions.period, conditions.model_factor
     u = factor * track_row(row, time, seen[0], seen[1])[0] + faded
-    slope, by_rate, rest, spread = fit_law(row, time, seen[0], reach, seen[1])
+    slope, by_rate, rest, spread = fit_law(row, time, seen[0], reach, seen[1], memory)
     slope, by_rate, rest = factor * slope, factor * by_rate, factor * (rest + spread * fast)
     size = abs(slope) * x_noise + abs(by_rate) * v_noise + rest
     most = abs(u) + abs(slope) * reach + abs(by_rate) * fast + rest
@@ -195,7 +197,7 @@ def _note(
     sample[DISTANCE] = nearest - 0.125 * period * period * (fastest + bent)
 
 
-@compiled
+@compiled(reassociate=True)
 def _respond(
     responses: FloatArray,
     p: FloatArray,
@@ -204,22 +206,28 @@ def _respond(
     law: tuple[float, float, float],
     lagging: tuple[float, float, float],
 ) -> tuple[float, float, float]:
-    """Carry all responses over a period; return the sums of their magnitudes times what they respond to."""
+    """Carry all responses over a period; return the sums of their magnitudes times what they respond to.
+
+    The loop has no branches and goes through memory in order, so that vector units are used.
+    """
     T, slope, by_rate = law
     left, in_v, in_x = lagging
-    ring, n = responses.shape[1], p.size - 3
-    now, old = k % ring, (k + 1) % ring
+    ring, last = responses.shape[1], 3 + k
+    x_now, v_now = responses[0, k % ring], responses[1, k % ring]
+    x_old, v_old = responses[0, (k + 1) % ring], responses[1, (k + 1) % ring]
     x_sum = v_sum = p_sum = 0.0
-    for j in range(n + 3):
-        if k < j < n:
-            continue
-        u = 1.0 if j == k else slope * responses[0, old, j] + by_rate * responses[1, old, j]
+    for j in range(last):
+        u = slope * x_old[j] + by_rate * v_old[j]
         gap = p[j] - u
-        x = responses[0, now, j] + T * responses[1, now, j] + 0.5 * T * T * u + in_x * gap
-        v = responses[1, now, j] + T * u + in_v * gap
+        x = x_now[j] + T * v_now[j] + 0.5 * T * T * u + in_x * gap
+        v = v_now[j] + T * u + in_v * gap
         p[j] = u + left * gap
-        responses[0, old, j], responses[1, old, j] = x, v
+        x_old[j], v_old[j] = x, v
         x_sum += abs(x) * weight[j]
         v_sum += abs(v) * weight[j]
         p_sum += abs(p[j]) * weight[j]
+    x_old[last], v_old[last], p[last] = 0.5 * T * T - in_x, T - in_v, 1.0 - left
+    x_sum += abs(x_old[last]) * weight[last]
+    v_sum += abs(v_old[last]) * weight[last]
+    p_sum += abs(p[last]) * weight[last]
     return x_sum, v_sum, p_sum

@@ -24,6 +24,7 @@ from scipy.linalg import expm
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.position_tube import PositionTube
+from coop_drake.compiled import compiled
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.tree.pose import FloatArray
 
@@ -34,7 +35,8 @@ HORIZON = 6.0
 """Responses are summed for so long [s]; what is left of them then must be below ``LEFT``."""
 
 LEFT = 1e-9
-"""Largest response at the end of ``HORIZON`` to a unit input [-]; a loop that is slower is refused."""
+"""Responses to a unit input are followed until they are below this [-]; a loop in which they stay above it
+for ``HORIZON`` is refused."""
 
 SLACK = 1e-3
 """Fraction by which stated bounds are wider than computed ones [-]: more than the responses after
@@ -42,6 +44,10 @@ SLACK = 1e-3
 
 E, V, S, Q, R = range(5)
 """State: e [m], e' [m/s], s [m/s^2], p^ - p_G [m], p^' [m/s]; then older e, e' for a delay."""
+
+
+Loop = tuple[float, float, float, float]
+"""K, zeta, K_t and zeta_t."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +68,11 @@ class PositionGains:
     tracking_damping: float
     speed: float
 
+    @property
+    def loop(self) -> Loop:
+        """All but the speed, on which the loop's responses do not depend."""
+        return self.stiffness, self.damping, self.tracking_stiffness, self.tracking_damping
+
 
 def position_tubes(gains: Sequence[PositionGains], budget: Budget) -> list[PositionTube | None]:
     """Return the tube of each choice of gains under a budget, None where the loop is not stable.
@@ -75,8 +86,9 @@ def position_tubes(gains: Sequence[PositionGains], budget: Budget) -> list[Posit
     rest = budget.model_error / parts
     for part in range(parts):
         error = budget.model_error * ((2 * part + 1) / parts - 1.0)
-        for i, (own, sums) in enumerate(zip(gains, _response_sums(gains, budget, error), strict=True)):
-            before, found = worst[i], _bounds(own, budget, sums, rest)
+        sums = {loop: _sums_of(loop, budget, error) for loop in dict.fromkeys(own.loop for own in gains)}
+        for i, own in enumerate(gains):
+            before, found = worst[i], _bounds(own, budget, sums[own.loop], rest)
             worst[i] = None if before is None or found is None else np.maximum(before, found)
     return [
         None if bounds is None else _stated(own, bounds) for own, bounds in zip(gains, worst, strict=True)
@@ -89,7 +101,7 @@ def _stated(gains: PositionGains, bounds: FloatArray) -> PositionTube:
 
 
 def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, rest: float) -> FloatArray | None:
-    """Return radius, rate, velocity, rest and command, shape (5,), from the sums of responses (5, 4).
+    """Return radius, rate, velocity, rest and command, shape (5,), from the sums of responses (5, 3).
 
     Part of the error of the model is a disturbance of at most ``rest`` times the command itself, which the
     command's bound must allow for.
@@ -113,56 +125,86 @@ def _bounds(gains: PositionGains, budget: Budget, sums: FloatArray | None, rest:
     return np.array([radius + between, rate, velocity, rests + between, own])
 
 
-def _response_sums(gains: Sequence[PositionGains], budget: Budget, error: float) -> list[FloatArray | None]:
-    """Return for each choice the sums of |h|, rows: e, e', feedback, nominal acceleration, p^'; shape (5, 4).
-
-    Columns: for a unit of command in each period, for a unit of acceleration w, for a unit of speed of p_G;
-    the last one is not used. A disturbance w within a period acts on the sample after it by (T - t) on e and
-    by 1 on e'; |h_e (T - t) + h_v| is convex in t, so that its chord is above it.
-    """
+def _sums_of(loop: Loop, budget: Budget, error: float) -> FloatArray | None:
+    """Return ``response_sums`` of a loop with one error of the model; None where it is not stable."""
     T, delay = budget.period, whole_periods(budget.delay, budget.period)
-    loops = [_loop(own, T, delay, budget.lag, error) for own in gains]
-    matrix, held, feedback, nominal = (np.array(part) for part in zip(*loops, strict=True))
-    state = np.zeros((len(gains), matrix.shape[1], 4))
-    state[:, :, 0], state[:, V, 1], state[:, E, 2], state[:, Q, 3] = held, 1.0, 1.0, -1.0
-    sums = np.zeros((len(gains), 5, 4))
-    for _ in range(ceil(HORIZON / T)):
-        led = _applied(feedback, state), _applied(nominal, state)
-        h = np.stack((state[:, E], state[:, V], *led, state[:, R]), axis=1)
-        kick = np.abs(h[:, :, 1])
-        sums[:, :, 0] += np.abs(h[:, :, 0])
-        sums[:, :, 1] += 0.5 * T * (np.abs(h[:, :, 2] * T + h[:, :, 1]) + kick)
-        sums[:, :, 2] += T * np.abs(h[:, :, 3])
-        state = matrix @ state
-    left = np.abs(state).max(axis=(1, 2))
-    return [own if small < LEFT else None for own, small in zip(sums, left, strict=True)]
+    sums, left = response_sums(T, *_loop(loop, T, delay, budget.lag, error), ceil(HORIZON / T))
+    return sums if left < LEFT else None
 
 
-def _applied(row: FloatArray, state: FloatArray) -> FloatArray:
-    product: FloatArray = (row[:, None, :] @ state)[:, 0]
-    return product
+@compiled
+def response_sums(
+    T: float,
+    matrix: FloatArray,
+    held: FloatArray,
+    feedback: FloatArray,
+    nominal: FloatArray,
+    samples: int,
+) -> tuple[FloatArray, float]:
+    """Return the sums of |h|, shape (5, 3), and the largest response that is left.
+
+    Rows: e, e', feedback, nominal acceleration, p^'. Columns: for a unit of command in each period, for
+    a unit of acceleration w, of speed of p_G. A disturbance w within a period acts on the sample after it
+    by (T - t) on e and by 1 on e'; |h_e (T - t) + h_v| is convex in t, so that its chord is above it.
+
+    Args:
+        T: Control period [s].
+        matrix: Of one period, see ``_loop``, shape (5 + 2 delay, 5 + 2 delay); so are the others.
+        held: Response to a unit command held for a period, shape (5 + 2 delay,).
+        feedback: What the state adds to the command, shape (5 + 2 delay,).
+        nominal: The nominal acceleration, shape (5 + 2 delay,).
+        samples: Largest number of samples.
+    """
+    size = len(held)
+    state, after = np.zeros((size, 4)), np.zeros((size, 4))
+    state[:, 0], state[V, 1], state[E, 2], state[Q, 3] = held, 1.0, 1.0, -1.0
+    sums, h, left = np.zeros((5, 3)), np.zeros((5, 4)), np.inf
+    for _ in range(samples):
+        h[0], h[1], h[4] = state[E], state[V], state[R]
+        h[2:4] = 0.0
+        for i in range(size):
+            for c in range(4):
+                h[2, c] += feedback[i] * state[i, c]
+                h[3, c] += nominal[i] * state[i, c]
+        for i in range(5):
+            sums[i, 0] += abs(h[i, 0])
+            sums[i, 1] += 0.5 * T * (abs(h[i, 2] * T + h[i, 1]) + abs(h[i, 1]))
+            sums[i, 2] += T * abs(h[i, 3])
+        left = 0.0
+        for i in range(size):
+            for c in range(4):
+                value = 0.0
+                for j in range(size):
+                    value += matrix[i, j] * state[j, c]
+                after[i, c] = value
+                left = max(left, abs(value))
+        state, after = after, state
+        if left < LEFT:
+            break
+    return sums, left
 
 
 def _loop(
-    gains: PositionGains, T: float, delay: int, lag: float, error: float
+    loop: Loop, T: float, delay: int, lag: float, error: float
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the matrix of one period, the response to a unit command held for it, and two rows.
 
     The rows give what e adds to the command, and the nominal acceleration.
     """
+    stiffness, damping, tracking_stiffness, tracking_damping = loop
     motion, size = np.zeros((6, 6)), 5 + 2 * delay
     motion[E, V] = motion[Q, R] = 1.0
-    motion[V, Q], motion[V, R] = gains.stiffness, gains.damping
-    motion[R, Q], motion[R, R] = -gains.stiffness, -gains.damping
+    motion[V, Q], motion[V, R] = stiffness, damping
+    motion[R, Q], motion[R, R] = -stiffness, -damping
     if lag > 0.0:
         motion[V, S], motion[S, S], motion[S, 5] = 1.0 + error, -1.0 / lag, 1.0 / lag
     else:
         motion[V, 5] = 1.0 + error
     flow = expm(T * motion)
     feedback, nominal, held = np.zeros(size), np.zeros(size), np.zeros(size)
-    nominal[[Q, R]] = -gains.stiffness, -gains.damping
+    nominal[[Q, R]] = -stiffness, -damping
     oldest = 5 + 2 * (delay - 1) if delay else E
-    feedback[[oldest, oldest + 1]] = -gains.tracking_stiffness, -gains.tracking_damping
+    feedback[[oldest, oldest + 1]] = -tracking_stiffness, -tracking_damping
     held[:5] = flow[:5, 5]
     matrix = np.outer(held, feedback + nominal)
     matrix[:5, :5] += flow[:5, :5]

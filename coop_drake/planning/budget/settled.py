@@ -27,7 +27,7 @@ from coop_drake.laws.axis_table import (
 )
 from coop_drake.laws.ppc import ramped_gain
 from coop_drake.planning.budget.axis_tube import AxisConditions, lag_factors
-from coop_drake.planning.budget.law_fit import fit_law
+from coop_drake.planning.budget.law_fit import fit_law, law_memory
 from coop_drake.tree.pose import FloatArray
 
 TIME_CONSTANTS = 5.0
@@ -116,7 +116,7 @@ def _line(
     k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
     lower, upper = bounds_of(row, time)[:2]
     missing = row[POSITION_GAIN] - k1
-    slope, by_rate, rest, spread = fit_law(row, time, 0.5 * (lower + upper), reach, 0.0)
+    slope, by_rate, rest, spread = fit_law(row, time, 0.5 * (lower + upper), reach, 0.0, law_memory())
     growing = (row[RATE_GAIN] * missing + k1_dot) * reach
     growing += missing * (1.0 - np.log(row[SATURATION])) * fast  # |h| <= 1 + |s| <= 1 - ln(saturation)
     slope, by_rate, rest = factor * slope, factor * by_rate, factor * (rest + spread * fast + growing)
