@@ -73,12 +73,26 @@ from coop_drake import entry_point
 def interrupt():
     while time.process_time() < begin + 0.1:
         time.sleep(0.01)
-    os.kill(os.getpid(), signal.SIGINT)
+    os.kill(os.getppid(), signal.SIGINT)  # The process that was started; the command works in another.
 def command_line():
+    global begin
+    begin = time.process_time()
     threading.Thread(target=interrupt).start()
     hashlib.pbkdf2_hmac("sha256", b"", b"", 200_000_000)  # a minute without Python
 sys.modules["coop_drake.cli"] = types.SimpleNamespace(main=command_line)
-begin = time.process_time()
+entry_point.main()
+"""
+
+# A library that holds Python's lock: no thread of this process can answer a signal.
+WITH_THE_LOCK = """
+import ctypes, os, signal, sys, types
+signal.signal(signal.SIGINT, signal.default_int_handler)
+from coop_drake import entry_point
+def command_line():
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    os.kill(os.getppid(), signal.SIGINT)
+    ctypes.PyDLL(None).sleep(60)
+sys.modules["coop_drake.cli"] = types.SimpleNamespace(main=command_line)
 entry_point.main()
 """
 
@@ -96,10 +110,33 @@ entry_point.main()
 """
 
 
-@pytest.mark.parametrize("program", [IN_COMPILED_CODE, IN_THE_FIRST_IMPORT], ids=["compiled", "import"])
+@pytest.mark.parametrize(
+    "program", [IN_COMPILED_CODE, WITH_THE_LOCK, IN_THE_FIRST_IMPORT], ids=["compiled", "lock", "import"]
+)
 def test_ctrl_c_ends_compiled_code_and_the_first_imports(program):
     done = subprocess.run(
         [sys.executable, "-c", program, "plan", str(MODELS / "base.scenario.yaml")], capture_output=True
     )
     assert done.returncode == 130
     assert done.stderr.decode() == "Error: interrupted; files already written are whole\n"
+
+
+WAITING = """
+import os, sys, time, types
+from coop_drake import entry_point
+def command_line():
+    os.write(1, b"ready")
+    time.sleep(60)
+sys.modules["coop_drake.cli"] = types.SimpleNamespace(main=command_line)
+entry_point.main()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGKILL])
+def test_a_command_that_is_ended_from_outside_leaves_no_process_behind(number):
+    interruptible = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    with subprocess.Popen([sys.executable, "-c", interruptible + WAITING], stdout=subprocess.PIPE) as process:
+        assert process.stdout.read(5) == b"ready"
+        process.send_signal(number)
+        assert process.wait() == -number
+        assert process.stdout.read() == b""  # It ends when no process can write any more.

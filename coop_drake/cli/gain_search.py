@@ -78,9 +78,9 @@ def tune(
     found = _search(task, runner, before, parameters, objective, request, reporter)
     folder.begin("tuning")
     write_trials(found, folder.path / "trials.json")
-    write_tuning_figure(found, folder.path / "tuning.png")
-    if found.interrupted:
+    if found.interrupted:  # Drawing would take longer than Ctrl-C may.
         return _interrupted(found, request, folder.path, reporter)
+    write_tuning_figure(found, folder.path / "tuning.png")
     return _verified(task, runner, found, request, folder.path, reporter)
 
 
