@@ -114,6 +114,10 @@ class StallError(CoopDrakeError):
     """A transition would take unreasonably long; the message names the passage."""
 
 
+class TooQuickError(StallError):
+    """In a transition a limit of acceleration would act; the message names the joint."""
+
+
 class RefusalError(CoopDrakeError):
     """A plan, a proof or a log does not hold; the message says where and what is wrong there, with numbers.
 

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from hashlib import sha256
 from typing import Any
 
+import numpy as np
 import shapely
 
 from coop_drake.answers.limits import TeamLimits
@@ -42,8 +43,15 @@ def problem_digest(problem: PlanningProblem) -> str:
 
 
 def _limits(limits: TeamLimits) -> dict[str, Any]:
-    """Limits of speed, if there are any."""
-    return {"limits": _rounded(list(to_plain(limits, TeamLimits).values()))} if limits.any else {}
+    """Limits of speed and of acceleration, if there are any; efforts are not part of the question."""
+    stated, document = to_plain(limits, TeamLimits), {}
+    accelerations = stated.pop("joint_accelerations")
+    del stated["joint_efforts"]
+    if limits.any:
+        document["limits"] = _rounded(list(stated.values()))
+    if np.isfinite(limits.joint_accelerations).any():
+        document["accelerations"] = _rounded(accelerations)
+    return document
 
 
 def _digest(value: Any) -> str:

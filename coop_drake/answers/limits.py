@@ -1,4 +1,4 @@
-"""The largest speeds of the bases and joints of a team, and what a plan states about them."""
+"""The limits of the bases and joints of a team, and what a plan states about their speeds."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def _none() -> FloatArray:
 
 @dataclass(frozen=True)
 class TeamLimits:
-    """What the robots' models and the scenario say about largest speeds, N robots and n joints.
+    """What the robots' models and the scenario say about limits, N robots and n joints.
 
     Attributes:
         base_components: Of every robot the index of its base's component in the team's tree.
@@ -24,6 +24,8 @@ class TeamLimits:
         base_speeds: Largest speed of that origin in W, shape (N,) [m/s].
         turn_rates: Largest rate of the base's angle in W, shape (N,) [rad/s].
         joint_rates: Largest rate of every joint, shape (n,) [rad/s or m/s].
+        joint_accelerations: Largest acceleration of every joint, shape (n,) [rad/s^2 or m/s^2].
+        joint_efforts: Largest effort of every joint's motor, shape (n,) [N m or N].
     """
 
     base_components: tuple[int, ...] = ()
@@ -31,10 +33,12 @@ class TeamLimits:
     base_speeds: Bounds = field(default_factory=_none)
     turn_rates: Bounds = field(default_factory=_none)
     joint_rates: Bounds = field(default_factory=_none)
+    joint_accelerations: Bounds = field(default_factory=_none)
+    joint_efforts: Bounds = field(default_factory=_none)
 
     @property
     def any(self) -> bool:
-        """Whether there is a limit."""
+        """Whether there is a limit of a speed or rate."""
         return bool(np.isfinite(np.concatenate((self.base_speeds, self.turn_rates, self.joint_rates))).any())
 
 

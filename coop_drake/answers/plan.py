@@ -91,6 +91,8 @@ class Plan:
             axis in its funnel if the budget says so; null if none were asked for.
         tube: How far the object may depart from its nominal motion under the budget; null without one.
         speeds: Limits of speed that are kept, and what follows for the bases; null where no limit is known.
+        age_factor: The gains are those of the gain set for so many times the age of its commands, so that
+            limits of acceleration are kept.
     """
 
     problem: str = ""
@@ -104,6 +106,7 @@ class Plan:
     budget: Budget | None = None
     speeds: SpeedStatement | None = None
     tube: PositionTube | None = None
+    age_factor: Annotated[Positive, EXACT] = 1.0
 
     def governed(self, index: int) -> Polygon:
         """Return the region to which the governor keeps p_G in a cell: Q_i, or less where there is a tube."""

@@ -1,4 +1,4 @@
-"""The speeds of the bases and joints in a run, beside their limits."""
+"""The speeds, accelerations and efforts of the bases and joints in a run, beside their limits."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ of their poses would count."""
 
 @dataclass(frozen=True)
 class PeakSpeed:
-    """The largest speed of one base or joint in a run.
+    """The largest speed, acceleration or effort of one base or joint in a run.
 
     Attributes:
         name: What moved.
-        peak: Its largest speed.
+        peak: The largest.
         limit: Its limit, None where none is known.
-        unit: ``m/s`` or ``rad/s``.
+        unit: Such as ``m/s``, ``rad/s²`` or ``N m``.
     """
 
     name: str
@@ -53,7 +53,10 @@ def base_speeds(log: SimulationLog) -> tuple[FloatArray, FloatArray]:
 
 
 def peak_speeds(log: SimulationLog, problem: PlanningProblem) -> list[PeakSpeed]:
-    """Return the largest speeds of a run: of every base, then of every joint in q's order."""
+    """Return the largest speeds of a run: of every base, then of every joint in q's order.
+
+    Then the largest accelerations and efforts of the joints that have limits of these.
+    """
     peaks, limits, found = base_speeds(log)[1].max(axis=0, initial=0.0), problem.limits, []
     for k, name in enumerate(log.robot_names):
         found.append(_peak(f"speed of {name}", peaks[k, 0], limits.base_speeds[k], "m/s"))
@@ -61,6 +64,17 @@ def peak_speeds(log: SimulationLog, problem: PlanningProblem) -> list[PeakSpeed]
     rates = np.abs(log.joint_rates).max(axis=0, initial=0.0)
     for joint, rate, limit in zip(problem.tree.joints, rates, limits.joint_rates, strict=True):
         found.append(_peak(f"rate of {joint.name}", rate, limit, f"{joint.unit}/s"))
+    accelerations, efforts = (
+        np.abs(values).max(axis=0, initial=0.0) for values in (log.accelerations[:, 3:], log.joint_torques)
+    )
+    for i, joint in enumerate(problem.tree.joints):
+        effort = "N m" if joint.kind == "revolute" else "N"
+        for what, peaks, most, unit in (
+            ("acceleration", accelerations, limits.joint_accelerations, f"{joint.unit}/s²"),
+            ("effort", efforts, limits.joint_efforts, effort),
+        ):
+            if np.isfinite(most[i]):
+                found.append(_peak(f"{what} of {joint.name}", peaks[i], most[i], unit))
     return found
 
 

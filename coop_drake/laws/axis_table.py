@@ -34,18 +34,18 @@ __all__ = [
     "write_row",
 ]
 
-LAW_COLUMNS = 18
+LAW_COLUMNS = 19
 """Columns of a table: slice and goal interval [rad or m], lambda [1/s], 1 where the funnel is quintic and 0
 where it is not, kappa [rad^2/s^2 or m^2/s^2], k1, k2 and mu [1/s], the smallest distance to a bound over the
 funnel's width [-], the time T in which the commands of the last cell fade [s], the largest V with which the
 cell may be entered, the time after which it may be left [s], and within what an axis must be to leave it at
 rest: the distance from the middle of the goal interval [rad or m] and the rate [rad/s or m/s]; both are 0
 where V alone decides. The last columns are the limit of the axis's rate, infinity for none [rad/s or m/s],
-and g, the rate at which the axis may approach it [1/s]."""
+g, the rate at which the axis may approach it [1/s], and the limit of its acceleration, infinity for none."""
 
 SLICE_LOWER, SLICE_UPPER, GOAL_LOWER, GOAL_UPPER, DECAY_RATE, QUINTIC = range(6)
 LOG_GAIN, POSITION_GAIN, RATE_GAIN, RAMP_RATE, SATURATION, FADING_TIME, ENERGY_BOUND = range(6, 13)
-LEAVING_TIME, REST_REACH, REST_RATE, RATE_LIMIT, LIMIT_GAIN = range(13, LAW_COLUMNS)
+LEAVING_TIME, REST_REACH, REST_RATE, RATE_LIMIT, LIMIT_GAIN, ACCELERATION_LIMIT = range(13, LAW_COLUMNS)
 """The columns by name, in this order."""
 
 
@@ -64,7 +64,7 @@ def axis_table(funnel: Funnel, gains: TransitionGains) -> FloatArray:
             (funnel.decay_rate[i], gains.log_gain[i], gains.energy_bound[i]),
             (gains.position_gain, gains.rate_gain, gains.ramp_rate, gains.saturation, gains.hand_over_time),
             funnel.shape == "quintic",
-            gains.rate_limit_of(i),
+            gains.limits_of(i),
         )
         if rest is not None:
             row[REST_REACH], row[REST_RATE] = rest.reach[i], rest.rate[i]
@@ -79,7 +79,7 @@ def write_row(
     scheduled: tuple[float, float, float],
     gains: tuple[float, float, float, float, float],
     quintic: bool,
-    rate_limit: tuple[float, float],
+    limits: tuple[float, float, float],
 ) -> None:
     """Write one row of a table, of an axis that leaves the cell by its V.
 
@@ -89,13 +89,14 @@ def write_row(
         scheduled: lambda, kappa and the largest V, as ``scheduled_axis`` returns them.
         gains: k1, k2 and mu [1/s], the smallest distance to a bound over the width [-], and T [s].
         quintic: Whether the funnel is quintic.
-        rate_limit: Largest rate of the axis, infinity for none [rad/s or m/s], and g [1/s].
+        limits: Largest rate of the axis [rad/s or m/s], g [1/s] and largest acceleration [rad/s^2 or
+            m/s^2]; infinity for no limit.
     """
     row[SLICE_LOWER], row[SLICE_UPPER], row[GOAL_LOWER], row[GOAL_UPPER] = intervals
     row[DECAY_RATE], row[LOG_GAIN], row[ENERGY_BOUND] = scheduled
     row[POSITION_GAIN], row[RATE_GAIN], row[RAMP_RATE], row[SATURATION], row[FADING_TIME] = gains
     row[QUINTIC] = 1.0 if quintic else 0.0
-    row[RATE_LIMIT], row[LIMIT_GAIN] = rate_limit
+    row[RATE_LIMIT], row[LIMIT_GAIN], row[ACCELERATION_LIMIT] = limits
     row[LEAVING_TIME], row[REST_REACH], row[REST_RATE] = row[FADING_TIME], 0.0, 0.0
 
 
@@ -168,8 +169,8 @@ def track_axes(
 ) -> None:
     """Write the desired accelerations of the object's angle and of one robot's joints.
 
-    Each is that of ``track_row``, plus the jump at the switch times ``fading``, with the damping by which
-    the axis keeps its rate limit. While a jump delta fades,
+    Each is that of ``track_row``, plus the jump at the switch times ``fading``, within the limits of the
+    axis, see ``limited_row``. While a jump delta fades,
     V' <= -kappa k1 s^2 - k2 (x' - v)^2 + |delta| f |x' - v| <= delta^2 f^2 / (4 k2): V grows by at most
     delta^2 T / (8 k2) in all, so that no axis leaves its funnel whatever the jump.
 
@@ -191,14 +192,18 @@ def track_axes(
 
 @compiled
 def limited_row(row: FloatArray, acceleration: float, rate: float) -> float:
-    """Return an acceleration with the damping that keeps the rate limit of the axis [rad/s^2 or m/s^2].
+    """Return an acceleration that keeps the limits of the axis [rad/s^2 or m/s^2].
+
+    It is cut off at the limit of the acceleration, and damped near that of the rate. The damping never asks
+    for more: while the rate is below its limit it takes away from an acceleration, and turns none round.
 
     Args:
         row: The axis, shape (``LAW_COLUMNS``,).
         acceleration: What the funnel's law and the hand-over ask for [rad/s^2 or m/s^2].
         rate: x' [rad/s or m/s].
     """
-    return damped(acceleration, rate, row[RATE_LIMIT], row[LIMIT_GAIN])
+    most = row[ACCELERATION_LIMIT]
+    return damped(min(max(acceleration, -most), most), rate, row[RATE_LIMIT], row[LIMIT_GAIN])
 
 
 @compiled
@@ -210,7 +215,7 @@ def _write_accelerations(
     robot: FloatArray,
     acceleration: FloatArray,
 ) -> None:
-    """Write what the funnels' law asks for, without jumps and rate limits; arguments as in ``track_axes``."""
+    """Write what the funnels' law asks for, without jumps and limits; arguments as in ``track_axes``."""
     n = table.shape[0] - 1
     tau, pace, pace_rate = time - clock[0], clock[1], clock[2]
     acceleration[0] = track_paced_row(table[0], tau, pace, pace_rate, object_state[2], object_state[5])[0]
@@ -231,7 +236,7 @@ def write_jumps(
 ) -> None:
     """Write by how much the accelerations of ``track_axes`` would jump if the next cell were entered now.
 
-    Of an axis that leaves the cell at rest it is ``rest_jump``. Rate limits do not count:
+    Of an axis that leaves the cell at rest it is ``rest_jump``. Limits do not count:
     they are the same in all cells, and act on the sum of law and fading jump.
 
     Args:

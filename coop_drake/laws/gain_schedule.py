@@ -24,6 +24,9 @@ the largest second derivative of the quintic over u."""
 PEAK_RATE = STEEPEST / CLOSING
 """Largest rate of a quintic bound over lambda times the distance that it moves [-]."""
 
+ACCELERATION_SHARE = 0.4
+"""Share of an acceleration limit that bounds, the log term at rest and the rate at entry take each [-]."""
+
 
 class Schedule(NamedTuple):
     """The rule by which gains follow the cell; in that of fixed gains, lower and upper bounds are equal.
@@ -103,8 +106,8 @@ def _fixed(gains: FixedGains) -> Schedule:
         min_angle_rate=angle, max_angle_rate=angle, min_joint_rate=joint, max_joint_rate=joint,
         max_log_gain=float(gains.log_gain), log_stiffness=inf, log_acceleration=inf,
         position_gain=float(gains.position_gain), rate_gain=float(gains.rate_gain),
-        limit_gain=float(gains.limit_gain),
-        ramp_rate=float(gains.ramp_rate), saturation=float(gains.saturation),
+        limit_gain=float(gains.limit_gain), ramp_rate=float(gains.ramp_rate),
+        saturation=float(gains.saturation),
         hand_over_time=float(gains.hand_over_time),
         energy_factor=float(gains.energy_factor), energy_allowance=float(gains.energy_allowance),
         entry_energy=0.0,
@@ -131,13 +134,11 @@ def _by_age(gains: ScheduledGains) -> Schedule:
         funnel_acceleration=float(gains.funnel_acceleration),
         goal_acceleration=gains.goal_acceleration * rate_gain * rate_gain,
         turning_rate=sqrt(gains.turning_acceleration / gains.turning_coupling) * rate_gain,
-        min_angle_rate=rates[0],
-        max_angle_rate=rates[1], min_joint_rate=rates[0], max_joint_rate=rates[1],
+        min_angle_rate=rates[0], max_angle_rate=rates[1], min_joint_rate=rates[0], max_joint_rate=rates[1],
         max_log_gain=float(gains.max_log_gain), log_stiffness=gains.log_fraction * rate_gain * rate_gain,
         log_acceleration=float(gains.log_acceleration), position_gain=gains.position_fraction * rate_gain,
         rate_gain=rate_gain, limit_gain=rate_gain, ramp_rate=gains.ramp_fraction * rate_gain,
-        saturation=float(gains.saturation),
-        hand_over_time=max(float(gains.hand_over_time), hand_over),
+        saturation=float(gains.saturation), hand_over_time=max(float(gains.hand_over_time), hand_over),
         energy_factor=float(gains.energy_factor), energy_allowance=float(gains.energy_allowance),
         entry_energy=0.5 * gains.entry_rate * gains.entry_rate,
     )  # fmt: skip
@@ -172,6 +173,7 @@ def scheduled_axis(
     resting: float,
     narrowest: float,
     rate_limit: float,
+    acceleration_limit: float,
 ) -> tuple[float, float, float]:
     """Return lambda, kappa and the energy bound of one axis.
 
@@ -179,13 +181,14 @@ def scheduled_axis(
     largest acceleration of a quintic bound is ``PEAK`` lambda^2 shrink. A is ``funnel_acceleration``, or less
     where the goal interval is narrow: an error of the model by a part of A must not fill it. Bounds of the
     angle move at most at ``turning_rate`` times the root of ``narrowest``, their largest rate being
-    ``PEAK_RATE`` lambda shrink: while the object turns, centrifugal forces disturb the joints by the square
-    of its rate, and a joint bears the less the narrower its goal interval is (docs/equations.md, "Turning and
-    narrow joints"). Where a bound would be too fast for the axis's rate limit, lambda is smaller, see
-    ``slowed_decay_rate``. kappa is the largest gain, up to ``max_log_gain``, with which the log term
-    kappa |a s| at rest stays below ``log_acceleration`` and its stiffness in the middle of the goal interval
-    below ``log_stiffness``; a and s are those of ``track_axis`` in ``ppc.py``. The bound on V is
-    ``energy_factor`` times the energy at rest, plus ``energy_allowance`` times kappa, plus ``entry_energy``.
+    ``PEAK_RATE`` lambda shrink (docs/equations.md, "Turning and narrow joints"). Where a bound would be too
+    fast for the axis's rate limit, lambda is smaller, see ``slowed_decay_rate``. The acceleration of bounds,
+    the log term at rest and k2 sqrt(kappa), by which an axis brakes at entry, are at most
+    ``ACCELERATION_SHARE`` of an acceleration limit. kappa is the largest gain, up to ``max_log_gain``, with
+    which the log term kappa |a s| at rest stays below ``log_acceleration`` and its stiffness in the middle of
+    the goal interval below ``log_stiffness``; a and s are those of ``track_axis`` in ``ppc.py``. The bound on
+    V is ``energy_factor`` times the energy at rest, plus ``energy_allowance`` times kappa, plus
+    ``entry_energy``.
 
     Args:
         schedule: The rule.
@@ -195,9 +198,9 @@ def scheduled_axis(
         goal_lower: Lower end of the goal interval [rad or m].
         goal_upper: Upper end of the goal interval [rad or m].
         resting: Where the axis rests when the transition begins; moved into the slice if outside [rad or m].
-        narrowest: Width of the narrowest goal interval of a joint, infinite for a team without joints [rad or
-            m]; not used for a joint.
+        narrowest: Width of a joint's narrowest goal interval, infinity without joints; not used for a joint.
         rate_limit: Largest rate of the axis, infinity for none [rad/s or m/s].
+        acceleration_limit: Its largest acceleration, infinity for none [rad/s^2 or m/s^2].
 
     Returns:
         lambda [1/s], kappa [rad^2/s^2 or m^2/s^2], largest V [rad^2/s^2 or m^2/s^2].
@@ -213,13 +216,18 @@ def scheduled_axis(
     if not is_joint and PEAK_RATE * shrink * rate > schedule.turning_rate * sqrt(narrowest):
         rate = max(schedule.turning_rate * sqrt(narrowest) / (PEAK_RATE * shrink), slowest)
     rate = slowed_decay_rate(rate, shrink, schedule.quintic, rate_limit)
+    share = ACCELERATION_SHARE * acceleration_limit
+    if PEAK * shrink * rate * rate > share:
+        rate = sqrt(share / (PEAK * shrink))
     near = schedule.saturation * width
     inside = min(max(resting, slice_lower + near), slice_upper - near)
     dl, du = inside - slice_lower, slice_upper - inside
     pull = abs(log(dl / du)) * (dl + du) / (dl * du)
     log_gain = min(schedule.max_log_gain, schedule.log_stiffness * goal_width * goal_width / 16.0)
-    if pull * log_gain > schedule.log_acceleration:
-        log_gain = schedule.log_acceleration / pull
+    log_gain = min(log_gain, (share / schedule.rate_gain) ** 2)
+    most = min(schedule.log_acceleration, share)
+    if pull * log_gain > most:
+        log_gain = most / pull
     bounds = axis_bounds(0.0, slice_lower, slice_upper, goal_lower, goal_upper, rate, schedule.quintic)
     k1, k1_dot = ramped_gain(0.0, schedule.position_gain, schedule.ramp_rate)
     at_rest = track_axis(inside, 0.0, bounds, (log_gain, k1, k1_dot, 0.0, schedule.saturation))[1]
@@ -238,6 +246,7 @@ def transition_gains(
     resting: FloatArray,
     speed_limit: float | None = None,
     rate_limit: FloatArray | None = None,
+    acceleration_limit: FloatArray | None = None,
 ) -> TransitionGains:
     """Return the gains with which a transition is executed.
 
@@ -248,14 +257,14 @@ def transition_gains(
         slice_upper: Upper ends, above the lower ones, shape (m,).
         goal_lower: Lower ends of the goal intervals, inside the slice, shape (m,).
         goal_upper: Upper ends, above the lower ones, shape (m,).
-        resting: Where each axis rests when the transition begins: the middle of the previous goal interval,
-            or the start; moved into the slice where it lies outside, shape (m,).
+        resting: Where each axis rests at the beginning, the middle of the last goal interval or the start;
+            moved into the slice where it lies outside, shape (m,).
         speed_limit: Largest speed of the object's origin, None for none [m/s].
         rate_limit: Largest rate of every axis, infinity for none, shape (m,) [rad/s or m/s]; None for none.
+        acceleration_limit: Largest acceleration of every axis in the same way, shape (m,).
 
     Returns:
-        Gains of the governor and of the funnels, and for each axis the energy V below which the transition
-        begins.
+        Gains of governor and funnels, and for each axis the energy V below which the transition begins.
 
     Raises:
         ValueError: A slice or a goal interval is empty, or a goal interval leaves its slice; names the axis.
@@ -266,8 +275,8 @@ def transition_gains(
     if isinstance(gain_set, FixedGains):  # as given, not by way of the root of K
         damping, governor_gain = float(gain_set.damping), float(gain_set.governor_gain)
     narrowest = np.full(len(resting), np.min(goal_upper[1:] - goal_lower[1:], initial=inf))
-    limits = np.full(len(resting), inf) if rate_limit is None else rate_limit
-    ends = slice_lower, slice_upper, goal_lower, goal_upper, resting, narrowest, limits
+    limits = (narrowest + inf if most is None else most for most in (rate_limit, acceleration_limit))
+    ends = slice_lower, slice_upper, goal_lower, goal_upper, resting, narrowest, *limits
     axes = np.transpose(ends).astype(float)
     rows = np.array([scheduled_axis(schedule, i > 0, *axis) for i, axis in enumerate(axes)])
     return TransitionGains(
@@ -287,4 +296,5 @@ def transition_gains(
         speed_limit=speed_limit,
         rate_limit=rate_limit,
         limit_gain=None if rate_limit is None else schedule.limit_gain,
+        acceleration_limit=acceleration_limit,
     )

@@ -78,6 +78,8 @@ class TransitionGains:
         speed_limit: Largest speed of the object's origin; null for none [m/s].
         rate_limit: Largest rate of every axis; null for none, shape (1 + n,) [rad/s or m/s].
         limit_gain: g, the rate at which an axis may approach its limit; null without limits [1/s].
+        acceleration_limit: Largest acceleration that is commanded of every axis; null for none, shape
+            (1 + n,) [rad/s^2 or m/s^2].
     """
 
     stiffness: Gain
@@ -97,6 +99,7 @@ class TransitionGains:
     speed_limit: Gain | None = None
     rate_limit: Bounds | None = None
     limit_gain: Gain | None = None
+    acceleration_limit: Bounds | None = None
 
     def governor_row(self, before: "TransitionGains") -> FloatArray:
         """Return the governor's gains as compiled code reads them, see ``governed_gains``, shape (9,).
@@ -121,13 +124,20 @@ class TransitionGains:
             energy_bound=self.energy_bound[axes],
             rest=self.rest and replace(self.rest, reach=self.rest.reach[axes], rate=self.rest.rate[axes]),
             rate_limit=None if self.rate_limit is None else self.rate_limit[axes],
+            acceleration_limit=None if self.acceleration_limit is None else self.acceleration_limit[axes],
         )
 
-    def rate_limit_of(self, axis: int) -> tuple[float, float]:
-        """Return the largest rate of an axis, infinity for none [rad/s or m/s], and g [1/s]."""
-        if self.rate_limit is None or self.limit_gain is None:
-            return inf, 0.0
-        return float(self.rate_limit[axis]), self.limit_gain
+    def limits_of(self, axis: int) -> tuple[float, float, float]:
+        """Return the largest rate of an axis [rad/s or m/s], g [1/s], and its largest acceleration.
+
+        Infinity where there is no limit.
+        """
+        rate, most = (inf, 0.0), inf
+        if self.rate_limit is not None and self.limit_gain is not None:
+            rate = float(self.rate_limit[axis]), self.limit_gain
+        if self.acceleration_limit is not None:
+            most = float(self.acceleration_limit[axis])
+        return *rate, most
 
 
 @dataclass(frozen=True)
@@ -257,6 +267,10 @@ class ScheduledGains:
     def age(self) -> float:
         """The age for which gains are scheduled [s]."""
         return IDEAL_AGE if self.command_age is None else self.command_age
+
+    def slowed(self, factor: float) -> "ScheduledGains":
+        """Return the rules for commands that are so many times as old."""
+        return self if factor == 1.0 else replace(self, command_age=factor * self.age)
 
     def for_age(self, age: float) -> "ScheduledGains":
         """Return the rules for a team whose efforts rest on measurements of an age [s].

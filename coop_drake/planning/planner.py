@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Found, Infeasible, Plan, PlanningResult, Undecided
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.search_report import SearchReport
-from coop_drake.errors import GeometryError, PlanError, StallError
+from coop_drake.errors import GeometryError, PlanError, StallError, TooQuickError
 from coop_drake.laws import GainSet, ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
 from coop_drake.planning.improvement.quickest import quickest_plan
@@ -23,6 +24,10 @@ if TYPE_CHECKING:
 
 FINER_ATTEMPTS = 2
 """Number of further searches after a path that cannot be executed, each with half the margin."""
+
+AGE_FACTORS = (1.0, 1.5, 2.0, 3.0, 4.5, 7.0)
+"""Gains are tried for so many times the age of the gain set's commands until no limit of acceleration acts
+[-]: accelerations fall by up to the square of the factor, so that 7 allows for limits of a few tenths."""
 
 
 def plan(
@@ -61,7 +66,7 @@ def plan(
             made = _made(question, answer, gain_set, gain_set_name, budget, progress)
         except (GeometryError, PlanError, StallError, ShapelyError) as error:
             stall = f"a free path exists, but a plan along it cannot be executed: {error}"
-            if answer.margin == 0.0:
+            if answer.margin == 0.0 or isinstance(error, TooQuickError):
                 break
             question = replace(question, settings=replace(question.settings, margin=0.5 * answer.margin))
         else:
@@ -80,12 +85,32 @@ def _made(
     progress: Progress | None,
 ) -> Plan | BeyondBudget:
     if budget is None:
-        return quickest_plan(problem, found, gain_set, gain_set_name=name, progress=progress)
+        return _slow_enough(problem, found, gain_set, name, progress)
     if not isinstance(gain_set, ScheduledGains):
         raise ValueError(f"a budget needs scheduled gains; the gain set {name!r} is fixed")
     from coop_drake.planning.budget.tolerant import tolerant_plan  # Here: it imports scipy.
 
     return tolerant_plan(problem, found, gain_set, gain_set_name=name, budget=budget, progress=progress)
+
+
+def _slow_enough(
+    problem: PlanningProblem,
+    found: Channel | CoveredPath,
+    gain_set: GainSet,
+    name: str,
+    progress: Progress | None,
+) -> Plan:
+    """The plan with the quickest gains for which no limit of acceleration acts."""
+    last = 1.0
+    if isinstance(gain_set, ScheduledGains):
+        for factor in AGE_FACTORS[:-1]:
+            with suppress(TooQuickError):
+                gains = gain_set.slowed(factor)
+                made = quickest_plan(problem, found, gains, gain_set_name=name, progress=progress)
+                return replace(made, age_factor=factor)
+        last, gain_set = AGE_FACTORS[-1], gain_set.slowed(AGE_FACTORS[-1])
+    made = quickest_plan(problem, found, gain_set, gain_set_name=name, progress=progress)
+    return replace(made, age_factor=last)
 
 
 def _added(before: SearchReport, latest: SearchReport) -> SearchReport:

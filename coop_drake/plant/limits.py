@@ -1,23 +1,26 @@
-"""Reads the largest speeds of bases and joints from the models of the robots."""
+"""Reads the limits of bases and joints from the models of the robots."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import inf
 
 import numpy as np
+from pydrake.multibody.tree import Joint
 
 from coop_drake.answers.limits import TeamLimits
 from coop_drake.plant.parsing import refusal
 from coop_drake.plant.planarity import planar_pose
 from coop_drake.plant.team import RobotModel, TeamPlant
 from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
 
 
 def read_limits(team: TeamPlant, tree: ComponentTree) -> TeamLimits:
-    """Read velocity limits of the joints, and where the bases' frames are.
+    """Read the limits of the joints, and where the bases' frames are.
 
     Raises:
-        ScenarioError: A joint cannot move because its velocity limit is zero.
+        ScenarioError: A joint cannot move because a limit is zero.
     """
     components = tuple(_base_component(team, tree, robot) for robot in team.robots)
     poses = tree.poses(np.zeros(3 + len(tree.joints)))
@@ -28,13 +31,15 @@ def read_limits(team: TeamPlant, tree: ComponentTree) -> TeamLimits:
         poses[component].inverse().apply(np.array([[pose.x, pose.y]]))[0]
         for component, pose in zip(components, placed, strict=True)
     ]
-    unknown = np.full(len(team.robots), inf)
+    unknown, joints = np.full(len(team.robots), inf), _moving(team)
     return TeamLimits(
         base_components=components,
         base_points=tuple((float(x), float(y)) for x, y in points),
         base_speeds=unknown,
         turn_rates=unknown.copy(),
-        joint_rates=np.array([rate for robot in team.robots for rate in _joint_rates(team, robot)]),
+        joint_rates=_of_joints(team, joints, "velocity"),
+        joint_accelerations=_of_joints(team, joints, "acceleration"),
+        joint_efforts=np.array([_effort(team, joint) for _, joint, _ in joints]),
     )
 
 
@@ -49,13 +54,33 @@ def _base_component(team: TeamPlant, tree: ComponentTree, robot: RobotModel) -> 
     return moving
 
 
-def _joint_rates(team: TeamPlant, robot: RobotModel) -> list[float]:
-    rates = []
-    for joint, name in zip(robot.joints, robot.joint_names, strict=True):
-        rate = float(min(-joint.velocity_lower_limits()[0], joint.velocity_upper_limits()[0]))
-        if not rate > 0.0:
+def _moving(team: TeamPlant) -> list[tuple[RobotModel, Joint, str]]:
+    """Return all joints in the order of q, each with its robot and its name."""
+    return [
+        (robot, joint, name)
+        for robot in team.robots
+        for joint, name in zip(robot.joints, robot.joint_names, strict=True)
+    ]
+
+
+def _of_joints(team: TeamPlant, joints: Sequence[tuple[RobotModel, Joint, str]], kind: str) -> FloatArray:
+    """Return the smaller magnitude of the lower and the upper limit of every joint; infinity for none."""
+    limits = []
+    for robot, joint, name in joints:
+        lower, upper = (
+            getattr(joint, f"{kind}_lower_limits")()[0],
+            getattr(joint, f"{kind}_upper_limits")()[0],
+        )
+        limits.append(float(min(-lower, upper)))
+        if not limits[-1] > 0.0:
             models = team.assembly.robots[robot.index]
-            allowed = f"a velocity limit above zero, not {rate + 0.0:g}; or a value under fixed_joints"
+            allowed = f"a {kind} limit above zero, not {limits[-1] + 0.0:g}; or a value under fixed_joints"
             raise refusal(team.scenario, models, name, allowed)
-        rates.append(rate)
-    return rates
+    return np.array(limits)
+
+
+def _effort(team: TeamPlant, joint: Joint) -> float:
+    """Return the effort limit of a joint's motor, infinity for none [N m or N]."""
+    plant = team.plant
+    motors = (plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices())
+    return min((float(m.effort_limit()) for m in motors if m.joint().index() == joint.index()), default=inf)

@@ -23,7 +23,7 @@ def stated_problem(
         scenario: The scenario; its joint values have been checked, or will be.
         tree: The team as seen from the object.
         joints: The robots in their order, each with its number of joints.
-        limits: What the models say about largest speeds.
+        limits: What the models say about limits.
     """
     start, goal = scenario.start, scenario.goal
     values = [value for robot in joints for value in start.joints.get(robot, ())]
@@ -45,14 +45,17 @@ def stated_problem(
 
 def _stated_limits(scenario: Scenario, joints: Mapping[str, int], limits: TeamLimits) -> TeamLimits:
     """Limits of the models with those that the scenario states in their place."""
-    speeds, turns, rates = limits.base_speeds.copy(), limits.turn_rates.copy(), limits.joint_rates.copy()
+    speeds, turns = limits.base_speeds.copy(), limits.turn_rates.copy()
+    rates, accelerations = limits.joint_rates.copy(), limits.joint_accelerations.copy()
     first = 0
     for k, (robot, count) in enumerate(joints.items()):
         stated = scenario.limits.get(robot, scenario.limits.get(ALL_ROBOTS, RobotLimits()))
         speeds[k] = speeds[k] if stated.base_speed is None else stated.base_speed
         turns[k] = turns[k] if stated.base_turn_rate is None else stated.base_turn_rate
-        given = stated.joint_rates * count if len(stated.joint_rates) == 1 else stated.joint_rates
-        for i, rate in enumerate(given):
-            rates[first + i] = rates[first + i] if rate is None else rate
+        for values, given in ((rates, stated.joint_rates), (accelerations, stated.joint_accelerations)):
+            for i, value in enumerate(given * count if len(given) == 1 else given):
+                values[first + i] = values[first + i] if value is None else value
         first += count
-    return replace(limits, base_speeds=speeds, turn_rates=turns, joint_rates=rates)
+    return replace(
+        limits, base_speeds=speeds, turn_rates=turns, joint_rates=rates, joint_accelerations=accelerations
+    )

@@ -8,7 +8,7 @@ from coop_drake.plant.chain import limits_of
 from coop_drake.plant.placement import collisions, wall_clearance
 from coop_drake.plant.team import TeamPlant
 from coop_drake.scenario import Scenario
-from coop_drake.scenario.limits import ALL_ROBOTS
+from coop_drake.scenario.limits import ALL_ROBOTS, RobotLimits
 
 
 def check_joints(scenario: Scenario, team: TeamPlant) -> None:
@@ -50,11 +50,13 @@ def _check_rates(scenario: Scenario, team: TeamPlant) -> None:
     """Refuse limits of joints that are not as many as the joints."""
     for robot in team.robots:
         name = robot.name if robot.name in scenario.limits else ALL_ROBOTS
-        given = scenario.limits[name].joint_rates if name in scenario.limits else ()
-        if len(given) not in (0, 1, len(robot.joints)):
-            names = ", ".join(robot.joint_names) or "no joints"
-            allowed = f"one for all joints, or a list of {len(robot.joints)}, for {names} of {robot.name}"
-            raise ScenarioError(str(scenario.path), f"limits.{name}.joint_rates", list(given), allowed)
+        stated = scenario.limits.get(name, RobotLimits())
+        for key in ("joint_rates", "joint_accelerations"):
+            given = getattr(stated, key)
+            if len(given) not in (0, 1, len(robot.joints)):
+                names = ", ".join(robot.joint_names) or "no joints"
+                allowed = f"one for all joints, or a list of {len(robot.joints)}, for {names} of {robot.name}"
+                raise ScenarioError(str(scenario.path), f"limits.{name}.{key}", list(given), allowed)
 
 
 def check_places(scenario: Scenario, problem: PlanningProblem) -> None:

@@ -1,4 +1,4 @@
-"""Largest speeds that a scenario states for its robots, besides those in the robots' models."""
+"""Limits that a scenario states for its robots, besides those in the robots' models."""
 
 from dataclasses import dataclass
 
@@ -10,15 +10,17 @@ ALL_ROBOTS = "*"
 
 @dataclass(frozen=True)
 class RobotLimits:
-    """Largest speeds of one robot; each replaces what the robot's model says, null keeps that.
+    """Limits of one robot; each replaces what the robot's model says, null keeps that.
 
     Attributes:
         base_speed: Largest speed of the base's frame Bk in W [m/s].
         base_turn_rate: Largest rate of the base's angle in W [rad/s].
         joint_rates: Largest rates of the joints, from the base to the end effector; a single one counts for
             all joints [rad/s or m/s].
+        joint_accelerations: Largest accelerations of the joints, in the same way [rad/s^2 or m/s^2].
     """
 
     base_speed: Positive | None = None
     base_turn_rate: Positive | None = None
     joint_rates: tuple[Positive | None, ...] = ()
+    joint_accelerations: tuple[Positive | None, ...] = ()

@@ -238,8 +238,9 @@ class Scenario:
         maps: Accuracy of the harmonic maps.
         plant: Model of the grasps in the simulated plant.
         simulator: Numerical integration of the closed loop.
-        limits: Largest speeds of robots, by name; ``"*"`` for all that have no entry of their own. Transports
-            are planned and driven so that these, and those of the robots' models, are kept.
+        limits: Largest speeds and accelerations of robots, by name; ``"*"`` for all that have no entry of
+            their own. Transports are planned and driven so that these, and those of the robots' models, are
+            kept.
         deployment: Departures of the real team from the ideal one.
         control: Additions to the controllers.
         visualization: Appearance of recordings.

@@ -19,7 +19,7 @@ from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.gains import check_gains
 from coop_drake.verification.problem_match import check_problem
 from coop_drake.verification.question import question_of
-from coop_drake.verification.speeds import check_speeds
+from coop_drake.verification.speeds import check_accelerations, check_speeds
 
 
 def verify_plan(
@@ -43,7 +43,9 @@ def verify_plan(
     exact = _exactly(problem, plan_document(plan), progress)
     checks = [same, *exact, check_gains(plan, gain_sets)]
     checks += [
-        further for further in (check_speeds(plan, problem), check_budget(plan)) if further is not None
+        further
+        for further in (check_speeds(plan, problem), check_accelerations(plan, problem), check_budget(plan))
+        if further is not None
     ]
     checks += check_position(plan, problem.position_tolerance)
     return Verified("found", f"plan of {len(plan.cells)} cells", tuple(checks))

@@ -23,7 +23,7 @@ SAME_PLACE = 1e-9
 def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
     """Compute the gains of every transition again; all that is geometry belongs to the exact checker.
 
-    Limits of speed are taken as they are stated; ``check_speeds`` checks them.
+    Limits are taken as they are stated; ``check_speeds`` and ``check_accelerations`` check them.
 
     The estimated time comes of a simulation and does not matter for safety: it is the only figure that
     nothing but the digest of the file protects.
@@ -41,8 +41,9 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
         if transition.only_angles != (transition.length <= SAME_PLACE):
             raise RefusalError(f"{where}.only_angles", f"{transition.only_angles} over {transition.length} m")
         gain_set, tolerance = gain_sets[plan.gain_set], transition.tolerance
-        if tolerance is not None and isinstance(gain_set, ScheduledGains):
-            gain_set = replace(gain_set, command_age=tolerance.age_factor * gain_set.age)
+        if isinstance(gain_set, ScheduledGains):
+            factor = plan.age_factor * (1.0 if tolerance is None else tolerance.age_factor)
+            gain_set = gain_set.slowed(factor)
         gains = transition_gains(
             gain_set,
             clearance=transition.neck,
@@ -53,6 +54,7 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
             resting=resting,
             speed_limit=transition.gains.speed_limit,
             rate_limit=transition.gains.rate_limit,
+            acceleration_limit=transition.gains.acceleration_limit,
         )
         if tolerance is not None:  # the condition of rest follows from the budget
             gains = replace(gains, rest=transition.gains.rest)

@@ -59,6 +59,26 @@ def check_speeds(plan: Plan, problem: PlanningProblem) -> Check | None:
     return Check("limits of speed are kept by the gains", count, least, "of one left")
 
 
+def check_accelerations(plan: Plan, problem: PlanningProblem) -> Check | None:
+    """Check that no more is commanded of any joint than its limit of acceleration; None without limits.
+
+    Raises:
+        RefusalError: Names the entry, and what it should be.
+    """
+    limits = problem.limits.joint_accelerations
+    known, least = np.isfinite(limits), 1.0
+    for k, transition in enumerate(plan.transitions):
+        where, stated = f"transitions[{k}].gains.acceleration_limit", transition.gains.acceleration_limit
+        if stated is None and known.any():
+            raise RefusalError(where, "is missing; models or scenario state limits of acceleration")
+        if stated is not None and not known.any():
+            raise RefusalError(where, "is there, but neither models nor scenario state a limit")
+        if stated is not None:
+            least = min(least, _require_below(where, stated[1:], limits))
+    name = "limits of acceleration are kept by the commands"
+    return Check(name, int(known.sum()), least, "of one left") if known.any() else None
+
+
 def _check_limits(stated: SpeedStatement, limits: TeamLimits) -> None:
     for name, found, expected in (
         ("base_speed_limits", stated.base_speed_limits, limits.base_speeds),

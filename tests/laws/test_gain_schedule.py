@@ -41,6 +41,20 @@ def test_gains_follow_the_age_of_what_a_command_rests_on(age):
     assert np.all(gains.decay_rate <= 0.5 * k2 * (1.0 + 1e-12))
 
 
+def test_bounds_log_term_and_entry_take_a_share_of_a_limit_of_acceleration():
+    most = np.array([np.inf, 2.0])
+    narrow = {"goal_lower": np.array([0.8, 0.6]), "resting": np.array([0.4, -0.8])}
+    free, limited = (schedule(ScheduledGains(), acceleration_limit=a, **narrow) for a in (None, most))
+    assert (limited.decay_rate[0], limited.log_gain[0]) == (free.decay_rate[0], free.log_gain[0])
+    assert limited.decay_rate[1] == pytest.approx(np.sqrt(0.8 * 2.5 * np.sqrt(3.0) / 1.6))
+    assert limited.log_gain[1] == pytest.approx((0.8 / limited.rate_gain) ** 2)
+    assert limited.energy_bound[1] < free.energy_bound[1]
+    funnel = Funnel(SLICE["slice_lower"], SLICE["slice_upper"], narrow["goal_lower"], GOAL["goal_upper"],
+                    limited.decay_rate)  # fmt: skip
+    at_rest = funnel_acceleration(narrow["resting"], np.zeros(2), funnel, 0.0, limited)
+    assert abs(at_rest[1]) <= 0.8
+
+
 def test_walls_that_close_far_close_slowly():
     gains = schedule(
         ScheduledGains(turning_acceleration=1e3),  # joints bear any turn

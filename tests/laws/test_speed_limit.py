@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from coop_drake.laws.axis_table import ACCELERATION_LIMIT, LAW_COLUMNS, LIMIT_GAIN, RATE_LIMIT, limited_row
 from coop_drake.laws.funnels import decay_factor
 from coop_drake.laws.governor import AHEAD, driving_margin, energy_margin, steady_clearance
 from coop_drake.laws.speed_limit import FUNNEL_SHARE, damped, funnel_rate, slowed_decay_rate, speed_damping
@@ -34,6 +35,18 @@ def test_without_a_limit_or_at_rest_nothing_is_damped():
     assert speed_damping(0.0, 0.0, 0.1, 10.0) == 0.0
     assert damped(-7.0, 3.0, np.inf, 10.0) == -7.0
     assert damped(5.0, -0.05, 0.1, 10.0) == 5.0  # braking is never limited
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(parts, st.floats(-1.0, 1.0), limits, gains, st.floats(0.1, 20.0))
+def test_no_more_than_the_limit_of_acceleration_is_commanded(acceleration, share, limit, gain, most):
+    row = np.full(LAW_COLUMNS, np.nan)
+    row[RATE_LIMIT], row[LIMIT_GAIN], row[ACCELERATION_LIMIT] = limit, gain, most
+    commanded = limited_row(row, acceleration, share * limit)
+    assert abs(commanded) <= min(abs(acceleration), most) * (1.0 + 1e-12)
+    assert commanded * share * limit <= 0.5 * gain * limit**2 * (1.0 - share**2) + 1e-9
+    row[RATE_LIMIT] = np.inf
+    assert limited_row(row, acceleration, share * limit) == np.clip(acceleration, -most, most)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -21,8 +21,8 @@ def arm(*more):
     return Arm(joints=tuple(("revolute", "0 0 1", limit) for limit in more))
 
 
-def limit(velocity):
-    return f"<limit><lower>-1.2</lower><upper>1.5</upper><velocity>{velocity}</velocity></limit>"
+def limit(velocity, more=""):
+    return f"<limit><lower>-1.2</lower><upper>1.5</upper><velocity>{velocity}</velocity>{more}</limit>"
 
 
 def limits_of(path):
@@ -37,6 +37,28 @@ def test_velocity_limits_of_sdf_are_read_and_those_without_are_unknown(tmp_path)
     limits = limits_of(path)
     assert limits.joint_rates.tolist()[:3] == [0.7, np.inf, np.inf]
     assert np.isinf(limits.base_speeds).all()
+
+
+def test_limits_of_acceleration_and_effort_are_read_and_replaced(tmp_path):
+    text = arm(limit(1, "<effort>7</effort><drake:acceleration>3</drake:acceleration>"), limit(1)).text()
+    text = text.replace("<sdf ", '<sdf xmlns:drake="drake.mit.edu" ')
+    stated = "\nlimits: {robot_1: {joint_accelerations: [4]}}"
+    changes = ("robot_0: [0.0]", "robot_0: [0.0, 0.0]"), (STATED, stated)
+    limits = limits_of(write_with_robot(tmp_path, text, "sdf", *changes))
+    assert limits.joint_accelerations.tolist() == [3.0, np.inf, 4.0]
+    assert limits.joint_efforts.tolist() == [7.0, np.inf, np.inf]
+
+
+def test_limits_of_acceleration_of_urdf_are_read(tmp_path):
+    text = urdf_arm().replace('velocity="1"', 'velocity="1" drake:acceleration="3"', 1)
+    text = text.replace("<robot ", '<robot xmlns:drake="drake.mit.edu" ')
+    limits = limits_of(
+        write_with_robot(
+            tmp_path, text, "urdf", ("robot_0: [0.0]", "robot_0: [0.0, 0.1]"), ("y: 2,", "y: 1.8,")
+        )
+    )
+    assert limits.joint_accelerations.tolist()[:2] == [3.0, np.inf]
+    assert np.isinf(limits.joint_efforts).all()  # no joint has a transmission
 
 
 def test_velocity_limits_of_urdf_are_read(tmp_path):
@@ -86,6 +108,7 @@ def test_a_negative_limit_of_urdf_is_refused_before_drake_ends_the_process(tmp_p
         ("{robot_0: {base_speed: 0}}", "limits.robot_0.base_speed", "a positive number"),
         ("{robot_0: {base_speed: .nan}}", "limits.robot_0.base_speed", "a finite number"),
         ("{robot_0: {joint_rates: [-1]}}", "limits.robot_0.joint_rates[0]", "a positive number"),
+        ("{'*': {joint_accelerations: [0]}}", "limits.*.joint_accelerations[0]", "a positive number"),
         ("{robot_7: {base_speed: 1}}", "limits.robot_7", "a robot, one of robot_0, robot_1"),
     ],
 )
@@ -94,20 +117,24 @@ def test_impossible_limits_of_a_scenario_are_refused(said, key, allowed, tmp_pat
 
 
 def test_as_many_limits_as_joints_are_expected(tmp_path):
-    path = write_edited(tmp_path, (STATED, '\nlimits: {"*": {joint_rates: [1, 2]}}'))
-    with pytest.raises(ScenarioError, match=r"limits\.\*\.joint_rates: .* a list of 1, for robot_0::"):
-        planning_problem(load_scenario(path))
+    for key in ("joint_rates", "joint_accelerations"):
+        path = write_edited(tmp_path, (STATED, f'\nlimits: {{"*": {{{key}: [1, 2]}}}}'))
+        with pytest.raises(ScenarioError, match=rf"limits\.\*\.{key}: .* a list of 1, for robot_0::"):
+            planning_problem(load_scenario(path))
 
 
 def test_kept_limits_are_the_same_and_change_the_question(tmp_path):
-    path = write_edited(tmp_path, (STATED, '\nlimits: {"*": {base_speed: 0.5}}'))
+    stated = '\nlimits: {"*": {base_speed: 0.5, joint_accelerations: [3]}}'
+    path = write_edited(tmp_path, (STATED, stated))
     scenario = load_scenario(path)
     problem = planning_problem(scenario)
     keep_problem(scenario, problem, tmp_path)
     again = kept_problem(read_scenario(path), tmp_path)
     assert repr(again.limits) == repr(problem.limits)
-    other = planning_problem(load_scenario(write_edited(tmp_path, (STATED, ""))))
-    assert problem_digest(again) == problem_digest(problem) != problem_digest(other)
+    digests = {problem_digest(again), problem_digest(problem)}
+    for less in ("", '\nlimits: {"*": {base_speed: 0.5}}'):
+        digests.add(problem_digest(planning_problem(load_scenario(write_edited(tmp_path, (STATED, less))))))
+    assert len(digests) == 3
 
 
 @pytest.mark.parametrize("name", ["base", "elbow", "three"])

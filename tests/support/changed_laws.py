@@ -106,7 +106,7 @@ def estimated(plan: Plan):
     edges, gains, table = cells[0]
     seconds = cross_cell(
         state, np.zeros(n), edges, path, gains, table, plan.transitions[0].inradius, *cells[1], False, 10.0,
-        np.zeros(1 + n),
+        np.zeros(1 + 2 * n),
     )  # fmt: skip
     return np.array([*state, seconds])
 

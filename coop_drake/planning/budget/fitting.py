@@ -49,7 +49,7 @@ def fit_budget(plan: Plan, gain_set: ScheduledGains, budget: Budget) -> Plan | U
     """
     first = None
     for factor in _factors(gain_set, budget):
-        transitions = _with_gains(plan, replace(gain_set, command_age=factor * gain_set.age))
+        transitions = _with_gains(plan, gain_set.slowed(factor))
         again = replace(plan, transitions=transitions)
         tables = [axis_table(again.funnel(k), one.gains) for k, one in enumerate(transitions)]
         proved = follow_transitions(tables, plan.start[2:], budget)
@@ -68,7 +68,7 @@ def sufficient_overlap(gain_set: ScheduledGains, budget: Budget) -> float:
     """
     for overlap in OVERLAPS:
         for factor in _factors(gain_set, budget):
-            gains = replace(gain_set, command_age=factor * gain_set.age)
+            gains = gain_set.slowed(factor)
             forth, back = (_typical(gains, overlap, way) for way in (False, True))
             start = np.full(len(TYPICAL), 0.5 * overlap)
             if not isinstance(follow_transitions([forth, back, forth], start, budget), UnprovedTransition):
@@ -113,6 +113,7 @@ def _with_gains(plan: Plan, gain_set: ScheduledGains) -> tuple[Transition, ...]:
             resting=resting,
             speed_limit=transition.gains.speed_limit,
             rate_limit=transition.gains.rate_limit,
+            acceleration_limit=transition.gains.acceleration_limit,
         )
         transitions.append(replace(transition, gains=gains))
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)

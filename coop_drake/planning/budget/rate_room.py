@@ -1,4 +1,4 @@
-"""Whether an axis under a budget comes so near the limit of its rate that the limit may damp it."""
+"""Whether limits of rate or acceleration may act on an axis under a budget."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from coop_drake.laws.axis_table import LIMIT_GAIN, RATE_LIMIT
+from coop_drake.laws.axis_table import ACCELERATION_LIMIT, LIMIT_GAIN, RATE_LIMIT
 from coop_drake.planning.budget.axis_sets import AxisSets, Entry
 from coop_drake.planning.budget.axis_tube import ACCELERATION, V_REACH, AxisConditions, V
 from coop_drake.tree.pose import FloatArray
@@ -15,9 +15,9 @@ from coop_drake.tree.pose import FloatArray
 def comes_near_limit(
     row: FloatArray, sets: AxisSets, conditions: Sequence[AxisConditions], entry: Entry
 ) -> bool:
-    """Return whether a x' <= g (L^2 - x'^2) / 2 may fail for what an axis measures and is commanded.
+    """Return whether a x' <= g (L^2 - x'^2) / 2 or |a| <= A may fail for what an axis measures and is asked.
 
-    Sets are those of the law without a limit; they hold with it where the damping is zero at all times.
+    Sets are those of the law without limits; they hold with these where none acts at any time.
 
     Args:
         row: The axis, a row of an ``axis_table``.
@@ -26,7 +26,7 @@ def comes_near_limit(
         entry: The set in which it entered.
     """
     limit, first = row[RATE_LIMIT], conditions[0]
-    if not limit < np.inf:
+    if not min(limit, row[ACCELERATION_LIMIT]) < np.inf:
         return False
     factor = min(one.model_factor - one.model_error for one in conditions)
     early = max(abs(entry.rate_lower), abs(entry.rate_upper)) + first.delay * first.period * entry.history
@@ -37,5 +37,9 @@ def comes_near_limit(
         pairs += zip(seen.tolist(), tube[:, ACCELERATION].tolist(), strict=True)
     measured, accelerations = np.array(pairs).T
     measured += first.rate_noise
+    if (accelerations / factor > row[ACCELERATION_LIMIT]).any():
+        return True
+    if not limit < np.inf:
+        return False
     room = 0.5 * row[LIMIT_GAIN] * (limit * limit - measured * measured)
     return bool((measured * accelerations / factor > room).any())

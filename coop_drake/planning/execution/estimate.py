@@ -43,8 +43,8 @@ def timed(plan: Plan) -> Plan:
     return estimated(plan)[0]
 
 
-def estimated(plan: Plan) -> tuple[Plan, FloatArray]:
-    """Estimate the time of every transition of a plan, and the largest speeds.
+def estimated(plan: Plan) -> tuple[Plan, FloatArray, FloatArray]:
+    """Estimate the time of every transition of a plan, and the largest speeds and accelerations.
 
     The closed loop is integrated from cell to cell: a point mass behind the governor (14)-(16) with the exact
     distance to the boundary of Q_i, a double integrator in its funnel for every axis, and the conditions of
@@ -56,7 +56,8 @@ def estimated(plan: Plan) -> tuple[Plan, FloatArray]:
 
     Returns:
         The plan with estimates; ``transition_time`` where a transition is not left within two minutes. And
-        the largest speed of the object, then those of the axes (theta, q...), shape (2 + n,) [m/s, rad/s].
+        the largest speed of the object, then those of the axes (theta, q...), shape (2 + n,) [m/s, rad/s];
+        and the largest accelerations of the axes in every cell, shape (cells, 1 + n) [rad/s^2 or m/s^2].
     """
     crossings = [
         (
@@ -69,23 +70,25 @@ def estimated(plan: Plan) -> tuple[Plan, FloatArray]:
     jumps = first_jumps(crossings[0][2], plan.start[2:])
     following = [*crossings[1:], crossings[-1]]
     state = _at_rest(plan.start[:2], plan.start[2:])
-    transitions, peaks = [], np.zeros(len(plan.start) - 1)
+    m = len(plan.start) - 2
+    transitions, speeds, accelerations = [], np.zeros(1 + m), np.zeros((len(crossings), m))
     for index, (transition, (edges, gains, table)) in enumerate(
         zip(plan.transitions, crossings, strict=True)
     ):
-        last = index + 1 == len(crossings)
+        last, peaks = index + 1 == len(crossings), np.zeros(1 + 2 * m)
         next_edges, next_gains, next_table = following[index]
         seconds = cross_cell(
             state, jumps, edges, transition.path, gains, table, transition.inradius,
             next_edges, next_gains, next_table, last, LONGEST, peaks,
         )  # fmt: skip
+        speeds, accelerations[index] = np.maximum(speeds, peaks[: 1 + m]), peaks[1 + m :]
         if not isfinite(seconds):
             speed = speed_per_clearance(transition.gains)
             seconds = LONGEST + transition_time(transition.length, transition.neck, speed)
             state = _at_rest(transition.target, 0.5 * (transition.goal_lower + transition.goal_upper))
             jumps[:] = 0.0
         transitions.append(replace(transition, estimated_time=seconds))
-    return replace(plan, transitions=tuple(transitions)), peaks
+    return replace(plan, transitions=tuple(transitions)), speeds, accelerations
 
 
 def _governor_row(plan: Plan, index: int) -> FloatArray:

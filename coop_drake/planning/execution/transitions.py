@@ -19,8 +19,9 @@ from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.parts import component_at
 from coop_drake.geometry.passage import Passage, PassageFinder
 from coop_drake.geometry.tidy import tidy_cell
-from coop_drake.laws import GainSet, TransitionGains, transition_gains
+from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains
 from coop_drake.planning.boxes.channel import Channel, FreeBox
+from coop_drake.planning.execution.acceleration_limits import check_accelerations, planned_accelerations
 from coop_drake.planning.execution.channel_ends import Bounds, check_ends, goal_intervals, turned_to_start
 from coop_drake.planning.execution.estimate import plan_time, timed
 from coop_drake.planning.execution.speed_shares import limits_of, speed_shares, stated_speeds
@@ -97,15 +98,27 @@ def make_plan(
 
 
 def keep_limits(problem: PlanningProblem, plan: Plan, gain_set: GainSet) -> Plan:
-    """Return a plan that keeps the limits of speed, the quickest of a few ways to share them among the axes.
+    """Return a plan that keeps all limits, the quickest of a few ways to share speeds among the axes.
 
     Args:
         problem: What was asked, with the limits.
-        plan: A plan with the gains of the gain set, without limits of speed.
+        plan: A plan with the gains of the gain set, without limits.
         gain_set: Gains, fixed or to be scheduled.
+
+    Raises:
+        TooQuickError: In the estimated transport a limit of acceleration acts; names the joint.
     """
-    if not problem.limits.any:
-        return plan
+    most = planned_accelerations(problem.limits)
+    if most is not None:
+        plan = timed(with_gains(plan, gain_set, plan.gain_set, accelerations=most))
+    if problem.limits.any:
+        plan = _sharing_speeds(problem, plan, gain_set)
+    if most is not None:
+        check_accelerations(plan, most)
+    return plan
+
+
+def _sharing_speeds(problem: PlanningProblem, plan: Plan, gain_set: GainSet) -> Plan:
     tried = []
     for shares in speed_shares(problem, plan):
         limited = timed(with_gains(plan, gain_set, plan.gain_set, shares))
@@ -118,7 +131,13 @@ def reschedule(plan: Plan, gain_set: GainSet, name: str) -> Plan:
     return timed(with_gains(plan, gain_set, name))
 
 
-def with_gains(plan: Plan, gain_set: GainSet, name: str, limits: FloatArray | None = None) -> Plan:
+def with_gains(
+    plan: Plan,
+    gain_set: GainSet,
+    name: str,
+    limits: FloatArray | None = None,
+    accelerations: FloatArray | None = None,
+) -> Plan:
     """A plan with the gains of another gain set, without a budget; its estimated times are kept.
 
     Args:
@@ -126,12 +145,16 @@ def with_gains(plan: Plan, gain_set: GainSet, name: str, limits: FloatArray | No
         gain_set: Gains, fixed or to be scheduled.
         name: Name under which the scenario knows them.
         limits: Largest speed of the object and rates of all axes, shape (2 + n,); those of the plan if None.
+        accelerations: Largest accelerations of all axes, shape (1 + n,); those of the plan if None.
     """
+    if isinstance(gain_set, ScheduledGains):
+        gain_set = gain_set.slowed(plan.age_factor)
     resting, limits = plan.start[2:], limits_of(plan) if limits is None else limits
     transitions = []
     for cell, transition in zip(plan.cells, plan.transitions, strict=True):
         goals = (transition.goal_lower, transition.goal_upper)
-        gains = _gains(gain_set, cell, transition.neck, goals, resting, limits)
+        most = transition.gains.acceleration_limit if accelerations is None else accelerations
+        gains = _gains(gain_set, cell, transition.neck, goals, resting, limits, most)
         transitions.append(replace(transition, gains=gains, tolerance=None, governed=None))
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
     return replace(plan, transitions=tuple(transitions), gain_set=name, budget=None, tube=None)
@@ -238,6 +261,7 @@ def _gains(
     goal: Bounds,
     resting: FloatArray,
     limits: FloatArray | None = None,
+    accelerations: FloatArray | None = None,
 ) -> TransitionGains:
     speed = None if limits is None or not isfinite(limits[0]) else float(limits[0])
     return transition_gains(
@@ -250,6 +274,7 @@ def _gains(
         resting=resting,
         speed_limit=speed,
         rate_limit=None if limits is None else limits[1:],
+        acceleration_limit=accelerations,
     )
 
 

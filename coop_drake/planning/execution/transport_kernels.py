@@ -214,12 +214,13 @@ def _steps(state: FloatArray, time: float, row: FloatArray, table: FloatArray) -
 
 
 @compiled
-def _note_peaks(state: FloatArray, peaks: FloatArray) -> None:
-    """Write the speed of the object and the rates of all axes where they are larger than before."""
+def _note_peaks(state: FloatArray, rates: FloatArray, peaks: FloatArray) -> None:
+    """Write the speed of the object and the rates and accelerations of all axes that exceed those before."""
     peaks[0] = max(peaks[0], hypot(state[2], state[3]))
-    m = peaks.size - 1
+    m = (peaks.size - 1) // 2
     for i in range(m):
         peaks[1 + i] = max(peaks[1 + i], abs(state[6 + m + i]))
+        peaks[1 + m + i] = max(peaks[1 + m + i], abs(rates[6 + m + i]))
 
 
 @compiled
@@ -254,8 +255,8 @@ def cross_cell(
         next_table: ``table`` of the next cell.
         last: Whether the object shall come to rest here; the next cell's data are then not read.
         time_limit: Longest time [s].
-        peaks: Largest speed of the object so far, then largest rates of all axes, shape (1 + m,); what is
-            larger on the way is written there [m/s, rad/s or m/s].
+        peaks: Largest speed of the object so far, then largest rates and accelerations of all axes, shape
+            (1 + 2 m,); what is larger on the way is written there [m/s, rad/s or m/s, rad/s^2 or m/s^2].
 
     Returns:
         Time that passed [s]; infinite beyond the limit.
@@ -279,6 +280,6 @@ def cross_cell(
             _rates(state + 0.5 * h * k2, t + 0.5 * h, edges, path, row, table, jumps, k3)
             _rates(state + h * k3, t + h, edges, path, row, table, jumps, k4)
             state += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-            _note_peaks(state, peaks)
+            _note_peaks(state, k1, peaks)
         time += PERIOD
     return np.inf

@@ -207,15 +207,15 @@ def cross_box(
     for a in range(m):
         ends = lower[a], upper[a], goal_intervals[0, a], goal_intervals[1, a]
         scheduled = scheduled_axis(
-            schedule, a > 0, ends[0], ends[1], ends[2], ends[3], axis_rest[a], narrowest, limits[1 + a]
-        )
+            schedule, a > 0, ends[0], ends[1], ends[2], ends[3], axis_rest[a], narrowest, limits[1 + a],
+            np.inf,
+        )  # fmt: skip
         gains_of_axes = (
             schedule.position_gain, schedule.rate_gain, schedule.ramp_rate, schedule.saturation,
             schedule.hand_over_time,
         )  # fmt: skip
-        write_row(
-            table[a], ends, scheduled, gains_of_axes, schedule.quintic, (limits[1 + a], schedule.limit_gain)
-        )
+        most = limits[1 + a], schedule.limit_gain, np.inf  # boxes are chosen without limits of acceleration
+        write_row(table[a], ends, scheduled, gains_of_axes, schedule.quintic, most)
     time = 0.0
     while time <= time_limit:
         if tolerance > 0.0:

@@ -9,7 +9,7 @@ from shapely.errors import ShapelyError
 from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.errors import GeometryError, PlanError, StallError
+from coop_drake.errors import GeometryError, PlanError, StallError, TooQuickError
 from coop_drake.laws import GainSet
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
 from coop_drake.planning.execution.channel_ends import check_ends, turned_to_start
@@ -52,6 +52,7 @@ def quickest_plan(
         GeometryError: If the boxes that the search found are needed and their polygons cannot be made.
         PlanError: If the channel does not join the start to the goal.
         StallError: If a passage is too narrow or too slow to be executed; names it.
+        TooQuickError: If a limit of acceleration would act; names the joint.
     """
     unit = usual_unit(problem.tree)
     if unit == 1.0:
@@ -66,6 +67,8 @@ def quickest_plan(
             least_overlap,
             progress,
         )
+    except TooQuickError:
+        raise
     except (GeometryError, PlanError, StallError) as error:
         raise StallError(f"{error} (these lengths are to be multiplied by {unit:g})") from error
     plan = with_gains(scale.plan(made), gain_set, gain_set_name)
@@ -96,6 +99,8 @@ def _quickest(
                 problem, better.channel, gain_set, gain_set_name=gain_set_name, targets=better.targets,
                 progress=progress,
             )  # fmt: skip
+        except TooQuickError:  # other boxes would not be slower
+            raise
         except (GeometryError, PlanError, StallError, ShapelyError):
             # The boxes that the search found are proved free too, and their passages may be wider.
             return None

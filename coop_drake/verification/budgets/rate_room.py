@@ -1,4 +1,4 @@
-"""Whether axes under a budget stay so far below the limits of their rates that these never act."""
+"""Whether axes under a budget stay so far below their limits of rate and acceleration that none acts."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ def check_rate_room(
     delay: int,
     where: str,
 ) -> None:
-    """Refuse sets in which an acceleration times the rate may exceed g (limit^2 - rate^2) / 2.
+    """Refuse sets in which a limit may act on a commanded acceleration a.
 
-    The sets are those of the law without limits.
+    It acts where |a| exceeds its own limit, or a times the rate g (limit^2 - rate^2) / 2. The sets are those
+    of the law without limits.
 
     Args:
         transition: The transition, with its stated sets.
@@ -36,14 +37,19 @@ def check_rate_room(
         RefusalError: Names the axis.
     """
     limits, stated = transition.gains.rate_limit, transition.tolerance
-    gain = transition.gains.limit_gain
-    if limits is None or gain is None or stated is None:
+    gain, most = transition.gains.limit_gain, transition.gains.acceleration_limit
+    if stated is None:
+        return
+    commanded = np.vstack([made[:, 4], last]) / (1.0 - budget.model_error)  # the model may make less of it
+    for axis, limit in enumerate(() if most is None else most):
+        if not (commanded[:, members == axis] <= limit).all():
+            raise RefusalError(f"{where}[{axis}]", f"an axis may ask for more than its limit of {limit:.6g}")
+    if limits is None or gain is None:
         return
     moving = np.abs(made[:, 2]) + made[:, 3]
     early = np.tile(_entry_rates(stated, budget, delay)[members], (delay, 1))
     seen = np.concatenate((early, moving))[: len(moving)] + budget.rate_noise
     settled = stated.settled_rate + budget.rate_noise
-    commanded = np.vstack([made[:, 4], last]) / (1.0 - budget.model_error)  # the model may make less of it
     for axis, limit in enumerate(limits):
         of = members == axis
         rates = np.append(seen[:, of].ravel(), np.full(int(of.sum()), settled[axis]))

@@ -1,4 +1,4 @@
-"""Check that bases and joints kept their limits of speed in a run, by kinematics of the checker's own."""
+"""Check that bases and joints kept their limits in a run, by kinematics of the checker's own."""
 
 from __future__ import annotations
 
@@ -37,6 +37,27 @@ def check_run_speeds(rows: Rows, problem: PlanningProblem) -> Check | None:
         count += int(np.isfinite(allowed).sum())
         least = min(least, float((1.0 - found / allowed).min(initial=1.0)))
     return Check("bases and joints kept their limits of speed", count, least, "of one left")
+
+
+def check_run_efforts(rows: Rows, problem: PlanningProblem) -> list[Check]:
+    """Check the acceleration and the effort of every joint in every row against its limit, if it has one.
+
+    Raises:
+        RefusalError: Names array, index and time.
+    """
+    limits, log, checks = problem.limits, rows.log, []
+    accelerations = np.concatenate((np.full(3, np.inf), limits.joint_accelerations))
+    for what, array, found, most in (
+        ("acceleration", "accelerations", log.accelerations, accelerations),
+        ("effort", "joint_torques", log.joint_torques, limits.joint_efforts),
+    ):
+        shares, known = np.abs(found) / most, int(np.isfinite(most).sum())
+        if known > 0:
+            text = f"is {{:.6g}} times the limit of the joint's {what}"
+            rows.require(shares <= 1.0, array, text, shares)
+            name, least = f"joints kept their limits of {what}", float(1.0 - shares.max())
+            checks.append(Check(name, known * len(shares), least, "of one left"))
+    return checks
 
 
 def _motion(point: FloatArray, stages: tuple[Stage, ...], rows: Rows) -> tuple[FloatArray, FloatArray]:

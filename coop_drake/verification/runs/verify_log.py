@@ -10,7 +10,7 @@ Each function raises a RefusalError at the first entry for which a statement doe
 6. Robots report what their states say, and cells were entered one by one when all were ready: ``readiness``,
    ``handovers``.
 7. Bases, wrenches and efforts go with the motion: ``grasps``, ``mechanics``.
-8. Bases and joints kept their limits of speed: ``speeds.check_run_speeds``.
+8. Bases and joints kept their limits: ``speeds.check_run_speeds``, ``speeds.check_run_efforts``.
 9. Nothing touched: ``clearances.check_clearances``.
 10. Where the plan has a budget, no more of it was used than there is: ``tube.check_budget_used``.
 """
@@ -36,7 +36,7 @@ from coop_drake.verification.runs.mechanics import check_mechanics
 from coop_drake.verification.runs.readiness import check_energy_margin, check_reports
 from coop_drake.verification.runs.rows import Rows, check_complete
 from coop_drake.verification.runs.setup import RunSetup
-from coop_drake.verification.runs.speeds import check_run_speeds
+from coop_drake.verification.runs.speeds import check_run_efforts, check_run_speeds
 from coop_drake.verification.runs.tube import check_budget_used
 
 
@@ -78,6 +78,7 @@ def verify_log(
         checks.append(check_mechanics(rows, problem, setup))
     kept = check_run_speeds(rows, problem)
     checks += [] if kept is None else [kept]
+    checks += check_run_efforts(rows, problem)
     checks += check_clearances(rows, between, problem, progress)
     checks += check_budget_used(rows)
     return Verified("arrived", f"run of {log.times[-1]:.2f} s in {len(log.times)} rows", tuple(checks))
