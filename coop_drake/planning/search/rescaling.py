@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import shapely
@@ -11,16 +13,15 @@ from shapely import Polygon
 
 from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.mixed_cell import MixedCell
-from coop_drake.answers.plan import Cell, Plan
+from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice
-from coop_drake.geometry.swept_tree import Intervals
 from coop_drake.laws.gains import FixedGains, GainSet
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.events import ChannelSearched, Event, SeenCell, SliceAdded, Watch
 from coop_drake.planning.questions.margins import SMALLEST_MARGIN
-from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
+from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape
 from coop_drake.tree.pose import FloatArray, PlanarPose
 
 USUAL_MARGINS = (SMALLEST_MARGIN, 0.4)
@@ -44,7 +45,7 @@ class Rescaling:
         problem, scale = self.problem, 1.0 / self.unit
         tree = problem.tree
         components = tuple(_component(component, scale) for component in tree.components)
-        units = 1.0 / self._configuration_units()
+        units = 1.0 / self._units
         goals = zip(problem.goal_joints, units[3:], strict=True)
         return replace(
             problem,
@@ -81,8 +82,8 @@ class Rescaling:
 
     def plan(self, made: Plan) -> Plan:
         """A plan in the unit, expressed in metres, but for its gains and the digest of its problem."""
-        unit, axes = self.unit, self._axis_units(range(len(self.problem.tree.joints)))
-        cells = tuple(Cell(c.lower * axes, c.upper * axes, _scaled(c.tidied, unit)) for c in made.cells)
+        unit, axes = self.unit, self._units[2:]
+        cells = tuple(self._scaled_box(cell, axes, "tidied") for cell in made.cells)
         transitions = tuple(
             replace(
                 step,
@@ -106,27 +107,15 @@ class Rescaling:
         )
 
     def _mixed(self, cell: MixedCell) -> MixedCell:
-        units = self._robot_units(cell.robots)
-        polygon = _scaled(cell.polygon, self.unit)
-        return replace(cell, lower=cell.lower * units, upper=cell.upper * units, polygon=polygon)
+        return self._scaled_box(cell, self._robot_units(cell.robots), "polygon")
 
     def _covered(self, found: CoveredPath) -> CoveredPath:
-        path, margin = found.path * self._configuration_units(), self.unit * found.margin
+        path, margin = found.path * self._units, self.unit * found.margin
         return replace(found, path=path, margin=margin, channel=lambda: self._channel(found.channel()))
 
     def _channel(self, found: Channel) -> Channel:
-        units = self._axis_units(range(len(self.problem.tree.joints)))
-        boxes = tuple(
-            replace(
-                box,
-                polygon=_scaled(box.polygon, self.unit),
-                core=_scaled(box.core, self.unit),
-                lower=box.lower * units,
-                upper=box.upper * units,
-            )
-            for box in found.boxes
-        )
-        path = None if found.path is None else found.path * self._configuration_units()
+        boxes = tuple(self._scaled_box(box, self._units[2:], "polygon", "core") for box in found.boxes)
+        path = None if found.path is None else found.path * self._units
         return replace(found, boxes=boxes, margin=self.unit * found.margin, path=path)
 
     def watched(self, watch: Watch | None) -> Watch | None:
@@ -139,7 +128,9 @@ class Rescaling:
             nonlocal robots
             robots = getattr(event, "robots", robots)
             if isinstance(event, SliceAdded):
-                intervals = self._intervals(event.intervals, self._robot_units(robots))
+                units = self._robot_units(robots).tolist()
+                ends = zip(event.intervals, units, strict=True)
+                intervals = tuple((low * unit, high * unit) for (low, high), unit in ends)
                 event = replace(event, intervals=intervals, cells=self._seen(event.cells))
             elif isinstance(event, ChannelSearched):
                 event = replace(event, cells=self._seen(event.cells))
@@ -147,47 +138,41 @@ class Rescaling:
 
         return see
 
+    def _scaled_box(self, box: Any, units: FloatArray, *polygons: str) -> Any:
+        """A cell or box with its intervals times the units of its axes, and with scaled polygons."""
+        scaled = {name: _scaled(getattr(box, name), self.unit) for name in polygons}
+        return replace(box, lower=box.lower * units, upper=box.upper * units, **scaled)
+
     def _proof(self, proof: InfeasibilityProof) -> InfeasibilityProof:
         slices = tuple(map(self._slice, proof.slices))
         return replace(proof, point=self.unit * proof.point, slices=slices)
 
     def _slice(self, part: OverSlice) -> OverSlice:
         witnesses = tuple(replace(one, polygon=self.unit * one.polygon) for one in part.witnesses)
-        lower, upper = self._ends(part.lower), self._ends(part.upper)
-        return OverSlice(lower, upper, witnesses, self._cells(part.cells))
+        cells = tuple(OverCell(cell.reached, _scaled(cell.polygon, self.unit)) for cell in part.cells)
+        return OverSlice(self._ends(part.lower), self._ends(part.upper), witnesses, cells)
 
     def _ends(self, ends: FloatArray) -> FloatArray:
         """Ends of a slice in metres; those that are limits are the limits, without rounding."""
-        found = ends * self._axis_units(range(len(self.problem.tree.joints)))
+        found = ends * self._units[2:]
         tree, usual = self.problem.tree, self.question().tree
         for exact, limits in ((tree.joint_lower, usual.joint_lower), (tree.joint_upper, usual.joint_upper)):
             found[1:] = np.where(ends[1:] == limits, exact, found[1:])
         return found
 
-    def _cells(self, cells: Sequence[OverCell]) -> tuple[OverCell, ...]:
-        return tuple(OverCell(cell.reached, _scaled(cell.polygon, self.unit)) for cell in cells)
-
     def _seen(self, cells: Sequence[SeenCell]) -> tuple[SeenCell, ...]:
         scale = (self.unit, self.unit)
         return tuple(replace(cell, region=Region.of(cell.region.section.scale(scale))) for cell in cells)
 
-    @staticmethod
-    def _intervals(intervals: Intervals, units: FloatArray) -> Intervals:
-        return tuple((a * unit, b * unit) for (a, b), unit in zip(intervals, units.tolist(), strict=True))
-
-    def _configuration_units(self) -> FloatArray:
+    @cached_property
+    def _units(self) -> FloatArray:
         """Units of (x, y, theta, q...)."""
-        return np.concatenate(
-            ((self.unit, self.unit), self._axis_units(range(len(self.problem.tree.joints))))
-        )
+        kinds = [joint.kind for joint in self.problem.tree.joints]
+        return np.array([self.unit, self.unit, 1.0, *(self.unit if k == "prismatic" else 1.0 for k in kinds)])
 
     def _robot_units(self, robots: Sequence[int]) -> FloatArray:
         """Units of theta and of the joints of some robots."""
-        return self._axis_units([j.index for j in self.problem.tree.joints if j.robot in robots])
-
-    def _axis_units(self, joints: Sequence[int]) -> FloatArray:
-        kinds = [self.problem.tree.joints[joint].kind for joint in joints]
-        return np.array([1.0, *(self.unit if kind == "prismatic" else 1.0 for kind in kinds)])
+        return self._units[[2, *[3 + j.index for j in self.problem.tree.joints if j.robot in robots]]]
 
 
 def _settings(settings: PlannerSettings, scale: float) -> PlannerSettings:
@@ -204,17 +189,13 @@ def _scaled(polygon: Polygon, scale: float) -> Polygon:
 
 
 def _component(component: Component, scale: float) -> Component:
-    joint = None if component.joint is None else _joint(component.joint, scale)
-    bodies = tuple(_body(body, scale) for body in component.bodies)
+    joint = component.joint
+    if joint is not None:
+        X, unit = joint.X_PJ, scale if joint.kind == "prismatic" else 1.0
+        moved = PlanarPose(scale * X.x, scale * X.y, X.angle)
+        joint = replace(joint, X_PJ=moved, lower=unit * joint.lower, upper=unit * joint.upper)
+    bodies = tuple(
+        replace(body, shapes=tuple(ConvexShape(scale * s.vertices, scale * s.radius) for s in body.shapes))
+        for body in component.bodies
+    )
     return replace(component, joint=joint, bodies=bodies)
-
-
-def _joint(joint: TreeJoint, scale: float) -> TreeJoint:
-    X, unit = joint.X_PJ, scale if joint.kind == "prismatic" else 1.0
-    moved = PlanarPose(scale * X.x, scale * X.y, X.angle)
-    return replace(joint, X_PJ=moved, lower=unit * joint.lower, upper=unit * joint.upper)
-
-
-def _body(body: Body, scale: float) -> Body:
-    shapes = tuple(ConvexShape(scale * shape.vertices, scale * shape.radius) for shape in body.shapes)
-    return replace(body, shapes=shapes)
