@@ -52,28 +52,21 @@ class Solid:
     stages: tuple[Stage, ...]
 
 
-def team_solids(tree: ComponentTree, robots: Collection[int] | None = None) -> tuple[Solid, ...]:
-    """List every convex piece of a team.
-
-    ``robots``: robots whose joints are kept, None for all; what hangs from a joint of another is left out.
-    """
-    solids = []
-    for index, component in enumerate(tree.components):
-        joints = _joints_to_object(tree, index)
-        if robots is not None and any(joint.robot not in robots for joint in joints):
-            continue
-        stages = component_stages(tree, index)
-        solids += [
-            Solid(body.name, index, number, np.asarray(shape.vertices, dtype=float), shape.radius, stages)
-            for number, body in enumerate(component.bodies)
-            for shape in body.shapes
-        ]
-    return tuple(solids)
+def team_solids(tree: ComponentTree) -> tuple[Solid, ...]:
+    """List every convex piece of a team."""
+    return tuple(
+        Solid(body.name, index, number, np.asarray(shape.vertices, dtype=float), shape.radius, stages)
+        for index, component in enumerate(tree.components)
+        for stages in [component_stages(tree, index)]
+        for number, body in enumerate(component.bodies)
+        for shape in body.shapes
+    )
 
 
 def component_stages(tree: ComponentTree, index: int) -> tuple[Stage, ...]:
     """The stages that move a component: its own joint first, theta last."""
-    return (*[_stage(joint) for joint in _joints_to_object(tree, index)], _THETA)
+    joints = (tree.components[i].joint for i in tree.ancestors[index])
+    return (*[_stage(joint) for joint in joints if joint is not None], _THETA)
 
 
 def colliding_pairs(
@@ -85,7 +78,7 @@ def colliding_pairs(
         members.setdefault((solid.component, solid.body), []).append(solid)
     pairs = []
     for first, second in tree.collision_pairs:
-        one, other = (_components_to_object(tree, component) for component, _ in (first, second))
+        one, other = (tree.ancestors[component] for component, _ in (first, second))
         common = max(set(one) & set(other))
         pairs += [
             (a, b, one.index(common), other.index(common))
@@ -101,16 +94,3 @@ _THETA = Stage(0, "revolute", 1.0, np.zeros(2), PlanarPose())
 def _stage(joint: TreeJoint) -> Stage:
     scale = joint.sign if joint.kind == "revolute" else 1.0
     return Stage(1 + joint.index, joint.kind, scale, np.array(joint.axis), joint.X_PJ)
-
-
-def _components_to_object(tree: ComponentTree, index: int) -> list[int]:
-    """The component itself, its parent and so on, the object's last."""
-    path = [index]
-    while (parent := tree.components[path[-1]].parent) is not None:
-        path.append(parent)
-    return path
-
-
-def _joints_to_object(tree: ComponentTree, index: int) -> list[TreeJoint]:
-    joints = [tree.components[i].joint for i in _components_to_object(tree, index)]
-    return [joint for joint in joints if joint is not None]

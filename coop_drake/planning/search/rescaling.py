@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 import shapely
@@ -13,16 +13,18 @@ from shapely import Polygon
 
 from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.mixed_cell import MixedCell
-from coop_drake.answers.plan import Plan
+from coop_drake.answers.plan import Cell, Plan
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice
 from coop_drake.laws.gains import FixedGains, GainSet
-from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
+from coop_drake.planning.boxes.channel import Channel, CoveredPath, FreeBox, NoChannel
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.events import ChannelSearched, Event, SeenCell, SliceAdded, Watch
 from coop_drake.planning.questions.margins import SMALLEST_MARGIN
 from coop_drake.tree.component_tree import Component, ComponentTree, ConvexShape
 from coop_drake.tree.pose import FloatArray, PlanarPose
+
+Box = TypeVar("Box", MixedCell, FreeBox, Cell)
 
 USUAL_MARGINS = (SMALLEST_MARGIN, 0.4)
 """Margins that make sense for a team of the usual size, smallest and largest [m]."""
@@ -138,10 +140,10 @@ class Rescaling:
 
         return see
 
-    def _scaled_box(self, box: Any, units: FloatArray, *polygons: str) -> Any:
+    def _scaled_box(self, box: Box, units: FloatArray, *polygons: str) -> Box:
         """A cell or box with its intervals times the units of its axes, and with scaled polygons."""
         scaled = {name: _scaled(getattr(box, name), self.unit) for name in polygons}
-        return replace(box, lower=box.lower * units, upper=box.upper * units, **scaled)
+        return replace(box, lower=box.lower * units, upper=box.upper * units, **scaled)  # type: ignore[arg-type]
 
     def _proof(self, proof: InfeasibilityProof) -> InfeasibilityProof:
         slices = tuple(map(self._slice, proof.slices))

@@ -64,11 +64,7 @@ class Between:
 
 
 def check_motion(rows: Rows, between: Between) -> Check:
-    """Check that rates are derivatives of positions, and accelerations those of rates, within the bounds.
-
-    Raises:
-        RefusalError: Names array, index and time.
-    """
+    """Check that rates are derivatives of positions, and accelerations those of rates, within the bounds."""
     h, z, rates = rows.steps[:, None], rows.z, rows.rates
     change = np.abs(np.diff(rates, axis=0))
     residual = np.abs(np.diff(z, axis=0) - 0.5 * h * (rates[1:] + rates[:-1]))

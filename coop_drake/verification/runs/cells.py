@@ -20,9 +20,6 @@ def check_cells(rows: Rows, between: Between) -> tuple[Check, Check]:
 
     A row at which a cell is entered must lie in both its cells. Between two rows the position is as near to
     the chord as ``Between`` says, and so is every axis.
-
-    Raises:
-        RefusalError: Names array, index and time.
     """
     log, plan = rows.log, rows.plan
     clearance, slices = np.empty(len(log.times)), np.empty(len(log.times))

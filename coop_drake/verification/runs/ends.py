@@ -14,11 +14,7 @@ SAME = 1e-9
 
 
 def check_start(rows: Rows) -> Check:
-    """Check that the run begins at rest at the plan's start, with p_G at the object.
-
-    Raises:
-        RefusalError: Names array, index and time.
-    """
+    """Check that the run begins at rest at the plan's start, with p_G at the object."""
     start = rows.plan.start
     for name, expected in (
         ("object_pose", start[:3]),

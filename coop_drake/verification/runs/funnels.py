@@ -53,11 +53,7 @@ def bounds_at(plan: Plan, cell: int, times: FloatArray) -> tuple[FloatArray, Flo
 
 
 def check_funnels(rows: Rows, between: Between) -> tuple[Check, Check]:
-    """Check the stated funnels, and that every axis lay inside its funnel, between rows, too.
-
-    Raises:
-        RefusalError: Names array, index and time.
-    """
+    """Check the stated funnels, and that every axis lay inside its funnel, between rows, too."""
     log, plan, axes = rows.log, rows.plan, rows.z[:, 2:]
     lower, upper = np.empty_like(axes), np.empty_like(axes)
     least = np.inf
@@ -84,11 +80,7 @@ def check_funnels(rows: Rows, between: Between) -> tuple[Check, Check]:
 
 
 def check_stated_funnels(rows: Rows) -> Check:
-    """Check that in every row every axis lay in the funnel that is stated there.
-
-    Raises:
-        RefusalError: Names array, index and time.
-    """
+    """Check that in every row every axis lay in the funnel that is stated there."""
     log, axes = rows.log, rows.z[:, 2:]
     margins = np.minimum(axes - log.funnel_lower, log.funnel_upper - axes)
     rows.require(margins > 0.0, "angle, joints", "lies outside the stated funnel")

@@ -34,9 +34,6 @@ def check_grasps(rows: Rows, problem: PlanningProblem, setup: RunSetup) -> Check
     """Check that bases stand where object and joints put them, so that end effectors are at their grasps.
 
     Each base is fixed on one component that the robot's joints carry. Its pose there is the same in all rows.
-
-    Raises:
-        RefusalError: Names array, index and time.
     """
     log, tree = rows.log, problem.tree
     rows.require_same("grasp_error", np.zeros(len(log.times)), RIGID if setup.rigid else LOOSE)
@@ -52,11 +49,7 @@ def check_grasps(rows: Rows, problem: PlanningProblem, setup: RunSetup) -> Check
 
 
 def check_wrenches(rows: Rows, setup: RunSetup) -> Check:
-    """Check that the stated sums and differences of the wrenches at the grasps are right.
-
-    Raises:
-        RefusalError: Names array, index and time.
-    """
+    """Check that the stated sums and differences of the wrenches at the grasps are right."""
     log = rows.log
     commanded, bodies = log.commanded_wrenches, [body for body in setup.bodies if body.robot is None]
     error = np.abs(log.measured_wrenches - commanded).max(axis=(1, 2))

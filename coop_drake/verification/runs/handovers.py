@@ -20,9 +20,6 @@ def check_handovers(rows: Rows, *, exact: bool) -> tuple[Check, Check]:
     reports travel, and every robot must have reported to be ready at some time in the cell.
 
     ``exact``: whether the team is ideal.
-
-    Raises:
-        RefusalError: Names array, index and time.
     """
     log, plan, last = rows.log, rows.plan, len(rows.log.times) - 1
     if log.cell_index[-1] != len(plan.cells) - 1:

@@ -22,11 +22,7 @@ ROUNDING = 1e-6
 
 
 def check_clock(rows: Rows) -> Check:
-    """Check that the stated lag grows with time where the team is held, and not where it has long not been.
-
-    Raises:
-        RefusalError: Names array, index and time.
-    """
+    """Check that the stated lag grows with time while the team is held, and not where it is free for long."""
     log, h = rows.log, rows.steps
     rows.require((log.held == 0.0) | (log.held == 1.0), "held", "is {}; expected 0 or 1", log.held)
     rows.require_same("clock_lag", np.zeros(1), 0.0)

@@ -31,11 +31,7 @@ Needs = Sequence[tuple[BodyMass, tuple[FloatArray, FloatArray]]]
 
 
 def check_mechanics(rows: Rows, problem: PlanningProblem, setup: RunSetup) -> Check:
-    """Check base wrenches, joint efforts and wrenches at the grasps against the motion.
-
-    Raises:
-        RefusalError: Names array, index and time.
-    """
+    """Check base wrenches, joint efforts and wrenches at the grasps against the motion."""
     log, tree, count = rows.log, problem.tree, len(rows.z)
     needs = [(body, _inertial_force(rows, tree, body)) for body in setup.bodies]
     at_grasps = about_object(rows, setup, log.measured_wrenches, np.zeros(2))

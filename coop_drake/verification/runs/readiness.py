@@ -43,11 +43,7 @@ SAME = 1e-8
 
 
 def check_energy_margin(rows: Rows) -> Check:
-    """Check Delta E: it is what it should be, never negative, and all robots have one p_G.
-
-    Raises:
-        RefusalError: Names array, index and time.
-    """
+    """Check Delta E: it is what it should be, never negative, and all robots have one p_G."""
     log = rows.log
     margins, speeds = np.empty(len(log.times)), np.abs(log.object_twist[:, :2]).sum(axis=1)
     for k in range(len(rows.plan.cells)):
@@ -62,11 +58,7 @@ def check_energy_margin(rows: Rows) -> Check:
 
 
 def check_reports(rows: Rows, problem: PlanningProblem) -> Check:
-    """Check the margins that all robots report.
-
-    Raises:
-        RefusalError: Names array, index and time.
-    """
+    """Check the margins that all robots report."""
     log, plan = rows.log, rows.plan
     of_object, of_axes = np.empty(len(log.times)), np.empty(rows.z[:, 2:].shape)
     tolerances = np.full(len(log.times), SAME)

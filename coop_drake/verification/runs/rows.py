@@ -96,11 +96,7 @@ class Rows:
 
 
 def check_complete(rows: Rows) -> Check:
-    """Check that every number is one, that time passes, and that cells follow one another from the first.
-
-    Raises:
-        RefusalError: Names array, index and time.
-    """
+    """Check that every number is one, that time passes, and that cells follow one another from the first."""
     log, count = rows.log, 0
     for field in fields(log):
         values = np.asarray(getattr(log, field.name))

@@ -13,11 +13,7 @@ from coop_drake.verification.solids import Stage, component_stages
 
 
 def check_run_speeds(rows: Rows, problem: PlanningProblem) -> Check | None:
-    """Check every measured speed against its limit; None where there is none.
-
-    Raises:
-        RefusalError: Names array, index and time.
-    """
+    """Check every measured speed against its limit; None where there is none."""
     limits = problem.limits
     if not limits.any:
         return None

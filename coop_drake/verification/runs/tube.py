@@ -22,11 +22,7 @@ ROUNDING = 1e-9
 
 
 def check_budget_used(rows: Rows) -> list[Check]:
-    """Check what a plan's budget states against the run; nothing for a plan without a budget.
-
-    Raises:
-        RefusalError: Names array, index and time.
-    """
+    """Check what a plan's budget states against the run; nothing for a plan without a budget."""
     plan = rows.plan
     if plan.budget is None or plan.tube is None:
         return []

@@ -1,6 +1,7 @@
 """Verify what a run's log states, from the log alone, its plan and its scenario.
 
-Each function raises a RefusalError at the first entry for which a statement does not hold:
+Each function raises a RefusalError at the first entry for which a statement does not hold, with the name of
+the array, the index and the time:
 
 1. It belongs to the plan and the scenario: ``check_belonging`` below.
 2. Every number is finite, time passes, cells follow one another: ``rows.check_complete``.
