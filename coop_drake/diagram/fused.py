@@ -236,11 +236,6 @@ def _split(
     return [split.get_output_port(next(ports)) if size else None for size in sizes]
 
 
-def _told_only(hold: Hold | None) -> Hold | None:
-    """Return the same hold as one that only the scenario asks for."""
-    return None if hold is None else Hold(hold.at, hold.duration)
-
-
 def _check(scenario: Scenario, knowledge: Sequence[RobotKnowledge]) -> None:
     deployment = scenario.deployment
     allowed = Deployment(
@@ -257,7 +252,7 @@ def _check(scenario: Scenario, knowledge: Sequence[RobotKnowledge]) -> None:
         refused = "deployment", deployment
     elif scenario.control != Control(hold=scenario.control.hold):
         refused = "control", scenario.control
-    elif scenario.control.hold not in (None, _told_only(scenario.control.hold)):
+    elif (hold := scenario.control.hold) is not None and hold != Hold(hold.at, hold.duration):
         refused = "control.hold", scenario.control.hold
     elif any(robot.robot.has_springs for robot in knowledge):
         refused = "directives", "a robot with springs"

@@ -55,7 +55,8 @@ def solve_density(
     segments = _segments(outline, panels)
     layer = double_layer(grid, segments, panels.edge, nodes)
     on_hole = (ring[:, None] == np.arange(1, holes + 1)).astype(float)
-    right = np.hstack((2.0 * _as_real(grid.boundary_value), on_hole))
+    g = grid.boundary_value
+    right = np.column_stack((2.0 * g.real, 2.0 * g.imag, on_hole))
     blocks = [_corner_block(float(angle), nodes, closeness) for angle in angles]
     # On few cores a threaded factorisation of these sizes is slower.
     with _threads().limit(limits=1, user_api="blas"):
@@ -86,10 +87,6 @@ def _segments(outline: Outline, panels: Panels) -> ComplexArray:
     tangent = tangent / np.abs(tangent)
     middle, half = 0.5 * (panels.end + panels.start), 0.5 * (panels.end - panels.start)
     return np.column_stack((start + middle * tangent, half * tangent))
-
-
-def _as_real(z: ComplexArray) -> FloatArray:
-    return np.column_stack((z.real, z.imag))
 
 
 @lru_cache(maxsize=4096)

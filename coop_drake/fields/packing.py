@@ -29,11 +29,12 @@ def pack_layers(
     regular = incoming[refined.corner_start[-1] :].reshape(-1, REFINED_NODES, 2)
     index, grid, breaks, rings, tails = _pack_corners(angles, sources, refined, incoming, closeness)
     index[:, 5] += len(regular)
+    values = np.concatenate((regular, rings))
     m = m._replace(
         corner_index=index,
         grid=grid,
         breaks=breaks,
-        densities=_with_coefficients(np.concatenate((regular, rings))),
+        densities=np.stack((values, legendre_transform(REFINED_NODES) @ values), axis=1),
         tails=tails,
     )
     return grown(m, opened=True)
@@ -106,11 +107,6 @@ def _panel_ends(outline: Outline, panels: Panels) -> tuple[FloatArray, FloatArra
 def _columns(*arrays: np.ndarray) -> FloatArray:
     """Real and imaginary parts of complex arrays side by side."""
     return np.column_stack([part for z in arrays for part in (z.real, z.imag)])
-
-
-def _with_coefficients(values: FloatArray) -> FloatArray:
-    """Stack values at Gauss nodes (k, REFINED, 2) with their Legendre coefficients: (k, 2, REFINED, 2)."""
-    return np.ascontiguousarray(np.stack((values, legendre_transform(REFINED_NODES) @ values), axis=1))
 
 
 def _pack_corners(

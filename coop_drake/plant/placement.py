@@ -22,17 +22,12 @@ def wall_clearance(body: Body, X_WC: PlanarPose, workspace: Polygon) -> float:
     clearances = [float("inf")]
     for shape in body.shapes:
         solid = core(shape, X_WC)
-        inside = workspace.contains(solid)
-        gap = (
-            workspace.boundary.distance(solid) if inside else -_excess(solid.difference(workspace), workspace)
-        )
-        clearances.append(float(gap) - shape.radius)
+        gap = workspace.boundary.distance(solid)
+        if not workspace.contains(solid):
+            corners = get_coordinates(solid.difference(workspace))
+            gap = -max((Point(corner).distance(workspace) for corner in corners), default=0.0)
+        clearances.append(gap - shape.radius)
     return min(clearances)
-
-
-def _excess(outside: BaseGeometry, workspace: Polygon) -> float:
-    """Largest distance from the workspace of a corner of the part outside of it [m]."""
-    return max((float(Point(p).distance(workspace)) for p in get_coordinates(outside)), default=0.0)
 
 
 def body_clearance(first: Body, X_WC: PlanarPose, second: Body, X_WD: PlanarPose) -> float:

@@ -8,7 +8,7 @@ from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, SceneGraph
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.parsing import GetScopedFrameByName
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, DiscreteContactApproximation, MultibodyPlant
-from pydrake.multibody.tree import FixedOffsetFrame, Joint, PlanarJoint, RigidBody
+from pydrake.multibody.tree import FixedOffsetFrame, PlanarJoint, RigidBody
 from pydrake.systems.framework import Context, DiagramBuilder
 
 from coop_drake.plant.chain import find_base
@@ -97,7 +97,13 @@ def build_separate_team(scenario: Scenario, builder: DiagramBuilder) -> Separate
     finalize(scenario, plant)
     _let_nothing_touch(scene_graph)
     robots = tuple(
-        _in_plant(robot, base, joints, grasp)
+        replace(
+            robot,
+            model_instance=base.model_instance(),
+            base_body=base,
+            joints=joints,
+            gripper_frame=grasp.gripper_frame,
+        )
         for robot, (base, joints), grasp in zip(tree.robots, chains, grasps, strict=True)
     )
     return SeparateTeam(
@@ -147,19 +153,6 @@ def _grasp(
         object_body=GetScopedFrameByName(plant, names.object_frame).body(),
         X_OE=robot.gripper_frame.CalcPose(zero, grasped.body_frame()),
         base_joint=base_joint,
-    )
-
-
-def _in_plant(
-    robot: RobotModel, base: RigidBody, joints: tuple[Joint, ...], grasp: ConstrainedGrasp
-) -> RobotModel:
-    """Return the model of a robot as it stands in a plant of its own."""
-    return replace(
-        robot,
-        model_instance=base.model_instance(),
-        base_body=base,
-        joints=joints,
-        gripper_frame=grasp.gripper_frame,
     )
 
 

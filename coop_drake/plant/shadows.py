@@ -53,7 +53,8 @@ def without_covered(bodies: tuple[Body, ...], may_overlap: frozenset[tuple[str, 
         exempt.setdefault(first, set()).add(second)
         exempt.setdefault(second, set()).add(first)
     every = [(body, shape) for body in bodies for shape in body.shapes]
-    largest_first = sorted(range(len(every)), key=lambda place: -_size(every[place][1]))
+    sizes = [_core(shape).buffer(shape.radius).area for _, shape in every]
+    largest_first = sorted(range(len(every)), key=lambda place: -sizes[place])
     kept: list[int] = []
     for place in largest_first:
         body, shape = every[place]
@@ -69,10 +70,6 @@ def without_covered(bodies: tuple[Body, ...], may_overlap: frozenset[tuple[str, 
         Body(body.name, body.robot, tuple(shape for shape in body.shapes if id(shape) in left))
         for body in bodies
     )
-
-
-def _size(shape: ConvexShape) -> float:
-    return float(_core(shape).buffer(shape.radius).area)
 
 
 def _core(shape: ConvexShape) -> BaseGeometry:

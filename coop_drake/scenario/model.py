@@ -129,10 +129,6 @@ class Goal:
     tolerances: Tolerances = field(default_factory=Tolerances)
 
 
-def _shipped_gain_sets() -> dict[str, GainSet]:
-    return {"scheduled": ScheduledGains(), "table_2": FixedGains()}
-
-
 @dataclass(frozen=True)
 class Gains:
     """The gain sets, and which of them the run uses.
@@ -147,7 +143,8 @@ class Gains:
 
     def __post_init__(self) -> None:
         """Add the sets that are always defined."""
-        object.__setattr__(self, "sets", _shipped_gain_sets() | self.sets)
+        shipped = {"scheduled": ScheduledGains(), "table_2": FixedGains()}
+        object.__setattr__(self, "sets", shipped | self.sets)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.placement import points_in_world, turns
@@ -40,7 +39,8 @@ def check_grasps(rows: Rows, problem: PlanningProblem, setup: RunSetup) -> Check
     allowed = RIGID if setup.rigid else LOOSE + 2.0 * tree.reach * LOOSE
     largest = 0.0
     for k in range(len(setup.robot_names)):
-        away = np.min([_offset(rows, component_stages(tree, i), k) for i in _carried_by(tree, k)], axis=0)
+        own = [i for i, c in enumerate(tree.components) if c.joint is not None and c.joint.robot == k]
+        away = np.min([_offset(rows, component_stages(tree, i), k) for i in (0, *own)], axis=0)
         text = f"base of robot {k} is {{:.3g}} m or rad from where object and joints put it"
         rows.require(away <= allowed, "base_poses, object_pose, joints", text, away)
         largest = max(largest, float(away.max()))
@@ -88,8 +88,3 @@ def _offset(rows: Rows, stages: tuple[Stage, ...], robot: int) -> FloatArray:
     turn -= np.median(turn)
     away: FloatArray = np.abs(np.column_stack((place - np.median(place, axis=0), turn))).max(axis=1)
     return away
-
-
-def _carried_by(tree: ComponentTree, robot: int) -> list[int]:
-    """The components that a robot's own joints carry, and the object's."""
-    return [0, *(i for i, c in enumerate(tree.components) if c.joint is not None and c.joint.robot == robot)]
