@@ -89,9 +89,6 @@ class SampledSearch:
     def attempt(self, progress: Callable[[float], None] | None = None) -> BoxSequence | None:
         """Sample one path and cover it at margin zero; every call uses other samples.
 
-        Args:
-            progress: Called with the fraction of the sampling that is done.
-
         Returns:
             The boxes, or None if no path was found or covered.
         """
@@ -120,9 +117,6 @@ class SampledSearch:
         """Sample paths on larger floors, repair them until they fit the floor, and cover them at margin zero.
 
         This finds passages that are too narrow for samples.
-
-        Args:
-            progress: Called with the fraction of the sampling that is done.
 
         Returns:
             The boxes, or None if no path was found or covered.

@@ -57,11 +57,6 @@ def find_channel(
 ) -> tuple[Channel | NoChannel, SearchReport]:
     """Find a channel at any margin or prove that there is none; like ``find_path`` with the channel made.
 
-    Args:
-        problem: The question.
-        progress: Called with a phase and the fraction of it that is done.
-        watch: Called with the events of explorations.
-
     Returns:
         The channel, or why there is none, and a report.
     """
@@ -81,11 +76,6 @@ def find_path(
 
     Only explorations of cells may answer "infeasible", and only at margin zero. Budgets are counted in
     samples and slices, never in time, so the same question has the same answer.
-
-    Args:
-        problem: The question.
-        progress: Called with a phase and the fraction of it that is done.
-        watch: Called with the events of explorations.
 
     Returns:
         A sampled path, the channel of an exploration, or why there is neither, and a report.
@@ -117,11 +107,7 @@ def _answered(
 class _Search:
     """One search by samples and by cells in turns.
 
-    Args:
-        problem: The question.
-        progress: Called with a phase and the fraction of it that is done.
-        watch: Called with the events of explorations.
-        unit: The question's unit of length, for sentences [m].
+    ``unit``: the question's unit of length, for sentences [m].
     """
 
     def __init__(
