@@ -9,6 +9,7 @@ from math import ceil
 import numpy as np
 
 from coop_drake.answers.budget import Budget
+from coop_drake.compiled import compiled
 from coop_drake.laws.axis_table import (
     DECAY_RATE,
     FADING_TIME,
@@ -133,13 +134,9 @@ def axis_sets(row: FloatArray, conditions: Sequence[AxisConditions], entry: Entr
         made = _tubes(row, one, entry, parts, begin + tail + 1)
         if not made:
             return AxisSets((), 0.0)
-        late = np.concatenate([tube[None, begin - delay :] for tube in made])
-        x = np.abs(late[:, :, X] - middle) + late[:, :, X_REACH]
-        v = np.abs(late[:, :, V]) + late[:, :, V_REACH]
-        first = slice(0, delay + 1)
-        box = x[:, first].max(), v[:, first].max(), late[:, first, ACCELERATION].max()
-        boxes.append((float(box[0]), float(box[1]), float(box[2])))
-        followed = max(followed[0], float(x.max())), max(followed[1], float(v.max()))
+        ends = np.array([_closed_part(tube[begin - delay :], middle, delay) for tube in made]).max(axis=0)
+        boxes.append((float(ends[0]), float(ends[1]), float(ends[2])))
+        followed = max(followed[0], float(ends[3])), max(followed[1], float(ends[4]))
         tubes += made
     kept = _settled(row, conditions, begin * T, boxes, followed, tail)
     last = max(one.acceleration for one in kept)
@@ -152,6 +149,18 @@ def axis_sets(row: FloatArray, conditions: Sequence[AxisConditions], entry: Entr
         kept[0].rate,
         parts,
     )
+
+
+@compiled
+def _closed_part(tube: FloatArray, middle: float, delay: int) -> tuple[float, float, float, float, float]:
+    """Return the largest |x - middle|, |v| and |x''| of the first samples, and of all the first two."""
+    x = v = pushed = x_all = v_all = 0.0
+    for k in range(len(tube)):
+        x_all = max(x_all, abs(tube[k, X] - middle) + tube[k, X_REACH])
+        v_all = max(v_all, abs(tube[k, V]) + tube[k, V_REACH])
+        if k <= delay:
+            x, v, pushed = x_all, v_all, max(pushed, tube[k, ACCELERATION])
+    return x, v, pushed, x_all, v_all
 
 
 def _settled(

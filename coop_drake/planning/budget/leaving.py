@@ -6,6 +6,7 @@ from math import ceil
 
 import numpy as np
 
+from coop_drake.compiled import compiled
 from coop_drake.laws.axis_table import (
     GOAL_LOWER,
     GOAL_UPPER,
@@ -16,6 +17,9 @@ from coop_drake.laws.axis_table import (
 from coop_drake.planning.budget.axis_sets import AxisSets, Entry
 from coop_drake.planning.budget.axis_tube import ACCELERATION, V_REACH, X_REACH, AxisConditions, V, X
 from coop_drake.tree.pose import FloatArray
+
+LOWEST, HIGHEST = [0, 2], [1, 3, 4, 5]
+"""Which of the numbers of an entry set are lower bounds, and which upper ones."""
 
 SETTLED_FACTOR = 1.5
 """An axis counts as settled while it departs from rest by so many times what it does in the end [-]."""
@@ -50,27 +54,20 @@ def next_entry(
     reach, fast = row[REST_REACH] + conditions.position_noise, row[REST_RATE] + conditions.rate_noise
     since = conditions.delay + report_periods + 1
     time = since * conditions.period
-
-    def limited(
-        x_low: float, x_high: float, v_low: float, v_high: float, pushed: float, history: float
-    ) -> tuple[float, ...]:
-        farther, faster = reach + time * (fast + 0.5 * time * history), fast + time * history
-        return (
-            max(x_low, middle - farther), min(x_high, middle + farther), max(v_low, -faster),
-            min(v_high, faster), pushed, history,
-        )  # fmt: skip
-
-    x, v, pushed = sets.settled, sets.settled_rate, sets.last
-    before = max(pushed, *(float(tube[-1 - since :, ACCELERATION].max()) for tube in sets.tubes))
-    parts = [limited(middle - x, middle + x, -v, v, pushed, before)]
+    before = max(sets.last, *(float(tube[-1 - since :, ACCELERATION].max()) for tube in sets.tubes))
+    x, v = sets.settled, sets.settled_rate
+    bounds = np.array([middle - x, middle + x, -v, v, sets.last, before])
+    _limit(bounds, middle, reach, fast, time)
+    leaving = ceil(row[LEAVING_TIME] / conditions.period - 1e-6)
+    earlier = max(entry.history, entry.acceleration)
     for tube in sets.tubes:
-        found = _switching(tube, middle, reach, fast, since, float(row[LEAVING_TIME]), conditions, entry)
-        parts += [limited(*found)] if found else []
-    lows, highs, slow, quick, pushes, histories = np.array(parts).T
-    return Entry(
-        float(lows.min()), float(highs.max()), float(slow.min()), float(quick.max()), float(pushes.max()),
-        float(histories.max()), middle,
-    )  # fmt: skip
+        found = _switching(tube, middle, (reach, fast), (since, leaving), earlier)
+        if found[0] <= found[1]:
+            _limit(found, middle, reach, fast, time)
+            bounds[LOWEST] = np.minimum(bounds[LOWEST], found[LOWEST])
+            bounds[HIGHEST] = np.maximum(bounds[HIGHEST], found[HIGHEST])
+    low, high, slow, quick, pushed, history = bounds.tolist()
+    return Entry(low, high, slow, quick, pushed, history, middle)
 
 
 def settling_time(row: FloatArray, sets: AxisSets, conditions: AxisConditions) -> float:
@@ -87,32 +84,46 @@ def settling_time(row: FloatArray, sets: AxisSets, conditions: AxisConditions) -
     return samples * conditions.period
 
 
+@compiled
+def _limit(bounds: FloatArray, middle: float, reach: float, fast: float, time: float) -> None:
+    """Cut bounds of states to where an axis can be that was within ``reach`` and ``fast`` some time ago."""
+    history = bounds[5]
+    farther, faster = reach + time * (fast + 0.5 * time * history), fast + time * history
+    bounds[0], bounds[1] = max(bounds[0], middle - farther), min(bounds[1], middle + farther)
+    bounds[2], bounds[3] = max(bounds[2], -faster), min(bounds[3], faster)
+
+
+@compiled
 def _switching(
-    tube: FloatArray,
-    middle: float,
-    reach: float,
-    fast: float,
-    since: int,
-    leaving: float,
-    conditions: AxisConditions,
-    entry: Entry,
-) -> tuple[float, ...]:
+    tube: FloatArray, middle: float, rest: tuple[float, float], samples: tuple[int, int], earlier: float
+) -> FloatArray:
     """Return bounds of x and v, the largest |x''|, and that of the time before, when a tube can be left.
 
-    Nothing if it cannot be left before its end.
+    The lowest x is above the highest one if it cannot be left before its end.
+
+    Args:
+        tube: The tube.
+        middle: Where the axis rests [rad or m].
+        rest: Distance and rate within which the axis counts as at rest [rad or m, rad/s or m/s].
+        samples: For how many samples a report may be used, and the first sample of a switch.
+        earlier: Largest |x''| before the entry [rad/s^2 or m/s^2].
+
+    Returns:
+        Shape (6,): lowest and highest x, lowest and highest v, the two accelerations.
     """
-    x_low, x_high = tube[:, X] - tube[:, X_REACH], tube[:, X] + tube[:, X_REACH]
-    v_low, v_high = tube[:, V] - tube[:, V_REACH], tube[:, V] + tube[:, V_REACH]
-    reported = (x_low <= middle + reach) & (x_high >= middle - reach) & (v_low <= fast) & (v_high >= -fast)
-    reported[0] = True  # reports may rest on measurements from before the entry
-    possible = np.convolve(reported, np.ones(since + 1))[: len(tube)] > 0.5
-    possible[: ceil(leaving / conditions.period - 1e-6)] = False
-    if not possible.any():
-        return ()
-    pushed = tube[:, ACCELERATION]
-    ahead = np.concatenate([np.full(since, max(entry.history, entry.acceleration)), pushed])
-    history = np.lib.stride_tricks.sliding_window_view(ahead, since + 1).max(axis=1)
-    return (
-        float(x_low[possible].min()), float(x_high[possible].max()), float(v_low[possible].min()),
-        float(v_high[possible].max()), float(pushed[possible].max()), float(history[possible].max()),
-    )  # fmt: skip
+    since, leaving = samples
+    found = np.array([np.inf, -np.inf, np.inf, -np.inf, 0.0, 0.0])
+    reported = 0  # reports may rest on measurements from before the entry
+    for k in range(len(tube)):
+        x, x_reach, v, v_reach = tube[k, X] - middle, tube[k, X_REACH], tube[k, V], tube[k, V_REACH]
+        if abs(x) <= rest[0] + x_reach and abs(v) <= rest[1] + v_reach:
+            reported = k
+        if k < leaving or k - reported > since:
+            continue
+        found[0], found[1] = min(found[0], middle + x - x_reach), max(found[1], middle + x + x_reach)
+        found[2], found[3] = min(found[2], v - v_reach), max(found[3], v + v_reach)
+        found[4] = max(found[4], tube[k, ACCELERATION])
+        found[5] = max(found[5], earlier) if k < since else found[5]
+        for i in range(max(k - since, 0), k + 1):
+            found[5] = max(found[5], tube[i, ACCELERATION])
+    return found

@@ -30,13 +30,13 @@ def comes_near_limit(
         return False
     factor = min(one.model_factor - one.model_error for one in conditions)
     early = max(abs(entry.rate_lower), abs(entry.rate_upper)) + first.delay * first.period * entry.history
-    pairs = [(sets.settled_rate, sets.last)]
+    seen, pushes = [np.array([sets.settled_rate])], [np.array([sets.last])]
     for tube in sets.tubes:
         rates = np.abs(tube[:, V]) + tube[:, V_REACH]
-        seen = np.concatenate((np.full(first.delay, early), rates))[: len(rates)]  # what was measured before
-        pairs += zip(seen.tolist(), tube[:, ACCELERATION].tolist(), strict=True)
-    measured, accelerations = np.array(pairs).T
-    measured += first.rate_noise
+        late = min(first.delay, len(rates))  # for so many samples what was measured before
+        seen += [np.full(late, early), rates[: len(rates) - late]]
+        pushes.append(tube[:, ACCELERATION])
+    measured, accelerations = np.concatenate(seen) + first.rate_noise, np.concatenate(pushes)
     if (accelerations / factor > row[ACCELERATION_LIMIT]).any():
         return True
     if not limit < np.inf:
