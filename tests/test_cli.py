@@ -145,6 +145,16 @@ def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_
     assert (tmp_path / "maps.json").read_bytes() == (out / "maps.json").read_bytes()
     assert not (tmp_path / "plan.json").exists()
     assert [directory for _, directory in drawn] == [tmp_path]
+    assert NoDrawings.order == ["recording", "figures"]
+
+
+def test_people_get_the_recording_before_the_figures_which_can_be_left_out(finished, room, tmp_path, drawn):
+    plan = finished[0] / "plan.json"
+    shown = invoke("simulate", room, "--plan", plan, "--out", tmp_path, "--no-figures").stdout
+    assert NoDrawings.order == ["none", "recording", "figures"]
+    assert (
+        shown.index("peak base force") < shown.index("The recording is") < shown.index("All results are in")
+    )
 
 
 def test_a_gap_too_narrow_is_infeasible_and_an_older_plan_does_not_stay(tmp_path):

@@ -102,6 +102,7 @@ Live = Annotated[
     bool,
     typer.Option("--live", help="Show the run in a browser while it is simulated, at most in real time."),
 ]
+NoFigures = Annotated[bool, typer.Option("--no-figures", help="Write the recording, but no figures.")]
 BlocksName = Annotated[
     Literal["named", "fused"],
     typer.Option(

@@ -15,6 +15,7 @@ from coop_drake.cli.options import (
     GainsName,
     Live,
     Machine,
+    NoFigures,
     Quiet,
     ResultsFolder,
     ScenarioPath,
@@ -43,6 +44,7 @@ def run_command(
     gains: GainsName = None,
     fresh_maps: FreshMaps = False,
     live: Live = False,
+    no_figures: NoFigures = False,
     blocks: BlocksName = "named",
     machine: Machine = False,
     quiet: Quiet = False,
@@ -52,7 +54,7 @@ def run_command(
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "plan", "simulation")
-        with DrawingProcesses() as drawing:
+        with DrawingProcesses(figures=not no_figures) as drawing:
             plan = plan_of(task, folder, reporter, simulated=True)
             if plan:
                 reporter.code = carry_out(
@@ -83,13 +85,14 @@ def carry_out(
     drawing.draw(log, folder.path)
     write_certificates(task, maps, folder)
     log.save(folder.path / "log.npz")
-    with reporter.stage("drawing", "drawing"):
-        drawing.wait()
+    with reporter.stage("recording", "drawing"):
+        drawing.wait("recording")
     reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
-    reporter.say(
-        f"Results are in {escape(str(folder.path))}; open {escape(str(folder.recording))} in a browser"
-    )
     _warn_of_unknown_limits(reporter)
+    reporter.say(f"The recording is {escape(str(folder.recording))}; open it in a browser")
+    with reporter.stage("figures", "drawing"):
+        drawing.wait("figures")
+    reporter.say(f"All results are in {escape(str(folder.path))}")
     if log.violation:
         reporter.complain(log.violation)
     elif not log.reached:

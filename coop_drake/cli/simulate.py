@@ -12,6 +12,7 @@ from coop_drake.cli.options import (
     FreshMaps,
     Live,
     Machine,
+    NoFigures,
     Quiet,
     ResultsFolder,
     ScenarioPath,
@@ -43,6 +44,7 @@ def simulate_command(
     ] = None,
     fresh_maps: FreshMaps = False,
     live: Live = False,
+    no_figures: NoFigures = False,
     blocks: BlocksName = "named",
     machine: Machine = False,
     quiet: Quiet = False,
@@ -53,7 +55,7 @@ def simulate_command(
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "simulation")
         found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)
-        with DrawingProcesses() as drawing:
+        with DrawingProcesses(figures=not no_figures) as drawing:
             reporter.code = carry_out(
                 task, found, folder, reporter, drawing, fresh_maps=fresh_maps, live=live, blocks=blocks
             )

@@ -15,7 +15,7 @@ from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 from coop_drake.errors import ProcessError, transferable
 
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 _CONTEXT = get_context("fork") if sys.platform == "linux" else get_context("spawn")
 """A copy has imported already what this process has; libraries of macOS may not be used in one."""
 
+_AFTER_RECORDING = 5
+"""By how much less urgent figures are than the recording, which people open first [steps of ``nice``]."""
 _MOST = 2
 """Number of processes that draw figures; more draw no sooner beside the one that makes the recording."""
 
@@ -39,11 +41,18 @@ class DrawingProcesses:
     """A process for the figures, which begins with the block, and one for the recording; they end with it.
 
     They have sessions of their own, so that Ctrl-C reaches only the command, which ends them.
+
+    Args:
+        figures: Whether figures are drawn beside the recording.
     """
+
+    def __init__(self, *, figures: bool = True) -> None:
+        self._figures = figures
 
     def __enter__(self) -> DrawingProcesses:
         self._running: dict[str, tuple[BaseProcess, Connection]] = {}
-        self._start("figures", _draw_figures)
+        if self._figures:
+            self._start("figures", _draw_figures)
         return self
 
     def begin(self, scenario: Scenario, problem: PlanningProblem, plan: Plan) -> None:
@@ -62,14 +71,15 @@ class DrawingProcesses:
         """
         self._send((log, folder))
 
-    def wait(self) -> None:
-        """Wait until all is written.
+    def wait(self, *subjects: Literal["recording", "figures"]) -> None:
+        """Wait until all of these that are drawn are written.
 
         Raises:
             ProcessError: A process was ended.
             Exception: Whatever went wrong in a process.
         """
-        for subject, (process, connection) in self._running.items():
+        for subject in [subject for subject in subjects if subject in self._running]:
+            process, connection = self._running[subject]
             error = None
             with suppress(EOFError, ConnectionError):
                 error = connection.recv()
@@ -143,6 +153,7 @@ def _draw_figures(messages: Connection) -> None:
 
     _, workspace, tree, plan = _next(messages)
     figures = RunFigures(workspace, tree, plan)
+    os.nice(_AFTER_RECORDING)
     gc.freeze()  # Else each collection of garbage would look at all that was imported.
     _draw_in_two(figures, *_next(messages))
 

@@ -9,9 +9,15 @@ class NoDrawings(nullcontext):
 
     Attributes:
         asked: Log and folder of every run that was to be drawn since this list was last emptied.
+        order: What was waited for in the last run; "none" first if it was to have no figures.
     """
 
     asked: ClassVar[list[tuple]] = []
+    order: ClassVar[list[str]] = []
+
+    def __init__(self, *, figures=True):
+        super().__init__()
+        self.order[:] = [] if figures else ["none"]
 
     def __enter__(self):
         return self
@@ -22,5 +28,5 @@ class NoDrawings(nullcontext):
     def draw(self, *asked):
         self.asked.append(asked)
 
-    def wait(self):
-        pass
+    def wait(self, *subjects):
+        self.order.extend(subjects)

@@ -34,10 +34,19 @@ def alive(group: int) -> bool:
 def test_both_write_what_they_draw_and_end(drawing, tmp_path):
     processes, log = drawing
     processes.draw(log, tmp_path)
-    processes.wait()
+    processes.wait("recording", "figures")
     names = {path.name for path in tmp_path.iterdir()}
     assert {"transport.html", "fig04_start_and_goal.png", "fig05_path.png", "summary.png"} <= names
     assert not any(alive(process.pid) for process, _ in processes._running.values())
+
+
+def test_without_figures_the_recording_alone_is_written(tmp_path):
+    problem, scenario = case("base"), load_scenario(MODELS / "base.scenario.yaml")
+    with DrawingProcesses(figures=False) as processes:
+        processes.begin(scenario, problem, synthetic_plan(problem))
+        processes.draw(synthetic_log(problem), tmp_path)
+        processes.wait("recording", "figures")
+    assert [path.name for path in tmp_path.iterdir()] == ["transport.html"]
 
 
 def test_what_goes_wrong_in_a_process_is_raised_here(drawing, tmp_path):
@@ -46,7 +55,7 @@ def test_what_goes_wrong_in_a_process_is_raised_here(drawing, tmp_path):
     taken.write_text("")
     processes.draw(log, taken)
     with pytest.raises(OSError, match=r"Not a directory|File exists"):
-        processes.wait()
+        processes.wait("recording", "figures")
 
 
 def test_a_process_that_is_ended_is_named(drawing, tmp_path):
@@ -54,7 +63,7 @@ def test_a_process_that_is_ended_is_named(drawing, tmp_path):
     processes._running["recording"][0].kill()
     processes.draw(log, tmp_path)
     with pytest.raises(ProcessError, match="the process that draws the recording ended with code -9"):
-        processes.wait()
+        processes.wait("recording", "figures")
 
 
 def test_both_end_with_the_block_and_with_the_command(tmp_path):
