@@ -27,8 +27,14 @@ from coop_drake.drawing.colours import (
 )
 from coop_drake.viz.signal_flow import INPUTS, OUTPUTS, DiagramBlock, Signal, SignalFlow, signal_flow
 
-_ROW, _TITLE, _WIDTH, _GAP, _SPACE = 0.22, 0.42, 2.3, 0.9, 0.25
+_ROW, _TITLE, _WIDTH, _GAP, _SPACE = 0.16, 0.42, 1.22, 0.36, 0.25
 """Heights of a port and of a title, width of a block, gaps between columns and between blocks [in]."""
+
+_NAME, _CAPTION = 0.5, 0.4
+"""Heights of a Diagram's name with the space below it, and of the caption [in]."""
+
+_PAGE = (11.0, 7.6)
+"""Width and height of what fits on a page of A4 or letter paper, turned sideways [in]."""
 
 _COLOURS = (BLUE, VERMILLION, GREEN, PURPLE, ORANGE, SKY)
 Point = tuple[float, float]
@@ -43,7 +49,7 @@ class _Place:
     height: float
 
     def port(self, row: int) -> float:
-        """Return the height of the middle of a port's row [in]."""
+        """Return the height of the middle of a port's row, inputs first, outputs below them [in]."""
         return self.y - _TITLE - _ROW * (row + 0.5)
 
 
@@ -62,14 +68,19 @@ def block_diagram_figure(loop: ClosedLoop, robot: int = 0) -> Figure:
         ),
     )
     places = [_places(flow) for flow in flows]
-    extents = [_extent(found) for found in places]
-    width = max(right for right, _ in extents)
+    extents = [_extent(flow, found) for flow, found in zip(flows, places, strict=True)]
+    width = max(right - left for left, right, _, _ in extents)
+    height = _CAPTION + sum(top - bottom for _, _, bottom, top in extents)
+    scale = min(1.0, _PAGE[0] / width, _PAGE[1] / height)
     caption = "Blocks as they are wired in Drake, inputs at the left, outputs at the right of each."
     with house_style():
-        figure = new_figure(width + 0.8, sum(height for _, height in extents) + 1.6, caption)
-        panels = figure.subplots(2, 1, height_ratios=[height + 0.5 for _, height in extents])
-        for ax, flow, found, (_, height) in zip(panels, flows, places, extents, strict=True):
-            _draw(ax, flow, found, width, height)
+        figure = new_figure(scale * width, scale * height, caption, margins=(0.0, 0.0, 0.0))
+        above = height
+        for flow, found, (left, right, bottom, top) in zip(flows, places, extents, strict=True):
+            above -= top - bottom
+            rectangle = (0.0, above / height, (right - left) / width, (top - bottom) / height)
+            ax = figure.add_axes(rectangle, xlim=(left, right), ylim=(bottom, top))
+            _draw(ax, flow, found, scale)
     return figure
 
 
@@ -110,7 +121,11 @@ def _wire(signal: Signal, column: int) -> str:
 
 
 def _height(block: DiagramBlock) -> float:
-    return _TITLE + _ROW * max(len(block.inputs), len(block.outputs)) + 0.1
+    return _TITLE + _ROW * max(len(block.inputs) + len(block.outputs), 1) + 0.1
+
+
+def _output_row(block: DiagramBlock, port: str) -> int:
+    return len(block.inputs) + block.outputs.index(port)
 
 
 def _stack(names: list[str], heights: dict[str, float]) -> float:
@@ -127,42 +142,53 @@ def _fed_from(
     heights = []
     for s in feeding:
         before = _wire(s, (column or blocks[name].column) - 1)
-        port = places[s.source].port(blocks[s.source].outputs.index(s.output))
+        port = places[s.source].port(_output_row(blocks[s.source], s.output))
         heights.append(places[before].y if before in places else port)
     return float(np.mean(heights)) if heights else 0.0
 
 
-def _extent(places: dict[str, _Place]) -> Point:
+def _extent(flow: SignalFlow, places: dict[str, _Place]) -> tuple[float, float, float, float]:
+    """Return left, right, lower and upper end of all that is drawn of a Diagram, its name above it [in]."""
+    lanes = len(_lanes(flow, places))
+    aside = 0.2 + 0.1 * lanes
     right = max(place.x for place in places.values()) + _WIDTH
-    return right, max(-(place.y - place.height) for place in places.values())
+    bottom = min(place.y - place.height for place in places.values())
+    return -aside, right + aside, bottom - 0.35 - 0.14 * lanes, _NAME
 
 
-def _draw(ax: Axes, flow: SignalFlow, places: dict[str, _Place], width: float, height: float) -> None:
-    back = [s for s in flow.signals if places[s.sink].x <= places[s.source].x]
-    lanes = sorted({(s.source, s.output) for s in back})
-    aside = max(0.6, 0.3 + 0.1 * len(lanes))
-    ax.set(xlim=(-aside, width + aside), ylim=(-height - 0.35 - 0.14 * len(lanes), 0.3), aspect="equal")
+def _lanes(flow: SignalFlow, places: dict[str, _Place]) -> list[tuple[str, str]]:
+    """Return the sources and outputs of all signals that go back to the left."""
+    return sorted({(s.source, s.output) for s in flow.signals if _goes_back(s, places)})
+
+
+def _goes_back(signal: Signal, places: dict[str, _Place]) -> bool:
+    return places[signal.sink].x <= places[signal.source].x
+
+
+def _draw(ax: Axes, flow: SignalFlow, places: dict[str, _Place], scale: float) -> None:
+    """Draw a Diagram, all texts and marks scaled."""
+    lanes, lowest = _lanes(flow, places), min(place.y - place.height for place in places.values())
     ax.axis("off")
-    ax.set_title(flow.name, loc="left", fontsize=11, color=INK)
+    ax.text(0.0, _NAME - 0.2, flow.name, fontsize=11 * scale, color=INK)
     blocks = {block.name: block for block in flow.blocks}
     sources = list(dict.fromkeys((s.source, s.output) for s in flow.signals))
     for signal in flow.signals:
         start, end = _ends(signal, blocks, places)
         colour = _COLOURS[sources.index((signal.source, signal.output)) % len(_COLOURS)]
-        if signal in back:
+        if _goes_back(signal, places):
             lane = lanes.index((signal.source, signal.output))
-            path = _round_trip(start, end, -height - 0.3 - 0.14 * lane, 0.2 + 0.1 * lane)
+            path = _round_trip(start, end, lowest - 0.3 - 0.14 * lane, 0.15 + 0.1 * lane)
         else:
             path = _curves([start, *_passing(signal, blocks, places), end])
         ax.add_patch(PathPatch(path, facecolor="none", edgecolor=colour, linewidth=1.2, alpha=0.85))
-        ax.plot(*end, marker=">", color=colour, markersize=4)
+        ax.plot(*end, marker=">", color=colour, markersize=4 * scale)
     for block in flow.blocks:
-        _draw_block(ax, block, places[block.name])
+        _draw_block(ax, block, places[block.name], scale)
 
 
 def _ends(signal: Signal, blocks: dict[str, DiagramBlock], places: dict[str, _Place]) -> tuple[Point, Point]:
     source, sink = places[signal.source], places[signal.sink]
-    output = blocks[signal.source].outputs.index(signal.output)
+    output = _output_row(blocks[signal.source], signal.output)
     entry = blocks[signal.sink].inputs.index(signal.input)
     return (source.x + _WIDTH, source.port(output)), (sink.x - 0.03, sink.port(entry))
 
@@ -190,7 +216,7 @@ def _round_trip(start: Point, end: Point, lane: float, out: float) -> Path:
     return Path([start, (right, start[1]), (right, lane), (left, lane), (left, end[1]), end])
 
 
-def _draw_block(ax: Axes, block: DiagramBlock, place: _Place) -> None:
+def _draw_block(ax: Axes, block: DiagramBlock, place: _Place, scale: float) -> None:
     outside = block.name in (INPUTS, OUTPUTS)
     ax.add_patch(
         FancyBboxPatch(
@@ -207,10 +233,13 @@ def _draw_block(ax: Axes, block: DiagramBlock, place: _Place) -> None:
     )
     middle = place.x + 0.5 * _WIDTH
     ax.text(middle, place.y - 0.15, block.name.replace("_", " "), ha="center", va="center", weight="bold",
-            fontsize=8.5, zorder=4)  # fmt: skip
-    ax.text(middle, place.y - 0.32, block.kind, ha="center", va="center", fontsize=6.5, color=GREY, zorder=4)
+            fontsize=7.0 * scale, zorder=4)  # fmt: skip
+    small = 6.5 * scale
+    ax.text(
+        middle, place.y - 0.32, block.kind, ha="center", va="center", fontsize=small, color=GREY, zorder=4
+    )
     for row, port in enumerate(block.inputs):
-        ax.text(place.x + 0.06, place.port(row), port, ha="left", va="center", fontsize=6.5, zorder=4)
-    for row, port in enumerate(block.outputs):
-        x = place.x + _WIDTH - 0.06
-        ax.text(x, place.port(row), port, ha="right", va="center", fontsize=6.5, zorder=4)
+        ax.text(place.x + 0.06, place.port(row), port, ha="left", va="center", fontsize=small, zorder=4)
+    for port in block.outputs:
+        x, row = place.x + _WIDTH - 0.06, _output_row(block, port)
+        ax.text(x, place.port(row), port, ha="right", va="center", fontsize=small, zorder=4)

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
@@ -16,7 +13,7 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.drawing.canvas import legend_above, new_figure
-from coop_drake.drawing.colours import INK, SKY, VERMILLION
+from coop_drake.drawing.colours import INK, SKY
 from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace, frame_of, team_legend
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
@@ -30,10 +27,10 @@ _WIDEST, _NARROWEST = 11.0, 4.5
 _WIDTH = 6.0
 """Width of a floor whose height is within its limits [in]."""
 
-_COLOUR_BAR = 0.9
-"""Width of the colour bar with its labels [in]."""
+_OPACITIES = (0.12, 0.55)
+"""Opacity of the first and of the last footprint along a path."""
 
-_FOOTPRINTS = 14
+_FOOTPRINTS = 10
 """Number of footprints drawn along a path, start and end included."""
 
 _TURNING = 0.3
@@ -72,29 +69,38 @@ def start_and_goal_figure(workspace: Polygon, tree: ComponentTree, plan: Plan) -
 
 
 def path_figure(workspace: Polygon, tree: ComponentTree, log: SimulationLog) -> Figure:
-    """Draw the object's path, and the team's footprint at instants spread evenly along it."""
-    caption = "Figure 5. Path of the object (red) and footprints of the team along it, coloured by time."
-    figure, ax = _floor_axes(workspace, caption, right=_COLOUR_BAR)
-    colours = mpl.colormaps["cividis"]
-    scale = Normalize(float(log.times[0]), float(log.times[-1]))
-    for row in _rows_along(log):
-        z = np.concatenate([log.object_pose[row], log.joints[row]])
-        draw_team(ax, tree, z, colour=colours(scale(log.times[row])), alpha=0.35)
-    ax.plot(log.object_pose[:, 0], log.object_pose[:, 1], color=VERMILLION, linewidth=1.8, zorder=5)
-    place, inch = ax.get_position(), 1.0 / figure.get_figwidth()
-    beside = (place.x1 + 0.15 * inch, place.y0 + 0.2 * place.height, 0.2 * inch, 0.6 * place.height)
-    figure.colorbar(ScalarMappable(scale, colours), cax=figure.add_axes(beside), label="time [s]")
+    """Draw the object's path, and the team's footprint in its colours at instants spread evenly along it."""
+    caption = (
+        "Figure 5. Path of the object (black line) and footprints of object and robots along it, the later "
+        "the darker; the numbers are times [s]."
+    )
+    figure, ax = _floor_axes(workspace, caption)
+    rows = _rows_along(log)
+    for row, alpha in zip(rows, np.linspace(*_OPACITIES, len(rows)), strict=True):
+        draw_team(ax, tree, np.concatenate([log.object_pose[row], log.joints[row]]), alpha=alpha)
+    ax.plot(log.object_pose[:, 0], log.object_pose[:, 1], color=INK, linewidth=1.4, zorder=5)
+    for row in rows:
+        ax.plot(*log.object_pose[row, :2], "o", color=INK, markersize=3, zorder=5)
+        ax.annotate(
+            f"{log.times[row]:.1f}",
+            tuple(log.object_pose[row, :2].tolist()),
+            xytext=(4, 2),
+            textcoords="offset points",
+            fontsize=7.5,
+            zorder=6,
+        )
+    legend_above(ax, team_legend(tree))
     return figure
 
 
-def _floor_axes(workspace: Polygon, caption: str, *, right: float = 0.15) -> tuple[Figure, Axes]:
-    """Return a figure whose axes show the floor, are just as large, and leave space at their right [in]."""
+def _floor_axes(workspace: Polygon, caption: str) -> tuple[Figure, Axes]:
+    """Return a figure whose axes show the floor and are just as large."""
     x_min, y_min, x_max, y_max = frame_of(workspace)
     aspect = (y_max - y_min) / (x_max - x_min)
     height = min(_TALLEST, max(_LOWEST, _WIDTH * aspect))
     width = min(_WIDEST, max(_NARROWEST, height / aspect))
-    margins = (0.65, right, 0.3)
-    figure = new_figure(width + margins[0] + right, height + margins[2] + 0.8, caption, margins=margins)
+    margins = (0.65, 0.15, 0.3)
+    figure = new_figure(width + margins[0] + margins[1], height + margins[2] + 0.8, caption, margins=margins)
     ax = figure.subplots()
     draw_workspace(ax, workspace)
     return figure, ax

@@ -25,22 +25,24 @@ _GAP = 0.28
 
 
 def time_axes(
-    log: SimulationLog, caption: str, labels: list[str], *, height: float | None = None
+    log: SimulationLog, caption: str, labels: list[str], *, height: float | None = None, switches: bool = True
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure with one panel per label, stacked over a common axis of time, each of some height [in].
 
-    A dashed vertical line marks every switch to the next cell, and the caption says so.
+    A dashed vertical line marks every switch to the next cell, and the caption says so, unless ``switches``
+    is false.
     """
     count = len(labels)
     height = height or (_SINGLE if count == 1 else _SEVERAL)
-    caption = f"{caption} Dashed lines mark the switches from cell to cell."
+    if switches:
+        caption = f"{caption} Dashed lines mark the switches from cell to cell."
     figure = new_figure(_WIDTH, count * (height + _GAP) + 1.0, caption, margins=_MARGINS)
     axes = figure.subplots(count, 1, sharex=True, squeeze=False, gridspec_kw={"hspace": _GAP / height})[:, 0]
-    switches = log.times[1:][np.diff(log.cell_index) != 0]
+    marked = log.times[1:][np.diff(log.cell_index) != 0] if switches else []
     for ax, label in zip(axes, labels, strict=True):
         ax.set_ylabel(label)
         ax.vlines(
-            switches,
+            marked,
             0.0,
             1.0,
             transform=ax.get_xaxis_transform(),

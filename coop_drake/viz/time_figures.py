@@ -1,16 +1,15 @@
-"""Figures of a run over time: the paper's Figures 6 to 13, and a summary of the margins."""
+"""Figures of a run over time: the paper's Figures 6 to 13, and a summary of clearances, speeds and forces."""
 
 from __future__ import annotations
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import NullFormatter, StrMethodFormatter
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.speeds import base_speeds
 from coop_drake.drawing.canvas import legend_above
-from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, OBJECT, ORANGE, SKY, robot_colour
+from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, OBJECT, SKY, robot_colour
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 from coop_drake.viz.time_axes import break_at_switches, time_axes
@@ -57,51 +56,28 @@ def joints_figure(tree: ComponentTree, log: SimulationLog, robot: int) -> Figure
 
 
 def summary_figure(log: SimulationLog) -> Figure:
-    """Draw the invariants' margins, which must stay above zero, and the bases' forces over time."""
+    """Draw the clearances, which must stay above zero, the speeds and the bases' forces over time."""
     caption = (
-        "Summary. Distance of the team to the walls, between bodies, and of the object to its cell's "
-        "boundary; energy margin of the governor; speed of object and bases; force of every base. Margins "
-        "must stay above zero."
+        "Summary. Smallest distance of the team to the walls and between bodies; speed of the object and of "
+        "the fastest base; force of the base with the largest one."
     )
-    labels = ["clearance [m]", "energy margin ΔE [m²/s²]", "speed [m/s]", "base force [N]"]
-    figure, (clearances, energy, speeds, forces) = time_axes(log, caption, labels)
-    for clearance, colour, label in (
-        (log.workspace_clearance, BLUE, "team to walls"),
-        (log.body_clearance, GREEN, "between bodies"),
-        (log.cell_clearance, ORANGE, "object to its cell's boundary"),
-    ):
-        clearances.plot(log.times, clearance, color=colour, linewidth=1.0, label=label)
-    clearances.axhline(0.0, color=INK, linewidth=0.8)
-    legend_above(clearances)
-    _draw_energy(energy, log)
-    _draw_speeds(speeds, log)
-    for robot, name in enumerate(log.robot_names):
-        force = np.hypot(log.base_wrenches[:, robot, 0], log.base_wrenches[:, robot, 1])
-        forces.plot(log.times, force, color=robot_colour(robot), linewidth=1.0, label=name)
-    legend_above(forces)
-    return figure
-
-
-def _draw_energy(ax: Axes, log: SimulationLog) -> None:
-    """Draw the energy margin on an axis that shows small values well."""
-    ax.plot(log.times, log.energy_margin, color=OBJECT, linewidth=1.0)
-    if log.energy_margin.min() > 0.0:
-        ax.set_yscale("log")
-        ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        ax.yaxis.set_minor_formatter(NullFormatter())
-    else:
-        ax.set_yscale("symlog", linthresh=1e-3)
-        ax.axhline(0.0, color=INK, linewidth=0.8)
-
-
-def _draw_speeds(ax: Axes, log: SimulationLog) -> None:
-    """Draw the speeds of the object and of all bases, whose colours the next panel explains."""
+    labels = ["clearance [m]", "speed [m/s]", "base force [N]"]
+    figure, (clearances, speeds, forces) = time_axes(log, caption, labels, switches=False)
     times, moved = base_speeds(log)
-    for robot in range(len(log.robot_names)):
-        ax.plot(times, moved[:, robot, 0], color=robot_colour(robot), linewidth=1.0)
     object_speed = np.hypot(log.object_twist[:, 0], log.object_twist[:, 1])
-    ax.plot(log.times, object_speed, color=OBJECT, linewidth=1.4, label="object; bases as below")
-    legend_above(ax)
+    strongest = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1]).max(axis=1)
+    for ax, at, values, colour, label in (
+        (clearances, log.times, log.workspace_clearance, BLUE, "team to walls"),
+        (clearances, log.times, log.body_clearance, GREEN, "between bodies"),
+        (speeds, times, moved[..., 0].max(axis=1, initial=0.0), INK, "fastest base"),
+        (speeds, log.times, object_speed, OBJECT, "object"),
+        (forces, log.times, strongest, INK, "largest of all bases"),
+    ):
+        ax.plot(at, values, color=colour, linewidth=1.0, label=label)
+    for ax in (clearances, speeds, forces):
+        ax.set_ylim(bottom=min(0.0, ax.get_ylim()[0] if ax.dataLim.y0 < 0.0 else 0.0))
+        legend_above(ax)
+    return figure
 
 
 def curves_figure(log: SimulationLog, caption: str, values: FloatArray, *labels: str) -> Figure:

@@ -7,16 +7,23 @@ from math import pi
 from typing import Any
 
 import numpy as np
+import shapely
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 
 from coop_drake.drawing import colours
+from coop_drake.drawing.floor import draw_polygon
+from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.swept_tree import Interval, Intervals
 from coop_drake.planning.cells.cell_graph import Kind
 from coop_drake.tree.pose import FloatArray
 from coop_drake.watching.channel_path import PathPiece
+from coop_drake.watching.floor_panel import draw_piece
 from coop_drake.watching.search_states import ChannelCell, Leaf
 from coop_drake.watching.theta_layers import THETA, on_turn
+
+_FILLED, _TINT = 0.5, 0.35
+"""Opacities of slices, and of the channel's slices over them: the path and what is halved stand out."""
 
 
 def cut(leaves: Iterable[Leaf], axis: int, point: FloatArray) -> list[Leaf]:
@@ -63,7 +70,7 @@ class AnglePanel:
         """Fill the rectangle of every leaf with its colour."""
         parts = [(part, fill) for leaf, fill in zip(leaves, fills, strict=True) for part in self._parts(leaf)]
         rectangles, colour_of = [part for part, _ in parts], [fill for _, fill in parts]
-        self._add(rectangles, facecolors=colour_of, edgecolors=colours.PAPER, linewidths=0.5, alpha=0.7)
+        self._add(rectangles, facecolors=colour_of, edgecolors=colours.PAPER, linewidths=0.3, alpha=_FILLED)
 
     def hatch(self, leaves: Sequence[Leaf], colour: str) -> None:
         """Hatch the rectangle of every leaf."""
@@ -71,20 +78,20 @@ class AnglePanel:
         self._add(rectangles, facecolors="none", edgecolors=colour, linewidths=0.0, hatch="////")
 
     def draw_channel(self, channel: Sequence[ChannelCell]) -> None:
-        """Outline the slices of a channel, whatever the values of the joints left out."""
-        for proved, colour in ((True, colours.CHANNEL), (False, colours.UNDECIDED_CHANNEL)):
+        """Tint the slices of a channel, whatever the values of the joints left out."""
+        for proved, colour in ((True, colours.PROVED_FREE), (False, colours.UNDECIDED_CHANNEL)):
             cells = [cell for cell in channel if (cell.kind is Kind.FREE) == proved]
-            rectangles = [part for cell in cells for part in self._parts(cell)]
-            self._add(rectangles, facecolors="none", edgecolors=colour, linewidths=0.8, zorder=3)
+            parts = [shapely.box(x0, y0, x1, y1) for cell in cells for x0, y0, x1, y1 in self._boxes(cell)]
+            for part in parts_of(shapely.union_all(parts)):
+                draw_polygon(self._ax, part, facecolor=colour, edgecolor="none", alpha=_TINT, zorder=3)
 
     def draw_splits(self, splits: Sequence[tuple[Leaf, int]]) -> None:
-        """Frame the slices that were just halved, the last one boldly, with the line that halves it."""
+        """Frame the slice that was halved last, with the line that halves it."""
         if not splits:
             return
         leaf, halved = splits[-1]
-        framed = [(part, 2.6 if one is leaf else 1.0) for one, _ in splits for part in self._parts(one)]
-        rectangles, widths = [part for part, _ in framed], [width for _, width in framed]
-        self._add(rectangles, facecolors="none", edgecolors=colours.HALVED, linewidths=widths, zorder=4)
+        frame = {"facecolors": "none", "edgecolors": colours.HALVED, "linewidths": 2.0, "zorder": 4}
+        self._add(self._parts(leaf), **frame)
         if halved in (0, self._axis):
             (x0, x1), (y0, y1) = leaf.intervals[0], self._upright(leaf.intervals)
             x, y = THETA[0] + (0.5 * (x0 + x1) - THETA[0]) % (2 * pi), 0.5 * (y0 + y1)
@@ -93,19 +100,24 @@ class AnglePanel:
             self._ax.add_collection(halving, autolim=False)
 
     def draw_angles(self, path: Sequence[PathPiece]) -> None:
-        """Draw how theta and the joint move along a channel, broken where theta leaves the turn drawn."""
-        if not path or self._axis == 0:
-            return
-        angles = np.concatenate([piece.angles for piece in path])
-        theta = THETA[0] + np.mod(angles[:, 0] - THETA[0], 2 * pi)
-        jumps = np.flatnonzero(np.abs(np.diff(theta)) > pi) + 1
-        x, y = np.insert(theta, jumps, np.nan), np.insert(angles[:, self._axis], jumps, np.nan)
-        self._ax.plot(x, y, color=colours.INK, linewidth=1.6, zorder=5)
+        """Draw how theta and the joint move along a channel: firm where it is proved free, dashed where not.
+
+        The line is broken where theta leaves the turn drawn.
+        """
+        for piece in path if self._axis else ():
+            theta = THETA[0] + np.mod(piece.angles[:, 0] - THETA[0], 2 * pi)
+            jumps = np.flatnonzero(np.abs(np.diff(theta)) > pi) + 1
+            x = np.insert(theta, jumps, np.nan)
+            draw_piece(self._ax, piece, np.array([x, np.insert(piece.angles[:, self._axis], jumps, np.nan)]))
 
     def _parts(self, slice_: Leaf | ChannelCell) -> list[list[tuple[float, float]]]:
-        """Return the rectangle of a slice, in two parts where it crosses the end of the turn drawn."""
+        """Return the corners of a slice, in two parts where it crosses the end of the turn drawn."""
+        return [[(x0, y0), (x1, y0), (x1, y1), (x0, y1)] for x0, y0, x1, y1 in self._boxes(slice_)]
+
+    def _boxes(self, slice_: Leaf | ChannelCell) -> list[tuple[float, float, float, float]]:
+        """Return the least and largest theta and joint position of a slice's parts."""
         y0, y1 = self._upright(slice_.intervals)
-        return [[(x0, y0), (x1, y0), (x1, y1), (x0, y1)] for x0, x1 in on_turn(slice_.intervals[0])]
+        return [(x0, y0, x1, y1) for x0, x1 in on_turn(slice_.intervals[0])]
 
     def _upright(self, intervals: Intervals) -> Interval:
         """Return the interval of the joint that is drawn upwards."""

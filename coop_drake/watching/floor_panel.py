@@ -49,12 +49,17 @@ def draw_section(ax: Axes, section: CrossSection, colour: str, alpha: float, *, 
 def draw_path(ax: Axes, path: Sequence[PathPiece]) -> None:
     """Draw the path through a channel: a firm line where it is proved free, a dashed one where not."""
     for piece in path:
-        proved = piece.kind is Kind.FREE
-        ax.plot(
-            *piece.positions.T,
-            color=colours.CHANNEL if proved else colours.UNDECIDED_CHANNEL,
-            linewidth=2.6,
-            linestyle="-" if proved else DASHES,
-            solid_capstyle="round",
-            zorder=6.0 if proved else 6.5,
-        )
+        draw_piece(ax, piece, piece.positions.T)
+
+
+def draw_piece(ax: Axes, piece: PathPiece, line: FloatArray) -> None:
+    """Draw the path through one cell as a line of shape (2, k): firm if it is proved free, else dashed."""
+    proved = piece.kind is Kind.FREE
+    ax.plot(
+        *line,
+        color=colours.CHANNEL if proved else colours.UNDECIDED_CHANNEL,
+        linewidth=2.6,
+        linestyle="-" if proved else DASHES,
+        solid_capstyle="round",
+        zorder=6.0 if proved else 6.5,
+    )

@@ -6,14 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PathCollection
+from matplotlib.colors import to_hex
 from PIL import Image
 
+from coop_drake.answers.speeds import base_speeds
+from coop_drake.drawing.colours import INK, OBJECT, robot_colour
 from coop_drake.viz import write_figures
 from coop_drake.viz.figures import RunFigures
 from coop_drake.viz.floor_figures import path_figure, start_and_goal_figure
 from coop_drake.viz.time_axes import break_at_switches
-from coop_drake.viz.time_figures import angle_figure, joints_figure
+from coop_drake.viz.time_figures import angle_figure, joints_figure, summary_figure
 from tests.support.cases import case
 from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
 from tests.support.sliding import with_sliding_joint
@@ -78,9 +81,38 @@ def test_figure_4_labels_start_and_goal_on_equal_axes_in_metres():
 def test_figure_5_draws_the_path_that_was_logged():
     problem = case("base")
     log = synthetic_log(problem)
-    axes = path_figure(problem.workspace, problem.tree, log).axes[0]
-    (line,) = axes.lines
-    np.testing.assert_array_equal(line.get_xydata(), log.object_pose[:, :2])
+    figure = path_figure(problem.workspace, problem.tree, log)
+    (axes,) = figure.axes
+    np.testing.assert_array_equal(axes.lines[0].get_xydata(), log.object_pose[:, :2])
+    assert axes.lines[0].get_color() == INK
+    assert "(black line)" in figure.texts[0].get_text()
+
+
+def test_figure_5_shows_every_robot_in_its_colour_and_says_when():
+    problem = case("base")
+    log = synthetic_log(problem)
+    (axes,) = path_figure(problem.workspace, problem.tree, log).axes
+    first, *_, last = [one for one in axes.collections if isinstance(one, PathCollection)]
+    shown = {to_hex(colour).lower() for colour in last.get_edgecolors()}
+    assert shown == {colour.lower() for colour in (OBJECT, robot_colour(0), robot_colour(1))}
+    assert first.get_facecolors()[0, 3] < last.get_facecolors()[0, 3]
+    assert axes.texts[-1].get_text() == f"{log.times[-1]:.1f}"
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["object", *log.robot_names]
+
+
+def test_the_summary_has_five_lines():
+    log = synthetic_log(case("three"))
+    clearances, speeds, forces = summary_figure(log).axes
+    np.testing.assert_array_equal(clearances.lines[0].get_ydata(), log.workspace_clearance)
+    np.testing.assert_array_equal(clearances.lines[1].get_ydata(), log.body_clearance)
+    fastest, of_object = speeds.lines
+    assert fastest.get_ydata().max() == pytest.approx(base_speeds(log)[1][..., 0].max())
+    np.testing.assert_allclose(of_object.get_ydata(), np.hypot(*log.object_twist[:, :2].T))
+    (strongest,) = forces.lines
+    np.testing.assert_allclose(
+        strongest.get_ydata(), np.linalg.norm(log.base_wrenches[..., :2], axis=2).max(axis=1)
+    )
+    assert not any(isinstance(lines, LineCollection) and lines.get_segments() for lines in speeds.collections)
 
 
 def test_figure_7_shows_the_angle_its_funnel_and_a_dashed_line_at_every_switch():

@@ -13,7 +13,7 @@ import umsgpack
 from matplotlib.colors import to_rgba
 from PIL import Image
 
-from coop_drake.drawing.colours import REACHED, UNDECIDED, UNREACHED
+from coop_drake.drawing.colours import CHANNEL, REACHED, UNDECIDED, UNREACHED
 from coop_drake.watching import keyframes, scene_page, write_pictures
 from coop_drake.watching.keyframe_figure import keyframe_figure
 from coop_drake.watching.pictures import on_sheet
@@ -61,6 +61,15 @@ def test_the_sheet_shows_the_first_and_the_last_keyframe(shown):
     chosen = on_sheet(frames)
     assert (chosen[0], chosen[-1]) == (0, len(frames) - 1)
     assert len(chosen) <= 6
+
+
+def test_the_path_through_the_angles_shows_what_is_proved_as_the_one_on_the_floor_does(shown):
+    recorded, frames, _ = shown
+    for frame in (one for one in frames if one.path):
+        floor, angles, *_ = keyframe_figure(recorded, frame, frame.state.history).axes
+        of_floor = {line.get_color() for line in floor.lines}
+        assert {line.get_color() for line in angles.lines} in (of_floor, set())
+    assert CHANNEL in of_floor
 
 
 def test_the_last_picture_of_a_proof_shows_the_two_parts_in_two_colours():
