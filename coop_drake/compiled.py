@@ -31,8 +31,10 @@ _REASSOCIATED = {"contract", "reassoc"}
 @overload
 def compiled(function: F) -> F: ...
 @overload
-def compiled(*, reassociate: bool) -> Callable[[F], F]: ...
-def compiled(function: F | None = None, *, reassociate: bool = False) -> F | Callable[[F], F]:
+def compiled(*, reassociate: bool = False, inlined: bool = False) -> Callable[[F], F]: ...
+def compiled(
+    function: F | None = None, *, reassociate: bool = False, inlined: bool = False
+) -> F | Callable[[F], F]:
     """Compile a function of numbers and arrays at its first call, and keep its machine code on disk.
 
     Compiled functions run without Python's global lock, and a division by zero gives infinity or NaN, as in
@@ -41,12 +43,15 @@ def compiled(function: F | None = None, *, reassociate: bool = False) -> F | Cal
     Args:
         function: The function; only what numba can compile.
         reassociate: Whether sums may be added in any order, which is quicker and rounds differently.
+        inlined: Whether its machine code becomes part of that of its callers: for small functions of large
+            named tuples, whose arrays would take longer to hand over than to use.
 
     Returns:
         The compiled function, or the decorator if only options are given.
     """
     flags = _REASSOCIATED if reassociate else False
     options = {"nogil": True, "error_model": "numpy", "fastmath": flags, "no_cfunc_wrapper": True}
+    options["forceinline"] = inlined
 
     def decorate(function: F) -> F:
         if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):  # Nothing is compiled.

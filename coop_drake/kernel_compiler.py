@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, cast
 
 import numba
 from numba import types
-from numba.core import event
+from numba.core import event, ir
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.lowering import Lower
+from numba.core.typed_passes import NativeLowering
+
+_VIEWS = "getattr", "getitem", "static_getitem"
+"""Operations of numba's intermediate code that give a part or a view of an array or a tuple."""
 
 
 class NumbaFunction:
@@ -27,6 +35,7 @@ class NumbaFunction:
     """
 
     def __init__(self, function: Callable[..., object], options: Mapping[str, object], stamp: str) -> None:
+        options = {**options, "pipeline_class": _Compiler}
         self._outer = numba.njit(**options)(function)
         self._outer._cache = _KernelCache(function, stamp, "called from Python")
         self._inner = numba.njit(no_cpython_wrapper=True, **options)(function)
@@ -54,6 +63,78 @@ class NumbaFunction:
         with event.install_listener("numba:compile", _Announcer(compiling)):
             self._outer.compile(signature)
         return self._outer.overloads[signature].entry_point, self._outer._cache.kept
+
+
+class _Compiler(CompilerBase):  # type: ignore[misc]
+    """Numba's compiler, with `_Lower` in place of numba's own way to LLVM's intermediate code."""
+
+    def define_pipelines(self) -> list[Any]:
+        steps = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        steps.passes = [
+            (_Lowering if step is NativeLowering else step, purpose) for step, purpose in steps.passes
+        ]
+        steps.finalize()
+        return [steps]
+
+
+class _Lower(Lower):  # type: ignore[misc]
+    """Leaves out the counting of references to arrays that the caller holds until the function returns.
+
+    Numba counts each array of each named tuple when a function begins and when it ends, which takes longer
+    than what a small function computes.
+    """
+
+    context: Any
+
+    def pre_lower(self) -> None:
+        super().pre_lower()
+        self._held = _held_by_caller(self.func_ir, self.fndesc.typemap)
+        self._uncounted = self.context.subtarget(enable_nrt=False)
+        vars(self._uncounted).pop("nrt", None)  # The copy must not have that of the original.
+
+    def lower_inst(self, inst: Any) -> None:
+        name = inst.target.name if isinstance(inst, ir.Assign) else getattr(inst, "value", None)
+        counted: Any = self.context
+        if isinstance(inst, ir.Assign | ir.Del) and name in self._held:
+            self.context = self._uncounted
+        try:
+            super().lower_inst(inst)
+        finally:
+            self.context = counted
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _Lowering(NativeLowering):  # type: ignore[misc]
+    _name = "lowering_without_counts_of_arguments"
+    lowering_class = _Lower
+
+
+def _held_by_caller(function: Any, kinds: Mapping[str, types.Type]) -> set[str]:
+    """Names of variables that are assigned once: arguments, constants, or parts and views of these."""
+    blocks = [block for _, block in sorted(function.blocks.items())]
+    assigned = [statement for block in blocks for statement in block.find_insts(ir.Assign)]
+    times = Counter(statement.target.name for statement in assigned)
+    held: set[str] = set()
+    for statement in assigned:
+        value = statement.value
+        if isinstance(value, ir.Expr):
+            of_caller = value.op in _VIEWS and value.value.name in held and _is_view(value, kinds)
+        elif isinstance(value, ir.Var):
+            of_caller = value.name in held
+        else:
+            of_caller = isinstance(value, ir.Arg | ir.Global | ir.FreeVar | ir.Const)
+        if of_caller and times[statement.target.name] == 1:
+            held.add(statement.target.name)
+    return held
+
+
+def _is_view(taken: Any, kinds: Mapping[str, types.Type]) -> bool:
+    """Whether an operation of ``_VIEWS`` makes no new array, as an index that is an array would."""
+    if not isinstance(kinds[taken.value.name], types.Array | types.BaseTuple):
+        return bool(taken.op == "getattr")
+    index = kinds[taken.index.name] if taken.op == "getitem" else types.intp
+    parts = index.types if isinstance(index, types.BaseTuple) else (index,)
+    return all(isinstance(part, types.Integer | types.SliceType | types.EllipsisType) for part in parts)
 
 
 class _Announcer(event.Listener):  # type: ignore[misc]

@@ -197,3 +197,71 @@ def test_nothing_is_compiled_where_numba_is_told_so(tmp_path):
     (tmp_path / "caller.py").write_text("\n".join([*lines, results]))
     write_callee(tmp_path)
     assert run(tmp_path, NUMBA_DISABLE_JIT="1") == ["function", "6.0", "6.0"]
+
+
+LIFETIMES = """
+import sys
+import tracemalloc
+from typing import NamedTuple
+
+import numpy as np
+
+from coop_drake.compiled import compiled
+
+class Pair(NamedTuple):
+    first: np.ndarray
+    second: np.ndarray
+
+@compiled
+def inner(pair, row, chosen):
+    part = pair.first[row]
+    part[0] += 1.0
+    kept = pair.second if chosen else pair.first[0]
+    last = kept
+    for k in range(2):
+        last, kept = kept, pair.first[k]
+    return last, kept[1:], pair, part
+
+@compiled(inlined=True)
+def doubled(pair):
+    return pair.first * 2.0
+
+@compiled
+def outer(pair, rows, chosen):
+    last, rest, same, part = inner(pair, 1, chosen)
+    for k in rows:
+        part = same.first[k]
+        new = doubled(same)
+        if new[0, 0] < 0.0:
+            part = new[0]
+    return last, rest, part, new, same.first[rows], same, rows
+
+def counts():
+    return np.array([sys.getrefcount(first), sys.getrefcount(second), sys.getrefcount(rows)])
+
+rows, first, second = np.array([0, 1]), np.arange(200_000.0).reshape(2, -1), np.ones(2)
+pair = Pair(first, second)
+tracemalloc.start()
+outer(pair, rows, True)  # Its machine code is kept.
+before, size = counts(), tracemalloc.get_traced_memory()[0]
+for call in range(100):
+    given = outer(pair, rows, call % 2 == 0)
+print(*(int(part.sum()) for part in (*given[:5], given[5].first, given[6])))
+print(*(counts() > before))
+del given
+print(*(counts() - before), tracemalloc.get_traced_memory()[0] - size < first.nbytes)
+given = outer(Pair(first.copy(), second.copy()), rows.copy(), True)
+others = [np.full(first.shape, np.nan) for _ in range(10)]
+print(*(int(part.sum()) for part in (*given[:5], given[5].first, given[6])))
+"""
+
+
+def test_arrays_of_callers_live_as_long_as_results_hold_them_and_no_longer(tmp_path):
+    (tmp_path / "caller.py").write_text(LIFETIMES)
+    row, moved, total = 4_999_950_000, 14_999_950_000, 19_999_900_000
+    results = [
+        [row, moved - 100_000, moved + n, 2 * (total + n), total + n, total + n, 1] for n in (101, 102)
+    ]
+    held, freed = ["True"] * 3, ["0", "0", "0", "True"]
+    for _ in range(2):
+        assert run(tmp_path) == [*map(str, results[0]), *held, *freed, *map(str, results[1])]

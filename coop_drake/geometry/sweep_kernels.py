@@ -182,7 +182,7 @@ def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> Flo
     """
     count, parts = len(vertices), arc_parts(half_width)
     edges = edge_directions(vertices)
-    radii, bearings = np.empty(count), np.empty(count)
+    radii = np.empty(count)
     angles = np.empty(2 * len(edges) + count * (parts + 1) + 4)
     size = 0
     for i in range(len(edges)):
@@ -190,24 +190,28 @@ def over_revolute(vertices: FloatArray, centre: float, half_width: float) -> Flo
         size += 2
     for i in range(count):
         radii[i] = hypot(vertices[i, 0], vertices[i, 1])
-        bearings[i] = atan2(vertices[i, 1], vertices[i, 0])
         if radii[i] > 0.0 and _furthest(vertices, i):
+            bearing = atan2(vertices[i, 1], vertices[i, 0])
             for part in range(parts + 1):
-                angles[size] = bearings[i] + half_width * (2.0 * part / parts - 1.0)
+                angles[size] = bearing + half_width * (2.0 * part / parts - 1.0)
                 size += 1
     for quarter in range(4 if count < 3 else 0):
-        angles[size] = bearings[0] + 0.5 * pi * quarter
+        angles[size] = atan2(vertices[0, 1], vertices[0, 0]) + 0.5 * pi * quarter
         size += 1
     for i in range(size):
         angles[i] += centre
     directions = closed_directions(angles[:size], _LARGEST_TURN)
     offsets = np.empty(len(directions))
+    window = min(half_width, pi)
+    c, s = cos(window), sin(window)
     for k in range(len(directions)):
+        x, y = cos(directions[k] - centre), sin(directions[k] - centre)
         best = -np.inf
         for i in range(count):
-            off = directions[k] - bearings[i] - centre
-            off = max(abs(off - _TURN * np.rint(off / _TURN)) - half_width, 0.0)
-            best = max(best, radii[i] * cos(off))
+            along = x * vertices[i, 0] + y * vertices[i, 1]
+            across = abs(x * vertices[i, 1] - y * vertices[i, 0])
+            inside = along >= c * radii[i]  # Some angle of the interval turns the vertex into this direction.
+            best = max(best, radii[i] if inside else c * along + s * across)
         offsets[k] = best
     return circumscribed(directions, offsets)
 

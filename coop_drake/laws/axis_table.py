@@ -25,6 +25,7 @@ __all__ = [
     "axis_table",
     "bounds_of",
     "funnel_acceleration",
+    "law_at",
     "limited_row",
     "rest_jump",
     "track_axes",
@@ -110,6 +111,16 @@ def bounds_of(row: FloatArray, time: float) -> tuple[float, float, float, float,
 
 
 @compiled
+def law_at(
+    row: FloatArray, time: float, pace: float, pace_rate: float
+) -> tuple[tuple[float, float, float, float, float, float], tuple[float, float, float, float, float]]:
+    """Return the bounds and the gains that ``track_axis`` takes; arguments as in ``track_paced_row``."""
+    k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
+    gains = row[LOG_GAIN], k1, k1_dot * pace, row[RATE_GAIN], row[SATURATION]
+    return slowed_bounds(bounds_of(row, time), pace, pace_rate), gains
+
+
+@compiled
 def track_row(row: FloatArray, time: float, position: float, rate: float) -> tuple[float, float]:
     """Return ``track_axis`` of one axis from its row.
 
@@ -136,9 +147,8 @@ def track_paced_row(
         position: x [rad or m].
         rate: x' [rad/s or m/s].
     """
-    k1, k1_dot = ramped_gain(time, row[POSITION_GAIN], row[RAMP_RATE])
-    gains = row[LOG_GAIN], k1, k1_dot * pace, row[RATE_GAIN], row[SATURATION]
-    return track_axis(position, rate, slowed_bounds(bounds_of(row, time), pace, pace_rate), gains)
+    bounds, gains = law_at(row, time, pace, pace_rate)
+    return track_axis(position, rate, bounds, gains)
 
 
 def funnel_acceleration(

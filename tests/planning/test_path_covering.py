@@ -15,6 +15,7 @@ from coop_drake.planning.execution.channel_ends import turned_to_start
 from coop_drake.planning.execution.channel_path import path_through
 from coop_drake.planning.execution.estimate import speed_per_clearance
 from coop_drake.planning.improvement.box_crossing import cross_box
+from coop_drake.planning.improvement.object_motion import object_motion, soonest_exit
 from coop_drake.planning.improvement.path_covering import cover_path
 from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.planning.search.search import find_channel
@@ -103,13 +104,19 @@ def test_a_long_aisle_is_crossed_at_the_governors_speed():
     places, room = np.linspace(0.0, 10.0, 6), np.full(6, 0.2)
     lower, upper = np.array([-0.1]), np.array([0.1])
     state = np.zeros(5)
-    seconds = cross_box(
-        state, places, room, lower, upper, np.array([lower, upper]), np.zeros(1), schedule,
-        np.full(2, np.inf), 0.0, 60.0,
-    )  # fmt: skip
+    motion = object_motion(state, places, room, schedule, np.inf, 0.0, np.empty((3_000, 3)))
+    goals = np.array([lower, upper])
+    seconds = cross_box(state, motion, lower, upper, goals, np.zeros(1), schedule, np.full(1, np.inf), 60.0)
     gains = transition_gains(
         ScheduledGains(), clearance=0.2, slice_lower=lower, slice_upper=upper,
         goal_lower=lower, goal_upper=upper, resting=np.zeros(1),
     )  # fmt: skip
     assert seconds == pytest.approx(10.0 / (speed_per_clearance(gains) * 0.2), rel=0.1)
     assert 9.8 < state[2] <= 10.0
+    # The axis rests where it may leave the box: only the object takes time.
+    assert soonest_exit(motion, 60.0) == seconds
+    assert soonest_exit(motion, seconds - 0.1) == np.inf
+    known = motion.states[: motion.known[0]].copy()
+    motion = object_motion(np.zeros(5), places, room, schedule, np.inf, 0.0, np.empty((3_000, 3)))
+    assert soonest_exit(motion, 60.0) == seconds
+    np.testing.assert_array_equal(motion.states[: motion.known[0]], known)

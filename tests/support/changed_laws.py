@@ -18,6 +18,7 @@ from coop_drake.laws.axis_table import axis_table
 from coop_drake.laws.gain_schedule import schedule_of
 from coop_drake.planning.execution.transport_kernels import cross_cell
 from coop_drake.planning.improvement.box_crossing import cross_box
+from coop_drake.planning.improvement.object_motion import object_motion
 from coop_drake.plant import set_configuration
 from coop_drake.simulation.stall import blocking_margin
 from coop_drake.simulation.telemetry import Telemetry
@@ -113,12 +114,12 @@ def estimated(plan: Plan):
 
 def crossed():
     """The state in which the choice of boxes leaves a box."""
-    state, axis = np.zeros(5), np.array([0.0])
-    seconds = cross_box(
-        state, np.array([0.0, 0.5]), np.array([0.2, 0.2]), axis - 0.5, axis + 0.5,
-        np.array([axis + 0.1, axis + 0.4]), axis, schedule_of(ScheduledGains()),
-        np.full(2, np.inf), 0.0, 5.0,
-    )  # fmt: skip
+    state, axis, schedule = np.zeros(5), np.array([0.0]), schedule_of(ScheduledGains())
+    motion = object_motion(
+        state, np.array([0.0, 0.5]), np.array([0.2, 0.2]), schedule, np.inf, 0.0, np.empty((300, 3))
+    )
+    goals = np.array([axis + 0.1, axis + 0.4])
+    seconds = cross_box(state, motion, axis - 0.5, axis + 0.5, goals, axis, schedule, axis + np.inf, 5.0)
     return np.array([*state, seconds])
 
 

@@ -9,7 +9,9 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.laws.gain_schedule import Schedule
 from coop_drake.planning.boxes.box_kernels import BoxArrays, clearances_in_box
-from coop_drake.planning.improvement.box_crossing import cross_box, smallest
+from coop_drake.planning.execution.transport_kernels import PERIOD
+from coop_drake.planning.improvement.box_crossing import cross_box
+from coop_drake.planning.improvement.object_motion import object_motion, smallest, soonest_exit
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.planning.travel_time import SETTLING_TIME
 from coop_drake.tree.pose import FloatArray, IntArray
@@ -84,6 +86,7 @@ def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
         for a in range(m):
             states[0, p, 3 + a] = waypoints.path[0, 2 + a]
     low, high, lower, upper = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
+    checks = np.empty((int(LONGEST / PERIOD) + 2, 3))
     for i in range(n - 1):
         for p in range(count):
             if not best[i, p] < smallest(best[i]) + LARGEST_DELAY:
@@ -103,7 +106,7 @@ def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
                 )
                 if len(clearances) == 0 or smallest(clearances) < waypoints.least_clearance:
                     break
-                _reach(waypoints, i, p, j, lower, upper, clearances, best, states, before)
+                _reach(waypoints, i, p, j, lower, upper, clearances, best, states, before, checks)
     return best[n - 1, 0], _box_rows(before)
 
 
@@ -119,6 +122,7 @@ def _reach(
     best: FloatArray,
     states: FloatArray,
     before: IntArray,
+    checks: FloatArray,
 ) -> None:
     """Cross a box from waypoint i to j for every padding of the next box, and keep what is faster.
 
@@ -133,11 +137,23 @@ def _reach(
         best: Earliest time at which each waypoint is reached, by the next box's padding, shape (n, p) [s].
         states: States in which that happens, shape (n, p, 3 + 2 m).
         before: First waypoint and padding of the box before, shape (n, p, 2).
+        checks: Memory for the object's motion, as in ``object_motion``.
     """
     last = j + 1 == len(waypoints.path)
-    m = len(lower)
+    m, nexts = len(lower), 1 if last else len(waypoints.pads)
     ends, state = np.empty((2, m)), np.empty(3 + 2 * m)
-    for q in range(1 if last else len(waypoints.pads)):
+    begun = best[i, p] + BOX_COST / waypoints.pads[p]
+    latest = 0.0
+    for q in range(nexts):
+        latest = max(latest, best[j, q])
+    motion = object_motion(
+        states[i, p], waypoints.places[i : j + 1], clearances, waypoints.schedule, waypoints.limits[0],
+        waypoints.tolerance if last else 0.0, checks,
+    )  # fmt: skip
+    soonest = begun + soonest_exit(motion, min(LONGEST, latest - begun))
+    for q in range(nexts):
+        if soonest >= best[j, q]:
+            continue
         for a in range(m):
             if last:
                 low, high = waypoints.goals[0, a], waypoints.goals[1, a]
@@ -149,11 +165,9 @@ def _reach(
             ends[0, a], ends[1, a] = max(lower[a], low), min(upper[a], high)
         for k in range(len(state)):
             state[k] = states[i, p, k]
-        limit = min(LONGEST, best[j, q] - best[i, p])
-        time = best[i, p] + BOX_COST / waypoints.pads[p]
-        time += cross_box(
-            state, waypoints.places[i : j + 1], clearances, lower, upper, ends, waypoints.path[i, 2:],
-            waypoints.schedule, waypoints.limits, waypoints.tolerance if last else 0.0, limit,
+        time = begun + cross_box(
+            state, motion, lower, upper, ends, waypoints.path[i, 2:], waypoints.schedule,
+            waypoints.limits[1:], min(LONGEST, best[j, q] - begun),
         )  # fmt: skip
         if time < best[j, q]:
             best[j, q] = time

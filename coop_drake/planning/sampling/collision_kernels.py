@@ -16,7 +16,7 @@ from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, place
 
 
-@compiled
+@compiled(inlined=True)
 def ring_clearance(
     grid: ObstacleGrid,
     vertices: FloatArray,
