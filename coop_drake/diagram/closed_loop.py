@@ -133,7 +133,8 @@ def build_closed_loop(
         builder.AddNamedSystem(f"robot_{k}_controller", controller)
         _connect(builder, station.diagram, planner, controller, k)
         if supervisor is not None:
-            builder.Connect(supervisor.GetOutputPort("hold"), controller.GetInputPort("hold"))
+            message = supervisor.GetOutputPort("hold_message")
+            builder.Connect(message, controller.GetInputPort("hold_message"))
             builder.Connect(
                 controller.GetOutputPort("hold_request"), supervisor.GetInputPort(f"robot_{k}_request")
             )

@@ -57,7 +57,8 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int, name: str) -
     In the order of the signals: ``robot_state`` and ``object_pose`` get their constant errors, noise, a delay
     and losses; ``current_cell`` gets the error of the clock and a delay; ``robot_effort`` fails where the
     motors do, is held for a period, then limited, then lags; ``ready`` stops where the robot is silent, then
-    goes through a :class:`MessageChannel`, or a hold where nothing is lost or late. The limit is always
+    goes through a :class:`MessageChannel`, or a hold where nothing is lost or late; so do messages about
+    holds, to the supervisor and back. The limit is always
     there: that of the actuators, or where none is given, one so high that only a diverging run reaches it.
 
     Args:
@@ -76,7 +77,7 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int, name: str) -
     builder.ExportOutput(wrapping.send(controller.GetOutputPort("ready")), "ready")
     held = controller.HasOutputPort("hold_request")
     if held:
-        builder.ExportInput(controller.GetInputPort("hold"), "hold")
+        wrapping.obey(controller.GetInputPort("hold_message"))
         request = wrapping.send(controller.GetOutputPort("hold_request"), "requests", 3)
         builder.ExportOutput(request, "hold_request")
     for output in (*TELEMETRY, *(["clock"] if held else [])):

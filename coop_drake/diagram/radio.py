@@ -10,7 +10,10 @@ from coop_drake.systems import MessageChannel, clear_channel
 
 
 def build_radio(deployment: Deployment, robot: int, use: int = 0) -> MessageChannel | LinearSystem:
-    """Build the channel of a robot's reports in a sampled team, or of its requests, whose use is 3."""
+    """Build the channel of a robot's reports in a sampled team.
+
+    The use is 3 for its requests to the hold supervisor, and 4 for what it hears of this.
+    """
     messages, period = deployment.messages, deployment.period or 0.0
     if messages == Messages():
         return clear_channel(period)

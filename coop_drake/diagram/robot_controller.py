@@ -19,6 +19,7 @@ from coop_drake.systems import (
     FunnelClock,
     GovernedCell,
     HoldMonitor,
+    HoldReceiver,
     NominalGovernor,
     NominalMotion,
     ObjectEstimator,
@@ -107,7 +108,7 @@ def build_robot_controller(knowledge: RobotKnowledge, replacements: Replacements
     input   ``current_cell``      2           (index, entry time), from the cell planner
     output  ``robot_effort``      3 + n       its base wrench and joint torques
     output  ``ready``             2           (index, margin), for the cell planner
-    input   ``hold``              1           whether the team is held, only where a scenario has holds
+    input   ``hold_message``      2           from the hold supervisor, only where a scenario has holds
     output  ``hold_request``      2           to the hold supervisor, only where a scenario has holds
     output  see ``TELEMETRY``                 for the log and for users, not for other robots
     ======= ===================== =========== ==========================================================
@@ -202,6 +203,8 @@ def _additions(knowledge: RobotKnowledge, laws: Sequence[AxisLaw]) -> dict[str, 
         )
     if knowledge.hold is not None:
         period, offset = knowledge.period, knowledge.sample_offset
+        silence = knowledge.hold.silence
+        added["hold_receiver"] = HoldReceiver(silence, period=period, offset=offset)
         added["funnel_clock"] = FunnelClock(period, offset)
         added["hold_monitor"] = HoldMonitor(laws, knowledge.hold.energy, period=period, offset=offset)
     if knowledge.observer_gains is not None:

@@ -21,7 +21,7 @@ from pydrake.systems.primitives import (
 
 from coop_drake.diagram.radio import build_radio, seed_of
 from coop_drake.laws.sampling import whole_periods
-from coop_drake.scenario import Deployment, PoseBias, RobotDepartures, Silence
+from coop_drake.scenario import Deafness, Deployment, Messages, PoseBias, RobotDepartures, Silence
 from coop_drake.systems import Interruption, LossyMeasurement
 from coop_drake.tree.pose import FloatArray
 
@@ -68,6 +68,15 @@ class Wrapping:
         if self._deployment.period is not None:
             delays = self._delays(2, whole_periods(self._own.switch_delay, self._deployment.period))
             blocks.extend((f"switch_delay{i or ''}", delay) for i, delay in enumerate(delays))
+        self._lead(entry, blocks)
+
+    def obey(self, entry: InputPort) -> None:
+        """Export the input of the hold supervisor's messages, which may be lost, late or not heard."""
+        blocks: list[tuple[str, LeafSystem]] = []
+        if self._deployment.messages != Messages():
+            blocks.append(("holds_radio", build_radio(self._deployment, self._robot, 4)))
+        if (deaf := self._own.deaf) is not None:
+            blocks.append(("deafness", self._interruption(entry.size(), deaf, held=True)))
         self._lead(entry, blocks)
 
     def actuate(self, effort: OutputPort) -> OutputPort:
@@ -164,7 +173,7 @@ class Wrapping:
             seed=seed_of(self._deployment, self._robot, 1 + (name == "robot_state")),
         )
 
-    def _interruption(self, size: int, silence: Silence, *, held: bool) -> Interruption:
+    def _interruption(self, size: int, silence: Silence | Deafness, *, held: bool) -> Interruption:
         return Interruption(
             size,
             self._deployment.period or 0.0,

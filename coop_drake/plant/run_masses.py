@@ -10,7 +10,7 @@ from coop_drake.plant.component_tree import read_component_tree
 from coop_drake.plant.parsing import bodies_of
 from coop_drake.plant.planar_chain import bodies_inertia, rotor_inertia
 from coop_drake.plant.team import TeamPlant, build_team_plant
-from coop_drake.scenario import Floor, Scenario
+from coop_drake.scenario import Floor, Messages, Scenario
 from coop_drake.scenario.digest import scenario_digest
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.verification.runs import BodyMass, RunSetup
@@ -27,6 +27,8 @@ def run_setup(scenario: Scenario) -> RunSetup:
     team.plant.SetPositionsAndVelocities(context, np.zeros(team.plant.num_multibody_states()))
     deployment = scenario.deployment
     springs = team.plant.num_force_elements() > 1  # every plant has gravity
+    deaf = any(robot.deaf is not None for robot in deployment.robots.values())
+    one_hold = scenario.control.hold is None or not (deaf or deployment.messages != Messages())
     return RunSetup(
         scenario_digest=scenario_digest(scenario),
         robot_names=tuple(robot.name for robot in team.robots),
@@ -36,7 +38,9 @@ def run_setup(scenario: Scenario) -> RunSetup:
         and not springs
         and deployment.floor == Floor()
         and not deployment.pushes,
-        one_clock=all(robot.clock_error == robot.switch_delay == 0.0 for robot in deployment.robots.values()),
+        one_hold=one_hold,
+        one_clock=one_hold
+        and all(robot.clock_error == robot.switch_delay == 0.0 for robot in deployment.robots.values()),
         grasps=np.array([[robot.X_LE.x, robot.X_LE.y] for robot in team.robots]),
         bodies=tuple(_masses(team, context, read_component_tree(team))),
         joint_damping=np.array([joint.GetDampingVector(context)[0] for joint in team.joints]),

@@ -2,6 +2,7 @@ from .assembly import Assembly, RobotAssembly, assemble
 from .control import Control, Hold
 from .deployment import (
     ActuatorLimits,
+    Deafness,
     Deployment,
     Floor,
     Measurements,
@@ -32,6 +33,7 @@ __all__ = [
     "ActuatorLimits",
     "Assembly",
     "Control",
+    "Deafness",
     "Deployment",
     "Floor",
     "Gains",

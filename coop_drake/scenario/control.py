@@ -18,7 +18,9 @@ class Hold:
         duration: How long it is told so each time [s].
         energy: Largest energy of an axis over the bound with which its cell may be entered; a robot that sees
             more, or that its Delta E is negative, asks for a hold; null for never [-].
-        silence: Longest time without a message of a robot; null to wait for ever [s]. Needs a control rate.
+        silence: Longest time without a message of a robot, after which the team is held, and of a robot
+            without a message of the supervisor, after which it holds by itself and asks for a hold; null to
+            wait for ever [s]. Needs a control rate.
     """
 
     at: tuple[NotNegative, ...] = ()

@@ -128,6 +128,19 @@ class Silence:
 
 
 @dataclass(frozen=True)
+class Deafness:
+    """A robot that hears nothing of the hold supervisor for a while. Needs a control rate.
+
+    Attributes:
+        begin: When it hears nothing any more [s].
+        duration: For how long; null for the rest of the run [s].
+    """
+
+    begin: NotNegative
+    duration: Positive | None = None
+
+
+@dataclass(frozen=True)
 class RobotDepartures:
     """What is wrong with a single robot.
 
@@ -141,6 +154,7 @@ class RobotDepartures:
         switch_delay: How much later than the others it hears that the cell was switched, rounded up to whole
             control periods; needs a control rate [s].
         silence: When it sends no reports, null for never.
+        deaf: When it hears nothing of the hold supervisor, null for never.
     """
 
     pose_bias: PoseBias = field(default_factory=PoseBias)
@@ -149,6 +163,7 @@ class RobotDepartures:
     clock_error: Annotated[float, Limits(at_least=-10.0, at_most=10.0)] = 0.0
     switch_delay: Delay = 0.0
     silence: Silence | None = None
+    deaf: Deafness | None = None
 
 
 @dataclass(frozen=True)

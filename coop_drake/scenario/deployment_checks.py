@@ -7,7 +7,7 @@ from coop_drake.errors import ScenarioError
 from coop_drake.scenario.limits import ALL_ROBOTS
 from coop_drake.scenario.model import Scenario
 
-_SAMPLED = ("sample_offset", "switch_delay", "silence")
+_SAMPLED = ("sample_offset", "switch_delay", "silence", "deaf")
 """Departures of single robots that need a control rate."""
 
 

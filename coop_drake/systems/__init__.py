@@ -9,6 +9,7 @@ from coop_drake.systems.disturbance_observer import DisturbanceObserver
 from coop_drake.systems.floor_friction import FloorFriction
 from coop_drake.systems.funnel_clock import CLOCK_SIZE, FunnelClock
 from coop_drake.systems.hold_monitor import REQUEST_SIZE, HoldMonitor
+from coop_drake.systems.hold_receiver import HoldReceiver
 from coop_drake.systems.hold_supervisor import HoldSupervisor
 from coop_drake.systems.interruption import Interruption
 from coop_drake.systems.lossy_measurement import LossyMeasurement
@@ -41,6 +42,7 @@ __all__ = [
     "FusedTeam",
     "GovernedCell",
     "HoldMonitor",
+    "HoldReceiver",
     "HoldSupervisor",
     "Interruption",
     "LossyMeasurement",

@@ -22,7 +22,7 @@ begin a second one at once."""
 
 
 class HoldMonitor(Block):
-    """Asks for a hold while an energy of its own is too large, or its Delta E is negative.
+    """Asks for a hold while an energy of its own is too large, its Delta E is negative, or it hears nothing.
 
     ======= =================== ========== ====================================================== =====
     input   ``object_state``    6          pose and twist of L, angle unwrapped                   W
@@ -30,6 +30,7 @@ class HoldMonitor(Block):
     input   ``current_cell``    2          index of the current cell, time of its entry [-, s]
     input   ``clock``           3          lag, pace and its derivative of the funnels' clock
     input   ``energy_margin``   1          Delta E [m^2/s^2]
+    input   ``missed``          1          1 where it misses messages of the supervisor, else 0 [-]
     output  ``hold_request``    2          1 to be held, else 0; the number of the message [-]
     ======= =================== ========== ====================================================== =====
 
@@ -38,7 +39,8 @@ class HoldMonitor(Block):
 
     Args:
         laws: Laws of the axes (theta, q_k), one for each cell of the plan.
-        energy: Largest V of an axis over the bound with which its cell may be entered [-]; None to never ask.
+        energy: Largest V of an axis over the bound with which its cell may be entered [-]; None to ask only
+            where messages are missed.
         period: Time between updates [s], None for every step.
         offset: Time of the first update [s].
     """
@@ -59,14 +61,15 @@ class HoldMonitor(Block):
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE)
         self._margin = self.DeclareVectorInputPort("energy_margin", 1)
+        self._missed = self.DeclareVectorInputPort("missed", 1)
         self.DeclareDiscreteState(np.zeros(REQUEST_SIZE))
         self.DeclareVectorOutputPort("hold_request", REQUEST_SIZE, self._write_request, {self.xd_ticket()})
         self.declare_update(self._judge, period, offset)
 
     def _judge(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         asked, number = context.get_discrete_state_vector().value()
-        asks = False
-        if self._energy is not None:
+        asks = bool(self._missed.Eval(context)[0] > 0.0)
+        if self._energy is not None and not asks:
             limit = self._energy * (RELEASE if asked else 1.0)
             asks = self._margin.Eval(context)[0] < 0.0 or self._largest_share(context) > limit
         discrete_state.get_mutable_vector().SetFromVector([float(asks), number + 1.0])

@@ -20,6 +20,8 @@ class HoldSupervisor(Block):
     input   ``order``             1     1 where the team is told to hold, else 0 [-]
     input   ``robot_<k>_request`` 2     the request of robot k that arrived last, see ``HoldMonitor``
     output  ``hold``              1     1 where the team is held, else 0 [-]
+    output  ``hold_message``      2     the same for the robots, and the number of the message, which tells
+                                        them that it is a new one [-]
     output  ``paused``            1     1 while the funnels' clock does not run as usual, else 0: the
                                         cell must not be left [-]
     output  ``causes``            1 + N first the order (0, or 1 where the team is told to hold), then each
@@ -27,8 +29,8 @@ class HoldSupervisor(Block):
     ======= ===================== ===== ================================================================
 
     State: one discrete group, updated at the start of every step, or every ``period``: the time at which the
-    last hold ended, the causes, and for each robot the number of its last message and the time at which
-    that message arrived.
+    last hold ended, the causes, for each robot the number of its last message and the time at which that
+    message arrived, and the number of the supervisor's own message.
 
     Args:
         robots: Number of robots N.
@@ -43,16 +45,17 @@ class HoldSupervisor(Block):
         self._requests = [
             self.DeclareVectorInputPort(f"robot_{k}_request", REQUEST_SIZE) for k in range(robots)
         ]
-        self.DeclareDiscreteState(np.array([-SETTLING_TIME, *np.zeros(1 + 3 * robots)]))
+        self.DeclareDiscreteState(np.array([-SETTLING_TIME, *np.zeros(2 + 3 * robots)]))
         self._robots = robots
         self.DeclareVectorOutputPort("hold", 1, self._write_hold, {self.xd_ticket()})
+        self.DeclareVectorOutputPort("hold_message", REQUEST_SIZE, self._write_message, {self.xd_ticket()})
         self.DeclareVectorOutputPort("paused", 1, self._write_paused, {self.xd_ticket(), self.time_ticket()})
         self.DeclareVectorOutputPort("causes", 1 + robots, self._write_causes, {self.xd_ticket()})
         self.declare_update(self._decide, period)
 
     def _decide(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         state, now = np.array(context.get_discrete_state_vector().value()), context.get_time()
-        causes, heard = state[1 : 2 + self._robots], state[2 + self._robots :].reshape(-1, 2)
+        causes, heard = state[1 : 2 + self._robots], state[2 + self._robots : -1].reshape(-1, 2)
         held = causes.any()
         causes[0] = TOLD if self._order.Eval(context)[0] > 0.0 else 0.0
         for k, port in enumerate(self._requests):
@@ -62,6 +65,7 @@ class HoldSupervisor(Block):
             causes[1 + k] = ASKED if asks > 0.0 else SILENT if now - heard[k, 1] > self._silence else 0.0
         if held and not causes.any():
             state[0] = now
+        state[-1] += 1.0
         discrete_state.get_mutable_vector().SetFromVector(state)
         return EventStatus.Succeeded()
 
@@ -70,6 +74,10 @@ class HoldSupervisor(Block):
 
     def _write_hold(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector([float(self._held(context))])
+
+    def _write_message(self, context: Context, output: BasicVector) -> None:
+        number = context.get_discrete_state_vector().value()[-1]
+        output.SetFromVector([float(self._held(context)), number])
 
     def _write_paused(self, context: Context, output: BasicVector) -> None:
         ended = context.get_discrete_state_vector().value()[0]

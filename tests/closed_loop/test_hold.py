@@ -10,7 +10,17 @@ from coop_drake.diagram import build_closed_loop
 from coop_drake.errors import ScenarioError
 from coop_drake.planning.planner import plan as plan_problem
 from coop_drake.plant import planning_problem, read_component_tree
-from coop_drake.scenario import Control, Deployment, Hold, Push, RobotDepartures, Silence, load_scenario
+from coop_drake.scenario import (
+    Control,
+    Deafness,
+    Deployment,
+    Hold,
+    Messages,
+    Push,
+    RobotDepartures,
+    Silence,
+    load_scenario,
+)
 from coop_drake.scenario.validation import validate
 from coop_drake.simulation import Invariants, TeamClearance, build_maps, configure_simulator, simulate
 from coop_drake.simulation.telemetry import Telemetry
@@ -121,6 +131,39 @@ def test_a_silent_robot_holds_the_team_until_it_is_heard_again():
     at_rest = (log.times > 0.6 + REST_TIME) & (log.times < 2.5)
     assert np.abs(log.object_twist[at_rest]).max() < RATE
     assert verified_run(scenario, plan, log).answer == "arrived"
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_robot_that_misses_the_order_holds_by_itself_and_the_team_arrives(seed):
+    """At a random moment one robot hears nothing any more; shortly afterwards the team is told to hold."""
+    generator = np.random.default_rng(seed)
+    begin, told = generator.uniform(0.1, 0.9), seed % 2 == 0
+    deaf = RobotDepartures(deaf=Deafness(begin=begin, duration=2.2))
+    deployment = Deployment(
+        control_rate=200.0, messages=Messages(loss=0.2), robots={f"robot_{seed // 2}": deaf}, seed=seed
+    )
+    order = Hold(at=(begin + 0.02,) if told else (), duration=1.0, silence=0.1)
+    scenario, plan = held_scenario(order, deployment)
+    log = simulate(scenario, plan, small_maps())
+    assert (log.reached, log.violation) == (True, "")
+    held = log.times[log.held > 0.0]
+    assert held[0] == pytest.approx(begin + (0.02 if told else 0.1), abs=0.05)
+    assert held[-1] == pytest.approx(begin + 2.2, abs=0.05)  # it is released when that robot hears again
+    at_rest = (log.times > begin + 0.1 + REST_TIME) & (log.times < begin + 2.2)
+    assert np.abs(log.object_twist[at_rest]).max() < RATE
+    assert verified_run(scenario, plan, log).answer == "arrived"
+
+
+def test_without_a_time_out_a_deaf_robot_goes_on_alone():
+    deaf = RobotDepartures(deaf=Deafness(begin=0.2, duration=1.5))
+    deployment = Deployment(control_rate=200.0, robots={"robot_0": deaf})
+    lags = []  # of the clock of robot 0
+    for silence in (0.1, None):
+        scenario, plan = held_scenario(Hold(at=(0.25,), duration=1.0, silence=silence), deployment)
+        log = simulate(scenario, plan, small_maps())
+        lags.append(log.clock_lag.max())
+    assert lags[0] == pytest.approx(1.4, abs=0.1)  # from 0.3 s, when it holds, to 1.7 s
+    assert lags[1] == 0.0
 
 
 def test_a_robot_that_is_pushed_asks_for_a_hold_until_it_has_recovered():

@@ -5,7 +5,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from coop_drake.laws.hold import HOLD_RATE, SETTLING_TIME
-from coop_drake.systems import FunnelClock, HoldMonitor, HoldSupervisor, axis_laws
+from coop_drake.systems import FunnelClock, HoldMonitor, HoldReceiver, HoldSupervisor, axis_laws
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import context_with, evaluate, port_sizes
 
@@ -16,6 +16,7 @@ MIDDLE = {
     "current_cell": [0.0, 0.0],
     "clock": [0.0, 1.0, 0.0],
     "energy_margin": [0.4],
+    "missed": [0.0],
 }
 
 
@@ -57,6 +58,29 @@ def test_a_robot_asks_when_its_energy_is_too_large_or_its_margin_negative():
     asks, later = request.Eval(advanced(simulator, 3e-3, object_state=MIDDLE["object_state"]))
     assert (asks, later > number) == (0.0, True)
     assert request.Eval(advanced(simulator, 4e-3, energy_margin=[-1e-9]))[0] == 1.0
+    assert request.Eval(advanced(simulator, 5e-3, energy_margin=[0.4]))[0] == 0.0
+    assert request.Eval(advanced(simulator, 6e-3, missed=[1.0]))[0] == 1.0
+
+
+def test_a_robot_that_hears_nothing_holds_by_itself():
+    receiver = HoldReceiver(0.1, period=0.01)
+    assert port_sizes(receiver) == ({"hold_message": 2}, {"hold": 1, "missed": 1})
+    simulator = Simulator(receiver, context_with(receiver, {"hold_message": [0.0, 1.0]}))
+
+    def outputs(until, **inputs):
+        context = advanced(simulator, until, **inputs)
+        return [receiver.GetOutputPort(name).Eval(context)[0] for name in ("hold", "missed")]
+
+    assert outputs(0.095) == [0.0, 0.0]
+    assert outputs(0.105, hold_message=[0.0, 2.0]) == [0.0, 0.0]
+    assert outputs(0.195) == [0.0, 0.0]
+    assert outputs(0.255) == [1.0, 1.0]
+    assert outputs(0.275, hold_message=[1.0, 3.0]) == [1.0, 0.0]
+    assert outputs(0.295, hold_message=[0.0, 4.0]) == [0.0, 0.0]
+    waiting = HoldReceiver()
+    assert evaluate(waiting, {"hold_message": [-1.0, -1.0]}, "hold") == 0.0
+    simulator = Simulator(waiting, context_with(waiting, {"hold_message": [0.0, 1.0]}))
+    assert waiting.GetOutputPort("hold").Eval(advanced(simulator, 9.0))[0] == 0.0
 
 
 def test_without_a_limit_no_robot_asks():
@@ -71,7 +95,7 @@ def test_the_supervisor_holds_for_every_cause_and_pauses_a_little_longer():
     quiet = {"order": [0.0], "robot_0_request": [0.0, 1.0], "robot_1_request": [0.0, 1.0]}
     assert port_sizes(supervisor) == (
         {"order": 1, "robot_0_request": 2, "robot_1_request": 2},
-        {"hold": 1, "paused": 1, "causes": 3},
+        {"hold": 1, "hold_message": 2, "paused": 1, "causes": 3},
     )
     assert evaluate(supervisor, quiet, "paused") == 0.0
     simulator = Simulator(supervisor, context_with(supervisor, quiet))
@@ -82,7 +106,9 @@ def test_the_supervisor_holds_for_every_cause_and_pauses_a_little_longer():
 
     assert outputs(0.25) == [[0.0], [0.0], [0.0, 0.0, 0.0]]
     assert outputs(0.35, order=[1.0]) == [[1.0], [1.0], [1.0, 0.0, 0.0]]
+    held, number = supervisor.GetOutputPort("hold_message").Eval(simulator.get_context())
     assert outputs(0.65, robot_0_request=[1.0, 2.0]) == [[1.0], [1.0], [1.0, 2.0, 3.0]]
+    assert list(supervisor.GetOutputPort("hold_message").Eval(simulator.get_context())) == [held, number + 3]
     now = {"order": [0.0], "robot_0_request": [0.0, 3.0], "robot_1_request": [0.0, 2.0]}
     assert outputs(0.75, **now) == [[0.0], [1.0], [0.0, 0.0, 0.0]]
     later = {"robot_0_request": [0.0, 4.0], "robot_1_request": [0.0, 3.0]}

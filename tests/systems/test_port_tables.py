@@ -99,7 +99,7 @@ def test_a_block_without_state_has_none_and_any_other_says_which(blocks, name):
 def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_are_remembered(blocks):
     remembering = {name for name in BLOCKS if any(map(len, state_of(blocks[name][0].CreateDefaultContext())))}
     failures = {"Interruption", "LossyMeasurement", "MessageChannel"}
-    holds = {"FunnelClock", "HoldMonitor", "HoldSupervisor"}
+    holds = {"FunnelClock", "HoldMonitor", "HoldReceiver", "HoldSupervisor"}
     laws = {"CellPlanner", "AxisPpc", "TeamController", "StatePredictor", "NominalGovernor"}
     assert remembering == laws | holds | failures
 

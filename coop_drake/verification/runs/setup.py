@@ -37,6 +37,7 @@ class RunSetup:
         rigid: Whether grasps are exactly rigid.
         mechanics: Whether grasps are rigid and nothing but actuators, joint damping and grasps acts on the
             bodies, so that the equations of motion hold to rounding.
+        one_hold: Whether all robots hear at once that they are held, and not.
         one_clock: Whether all robots have the same time since a cell was entered.
         grasps: Every robot's grasp in L, shape (N, 2) [m].
         bodies: Mass properties of all bodies.
@@ -49,6 +50,7 @@ class RunSetup:
     exact: bool
     rigid: bool
     mechanics: bool
+    one_hold: bool
     one_clock: bool
     grasps: FloatArray
     bodies: tuple[BodyMass, ...]

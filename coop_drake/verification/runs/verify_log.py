@@ -68,7 +68,7 @@ def verify_log(
     checks.append(check_start(rows))
     between = Between.of(rows)
     checks += [check_motion(rows, between), *check_cells(rows, between), check_stated_funnels(rows)]
-    checks.append(check_clock(rows))
+    checks.append(check_clock(rows, one_hold=setup.one_hold))
     if setup.one_clock:
         checks += check_funnels(rows, between)
     if setup.exact:
