@@ -17,7 +17,7 @@ demo: $(READY)  ## plan, simulate and record the paper's transport
 	$(BIN)/coop-drake run models/base.scenario.yaml
 
 test: $(READY_TO_DEVELOP)  ## run every test, and show which lines none of them runs
-	$(BIN)/python -m pytest -n 2 --cov --cov-report=term-missing
+	$(BIN)/python -m pytest -n 2 --dist worksteal --cov --cov-report=term-missing
 
 lint: $(READY_TO_DEVELOP)  ## formatting, lint, types, direction of imports, documentation
 	$(BIN)/ruff format --check $(CODE)

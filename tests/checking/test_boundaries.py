@@ -206,6 +206,7 @@ def test_large_documents_are_decided_or_refused_within_a_minute_and_a_gigabyte(m
     assert done.stdout.startswith("refused: ")
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize("way", [("floor", "outer"), ("pieces", 0, "corners")], ids=str)
 def test_a_million_corners_are_called_too_much_work(way):
     assert "more steps are needed" in refused(altered(TEAM, [[0, 0], [8, 0], [8, 8]] * 333_334, *way), plan())

@@ -128,6 +128,7 @@ def run_anew(deployment, gain_set=None, max_time=6.0):
     return simulate(*deployed(deployment, gain_set, max_time), small_maps())
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize("name", MILD)
 def test_a_mild_departure_is_survived(name):
     log = run(MILD[name])
@@ -158,6 +159,7 @@ def test_a_team_as_the_preset_describes_it_arrives(seed, mass_error):
     assert log.reached
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize("name", HARSH)
 def test_a_harsh_one_is_reported_as_what_it_is(name):
     deployment, complaint = HARSH[name]

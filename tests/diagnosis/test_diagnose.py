@@ -188,6 +188,7 @@ def test_an_undecided_question_says_what_remained_mixed(monkeypatch):
     assert facts_of(diagnosis)["mixed"][0]["share_of_axis"] == diagnosis.mixed[0].width_fraction
 
 
+@pytest.mark.no_cover
 def test_the_same_question_has_the_same_diagnosis_and_picture(rod, tmp_path):
     problem, first = rod
     second = diagnose(problem)

@@ -48,8 +48,8 @@ def test_consecutive_rows_overlap_and_the_start_lies_in_the_first():
 
 @pytest.fixture(scope="module")
 def runs():
-    transitions = table_transitions(CORRECTED)
-    return {type(g).__name__: play(transitions, g, start=START) for g in (FixedGains(), ScheduledGains())}
+    transitions, sets = table_transitions(CORRECTED), (FixedGains(), ScheduledGains())
+    return {type(gains).__name__: play(transitions, gains, start=START, step=2e-3) for gains in sets}
 
 
 @pytest.mark.parametrize("gain_set", ["FixedGains", "ScheduledGains"])

@@ -89,6 +89,7 @@ def test_no_exploration_errs_however_often_clipping_fails(failure, every: int, c
     assert outcome.verdict is not (Verdict.FOUND if corridor < 0.2 else Verdict.INFEASIBLE)
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize("corridor", [0.19, 0.3])
 def test_a_search_without_clipping_answers_nothing(monkeypatch, corridor: float) -> None:
     monkeypatch.setattr(FreeSpace, "_clipped", raising)
@@ -127,6 +128,7 @@ def test_no_exploration_errs_however_often_regions_cannot_be_cut_or_parted(
     assert outcome.verdict is not (Verdict.FOUND if corridor < 0.2 else Verdict.INFEASIBLE)
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize(("name", "failure"), BROKEN)
 def test_a_search_that_cannot_cut_or_part_regions_never_errs(monkeypatch, name: str, failure) -> None:
     monkeypatch.setattr(CrossSection, name, failure)

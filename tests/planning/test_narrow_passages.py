@@ -62,6 +62,7 @@ def test_a_wider_floor_holds_the_floor():
     assert widened_floor(floor, 0.05).contains(Point(0.0, 0.14))
 
 
+@pytest.mark.no_cover
 def test_a_corridor_too_narrow_for_samples_is_found_and_sound():
     problem = transport(0.79)
     channel, _ = find_channel(problem)

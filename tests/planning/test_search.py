@@ -79,6 +79,7 @@ def test_a_spent_budget_is_no_proof() -> None:
     assert 0.0 < channel.mixed[0].width_fraction <= 1.0
 
 
+@pytest.mark.no_cover
 def test_same_question_same_answer() -> None:
     first, second = (find_channel(transport())[0] for _ in range(2))
     assert isinstance(first, Channel)
@@ -140,6 +141,7 @@ def test_progress_is_told_and_may_interrupt() -> None:
     assert told == ["sampling paths"]
 
 
+@pytest.mark.no_cover
 def test_a_millimetre_of_room_is_found() -> None:
     """The corridor is three millimetres wider than one in which the object alone is proved to be stuck."""
     problem = transport(0.78)

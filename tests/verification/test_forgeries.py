@@ -87,6 +87,7 @@ def test_a_gap_of_a_metre_between_cells_that_reach_far_away_is_seen(name, reach,
     assert refusal(proof, scenario(name), tmp_path)
 
 
+@pytest.mark.no_cover
 @SCENARIOS
 def test_honest_proofs_that_a_goal_is_blocked_hold_with_several_slices(name, tmp_path) -> None:
     problem = replace(scenario(name), goal_pose=np.array(BLOCKED_GOALS[name]))
@@ -97,6 +98,7 @@ def test_honest_proofs_that_a_goal_is_blocked_hold_with_several_slices(name, tmp
     assert refusal(documents[1], problem, tmp_path) == ""
 
 
+@pytest.mark.no_cover
 @SCENARIOS
 def test_figures_and_goal_intervals_mean_what_is_executed(name, tmp_path) -> None:
     """A neck, an inradius or a length of a kilometre; a goal interval of one unit in the last place."""

@@ -19,6 +19,8 @@ from tests.planning.test_questions import reaching
 from tests.support.certificates import bent_corridor, changed, room_with_pillar
 from tests.support.moved import Similarity
 
+pytestmark = pytest.mark.no_cover  # other tests run the same lines, and measuring takes as long again
+
 VALUES = (
     math.nan,
     math.inf,

@@ -65,6 +65,7 @@ def test_no_number_can_be_altered_be_it_by_a_bit(document, tmp_path):
         assert refusal(changed(document, way, value), tmp_path, signed=False), way
 
 
+@pytest.mark.no_cover
 def test_what_is_accepted_under_a_new_digest_is_true(document, tmp_path):
     """Whoever signs again may only state what holds: accepted plans are sampled against exact footprints."""
     places = [way for way in number_places(document) if way[0] != "version"][::9]

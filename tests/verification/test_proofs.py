@@ -31,7 +31,7 @@ from tests.support.certificates import (
 )
 from tests.support.free_positions import FreePositions
 
-PROBLEM = bent_corridor(0.62)
+PROBLEM = bent_corridor(0.58)
 BY_DISC = bent_corridor(0.45)
 AT_GOAL = bent_corridor(1.2, goal=(5.6, 5.0, 0.1))
 KINDS = {"slices": PROBLEM, "disc": BY_DISC, "blocked goal": AT_GOAL}
@@ -74,6 +74,7 @@ def test_proofs_are_stated_saved_and_verified(proofs, documents, tmp_path, kind)
     assert all(check.count > 0 for check in verified.checks)
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_number_can_be_altered_be_it_by_a_bit(documents, tmp_path, kind):
     document = documents[kind]
@@ -83,6 +84,7 @@ def test_no_number_can_be_altered_be_it_by_a_bit(documents, tmp_path, kind):
         assert refusal(changed(document, way, value), tmp_path, KINDS[kind], signed=False), way
 
 
+@pytest.mark.no_cover
 def test_bounds_and_labels_are_refused_under_a_new_digest(documents, tmp_path):
     """Every label, and every end by one bit; where the turn closes, by more than 2 pi is rounded."""
     document = documents["slices"]
@@ -99,6 +101,7 @@ def test_bounds_and_labels_are_refused_under_a_new_digest(documents, tmp_path):
             assert found is None or "touches" in found or "may hold the" in found
 
 
+@pytest.mark.no_cover
 def test_cells_that_are_accepted_under_a_new_digest_still_cover(documents, tmp_path):
     document = documents["slices"]
     places = [way for way in number_places(document) if "cells" in way][::61]
@@ -126,6 +129,7 @@ def assert_covers(part):
         assert shapely.intersects_xy(cells, free).all()
 
 
+@pytest.mark.no_cover
 def test_no_slice_and_no_cell_can_be_left_out_doubled_or_moved(documents, tmp_path):
     document = documents["slices"]
     for k, part in list(enumerate(document["slices"]))[::4]:
