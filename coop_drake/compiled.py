@@ -93,6 +93,7 @@ class Kernel:
     def __init__(self, function: FunctionType, options: Mapping[str, object]) -> None:
         update_wrapper(self, function)
         self.loaded = 0
+        KERNEL_TIMES.functions += 1
         self._function, self._options, self._names = function, options, tuple(function.__globals__)
         _file_digest(function.__code__.co_filename)  # Now: the file may be edited while the program runs.
         self._count = function.__code__.co_argcount

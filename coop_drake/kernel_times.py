@@ -16,11 +16,13 @@ class KernelTimes:
     Attributes:
         wall_seconds: By the clock on the wall [s].
         cpu_seconds: By the processor [s].
+        functions: How many functions of the modules imported so far can be compiled; few commands need all.
         compiling: Called with the name of each function before it is compiled, None if nobody waits for it.
     """
 
     wall_seconds: float = 0.0
     cpu_seconds: float = 0.0
+    functions: int = 0
     compiling: Callable[[str], None] | None = None
 
     def __post_init__(self) -> None:

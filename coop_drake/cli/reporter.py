@@ -30,12 +30,15 @@ from coop_drake.errors import (
     StallError,
 )
 from coop_drake.extras import install_advice
+from coop_drake.kernel_times import KERNEL_TIMES
 from coop_drake.progress import Progress
 
 _SMALLEST_STEP = 0.002
 """Fraction by which a bar moves on; smaller steps cannot be seen on a terminal [-]."""
 _NEARLY = 0.999
 """Where a bar stops until its stage returns: only then it is over [-]."""
+_BETWEEN_LINES = 10.0
+"""Least time between two lines about compiling where there is no bar, as in a log file [s]."""
 
 
 class ExitCode(IntEnum):
@@ -76,7 +79,8 @@ class Reporter:
         self.facts: dict[str, Any] = {}
         self.code = ExitCode.DONE
         self._machine = machine
-        self._compiles = False
+        self._compiled: set[str] = set()
+        self._compiled_said = -math.inf
         self._console = Console(stderr=machine, quiet=quiet, highlight=False)
         self._errors = Console(stderr=True, highlight=False)
         # Colours may be forced on a file, bars that are drawn over and over may not.
@@ -116,11 +120,14 @@ class Reporter:
         self.facts[fact] = round(self.facts.get(fact, 0.0) + seconds, 4)
 
     def _compiling(self, advance: Progress, kernel: str) -> None:
+        """Say which of how many functions is compiled now: in the bar, or in a line every few seconds."""
+        self._compiled.add(kernel)
+        count = f"{len(self._compiled)} of at most {KERNEL_TIMES.functions}"
         if self._moving:
-            advance(f"compiling {kernel} (first run only)", 0.0)
-        elif not self._compiles:
-            self.say("Compiling kernels; later runs load them from the cache")
-        self._compiles = True
+            advance(f"compiling function {count}, {kernel} (first run only)", 0.0)
+        elif perf_counter() - self._compiled_said >= _BETWEEN_LINES:
+            self._compiled_said = perf_counter()
+            self.say(f"Compiling function {count}; later runs load them from the cache")
 
     @contextmanager
     def _bar(self, name: str) -> Iterator[Progress]:
