@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -123,7 +124,7 @@ def verify_run(
     from coop_drake.answers.log import SimulationLog
     from coop_drake.answers.plan_file import load_plan
     from coop_drake.plant import planning_problem, run_setup
-    from coop_drake.verification import Verified, verify_plan
+    from coop_drake.verification import verify_plan
     from coop_drake.verification.runs import verify_log
 
     log = log if isinstance(log, SimulationLog) else SimulationLog.load(log)
@@ -131,7 +132,7 @@ def verify_run(
     problem = planning_problem(scenario)
     of_plan = verify_plan(plan, problem, scenario.gain_sets, progress)
     verified = verify_log(log, plan, problem, run_setup(scenario), progress)
-    return Verified(verified.answer, verified.subject, (*of_plan.checks, *verified.checks))
+    return replace(verified, checks=(*of_plan.checks, *verified.checks))
 
 
 def why(question: Scenario | PlanningProblem, *, progress: Progress | None = None) -> Diagnosis:

@@ -155,10 +155,12 @@ class Reporter:
         """Show a line of text, with rich's markup."""
         self._console.print(text, soft_wrap=True)
 
-    def table(self, title: str, rows: Sequence[tuple[str, ...]], headings: Sequence[str] = ("",)) -> None:
-        """Show a table: of every row the label, then one value for each of the headings."""
+    def table(
+        self, title: str, rows: Sequence[tuple[str, ...]], headings: Sequence[str] = ("",), first: str = ""
+    ) -> None:
+        """Show a table: of every row the label, under the first heading, then a value for each other one."""
         table = Table(title=title, title_justify="left", show_header=any(headings))
-        table.add_column(style="bold")
+        table.add_column(first, style="bold")
         for heading in headings:
             table.add_column(heading, justify="right")
         for row in rows:

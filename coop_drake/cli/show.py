@@ -12,6 +12,7 @@ from coop_drake.cli.options import Quiet, ScenarioPath, out_file
 from coop_drake.cli.reporter import reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.simulate import read_plan
+from coop_drake.cli.summary import summary_rows
 from coop_drake.cli.task import read_task
 
 _PICTURES = (".png", ".svg")
@@ -40,4 +41,6 @@ def show_command(
         path = out or ResultFolder.of(task.name, None).path / "show.png"
         with house_style():
             save_figure(overview_figure(task.problem, found, f"{caption}."), path)
+        if found is not None:
+            reporter.table(task.name, summary_rows(reporter.facts))
         reporter.say(f"The picture is {escape(str(path))}")

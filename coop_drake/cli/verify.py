@@ -72,17 +72,21 @@ def _verify(certificate: Path, plan: Path | None, task: Task, reporter: Reporter
         answer=verified.answer,
         subject=verified.subject,
         checks=[vars(check) for check in verified.checks],
+        proved=verified.proved,
+        not_proved=verified.not_proved,
     )
-    reporter.table(task.name, [_row(check) for check in verified.checks])
+    headings = ("times", "closest to refusal")
+    reporter.table(task.name, [_row(check) for check in verified.checks], headings, "checked")
     reporter.say(f"[bold]valid, {verified.answer}[/]: {escape(verified.subject)}")
     if certificate.suffix != ".npz":
         from coop_drake.verification.question import TRUSTED
 
         reporter.facts["trusted"] = list(TRUSTED)
         reporter.say(escape("To be trusted: " + "; ".join(TRUSTED)))
+    reporter.say(escape(f"Proved: {verified.proved}. Not proved: {verified.not_proved}"))
     return ExitCode.DONE
 
 
-def _row(check: Check) -> tuple[str, str]:
-    tightest = "" if check.tightest is None else f", {check.tightest:.3g} {check.unit}"
-    return check.name, f"{check.count} check{'s' if check.count != 1 else ''}{tightest}"
+def _row(check: Check) -> tuple[str, str, str]:
+    tightest = "" if check.tightest is None else f"{check.tightest:.3g} {check.unit}"
+    return check.name, str(check.count), tightest

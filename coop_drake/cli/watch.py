@@ -10,9 +10,11 @@ import typer
 from rich.markup import escape
 
 from coop_drake.cli.options import Machine, Quiet, ScenarioPath
+from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.task import read_task
+from coop_drake.cli.summary import summary_rows
+from coop_drake.cli.task import Task, read_task
 
 if TYPE_CHECKING:
     from coop_drake.answers import PlanningProblem
@@ -71,6 +73,16 @@ def watch_command(
         task = read_task(scenario)
         folder = ResultFolder.of(task.name, output, "search", below="think")
         reporter.code = _watch(task.problem, folder, frames, strategy, margin, reporter)
+        if reporter.code is ExitCode.DONE:
+            _show_plan(task, strategy, reporter)
+
+
+def _show_plan(task: Task, strategy: str, reporter: Reporter) -> None:
+    """Show the rows that `plan` shows; a search that was watched alone has other cells."""
+    if strategy != "portfolio":
+        reporter.say("These cells are of this search alone; the plan is made of others: --strategy portfolio")
+    elif plan_of(task, None, reporter):
+        reporter.table(task.name, summary_rows(reporter.facts))
 
 
 def _watch(

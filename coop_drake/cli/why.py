@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from time import process_time
+from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
 from coop_drake.cli.options import Machine, PictureFolder, Quiet, ScenarioPath
-from coop_drake.cli.reporter import ExitCode, reporting
+from coop_drake.cli.plan import plan_of
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.task import read_task
+from coop_drake.cli.summary import summary_rows
+from coop_drake.cli.task import Task, read_task
+
+if TYPE_CHECKING:
+    from coop_drake.diagnosis import Diagnosis
 
 
 def why_command(
@@ -20,8 +26,7 @@ def why_command(
 ) -> None:
     """Say why there is no plan: what blocks, where, how much is missing, and what would help."""
     with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.diagnosis import diagnose, diagnosis_figure, facts_of, rows_of, sentences_of
-        from coop_drake.drawing import house_style, save_figure
+        from coop_drake.diagnosis import Answer, diagnose, facts_of
 
         task = read_task(scenario)
         folder, before = ResultFolder.of(task.name, out, "diagnosis"), process_time()
@@ -29,14 +34,31 @@ def why_command(
             diagnosis = diagnose(task.problem, progress)
         reporter.facts.update(facts_of(diagnosis), diagnosis_cpu_seconds=round(process_time() - before, 4))
         folder.begin("diagnosis")
-        with house_style():
-            figure = diagnosis_figure(task.problem, diagnosis)
-            if figure is not None:
-                for name in ("why.png", "why.svg"):
-                    save_figure(figure, folder.path / name)
-        reporter.table(task.name, rows_of(diagnosis))
-        for sentence in sentences_of(diagnosis):
-            reporter.say(escape(sentence))
+        if diagnosis.answer is Answer.FOUND:
+            _show_plan(task, reporter)
+        else:
+            _show_diagnosis(diagnosis, task, folder, reporter)
+            reporter.code = ExitCode.of(diagnosis.answer.value)
+
+
+def _show_plan(task: Task, reporter: Reporter) -> None:
+    """Show the rows that `plan` shows: a channel was found, of which a plan is made."""
+    if plan_of(task, None, reporter):
+        reporter.table(task.name, summary_rows(reporter.facts))
+        reporter.say("Nothing blocks: there is a plan")
+
+
+def _show_diagnosis(diagnosis: Diagnosis, task: Task, folder: ResultFolder, reporter: Reporter) -> None:
+    from coop_drake.diagnosis import diagnosis_figure, rows_of, sentences_of
+    from coop_drake.drawing import house_style, save_figure
+
+    with house_style():
+        figure = diagnosis_figure(task.problem, diagnosis)
         if figure is not None:
-            reporter.say(f"The picture is {escape(str(folder.path / 'why.png'))}")
-        reporter.code = ExitCode.of(diagnosis.answer.value)
+            for name in ("why.png", "why.svg"):
+                save_figure(figure, folder.path / name)
+    reporter.table(task.name, rows_of(diagnosis))
+    for sentence in sentences_of(diagnosis):
+        reporter.say(escape(sentence))
+    if figure is not None:
+        reporter.say(f"The picture is {escape(str(folder.path / 'why.png'))}")

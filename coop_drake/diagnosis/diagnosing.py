@@ -45,7 +45,7 @@ def diagnose(problem: PlanningProblem, progress: Progress | None = None) -> Diag
     """
     answer, report = find_channel(problem, progress)
     if isinstance(answer, Channel):
-        return Diagnosis(Answer.FOUND, "", margin=answer.margin, slices=report.slices)
+        return Diagnosis(Answer.FOUND, "", slices=report.slices)
     planner = BudgetedPlanner(SLICES, TOTAL, progress)
     known = Answer.INFEASIBLE if answer.proved else Answer.UNDECIDED
     made = Diagnosis(known, answer.reason, mixed=answer.mixed)

@@ -59,7 +59,6 @@ class Diagnosis:
     Attributes:
         answer: What the planner answers to the problem as it is.
         reason: Its reason in a sentence, empty if it found a channel.
-        margin: Margin of the channel found, None if none was [m].
         passages: What blocks every path, None if nothing does or the goal itself is blocked.
         goal: What blocks the goal, None if nothing does.
         relaxations: Changes to the team that were tried.
@@ -69,7 +68,6 @@ class Diagnosis:
 
     answer: Answer
     reason: str
-    margin: float | None = None
     passages: PassageFindings | None = None
     goal: BlockedPose | None = None
     relaxations: tuple[Relaxation, ...] = ()

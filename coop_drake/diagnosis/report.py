@@ -21,7 +21,7 @@ Row = tuple[str, str]
 def sentences_of(diagnosis: Diagnosis) -> list[str]:
     """The findings in sentences; they say what is proved and what was merely found."""
     if diagnosis.answer is Answer.FOUND:
-        return [f"Feasible: a channel was found that keeps {diagnosis.margin:.3f} m from the walls."]
+        return ["Feasible: a channel was found."]
     known = "Infeasible, proved" if diagnosis.answer is Answer.INFEASIBLE else "Undecided"
     sentences = [f"{known}: {diagnosis.reason}."]
     if diagnosis.mixed:
@@ -96,8 +96,6 @@ def _goal_sentences(goal: BlockedPose) -> list[str]:
 def rows_of(diagnosis: Diagnosis) -> list[Row]:
     """Label and value of every row of the table of findings, which the command `why` shows."""
     rows = [("answer", diagnosis.answer.value)]
-    if diagnosis.margin is not None:
-        rows.append(("margin kept", f"{diagnosis.margin:.3f} m"))
     findings = diagnosis.passages
     for number, passage in enumerate(findings.passages if findings is not None else (), start=1):
         proved = "unknown" if passage.refuted is None else f"{2.0 * passage.refuted:.3f}"
@@ -138,7 +136,6 @@ def facts_of(diagnosis: Diagnosis) -> dict[str, Any]:
         "answer": diagnosis.answer.value,
         "reason": diagnosis.reason,
         "slices": diagnosis.slices,
-        "margin_m": diagnosis.margin,
         "sentences": sentences_of(diagnosis),
     }
     findings, goal = diagnosis.passages, diagnosis.goal

@@ -30,8 +30,12 @@ class Verified:
         answer: ``found`` or ``infeasible``.
         subject: What was verified, in words.
         checks: The statements that were checked.
+        proved: What these prove together, in a sentence.
+        not_proved: What they do not prove, in words.
     """
 
     answer: str
     subject: str
     checks: tuple[Check, ...]
+    proved: str
+    not_proved: str

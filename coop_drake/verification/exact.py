@@ -48,7 +48,22 @@ def verify_plan(
         if further is not None
     ]
     checks += check_position(plan, problem.position_tolerance)
-    return Verified("found", f"plan of {len(plan.cells)} cells", tuple(checks))
+    return Verified(
+        "found",
+        f"plan of {len(plan.cells)} cells",
+        tuple(checks),
+        "no body touches a wall or another body in any state of the cells, which lead from start to goal",
+        f"{_unproved_of_control(plan)}; the estimated times; that the robots are as in their models",
+    )
+
+
+def _unproved_of_control(plan: Plan) -> str:
+    """What a plan's checks leave open of whether a team stays in its cells."""
+    if plan.budget is None:
+        return "that a team stays in the cells (verify the log of its run, or plan with --budget)"
+    if plan.budget.axes:
+        return "that a team that departs by more than the plan's budget stays in the cells"
+    return "that angles and joints stay in the cells, nor what departs by more than the plan's budget"
 
 
 def verify_proof(
@@ -72,7 +87,13 @@ def verify_proof(
     names = [body.name for c in problem.tree.components for body in c.bodies for _ in body.shapes]
     bodies = ", ".join(dict.fromkeys(names[number] for number in sorted(pieces)))
     subject = f"there is no plan, by {len(proof.slices)} slices about {bodies}"
-    return Verified("infeasible", subject, checks)
+    return Verified(
+        "infeasible",
+        subject,
+        checks,
+        "no motion leads from the start to the goal pose",
+        "that none leads to one within its tolerances; that the robots are as in their models",
+    )
 
 
 def _silent(phase: str, share: float) -> None:

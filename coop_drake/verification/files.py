@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from coop_drake.answers import plan_file, proof_file
@@ -49,7 +50,7 @@ def verify_file(
         unaltered = _check_unaltered(document)
         check_digest(saved.problem, problem)
         verified = verify_proof(saved.proof, problem, progress)
-    return Verified(verified.answer, verified.subject, (unaltered, *verified.checks))
+    return replace(verified, checks=(unaltered, *verified.checks))
 
 
 def _check_unaltered(document: Document) -> Check:

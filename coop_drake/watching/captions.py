@@ -42,6 +42,8 @@ def counters(state: SearchState) -> str:
 
 def _verdict(recording: SearchRecording, state: SearchState) -> str:
     """Return how the search ended."""
+    if state.verdict == Verdict.FOUND.value and state.question == BOXES:
+        return f"Found: {len(state.channel)} boxes join start and goal, which the plan is made of"
     if state.verdict == Verdict.FOUND.value:
         return f"Found: {len(state.channel)} free cells join start and goal"
     if state.verdict == Verdict.INFEASIBLE.value:

@@ -14,6 +14,12 @@ def invoke(*arguments):
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
+def told_by(path, folder):
+    """Commands that report the same plan of a scenario."""
+    watch = ("watch", path, "--strategy", "portfolio", "--frames", 2, "--output", folder / "think")
+    return ("plan", path, "--out", folder / "plan"), ("why", path, "--out", folder / "why"), watch
+
+
 @pytest.fixture
 def blocked(tmp_path):
     """A goal at which a hand just fits before the wall, but not the base behind it."""
@@ -41,7 +47,10 @@ def test_a_feasible_scenario_is_said_to_be_so_and_an_older_picture_goes(tmp_path
     (out / "why.png").write_bytes(b"of an older diagnosis")
     result = invoke("why", path, "--out", out)
     assert result.exit_code == 0, result.output
-    assert "Feasible" in result.output
+    assert "Nothing blocks: there is a plan" in result.output
+    rows = [json.loads(invoke(*command, "--json").stdout) for command in told_by(path, tmp_path)]
+    for name in ("answer", "cells", "narrowest_neck_m", "estimated_seconds"):
+        assert len({facts[name] for facts in rows}) == 1, name
     assert [path.name for path in out.iterdir()] == [".coop_drake_results.json"]
 
 

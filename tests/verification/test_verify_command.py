@@ -42,6 +42,8 @@ def test_both_answers_are_verified(planned, number, answer):
     assert {"name", "count", "tightest", "unit"} == facts["checks"][0].keys()
     shown = invoke("verify", file, scenario)
     assert f"valid, {answer}: {facts['subject']}" in " ".join(shown.stdout.split())
+    assert all(heading in shown.stdout for heading in ("checked", "times", "closest to refusal"))
+    assert shown.stdout.splitlines()[-1] == f"Proved: {facts['proved']}. Not proved: {facts['not_proved']}"
     assert invoke("verify", file, scenario, "--quiet").output == ""
 
 
