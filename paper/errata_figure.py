@@ -1,4 +1,4 @@
-"""The figure of eight errata: results of formulas as printed (red) and as corrected (blue)."""
+"""The figure of eight errata: results of formulas as printed (orange) and as corrected (blue)."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ def write_errata_figure(folder: Path) -> Path:
 
 
 def errata_figure() -> Figure:
-    """Draw eight errata: red as printed, blue as corrected."""
+    """Draw eight errata: orange as printed, blue as corrected."""
     caption = (
-        "Errata. Red as the paper prints it, blue as corrected. Above, the position: the spring's energy "
+        "Errata. Orange as the paper prints it, blue as corrected. Above, the position: the spring's energy "
         "(E15a), the wall that the goal's boundary would be (E15b), a hand-over to a cell 30 cm wide (E10), "
         "and the torque that two robots give together (E21). Below, an angle in its funnel: bounds (E17a), "
         "the acceleration on entering (E17b), the log term towards a goal (E18), the log that should "

@@ -13,6 +13,7 @@ class Agreement(Enum):
 
     AGREES = "agrees"
     DIFFERS = "differs"
+    COPIED = "copied from the paper"
     NO_FIGURE = "no number stated"
 
 
@@ -25,19 +26,24 @@ class Statement:
         ours: What we found: one text for all runs, or one for each.
         agrees: Whether it agrees, as computed; None where the paper gives nothing to compare with.
         because: Errata and assumptions that explain the figure, by id.
+        copied: Whether ours is a value that we took over from the paper, so that it says nothing about our
+            results that both are the same.
     """
 
     paper: str
     ours: tuple[str, ...]
     agrees: bool | None
     because: tuple[str, ...] = ()
+    copied: bool = False
 
     @property
     def agreement(self) -> Agreement:
         """Whether the statement agrees, for the reader."""
         if self.agrees is None:
             return Agreement.NO_FIGURE
-        return Agreement.AGREES if self.agrees else Agreement.DIFFERS
+        if not self.agrees:
+            return Agreement.DIFFERS
+        return Agreement.COPIED if self.copied else Agreement.AGREES
 
 
 @dataclass(frozen=True)
@@ -75,9 +81,9 @@ class Exhibit:
 
     @property
     def agreement(self) -> Agreement:
-        """Differs if any statement differs; agrees if any agrees and none differs."""
+        """Differs if any statement differs; agrees if any agrees and none differs; else copied if any is."""
         agreements = {statement.agreement for statement in self.statements}
-        for agreement in (Agreement.DIFFERS, Agreement.AGREES):
+        for agreement in (Agreement.DIFFERS, Agreement.AGREES, Agreement.COPIED):
             if agreement in agreements:
                 return agreement
         return Agreement.NO_FIGURE

@@ -59,17 +59,20 @@ def end_statements(problem: PlanningProblem) -> tuple[Statement, ...]:
             (f"{len(robots)} robots, {len(problem.tree.joints)} joints",),
             len(robots) == 2 == len(problem.tree.joints),
             ("R2",),
+            copied=True,
         ),
         Statement(
             f"The start is {_listed(START)}: x, y, θ and both joints.",
             (_listed(problem.start),),
             bool(np.array_equal(problem.start, START)),
+            copied=True,
         ),
         Statement(
             f"The goal is {_listed(GOAL)}: x, y and θ.",
             (_listed(problem.goal_pose),),
             bool(np.array_equal(problem.goal_pose, GOAL)),
             ("R4",),
+            copied=True,
         ),
     )
 
@@ -108,9 +111,9 @@ def path_statements(problem: PlanningProblem, runs: Sequence[Run]) -> tuple[Stat
             min(bodies) > 0.0,
         ),
         Statement(
-            "The way leads through narrow places and through wide ones.",
-            tuple(f"no room to turn the straight team on {share:.0%} of it" for share in narrow),
-            all(0.0 < share < 1.0 for share in narrow),
+            "part of the way on which the straight team has no room to turn",
+            tuple(f"{share:.0%}" for share in narrow),
+            None,
             ("R1", "R2"),
         ),
         Statement(

@@ -58,7 +58,7 @@ def _tables(material: Material) -> tuple[Exhibit, ...]:
         Exhibit(
             "Table 2",
             "parameters of the simulation",
-            "Mass and inertia of the object, and the gains. The gain set table_2 has them.",
+            "Mass and inertia of the object, and the gains. We copied them into the gain set table_2.",
             parameter_statements(material.table_2, material.inertia),
             (),
             ("table_2.md",),
@@ -78,14 +78,15 @@ def _floor_figures(material: Material) -> tuple[Exhibit, ...]:
         Exhibit(
             "Figure 4",
             "start and goal",
-            "The workspace with the team at the beginning and at the end.",
+            "The floor with the team at the start and at the goal, which are copied; the floor is ours.",
             end_statements(material.problem),
             (Picture(f"{material.runs[0].gains}/fig04_start_and_goal.png"),),
         ),
         Exhibit(
             "Figure 5",
             "the way over the floor",
-            "The object's path as a blue line, and footprints of the team along it.",
+            "The paper draws the object's path and footprints of the team along it. Ours: the path black, "
+            "the object brown, every robot in a colour of its own.",
             path_statements(material.problem, material.runs),
             _both("fig05_path"),
         ),

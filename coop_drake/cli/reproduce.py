@@ -1,4 +1,4 @@
-"""The command reproduce: the paper's tables and figures from our runs, beside what it states."""
+"""The command reproduce: our runs of the paper's example, beside the numbers that the paper states."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def reproduce_command(
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make the paper's Tables 1-2 and Figures 3-13 from our runs, beside what the paper states."""
+    """Run the paper's example, draw what its Tables 1-2 and Figures 3-13 show, compare with its numbers."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         reporter.code = _reproduce(scenario, out, reporter)
 

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from coop_drake.drawing.colours import INK
 from coop_drake.laws import FixedGains
 from coop_drake.plant.team import ObjectInertia
+from coop_drake.viz import path_figure
 from paper import Agreement, GainFigures, Material, exhibits, pages, write_report
 from paper.approximation import approximations, two_components
 from paper.background import ASSUMPTIONS, ERRATA
@@ -58,9 +60,29 @@ def test_every_table_and_figure_of_the_example_has_its_exhibit(material):
     figures_of_the_example = [f"Figure {number}" for number in range(3, 14)]
     assert list(found) == ["Table 1", "Table 1, played", "Table 2", *figures_of_the_example]
     assert found["Table 1"].agreement is Agreement.DIFFERS  # Five synthetic cells are not thirty.
-    assert {found[name].agreement for name in ("Table 2", "Figure 3", "Figure 4", "Figure 7")} == {
-        Agreement.AGREES
-    }
+    assert {found[name].agreement for name in ("Figure 3", "Figure 5", "Figure 7")} == {Agreement.AGREES}
+
+
+def test_inputs_that_were_copied_do_not_count_as_agreement(material):
+    found = judged(material)
+    assert {found[name].agreement for name in ("Table 2", "Figure 4")} == {Agreement.COPIED}
+    moved = replace(material.problem, start=material.problem.start + 0.1)
+    assert judged(replace(material, problem=moved))["Figure 4"].agreement is Agreement.DIFFERS
+
+
+def test_other_numbers_than_the_paper_s_differ(material):
+    """A plan of five cells agrees neither in how many need a bent arm nor in how far neighbours overlap."""
+    differing = {statement.paper for statement in judged(material)["Table 1"].differing}
+    assert "In 21 of 30 cells an arm must be bent, in the others both may be straight." in differing
+    assert "Their smallest overlap is 0.041 rad." in differing
+    assert not any(paper.startswith("Neighbouring cells overlap") for paper in differing)
+
+
+def test_the_colours_that_the_caption_of_figure_5_names_are_drawn(material):
+    assert "path black" in judged(material)["Figure 5"].caption
+    log = material.runs[0].log
+    (axes,) = path_figure(material.problem.workspace, material.problem.tree, log).axes
+    assert axes.lines[0].get_color() == INK
 
 
 def test_a_gain_or_mass_that_is_not_the_paper_s_differs(material):
