@@ -29,6 +29,7 @@ from coop_drake.cli.floor_plan import floor_plan_command
 from coop_drake.cli.kernel_cache import keep_kernels_somewhere
 from coop_drake.cli.maps import maps_command
 from coop_drake.cli.new import new_command
+from coop_drake.cli.object import object_command
 from coop_drake.cli.plan import plan_command
 from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.reproduce import reproduce_command
@@ -55,6 +56,7 @@ _PANELS: dict[str, dict[str, Callable[..., None]]] = {
         "new": new_command,
         "floor-plan": floor_plan_command,
         "robot": robot_command,
+        "object": object_command,
         "show": show_command,
         "schema": schema_command,
     },

@@ -58,10 +58,20 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("new hall --floor-plan hall.svg --unit cm --start 1 2 0 --goal 7 2 1.57", "on a floor of your own"),
     ),
     "robot": (
-        ("robot stretch4.urdf --out models/stretch4", "model and meshes in one folder, joints judged"),
+        (
+            "robot stretch4.urdf --gripper link_grasp_center --out models/stretch4",
+            "model and meshes in one folder with a gripper frame, joints judged, lines for a scenario",
+        ),
         (
             "robot pr2.urdf --package pr2_description=../pr2 --fix r_elbow_flex_joint=-0.3 --out models",
             "with a package's folder, and the axes behind a joint that will be fixed",
+        ),
+    ),
+    "object": (
+        (
+            "object ell --corners '-0.4 -0.25, 0.4 -0.25, 0.4 0, -0.1 0, -0.1 0.25, -0.4 0.25' "
+            "--mass 2 --grasps '0.4 -0.125 0, -0.4 0 3.1415926536'",
+            "an L with two grasps, into ell.sdf and a mesh for each convex part",
         ),
     ),
     "bench": (

@@ -26,6 +26,14 @@ def robot_command(
         list[str] | None,
         typer.Option("--fix", metavar="JOINT=VALUE", help="Show the others' axes with this joint there."),
     ] = None,
+    gripper: Annotated[
+        str | None,
+        typer.Option(
+            "--gripper",
+            metavar="LINK",
+            help="Add the gripper frame at this link's origin, upright, x pointing back to the base.",
+        ),
+    ] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace a model that is there already.")] = False,
     machine: Machine = False,
     quiet: Quiet = False,
@@ -34,7 +42,7 @@ def robot_command(
     packages = {name: Path(folder) for name, folder in _pairs(package, "--package")}
     values = {name: _number(value) for name, value in _pairs(fix, "--fix")}
     with reporting(machine=machine, quiet=quiet) as reporter:
-        reporter.code = _import(model, out, packages, values, reporter, force=force)
+        reporter.code = _import(model, out, packages, values, gripper, reporter, force=force)
 
 
 def _pairs(words: list[str] | None, option: str) -> list[tuple[str, str]]:
@@ -59,12 +67,14 @@ def _import(
     out: Path,
     packages: dict[str, Path],
     values: dict[str, float],
+    gripper: str | None,
     reporter: Reporter,
     *,
     force: bool,
 ) -> ExitCode:
     from coop_drake.errors import ScenarioError
     from coop_drake.files import write_atomically
+    from coop_drake.plant.gripper_frame import GRIPPER, has_gripper, scenario_lines, with_gripper
     from coop_drake.plant.importing import import_robot
     from coop_drake.plant.joint_survey import survey_joints
 
@@ -76,15 +86,25 @@ def _import(
     for name, content in robot.files.items():
         write_atomically(out / name, content)
     joints = survey_joints(target, values)
+    if gripper is not None:
+        rest = {joint.name: joint.rest for joint in joints if joint.axis and joint.verdict != "planar"}
+        write_atomically(target, with_gripper(target, gripper, rest))
+    frame = GRIPPER if has_gripper(target) else "LINK"
+    lines = scenario_lines(target, joints, frame)
     reporter.facts.update(
         model=str(target),
         notes=list(robot.notes),
         joints={joint.name: joint.verdict for joint in joints},
+        scenario_lines=lines,
     )
     reporter.table(f"{model.name}: joints", [(joint.name, _words(joint)) for joint in joints])
     for note in robot.notes:
         reporter.say(f"Note: {escape(note)}")
-    reporter.say(f"The model is {escape(str(target))}")
+    reporter.say(
+        f"The model is {escape(str(target))}; a scenario uses it with these lines:\n\n{escape(lines)}"
+    )
+    if frame != GRIPPER:
+        reporter.say(f"LINK: a link or frame of the model; --gripper LINK adds a frame {GRIPPER} there")
     return ExitCode.DONE
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Joint
+from pydrake.systems.framework import Context
 
 from coop_drake.errors import ScenarioError
 from coop_drake.plant.chain import limits_of
@@ -28,6 +29,7 @@ class SurveyedJoint:
         axis: In the base's frame, as text.
         limits: As text [rad or m].
         verdict: ``planar``, ``fix it`` for what leaves the plane, or ``fixed`` where a value was given.
+        rest: The value that was given, or else the one between the limits that is nearest to zero [rad or m].
     """
 
     name: str
@@ -35,6 +37,7 @@ class SurveyedJoint:
     axis: str
     limits: str
     verdict: str
+    rest: float = 0.0
 
 
 def survey_joints(path: Path, values: Mapping[str, float] | None = None) -> tuple[SurveyedJoint, ...]:
@@ -45,7 +48,16 @@ def survey_joints(path: Path, values: Mapping[str, float] | None = None) -> tupl
     Raises:
         ScenarioError: Drake cannot read the model, or a value is for no joint of it.
     """
-    values = dict(values or {})
+    plant, context = plant_at(path, values or {})
+    return tuple(_judged(joint, context, joint.name() in (values or {})) for joint in _movable(plant))
+
+
+def plant_at(path: Path, values: Mapping[str, float]) -> tuple[MultibodyPlant, Context]:
+    """Parse a model that stands alone, and place some of its joints, by name [rad or m].
+
+    Raises:
+        ScenarioError: Drake cannot read the model, or a value is for no joint of it.
+    """
     plant = MultibodyPlant(0.0)
     try:
         Parser(plant).AddModels(str(path))
@@ -53,9 +65,8 @@ def survey_joints(path: Path, values: Mapping[str, float] | None = None) -> tupl
     except RuntimeError as error:
         message = " ".join(str(error).split())
         raise ScenarioError(str(path), "the model", path.name, f"what Drake can read ({message})") from error
-    joints = [joint for joint in joints_of(plant) if joint.type_name() not in ("weld", "quaternion_floating")]
     context = plant.CreateDefaultContext()
-    known = {joint.name(): joint for joint in joints}
+    known = {joint.name(): joint for joint in _movable(plant)}
     for name, value in values.items():
         if name not in known or known[name].num_positions() != 1:
             movable = ", ".join(known) or "none"
@@ -63,10 +74,14 @@ def survey_joints(path: Path, values: Mapping[str, float] | None = None) -> tupl
         positions = plant.GetPositions(context)
         positions[known[name].position_start()] = value
         plant.SetPositions(context, positions)
-    return tuple(_judged(joint, context, joint.name() in values) for joint in joints)
+    return plant, context
 
 
-def _judged(joint: Joint, context: object, fixed: bool) -> SurveyedJoint:
+def _movable(plant: MultibodyPlant) -> list[Joint]:
+    return [joint for joint in joints_of(plant) if joint.type_name() not in ("weld", "quaternion_floating")]
+
+
+def _judged(joint: Joint, context: Context, fixed: bool) -> SurveyedJoint:
     kind = str(joint.type_name())
     if kind not in ("revolute", "prismatic"):
         return SurveyedJoint(joint.name(), kind, "", "", "fixed" if fixed else "fix it")
@@ -80,4 +95,5 @@ def _judged(joint: Joint, context: object, fixed: bool) -> SurveyedJoint:
         "(" + ", ".join(f"{value + 0.0:.3g}" for value in np.round(axis, 6)) + ")",
         f"{lower:.4g} to {upper:.4g}",
         "fixed" if fixed else "planar" if planar and not endless else "fix it",
+        float(joint.GetOnePosition(context)) if fixed else min(max(0.0, lower), upper),
     )

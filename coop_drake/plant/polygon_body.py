@@ -1,8 +1,7 @@
-"""Writes models of polygonal bodies, convex or not: ``python -m coop_drake.plant.polygon_body --help``."""
+"""Writes models of polygonal bodies, convex or not."""
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -177,45 +176,3 @@ def _shape(kind: str, mesh: str, index: int) -> str:
         f"            <uri>{mesh}</uri>\n{declared}          </mesh>\n        </geometry>\n"
         f"{colour if kind == 'visual' else ''}      </{kind}>\n"
     )
-
-
-def main(arguments: Sequence[str] | None = None) -> Path:
-    """Write a polygonal body from the command line."""
-    parser = argparse.ArgumentParser(
-        prog="python -m coop_drake.plant.polygon_body", description="Write the model of a polygonal body."
-    )
-    parser.add_argument("vertices", help="corners in metres, as one text: 'X Y, X Y, X Y'")
-    parser.add_argument("--mass", type=float, required=True, help="kg")
-    parser.add_argument("--name", required=True, help="name of the model and of its files")
-    parser.add_argument("--height", type=float, default=0.2, help="m")
-    parser.add_argument("--inertia", type=float, help="about the vertical through the centre of mass, kg m^2")
-    parser.add_argument("--elevation", type=float, default=0.4, help="height of the body's middle, m")
-    parser.add_argument("--grasps", default="", help="grasp frames in m and rad: 'X Y FACING, X Y FACING'")
-    parser.add_argument("--out", type=Path, default=Path(), help="directory")
-    given = parser.parse_args(arguments)
-    try:
-        files = polygon_body_files(
-            _rows(given.vertices, 2),
-            given.mass,
-            given.name,
-            given.height,
-            inertia=given.inertia,
-            elevation=given.elevation,
-            grasps=_rows(given.grasps, 3),
-        )
-    except (GeometryError, ValueError) as error:
-        parser.error(str(error))
-    return write_polygon_body(files, given.out)
-
-
-def _rows(text: str, count: int) -> list[list[float]]:
-    """Parse rows of numbers: commas between rows, spaces between numbers."""
-    rows = [[float(number) for number in row.split()] for row in text.split(",") if row.strip()]
-    for row in rows:
-        if len(row) != count:
-            raise ValueError(f"{row} should be {count} numbers; write commas between rows, spaces inside")
-    return rows
-
-
-if __name__ == "__main__":
-    print(main())

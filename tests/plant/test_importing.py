@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
+import yaml
 from shapely import Point, Polygon
 from typer.testing import CliRunner
 
@@ -35,6 +39,23 @@ ROBOT = """<robot name="maker">
   <origin xyz="0.4 0 0" rpy="0 0 3.14159"/></joint>
 <transmission name="drive"/><gazebo/>
 </robot>"""
+
+
+SDF = """<sdf version="1.9"><model name="maker">
+  <link name="base"><collision name="disc"><geometry><cylinder>
+    <radius>0.25</radius><length>0.3</length></cylinder></geometry></collision></link>
+  <link name="arm"><pose>0.3 0 0.5 0 0 0</pose><collision name="bar"><geometry><box>
+    <size>0.1 0.1 0.1</size></box></geometry></collision></link>
+  <joint name="turn" type="revolute"><parent>base</parent><child>arm</child>
+    <axis><xyz>0 0 1</xyz><limit><lower>-1</lower><upper>1</upper></limit></axis></joint>
+</model></sdf>"""
+
+
+def model_of(kind, maker, folder):
+    """The robot of the maker, or a simpler one in SDF whose arm begins at the same place."""
+    path = folder / "simple.sdf"
+    path.write_text(SDF)
+    return maker if kind == "urdf" else path
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +105,44 @@ def test_it_becomes_one_folder_that_a_team_can_be_built_of(maker, tmp_path):
     names = {body.name for component in tree.components for body in component.bodies}
     assert "robot_0::wheel" not in names  # Its shadow lies within the base's.
     assert "robot_0::arm" in names
+
+
+@pytest.mark.parametrize("kind", ["urdf", "sdf"])
+def test_the_gripper_frame_and_the_lines_for_a_scenario_make_a_team(maker, tmp_path, kind):
+    done = CliRunner().invoke(
+        app,
+        [
+            "robot",
+            str(model_of(kind, maker, tmp_path)),
+            "--gripper",
+            "arm",
+            "--out",
+            str(tmp_path / "mine"),
+            "--json",
+        ],
+    )
+    assert done.exit_code == 0, done.output
+    lines = yaml.safe_load(json.loads(done.stdout)["scenario_lines"])
+    model, weld = lines["directives"]
+    assert weld == {"add_weld": {"parent": "object::grasp_0", "child": "robot_0::gripper"}}
+    file = Path(model["add_model"]["file"]).relative_to(tmp_path)
+    path = write_edited(
+        tmp_path,
+        ("package://coop_drake_models/long_blue.sdf", str(file)),
+        ("robot_0: [0.0]", f"robot_0: {lines['start']['joints']['robot_0']}"),
+    )
+    path.write_text(path.read_text() + yaml.safe_dump({"fixed_joints": lines.get("fixed_joints", {})}))
+    tree = read_task(path, None).problem.tree
+    base = next(b for c in tree.components for b in c.bodies if b.name == "robot_0::base")
+    corners = base.shapes[0].vertices
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    assert middle == pytest.approx([0.3, 0.0], abs=1e-3)  # Outside, seen from the grasp.
+
+
+def test_a_gripper_at_a_link_that_is_not_there_is_refused(maker, tmp_path):
+    done = CliRunner().invoke(app, ["robot", str(maker), "--gripper", "hand", "--out", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "a link of the model, one of base, wheel, mast, arm" in " ".join(done.output.split())
 
 
 def test_what_was_changed_is_said(maker):

@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import Polygon, union_all
+from typer.testing import CliRunner
 
+from coop_drake.cli import app
 from coop_drake.errors import GeometryError
 from coop_drake.plant import planning_problem
 from coop_drake.plant.convex_parts import convex_parts
 from coop_drake.plant.placement import core
 from coop_drake.plant.polygon_body import (
-    main,
     planar_mass,
     polygon_body_files,
     write_polygon_body,
@@ -116,27 +117,45 @@ def test_team_carries_a_non_convex_object(outline, tmp_path):
     assert team.robots[1].X_LE.x == pytest.approx(-0.5)
 
 
-def test_command_line_writes_the_same_files(tmp_path):
+def called(folder, *arguments):
+    return CliRunner().invoke(app, ["object", *arguments, "--out", str(folder)])
+
+
+def test_command_line_writes_the_same_files_and_replaces_none(tmp_path):
     corners = ", ".join(f"{x} {y}" for x, y in U_SHAPE)
-    arguments = [corners, "--mass", "2", "--name", "u", "--height", "0.3", "--grasps", "-0.5 0 3.14, 0.5 0 0"]
-    path = main([*arguments, "--out", str(tmp_path / "made")])
+    arguments = [
+        "u",
+        "--corners",
+        corners,
+        "--mass",
+        "2",
+        "--height",
+        "0.3",
+        "--grasps",
+        "-0.5 0 3.14, 0.5 0 0",
+    ]
+    done = called(tmp_path / "made", *arguments)
+    assert done.exit_code == 0, done.output
+    assert "- add_weld: {parent: object::grasp_1, child: robot_1::gripper}" in done.output
     expected = polygon_body_files(U_SHAPE, 2.0, "u", 0.3, grasps=[(-0.5, 0, 3.14), (0.5, 0, 0)])
-    assert path == tmp_path / "made" / "u.sdf"
-    assert {file.name: file.read_text() for file in path.parent.iterdir()} == expected
+    assert {file.name: file.read_text() for file in (tmp_path / "made").iterdir()} == expected
+    assert called(tmp_path / "made", *arguments).exit_code == 2
 
 
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["0 0, 1 0", "--mass", "1", "--name", "x"], "three or more corners"),
-        (["0 0, 1 0, 1", "--mass", "1", "--name", "x"], "should be 2 numbers"),
-        (["0 0, 1 0, 1 1", "--mass", "0", "--name", "x"], "mass must be a positive number, got 0.0"),
+        (["x", "--corners", "0 0, 1 0", "--mass", "1"], "three or more corners"),
+        (["x", "--corners", "0 0, 1 0, 1", "--mass", "1"], "should be 2 numbers"),
+        (["x", "--corners", "0 0, 1 0, one", "--mass", "1"], "could not convert"),
+        (["x", "--corners", "0 0, 1 0, 1 1", "--mass", "0"], "mass must be a positive number, got 0.0"),
+        (["../x", "--corners", "0 0, 1 0, 1 1", "--mass", "1"], "no name of letters"),
     ],
 )
-def test_command_line_says_what_is_wrong(arguments, complaint, tmp_path, capsys):
-    with pytest.raises(SystemExit):
-        main([*arguments, "--out", str(tmp_path)])
-    assert complaint in capsys.readouterr().err
+def test_command_line_says_what_is_wrong(arguments, complaint, tmp_path):
+    done = called(tmp_path, *arguments)
+    assert done.exit_code == 2
+    assert complaint in " ".join(done.output.replace("│", " ").split())
     assert list(tmp_path.iterdir()) == []
 
 
