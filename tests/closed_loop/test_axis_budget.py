@@ -1,0 +1,106 @@
+"""A team within a budget for angles and joints keeps, in Drake's loop, what the plan states about them."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from coop_drake.answers.budget import Budget
+from coop_drake.errors import RefusalError
+from coop_drake.laws import ScheduledGains
+from coop_drake.planning.planner import plan as make
+from coop_drake.plant import planning_problem, run_setup
+from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
+from coop_drake.simulation import build_maps, simulate
+from coop_drake.verification.budgets import check_budget
+from coop_drake.verification.runs import verify_log
+from coop_drake.verification.runs.handovers import check_handovers
+from coop_drake.verification.runs.readiness import rest_shares
+from coop_drake.verification.runs.rows import Rows
+from coop_drake.verification.runs.tube import check_budget_used
+from tests.support.run_checks import verified_run
+from tests.support.small_scenario import small_scenario
+
+DEVIATIONS = 4.5
+"""Bounds of noise over the standard deviations in the run: one sample in 150,000 is beyond, none here."""
+
+BUDGET = Budget(
+    control_rate=200.0, delay=0.01, lag=0.005, angle_noise=0.0005, rate_noise=0.01, position_noise=0.001,
+    velocity_noise=0.02, single_noise=1.5, model_error=0.1, acceleration_error=0.2, report_age=0.03,
+    base_force=300.0, moved_mass=8.5,
+)  # fmt: skip
+
+
+@cache
+def run():
+    scenario = small_scenario()
+    goal = replace(scenario.goal, joints={"robot_0": (0.4,), "robot_1": (-0.3,)})
+    noise = [bound / DEVIATIONS for bound in (BUDGET.position_noise, BUDGET.angle_noise, BUDGET.rate_noise)]
+    deployment = Deployment(
+        control_rate=BUDGET.control_rate,
+        mass_error=BUDGET.model_error,
+        measurements=Measurements(*noise, delay=BUDGET.delay),
+        actuators=ActuatorLimits(base_force=BUDGET.base_force, lag=BUDGET.lag),
+        messages=Messages(loss=0.2),
+    )
+    scenario = replace(scenario, goal=goal, limits={}, deployment=deployment)
+    gains = ScheduledGains().for_age(deployment.command_age)
+    scenario = replace(scenario, gains=replace(scenario.gains, sets={"scheduled": gains}))
+    plan = make(planning_problem(scenario), gains, gain_set_name="scheduled", budget=BUDGET).plan
+    return scenario, plan, simulate(scenario, plan, build_maps(plan), blocks="named")
+
+
+def test_the_run_arrives_and_is_accepted_within_its_budget():
+    scenario, plan, log = run()
+    assert plan.budget == BUDGET
+    assert check_budget(plan).count == len(plan.cells) * (1 + len(plan.joint_names))
+    assert (log.reached, log.violation) == (True, "")
+    checks = {check.name: check for check in verified_run(scenario, plan, log).checks}
+    assert 0.01 < checks["the object stayed in the tube of its budget"].tightest < 1.0
+    assert checks["axes kept the distances that the budget states"].tightest > 0.0
+
+
+def test_no_axis_used_more_than_what_is_stated_of_it():
+    """Distances to bounds and accelerations are within the sets of the plan, and these not far beyond."""
+    _, plan, log = run()
+    gaps = np.minimum(log.joints - log.funnel_lower[:, 1:], log.funnel_upper[:, 1:] - log.joints)
+    for k, transition in enumerate(plan.transitions):
+        members, stated = log.cell_index == k, transition.tolerance
+        assert (gaps[members].min(axis=0) >= stated.distance[1:]).all()
+        asked = np.abs(log.accelerations[members, 2:]).max(axis=0)
+        assert (asked <= stated.acceleration).all()
+        assert (asked > 0.2 * stated.acceleration).any()
+
+
+def test_cells_are_left_at_rest_and_one_that_is_left_unready_or_earlier_is_refused():
+    scenario, plan, log = run()
+    left = np.flatnonzero(np.diff(log.cell_index))
+    assert len(left) == len(plan.cells) - 1 > 0
+    for k, row in enumerate(left):
+        rates = np.concatenate((log.object_twist[row + 1, 2:], log.joint_rates[row + 1]))
+        axes = np.concatenate((log.object_pose[row + 1, 2:], log.joints[row + 1]))
+        assert rest_shares(plan, k, axes, rates).max() <= 1.0
+        assert (
+            log.transition_start[row + 1] - log.transition_start[row] >= plan.transitions[k].gains.rest.after
+        )
+    never = replace(log, ready_margins=np.where(log.cell_index[:, None] == 0, -0.1, log.ready_margins))
+    with pytest.raises(RefusalError, match="all before in cell 0 are negative, but the cell is left"):
+        verify_log(never, plan, planning_problem(scenario), run_setup(scenario))
+    cells = log.cell_index.copy()
+    cells[left[0] - 20 : left[0] + 1] += 1
+    with pytest.raises(RefusalError, match=r"transition_start\[\d+\]"):
+        check_handovers(Rows(replace(log, cell_index=cells), plan), exact=False)
+
+
+def test_a_log_with_an_axis_nearer_to_a_bound_than_stated_is_refused():
+    _, plan, log = run()
+    closest = replace(
+        plan,
+        transitions=tuple(
+            replace(one, tolerance=replace(one.tolerance, distance=one.tolerance.distance + 0.02))
+            for one in plan.transitions
+        ),
+    )
+    with pytest.raises(RefusalError, match="nearer to a bound than stated"):
+        check_budget_used(Rows(log, closest))
