@@ -24,8 +24,8 @@ from coop_drake.planning.execution.estimate import timed
 from coop_drake.tree.pose import FloatArray
 
 AGE_FACTORS = (1.0, 1.5)
-"""Gains are tried for so many times the age of the gain set's commands [-]: slow ones bear more delay, quick
-ones more noise and larger forces. All transitions have the same factor, so that K falls slowly."""
+"""Gains are tried for so many times the age of the gain set's commands [-]. Slow gains tolerate more delay,
+quick ones larger disturbances. One factor for all transitions keeps K from changing much between cells."""
 
 OVERLAPS = (0.02, 0.04, 0.06, 0.09, 0.12)
 """Least overlaps of consecutive boxes to choose from, in every angle and joint [rad or m]: the wider the goal
