@@ -63,7 +63,7 @@ def test_a_floor_plan_takes_the_place_of_the_rooms(tmp_path):
     groups = [f'<g inkscape:groupmode="layer" inkscape:label="{name}">{body}</g>' for name, body in layers]
     write_svg(tmp_path, "".join(groups))
     poses = ["--start", 2, 2, 0, "--goal", 8, 4, 1.57]
-    drawing = ["--floor-plan", tmp_path / "hall.svg", "--unit", "m", "--layer", "walls"]
+    drawing = ["--floor-plan", tmp_path / "hall.svg", "--unit", "cm", "--scale", 100, "--layer", "walls"]
     done = call("mine", *drawing, *poses, "--out", tmp_path / "deep" / "mine")
     assert done.exit_code == 0, done.output
     path = tmp_path / "deep" / "mine" / "mine.scenario.yaml"
@@ -77,6 +77,8 @@ REFUSED = {
     "flat": (["--width", 0], "--width: 0.0 is not allowed"),
     "no start": (["--floor-plan", "hall.svg"], "--start: None is not allowed; expected X Y THETA"),
     "unit alone": (["--unit", "m"], "--unit is for a floor plan"),
+    "scale alone": (["--scale", 50], "--scale is for a floor plan"),
+    "arm in a wall at the goal": (["--goal", 3.2, 1.0, 0], "mine/mine.scenario.yaml: goal.object: "),
     "layer alone": (["--layer", "walls"], "--layer is for a floor plan"),
     "in a wall": (["--start", 0, 0, 0], "mine/mine.scenario.yaml: start: "),
 }

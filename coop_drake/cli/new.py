@@ -15,6 +15,7 @@ from coop_drake.cli.options import Machine, Quiet, out_folder
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 
 if TYPE_CHECKING:
+    from coop_drake.answers import PlanningProblem
     from coop_drake.scenario.starter import Starter
 
 _QUESTIONS: tuple[tuple[str, str, Any], ...] = (
@@ -69,6 +70,10 @@ def new_command(
         typer.Option("--floor-plan", metavar="FILE", help="A drawing or map in place of two rooms."),
     ] = None,
     unit: Annotated[str | None, typer.Option("--unit", metavar="UNIT", help="Unit of the drawing.")] = None,
+    scale: Annotated[
+        float | None,
+        typer.Option("--scale", metavar="S", help="Factor on the drawing's lengths, 50 for one at 1:50."),
+    ] = None,
     layer: Annotated[
         list[str] | None,
         typer.Option("--layer", metavar="NAME", help="A layer of the drawing to read; may be repeated."),
@@ -101,14 +106,14 @@ def new_command(
         said["links"] = _lengths(str(said.pop("arm")))
     if not name.replace("-", "_").isidentifier():
         raise typer.BadParameter(f"{name} is no name of letters, digits, - and _.")
-    for flag, given in (("--unit", unit), ("--layer", layer)):
+    for flag, given in (("--unit", unit), ("--scale", scale), ("--layer", layer)):
         if given and floor_plan is None:
             raise typer.BadParameter(f"{flag} is for a floor plan; name it with --floor-plan.")
     folder = out if out is not None else Path(name)
     with reporting(machine=machine, quiet=quiet) as reporter:
         from coop_drake.scenario.starter import Starter
 
-        workspace = None if floor_plan is None else _section(floor_plan, unit, layer, folder)
+        workspace = None if floor_plan is None else _section(floor_plan, unit, scale, layer, folder)
         starter = Starter(name, **said, door=door, workspace=workspace, start=start, goal=goal)
         reporter.code = _write(starter, folder, reporter, force=force)
 
@@ -129,10 +134,30 @@ def _lengths(text: str) -> tuple[float, ...]:
         raise typer.BadParameter(f"--arm {text} is no list of lengths such as 0.35,0.4.") from None
 
 
-def _section(floor_plan: Path, unit: str | None, layers: list[str] | None, folder: Path) -> dict[str, object]:
+def _section(
+    floor_plan: Path, unit: str | None, scale: float | None, layers: list[str] | None, folder: Path
+) -> dict[str, object]:
     """How the scenario names the floor plan: relative to the folder that it will stand in."""
-    said = {"file": Path(os.path.relpath(floor_plan, folder)).as_posix(), "unit": unit, "layers": layers}
-    return {key: value for key, value in said.items() if value}
+    file = Path(os.path.relpath(floor_plan, folder)).as_posix()
+    said = {"file": file, "unit": unit, "scale": scale, "layers": layers}
+    return {key: value for key, value in said.items() if value not in (None, [])}
+
+
+def _refuse_blocked_goal(problem: PlanningProblem, path: Path) -> None:
+    """Refuse a goal at which the team is proved to be in collision, whatever its free joints are."""
+    from coop_drake.answers.problem import at_goal
+    from coop_drake.errors import ScenarioError
+    from coop_drake.planning.proofs.blocked_goals import blocked_goal
+    from coop_drake.plant.placement import collisions
+
+    if blocked_goal(problem)[0] is None:
+        return
+    there = collisions(
+        problem.tree, at_goal(problem.goal_pose, problem.goal_joints, problem.start[3:]), problem.workspace
+    )
+    found = "; ".join(f"{first} touches {second}" for first, second, _ in there)
+    allowed = f"a pose at which the team fits ({found}, with joints as at the start)"
+    raise ScenarioError(str(path), "goal.object", problem.goal_pose.tolist(), allowed)
 
 
 def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -> ExitCode:
@@ -157,7 +182,8 @@ def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -
             (Path(draft) / name).write_text(text, encoding="utf-8")
         try:
             with reporter.stage("checking"):
-                planning_problem(load_scenario(Path(draft) / f"{starter.name}.scenario.yaml"))
+                path = Path(draft) / f"{starter.name}.scenario.yaml"
+                _refuse_blocked_goal(planning_problem(load_scenario(path)), path)
         except ScenarioError as error:  # The draft is gone when the message is read.
             file = error.file.replace(str(Path(draft)), str(folder))
             raise ScenarioError(file, error.key, error.value, error.allowed) from error

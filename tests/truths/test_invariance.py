@@ -3,13 +3,18 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pydrake.math import RigidTransform, RotationMatrix
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.boxes.channel import Channel
+from coop_drake.planning.cells.slices import nearest_turn
 from coop_drake.planning.search.search import find_channel
+from coop_drake.plant.planarity import planar_pose
 from coop_drake.tree.component_tree import TreeJoint
+from coop_drake.verification.problem_match import same_angle
 from tests.support.cases import team_tree
 from tests.support.moved import Similarity
 from tests.support.passages import DiscDoor, FoldingArm, LadderCorner, RodCorridor
@@ -36,6 +41,37 @@ def test_a_passage_is_passed_or_blocked_wherever_it_stands(
     else:
         assert not isinstance(answer, Channel)
         assert answer.proved
+
+
+@settings(max_examples=4)
+@given(st.sampled_from(PASSAGES), st.sampled_from((0.02, -0.02)), st.integers(-3, 3), st.integers(-3, 3))
+def test_whole_turns_of_start_and_goal_change_no_answer(
+    passage, offset: float, first: int, last: int
+) -> None:
+    problem = passage.problem(passage.critical + offset)
+    turned = replace(
+        problem,
+        start=problem.start + 2.0 * np.pi * first * (np.arange(len(problem.start)) == 2),
+        goal_pose=problem.goal_pose + np.array([0.0, 0.0, 2.0 * np.pi * last]),
+    )
+    answer, _ = find_channel(turned)
+    assert isinstance(answer, Channel) == (offset > 0.0)
+    if isinstance(answer, Channel):
+        assert same_angle(answer.goal_angle, problem.goal_pose[2])
+        assert answer.boxes[0].lower[0] <= turned.start[2] <= answer.boxes[0].upper[0]
+    else:
+        assert answer.proved
+
+
+@given(st.floats(-100.0, 100.0), st.integers(-9, 9))
+def test_every_part_takes_angles_apart_by_whole_turns_for_one(angle: float, turns: int) -> None:
+    turned = angle + 2.0 * np.pi * turns
+    assert same_angle(angle, turned)
+    assert same_angle(nearest_turn(turned), angle)
+    assert nearest_turn(turned - angle) == pytest.approx(0.0, abs=1e-12)
+    assert same_angle(
+        planar_pose(RigidTransform(RotationMatrix.MakeZRotation(turned), np.zeros(3))).angle, angle
+    )
 
 
 @settings(max_examples=20)
