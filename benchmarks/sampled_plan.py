@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from coop_drake.answers.plan import Plan
 from coop_drake.compiled import compiled
 from coop_drake.laws.axis_table import FADING_TIME, LEAVING_TIME, axis_table, bounds_of, rest_jump, track_row
 from coop_drake.laws.hand_over import fading
+from coop_drake.laws.nominal_axes import carry_axes as carry_nominal
+from coop_drake.laws.nominal_axes import lag_factors, pulled_axis
 from coop_drake.laws.readiness import axis_ready
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.tree.pose import FloatArray
@@ -19,42 +21,129 @@ HELD, SLOWEST = 0.5, 6.0
 """A plan's axes are followed for so long in the last cell, and for so long in any other one at most [s]."""
 
 
-def carry_axes(plan: Plan, budget: Budget, seed: int) -> float:
-    """Simulate all axes of a plan with random disturbances within a budget.
+class Departures(NamedTuple):
+    """What departs from the ideal team in one run of all axes of a plan.
 
-    Every disturbance is drawn anew for each axis: noise of random sizes, constant, alternating at random or
-    anew in every sample; the model's factor; how long the object's position lets all wait in a cell; and how
-    old the reports are that a switch rests on.
-
-    Args:
-        plan: A plan with a budget.
-        budget: The budget, or another one.
-        seed: Of the disturbances.
-
-    Returns:
-        Least distance to a funnel's bound [rad or m], negative where an axis left its funnel or never came to
-        rest.
+    Attributes:
+        factors: Factor by which the model makes accelerations too large, shape (axes,).
+        disturbances: Errors of position, rate and acceleration, shape (samples, axes, 3).
+        waits: How much longer the axes wait in every cell, because the position does, shape (cells,) [s].
     """
-    tables = np.array([axis_table(plan.funnel(k), one.gains) for k, one in enumerate(plan.transitions)])
-    generator, axes = np.random.default_rng(seed), tables.shape[1]
-    samples = int((SLOWEST + plan_seconds(plan)) / budget.period)
+
+    factors: FloatArray
+    disturbances: FloatArray
+    waits: FloatArray
+
+
+class AxesRun(NamedTuple):
+    """One run of all axes of a plan.
+
+    Attributes:
+        nearest: Least distance to a funnel's bound [rad or m], negative where an axis left its funnel or its
+            nominal motion never came to rest.
+        farthest: Largest departures from the nominal motions in every cell, shape (cells, axes) [rad or m].
+        rooms: Distances to the lower, then to the upper bound at every sample, shape (samples, 2, axes) [rad
+            or m].
+    """
+
+    nearest: float
+    farthest: FloatArray
+    rooms: FloatArray
+
+
+def random_departures(plan: Plan, budget: Budget, seed: int) -> Departures:
+    """Return departures within a budget, all drawn anew for each axis.
+
+    Noise is of random sizes, constant, alternating at random or anew in every sample.
+    """
+    generator, cells, axes = np.random.default_rng(seed), len(plan.cells), len(plan.start) - 2
     size = np.array([budget.angle_noise, budget.rate_noise, budget.acceleration_error])
-    return float(
-        _carry(
-            tables,
-            plan.start[2:],
-            np.array([budget.period, budget.lag]),
-            np.array([whole_periods(time, budget.period) for time in (budget.delay, budget.report_age)]),
-            1.0 + budget.model_error * generator.choice([-1.0, 0.0, 1.0], axes),
-            size * _waves(generator, samples, axes),
-            generator.exponential(0.1, len(tables)) * generator.choice([0.0, 1.0], len(tables)),
-        )
+    return Departures(
+        1.0 + budget.model_error * generator.choice([-1.0, 0.0, 1.0], axes),
+        size * _waves(generator, _samples(plan, budget), axes),
+        generator.exponential(0.1, cells) * generator.choice([0.0, 1.0], cells),
     )
 
 
-def plan_seconds(plan: Plan) -> float:
-    """Return three times the estimated duration of a plan [s]."""
-    return 3.0 * sum(transition.estimated_time for transition in plan.transitions)
+def worst_departures(plan: Plan, budget: Budget, seed: int) -> Departures:
+    """Return departures within a budget that take every axis as near to a bound of its funnel as they can.
+
+    The loop is linear and no departure changes the nominal motion, so that both can be computed before. All
+    errors have the signs of the loop's responses, back from the sample and towards the bound for which the
+    distance of the nominal motion, less what all errors together and the model's error can take from it, is
+    least. The waits in the cells are drawn at random.
+    """
+    none = random_departures(plan, budget.scaled(0.0), seed)
+    assert plan.axis_tracking is not None  # the plan has a budget for the axes
+    gains, delay = plan.axis_tracking, whole_periods(budget.delay, budget.period)
+    axes, samples = none.disturbances.shape[1], len(none.disturbances)
+    size = np.array([-budget.angle_noise, -budget.rate_noise, budget.acceleration_error])
+    factors, errors, least = np.ones(axes), np.zeros((samples, axes, 3)), np.full(axes, np.inf)
+    for factor in (1.0 - budget.model_error, 1.0 + budget.model_error):
+        run = run_axes(plan, budget, none._replace(factors=np.full(axes, factor)))
+        loop = budget.period, budget.lag, factor
+        answer = pull_response((gains.stiffness, gains.damping), loop, delay, len(run.rooms))
+        noise = factor * np.array([gains.stiffness, gains.damping]) @ np.abs(size[:2]) + abs(size[2])
+        together = noise * np.concatenate(([0.0], np.cumsum(np.abs(answer[1:]))))[: len(run.rooms)]
+        left = run.rooms - together[:, None, None]
+        for axis in range(axes):
+            last, side = np.unravel_index(np.argmin(left[:, :, axis]), left.shape[:2])
+            if left[last, side, axis] < least[axis]:
+                least[axis], factors[axis], errors[:, axis] = left[last, side, axis], factor, 0.0
+                towards = (1.0 if side else -1.0) * np.sign(answer[1 : last + 1][::-1])
+                errors[:last, axis] = towards[:, None] * size
+    return Departures(factors, errors, none.waits)
+
+
+def run_axes(plan: Plan, budget: Budget, departures: Departures) -> AxesRun:
+    """Simulate all axes of a plan that has a budget for them, with departures within this or another one."""
+    tables = np.array([axis_table(plan.funnel(k), one.gains) for k, one in enumerate(plan.transitions)])
+    assert plan.axis_tracking is not None  # there is a budget for the axes
+    assert plan.budget is not None
+    axes, samples = tables.shape[1], len(departures.disturbances)
+    farthest, rooms = np.zeros((len(tables), axes)), np.zeros((samples, 2, axes))
+    nearest, ended = _carry(
+        tables,
+        plan.start[2:],
+        (plan.axis_tracking.stiffness, plan.axis_tracking.damping),
+        np.array([budget.period, budget.lag, plan.budget.lag]),
+        np.array([whole_periods(time, budget.period) for time in (budget.delay, budget.report_age)]),
+        *departures,
+        farthest,
+        rooms,
+    )
+    return AxesRun(nearest, farthest, rooms[:ended])
+
+
+def _samples(plan: Plan, budget: Budget) -> int:
+    """Return for how many samples departures are made, enough for three times the estimated duration."""
+    seconds = SLOWEST + 3.0 * sum(transition.estimated_time for transition in plan.transitions)
+    return int(seconds / budget.period)
+
+
+@compiled
+def pull_response(
+    gains: tuple[float, float], loop: tuple[float, float, float], delay: int, samples: int
+) -> FloatArray:
+    """Return the departures at every sample that follow a unit of command in the first period, (samples,).
+
+    Args:
+        gains: K_a [1/s^2] and zeta_a [1/s].
+        loop: Control period, lag of the actuators [s], and the model's factor.
+        delay: Age of measurements in periods.
+        samples: How many.
+    """
+    T, (left, in_v, in_x) = loop[0], lag_factors(loop[0], loop[1])
+    x, v, p = np.zeros(samples), np.zeros(samples), 0.0
+    for k in range(samples - 1):
+        u = 1.0 if k == 0 else 0.0
+        if k >= delay:
+            u += loop[2] * pulled_axis(0.0, x[k - delay], v[k - delay], (0.0, 0.0), gains)
+        gap = p - u
+        x[k + 1] = x[k] + T * v[k] + 0.5 * T * T * u + in_x * gap
+        v[k + 1] = v[k] + T * u + in_v * gap
+        p = u + left * gap
+    return x
 
 
 def _waves(generator: np.random.Generator, samples: int, axes: int) -> FloatArray:
@@ -79,29 +168,37 @@ def _waves(generator: np.random.Generator, samples: int, axes: int) -> FloatArra
 def _carry(
     tables: FloatArray,
     start: FloatArray,
+    gains: tuple[float, float],
     times: FloatArray,
     periods: FloatArray,
     factors: FloatArray,
     disturbances: FloatArray,
     waits: FloatArray,
-) -> float:
-    """Return what ``carry_axes`` does. A robot hears of a switch one period late.
+    farthest: FloatArray,
+    rooms: FloatArray,
+) -> tuple[float, int]:
+    """Return the least distance to a funnel's bound, and for how many samples the axes were followed.
+
+    A robot hears of a switch one period late.
 
     Args:
         tables: The axes in every cell, shape (cells, axes, ``LAW_COLUMNS``).
         start: Where they rest at the beginning, shape (axes,).
-        times: Control period and lag of the actuators [s].
+        gains: K_a and zeta_a of the pull to the nominal motion.
+        times: Control period, lag of the actuators, and the lag that the nominal motion has [s].
         periods: Delay of measurements and age of reports in periods.
-        factors: Factor by which the model makes accelerations too large, shape (axes,).
-        disturbances: Errors of position, rate and acceleration, shape (samples, axes, 3).
-        waits: How much longer the axes wait in every cell, because the position does [s].
+        factors: The departures, see ``Departures``.
+        disturbances: The errors.
+        waits: How much longer the axes wait.
+        farthest: Receives the largest departures from the nominal motions.
+        rooms: Receives what ``AxesRun`` says.
     """
     T, lag = times[0], times[1]
     delay, age = int(periods[0]), int(periods[1])
     cells, m, n = tables.shape[0], tables.shape[1], disturbances.shape[0]
-    x, v, p, jumps = start.copy(), np.zeros(m), np.zeros(m), np.zeros(m)
-    before = np.zeros((n + 1, m, 2))
-    seen, reported = np.empty((m, 2)), np.full(m, -n)
+    x, v, p, law, jumps = start.copy(), np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m)
+    before, nominal = np.zeros((n + 1, m, 2)), np.zeros((n + 1, 3, m))
+    nominal[0, 0], reported = start, np.full(m, -n)
     for i in range(m):
         jumps[i] = -track_row(tables[0, i], 0.0, start[i], 0.0)[0]
     old = jumps.copy()
@@ -110,37 +207,43 @@ def _carry(
         ready = True
         for i in range(m):
             before[k, i, 0], before[k, i, 1] = x[i], v[i]
-            for j in range(2):
-                seen[i, j] = before[max(k - delay, 0), i, j] + disturbances[k, i, j]
+            farthest[cell, i] = max(farthest[cell, i], abs(x[i] - nominal[k, 0, i]))
+            lower, upper = bounds_of(tables[cell, i], (k - entered) * T)[:2]
+            rooms[k, 0, i], rooms[k, 1, i] = x[i] - lower, upper - x[i]
             following = tables[min(cell + 1, cells - 1), i]
-            rests = axis_ready(tables[cell, i], following, seen[i, 0], seen[i, 1]) >= 0.0
+            rests = axis_ready(tables[cell, i], following, nominal[k, 0, i], nominal[k, 1, i]) >= 0.0
             if rests and (k - entered) * T >= tables[cell, i, LEAVING_TIME] - 1e-9:
                 reported[i] = k
             ready = ready and k - reported[i] <= age
         if cell + 1 == cells and (k - entered) * T > HELD + tables[cell, 0, LEAVING_TIME]:
-            return nearest
+            return nearest, k + 1
         if ready and cell + 1 < cells and (k - entered) * T > tables[cell, 0, LEAVING_TIME] + waits[cell]:
             old[:] = jumps
             for i in range(m):
                 jumps[i], reported[i] = rest_jump(tables[cell, i], tables[cell + 1, i]), -n
             former, entered, cell = entered, k, cell + 1
         elif (k - entered) * T > SLOWEST:
-            return -1.0
+            return -1.0, k + 1
         for i in range(m):
             row, since, jump = tables[cell, i], (k - entered) * T, jumps[i]
             if k == entered and cell > 0:
                 row, since, jump = tables[cell - 1, i], (k - former) * T, old[i]
-            u = track_row(row, since, seen[i, 0], seen[i, 1])[0] + fading(since, row[FADING_TIME]) * jump
-            u = factors[i] * u + disturbances[k, i, 2]
+            law[i] = track_row(row, since, nominal[k, 0, i], nominal[k, 1, i])[0]
+            law[i] += fading(since, row[FADING_TIME]) * jump
+            ago = max(k - delay, 0)
+            seen = before[ago, i] + disturbances[k, i, :2]
+            expected = nominal[ago, 0, i], nominal[ago, 1, i]
+            u = factors[i] * pulled_axis(law[i], seen[0], seen[1], expected, gains) + disturbances[k, i, 2]
             for half in range(2):
                 t = 0.5 * T
-                left = exp(-t / lag) if lag > 0.0 else 0.0
+                left, in_v, in_x = lag_factors(t, lag)
                 gap = p[i] - u
-                x[i] += t * v[i] + 0.5 * t * t * u + (lag * t - lag * lag * (1.0 - left)) * gap
-                v[i] += t * u + lag * (1.0 - left) * gap
+                x[i] += t * v[i] + 0.5 * t * t * u + in_x * gap
+                v[i] += t * u + in_v * gap
                 p[i] = u + left * gap
                 lower, upper = bounds_of(tables[cell, i], (k - entered + 0.5 * (1 + half)) * T)[:2]
                 nearest = min(nearest, x[i] - lower, upper - x[i])
+        carry_nominal(nominal[k], law, T, times[2], nominal[k + 1])
         if not nearest > 0.0:
-            return nearest
-    return -1.0
+            return nearest, k + 1
+    return -1.0, k + 1

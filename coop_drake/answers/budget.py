@@ -65,6 +65,11 @@ class Budget:
         """Control period [s]."""
         return 1.0 / self.control_rate
 
+    @property
+    def nominal(self) -> Budget:
+        """What of the budget concerns a nominal motion: how often it is computed, its lag, and reports."""
+        return Budget(control_rate=self.control_rate, lag=self.lag, report_age=self.report_age)
+
     def scaled(self, factor: float) -> Budget:
         """Return the budget with every departure this many times as large, at the same control rate."""
         return replace(self, **{name: factor * getattr(self, name) for name in SCALED})
@@ -78,7 +83,9 @@ class Budget:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """The sets that follow from a budget in one transition, per axis (theta, q...), arrays of shape (1 + n,).
+    """What follows from a budget in one transition, per axis (theta, q...), arrays of shape (1 + n,).
+
+    Entry sets are those of the nominal motions.
 
     Attributes:
         age_factor: The gains are those of the gain set for this many times the age of its commands [-].
@@ -87,12 +94,15 @@ class Tolerance:
         entry_rate_lower: Lowest rate at the entry [rad/s or m/s].
         entry_rate_upper: Highest rate at the entry [rad/s or m/s].
         entry_acceleration: Largest magnitude of acceleration and command at the entry [rad/s^2 or m/s^2].
-        entry_history: Largest magnitude of the acceleration before the entry, as far back as the oldest
-            measurement that is used after it [rad/s^2 or m/s^2].
-        distance: Least distance to the funnel's bounds at all times [rad or m].
-        acceleration: Largest magnitude of the acceleration [rad/s^2 or m/s^2].
-        settled: Largest departure from the middle of the goal interval in the end [rad or m].
-        settled_rate: Largest rate in the end [rad/s or m/s].
+        entry_history: Largest magnitude of the acceleration in the time before the entry of which
+            measurements still speak [rad/s^2 or m/s^2].
+        distance: Least distance of the axis to the funnel's bounds at all times [rad or m].
+        acceleration: Largest magnitude of the nominal acceleration [rad/s^2 or m/s^2].
+        settled: Largest distance of the nominal motion from the goal interval's middle in the end [rad or
+            m].
+        settled_rate: Largest nominal rate in the end [rad/s or m/s].
+        departure: Largest departure of the axis from its nominal motion [rad or m].
+        rate_departure: Largest departure of its rate from the nominal one [rad/s or m/s].
         entry_parts: Into how many parts the positions at the entry are cut, so that these bounds follow [-].
     """
 
@@ -107,4 +117,6 @@ class Tolerance:
     acceleration: Vector
     settled: Vector
     settled_rate: Vector
+    departure: Vector
+    rate_departure: Vector
     entry_parts: tuple[Annotated[int, Limits(at_least=1, at_most=64)], ...]

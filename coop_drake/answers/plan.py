@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from shapely import Polygon
 
+from coop_drake.answers.axis_tracking import AxisTracking
 from coop_drake.answers.budget import Budget, Tolerance
 from coop_drake.answers.limits import SpeedStatement
 from coop_drake.answers.position_tube import PositionTube
@@ -90,6 +91,8 @@ class Plan:
         budget: Departures from the ideal team under which the object provably stays in its cells, and every
             axis in its funnel if the budget says so; null if none were asked for.
         tube: How far the object may depart from its nominal motion under the budget; null without one.
+        axis_tracking: How angles and joints are pulled to their nominal motions; null in a plan without a
+            budget for them.
         speeds: Limits of speed that are kept, and what follows for the bases; null where no limit is known.
         age_factor: The gains are those of the gain set for so many times the age of its commands, so that
             limits of acceleration are kept.
@@ -107,6 +110,7 @@ class Plan:
     speeds: SpeedStatement | None = None
     tube: PositionTube | None = None
     age_factor: Annotated[Positive, EXACT] = 1.0
+    axis_tracking: AxisTracking | None = None
 
     def governed(self, index: int) -> Polygon:
         """Return the region to which the governor keeps p_G in a cell: Q_i, or less where there is a tube."""

@@ -238,6 +238,9 @@ def _split(
 
 def _check(scenario: Scenario, knowledge: Sequence[RobotKnowledge]) -> None:
     deployment = scenario.deployment
+    if any(known.axis_motion is not None for known in knowledge):
+        blocks = "named, for a plan with a budget for angles and joints"
+        raise ScenarioError(str(scenario.path), "--blocks", "fused", blocks)
     allowed = Deployment(
         control_rate=deployment.control_rate,
         mass_error=deployment.mass_error,

@@ -15,8 +15,9 @@ from coop_drake.laws.disturbance import observer_gains
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.plant import RobotPlant, TeamPlant, build_robot_plant
+from coop_drake.plant.team import RobotModel
 from coop_drake.scenario import Scenario
-from coop_drake.systems import GovernedCell, NominalMotion
+from coop_drake.systems import AxisMotion, GovernedCell, NominalMotion
 
 REPORT_PERIODS = 2
 """Periods in which p_G moves on in the old cell after a report was received [-]: the one in which the switch
@@ -63,6 +64,7 @@ def robot_knowledge(
             hold=control.hold,
             observer_gains=observer_gains(scenario.command_age) if control.observer else None,
             motion=_motion(scenario, plan, robot.name, 0 if control.predictor else delay),
+            axis_motion=_axis_motion(scenario, plan, robot, 0 if control.predictor else delay),
         )
         for robot in team.robots
     ]
@@ -93,6 +95,22 @@ def _motion(scenario: Scenario, plan: Plan, robot: str, age: int) -> NominalMoti
         report_periods=whole_periods(budget.report_age, deployment.period) + REPORT_PERIODS,
         measurement_periods=age,
         offset=deployment.of_robot(robot).sample_offset,
+    )
+
+
+def _axis_motion(scenario: Scenario, plan: Plan, robot: RobotModel, age: int) -> AxisMotion | None:
+    """Return the nominal motion of a robot's axes, None where the plan's budget has none."""
+    deployment, tracking = scenario.deployment, plan.axis_tracking
+    if plan.budget is None or tracking is None or deployment.period is None:
+        return None
+    joints = range(1 + robot.q_slice.start, 1 + robot.q_slice.stop)
+    return AxisMotion(
+        tracking=tracking,
+        start=plan.start[2:][[0, *joints]],
+        period=deployment.period,
+        lag=plan.budget.lag,
+        measurement_periods=age,
+        offset=deployment.of_robot(robot.name).sample_offset,
     )
 
 

@@ -14,12 +14,14 @@ from coop_drake.plant import ObjectInertia, RobotPlant
 from coop_drake.scenario import Hold
 from coop_drake.systems import (
     AxisLaw,
+    AxisMotion,
     AxisPpc,
     DisturbanceObserver,
     FunnelClock,
     GovernedCell,
     HoldMonitor,
     HoldReceiver,
+    NominalAxes,
     NominalGovernor,
     NominalMotion,
     ObjectEstimator,
@@ -65,6 +67,8 @@ class RobotKnowledge:
         hold: When the team is held, None for never.
         observer_gains: Gain and leak of its disturbance observer [1/s]; None for no observer.
         motion: The nominal motion of the position; None where p_G follows the measured position.
+        axis_motion: That of the object's angle and of its joints; None where their law acts on what is
+            measured.
     """
 
     robot: RobotPlant
@@ -81,6 +85,7 @@ class RobotKnowledge:
     observer_gains: tuple[float, float] | None = None
     hold: Hold | None = None
     motion: NominalMotion | None = None
+    axis_motion: AxisMotion | None = None
 
     @property
     def p_LE(self) -> FloatArray:
@@ -201,6 +206,8 @@ def _additions(knowledge: RobotKnowledge, laws: Sequence[AxisLaw]) -> dict[str, 
             knowledge.period,
             offset=knowledge.sample_offset,
         )
+    if knowledge.axis_motion is not None:
+        added["nominal_axes"] = NominalAxes(knowledge.axis_motion)
     if knowledge.hold is not None:
         period, offset = knowledge.period, knowledge.sample_offset
         silence = knowledge.hold.silence
@@ -243,6 +250,12 @@ _REPLACED = {
 }
 """Which signals others get in place of those that a block takes in."""
 
+_NOMINAL = {"object_state": "nominal_object", "robot_state": "nominal_robot"}
+"""Which signals the law of the axes and the reports get where a plan has a nominal motion of the axes."""
+
+_FOLLOWERS = ("axis_ppc", "ready_monitor")
+"""Blocks that act on this nominal motion."""
+
 _COMPENSATED = ("wrench_law", "robot_effort")
 """Blocks that command; all others take the accelerations that the law wants."""
 
@@ -256,6 +269,8 @@ def _connect_by_name(
         renamed: dict[str, str] = {}
         if "state_predictor" in blocks and label != "state_predictor":
             renamed |= _REPLACED["state_predictor"]
+        if "nominal_axes" in blocks and label != "nominal_axes":
+            renamed |= _NOMINAL if label in _FOLLOWERS else {"axis_acceleration": "pulled_axes"}
         if "disturbance_observer" in blocks and label in _COMPENSATED:
             renamed |= _REPLACED["disturbance_observer"]
         for port in (block.get_input_port(i) for i in range(block.num_input_ports())):

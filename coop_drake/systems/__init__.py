@@ -14,6 +14,7 @@ from coop_drake.systems.hold_supervisor import HoldSupervisor
 from coop_drake.systems.interruption import Interruption
 from coop_drake.systems.lossy_measurement import LossyMeasurement
 from coop_drake.systems.message_channel import MessageChannel, clear_channel
+from coop_drake.systems.nominal_axes import AxisMotion, NominalAxes
 from coop_drake.systems.nominal_governor import NominalGovernor, NominalMotion
 from coop_drake.systems.object_estimator import ObjectEstimator
 from coop_drake.systems.ready_monitor import ReadyMonitor
@@ -32,6 +33,7 @@ __all__ = [
     "READY_SIZE",
     "REQUEST_SIZE",
     "AxisLaw",
+    "AxisMotion",
     "AxisPpc",
     "Block",
     "CellPlanner",
@@ -47,6 +49,7 @@ __all__ = [
     "Interruption",
     "LossyMeasurement",
     "MessageChannel",
+    "NominalAxes",
     "NominalGovernor",
     "NominalMotion",
     "ObjectEstimator",

@@ -13,7 +13,7 @@ from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification.runs.rows import Rows
 from coop_drake.verification.runs.tube import check_budget_used
 from tests.support.run_checks import verified_run
-from tests.support.tubes import BUDGET, tubed_problem
+from tests.support.tubes import BUDGET, WITH_AXES, tubed_problem
 
 FUSED = replace(BUDGET, delay=0.0, lag=0.0, position_noise=0.0, velocity_noise=0.0)
 
@@ -62,6 +62,12 @@ def test_fused_and_named_blocks_lead_alike(mass_error):
         assert len(named.times) == len(fused.times)
         for name in ("object_pose", "governor_position", "energy_margin", "ready_margins"):
             np.testing.assert_allclose(getattr(named, name), getattr(fused, name), atol=1e-9)
+
+
+def test_fused_blocks_refuse_a_budget_for_the_axes():
+    scenario, plan, maps = problem(WITH_AXES)
+    with pytest.raises(ScenarioError, match="named, for a plan with a budget for angles and joints"):
+        simulate(scenario, plan, maps, blocks="fused")
 
 
 def test_a_held_team_keeps_its_tube():

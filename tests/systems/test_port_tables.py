@@ -23,7 +23,7 @@ from coop_drake.scenario import (
 from coop_drake.simulation import build_maps
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.system_checks import SIZE_OF_ABSTRACT, port_sizes, state_of
-from tests.support.tubes import tubed_problem
+from tests.support.tubes import WITH_AXES, tubed_problem
 
 ROW = re.compile(r"^ *(input|output) +``(\S+)`` +(\S(?:.*?\S)?)(?:  |$)", re.MULTILINE)
 BLOCKS = sorted(
@@ -51,6 +51,7 @@ def leaves(system):
 def blocks():
     """One of each block: from loops with a tube, one that is sampled, and one whose robots are separate."""
     own, (scenario, plan) = small_problem("base"), tubed_problem()
+    axes = tubed_problem(WITH_AXES)
     tubed, hold = (scenario, plan, build_maps(plan)), Control(hold=Hold(at=(1.0,)))
     everything = {"deployment": EVERYTHING, "control": Control(predictor=True, observer=True, hold=Hold())}
     separate = {"plant": PlantSettings(grasps="constraints")}
@@ -58,6 +59,7 @@ def blocks():
     for (scenario, plan, maps), blocks, changes in (
         (tubed, "named", {"control": hold}),
         (tubed, "fused", {"control": hold}),
+        ((*axes, build_maps(axes[1])), "named", {"control": hold}),
         ((*own, small_maps()), "named", everything),
         ((*own, small_maps()), "named", separate),
     ):
@@ -100,7 +102,7 @@ def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_ar
     remembering = {name for name in BLOCKS if any(map(len, state_of(blocks[name][0].CreateDefaultContext())))}
     failures = {"Interruption", "LossyMeasurement", "MessageChannel"}
     holds = {"FunnelClock", "HoldMonitor", "HoldReceiver", "HoldSupervisor"}
-    laws = {"CellPlanner", "AxisPpc", "TeamController", "StatePredictor", "NominalGovernor"}
+    laws = {"CellPlanner", "AxisPpc", "TeamController", "StatePredictor", "NominalAxes", "NominalGovernor"}
     assert remembering == laws | holds | failures
 
 

@@ -80,7 +80,7 @@ def test_a_larger_budget_is_refused(plan, name):
     altered = replace(plan, budget=replace(plan.budget, **{name: DEPARTURES[name]}))
     with pytest.raises(RefusalError) as refusal:
         check_budget(altered)
-    assert "tolerance" in refusal.value.where
+    assert "tolerance" in refusal.value.where or refusal.value.where == "axis_tracking"
 
 
 def with_transition(plan, k, **changes):
@@ -92,13 +92,13 @@ def with_transition(plan, k, **changes):
 ALTERED = {
     "entry_lower": 1.002, "entry_upper": -1.002, "entry_rate_lower": 0.9, "entry_rate_upper": 0.9,
     "entry_acceleration": 0.9, "entry_history": 0.9, "distance": 1.05, "acceleration": 0.95, "settled": 0.95,
-    "settled_rate": 0.95,
+    "settled_rate": 0.95, "departure": 0.99, "rate_departure": 0.99,
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ALTERED)
 def test_an_altered_statement_is_refused(plan, name):
-    number, k = 1, len(plan.transitions) - 1
+    number, k = 0, len(plan.transitions) - 1  # the object's angle, which moves most
     stated = plan.transitions[k].tolerance
     values = getattr(stated, name).copy()
     if name in ("entry_lower", "entry_upper"):
@@ -148,8 +148,20 @@ def test_a_plan_without_a_condition_of_rest_is_refused(plan):
 def test_a_budget_without_sets_and_sets_without_a_budget_are_refused(plan):
     with pytest.raises(RefusalError, match="has no budget"):
         check_budget(replace(plan, budget=None))
-    with pytest.raises(RefusalError, match="is missing"):
-        check_budget(with_transition(plan, 0, tolerance=None))
+    for altered in (with_transition(plan, 0, tolerance=None), replace(plan, axis_tracking=None)):
+        with pytest.raises(RefusalError, match="is missing"):
+            check_budget(altered)
+    position = replace(plan, budget=replace(plan.budget, axes=False))
+    with pytest.raises(RefusalError, match="no budget for the axes"):
+        check_budget(position)
+
+
+@pytest.mark.parametrize(("name", "factor"), [("stiffness", 0.5), ("damping", 0.5), ("damping", 3.0)])
+def test_another_pull_is_refused(plan, name, factor):
+    tracking = plan.axis_tracking
+    altered = replace(tracking, **{name: factor * getattr(tracking, name)})
+    with pytest.raises(RefusalError, match=r"axis_tracking|departure"):
+        check_budget(replace(plan, axis_tracking=altered))
 
 
 def test_a_file_keeps_all_of_it(plan, tmp_path):
@@ -183,7 +195,7 @@ def test_bad_budgets_are_bad_input(folder, tmp_path, text, key):
 
 def test_budgets_need_a_control_rate_and_scheduled_gains(folder):
     scenario = folder / "room.scenario.yaml"
-    ideal = invoke("plan", scenario, "--budget", "all")
+    ideal = invoke("plan", scenario, "--budget", "deployment")
     assert (ideal.exit_code, "control_rate" in ideal.output) == (2, True)
     fixed = invoke("plan", scenario, "--budget", folder / "budget.yaml", "--gains", "table_2")
     assert (fixed.exit_code, "scheduled gains" in " ".join(fixed.output.split())) == (2, True)

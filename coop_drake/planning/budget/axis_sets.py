@@ -59,7 +59,7 @@ class Entry:
         acceleration: Largest magnitude of acceleration and command at the entry [rad/s^2 or m/s^2].
         history: Largest magnitude of the acceleration before the entry, over the age of the measurements and
             reports that are used at the entry [rad/s^2 or m/s^2].
-        rest: Position at which the last cell is left at rest, for which ``rest_jump`` is computed [rad
+        rest: Where the axis rests in the middle of the set, for which the jump of the command is known [rad
             or m]; the middle of the positions if not given.
     """
 
@@ -81,6 +81,7 @@ class AxisSets:
         distance: Least distance to the funnel's bounds at all times [rad or m]; not positive if none is
             shown.
         acceleration: Largest magnitude of the acceleration [rad/s^2 or m/s^2].
+        rate: Largest magnitude of the rate, between samples, too [rad/s or m/s].
         last: Largest magnitude of the acceleration once the funnel is closed [rad/s^2 or m/s^2].
         settled: Largest departure from the goal interval's middle once the funnel is closed [rad or m].
         settled_rate: Largest rate once the funnel is closed [rad/s or m/s].
@@ -90,6 +91,7 @@ class AxisSets:
     tubes: tuple[FloatArray, ...]
     distance: float
     acceleration: float = np.inf
+    rate: float = np.inf
     last: float = np.inf
     settled: float = np.inf
     settled_rate: float = np.inf
@@ -121,7 +123,7 @@ def axis_sets(row: FloatArray, conditions: Sequence[AxisConditions], entry: Entr
 
     Args:
         row: The axis, a row of an ``axis_table``, with a quintic funnel.
-        conditions: Alternatives for what disturbs it; one of them holds during the whole transition.
+        conditions: What disturbs it: in one of these ways, but in the same one all the time.
         entry: The set in which it enters.
         parts: Into how many parts the positions at the entry are cut, each with a tube of its own.
     """
@@ -140,10 +142,13 @@ def axis_sets(row: FloatArray, conditions: Sequence[AxisConditions], entry: Entr
         tubes += made
     kept = _settled(row, conditions, begin * T, boxes, followed, tail)
     last = max(one.acceleration for one in kept)
+    most = max(last, *(float(tube[:, ACCELERATION].max()) for tube in tubes))
+    rate = max(kept[0].rate, *(float((np.abs(tube[:, V]) + tube[:, V_REACH]).max()) for tube in tubes))
     return AxisSets(
         tuple(tubes),
         min(*(one.distance for one in kept), *(float(tube[:, DISTANCE].min()) for tube in tubes)),
-        max(last, *(float(tube[:, ACCELERATION].max()) for tube in tubes)),
+        most,
+        rate + 0.5 * T * most,
         last,
         kept[0].x,
         kept[0].rate,

@@ -11,7 +11,6 @@ measured before, so that one pass forward in time bounds all of them.
 
 from __future__ import annotations
 
-from math import exp
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +18,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.laws.axis_table import FADING_TIME, bounds_of, track_row
 from coop_drake.laws.hand_over import fading
+from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.planning.budget.law_fit import fit_law, law_memory
 from coop_drake.tree.pose import FloatArray
 
@@ -56,15 +56,6 @@ class AxisConditions(NamedTuple):
     model_error: float
     acceleration_error: float
     late: int
-
-
-@compiled
-def lag_factors(period: float, lag: float) -> tuple[float, float, float]:
-    """Return what a command held over a period leaves of p - u: in p [-], in v [s] and in x [s^2]."""
-    if lag == 0.0:
-        return 0.0, 0.0, 0.0
-    left = exp(-period / lag)
-    return left, lag * (1.0 - left), lag * period - lag * lag * (1.0 - left)
 
 
 @compiled

@@ -25,8 +25,9 @@ from coop_drake.laws.axis_table import (
     SATURATION,
     bounds_of,
 )
+from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.laws.ppc import ramped_gain
-from coop_drake.planning.budget.axis_tube import AxisConditions, lag_factors
+from coop_drake.planning.budget.axis_tube import AxisConditions
 from coop_drake.planning.budget.law_fit import fit_law, law_memory
 from coop_drake.tree.pose import FloatArray
 

@@ -12,7 +12,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
-from coop_drake.planning.budget.fitting import OVERLAPS, fit_budget, sufficient_overlap
+from coop_drake.planning.budget.fitting import fit_budget
 from coop_drake.planning.budget.position_fit import UnprovedPosition, fit_position
 from coop_drake.planning.budget.transitions import UnprovedTransition
 from coop_drake.planning.improvement.quickest import quickest_plan
@@ -21,8 +21,10 @@ from coop_drake.progress import Progress
 SHARE_STEP = 0.01
 """The largest share of a budget is found within this [-]."""
 
-USUAL_OVERLAP = 0.06
-"""This overlap is tried, too, where boxes with the wider ones that a budget needs do not exist [rad or m]."""
+OVERLAPS = (0.04, 0.06, 0.09, 0.02)
+"""Least overlaps of consecutive boxes that are tried, in every angle and joint [rad or m]: the wider the goal
+intervals, the larger are the departures that an axis bears in them, and the more cells a plan has. The last
+one is for passages that leave no room for wider ones."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +75,7 @@ def tolerant_plan(
         StallError: No plan can be executed.
     """
     tried: list[tuple[Plan, UnprovedTransition | UnprovedPosition]] = []
-    for overlap in _overlaps(gain_set, budget):
+    for overlap in OVERLAPS if budget.axes else (0.0,):  # the position alone asks for none
         try:
             plan = quickest_plan(
                 problem,
@@ -116,21 +118,12 @@ def _beyond(
     return BeyondBudget(said, budget, best)
 
 
-def _overlaps(gain_set: ScheduledGains, budget: Budget) -> list[float]:
-    """Return the least overlaps of boxes that are tried; the position alone asks for none."""
-    if not budget.axes:
-        return [0.0]
-    least = sufficient_overlap(gain_set, budget)
-    wider = [overlap for overlap in OVERLAPS if overlap >= least]
-    return [*wider, *([USUAL_OVERLAP] if least > USUAL_OVERLAP else [])]
-
-
 def _fitted(
     problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget
 ) -> Plan | UnprovedTransition | UnprovedPosition:
     """Return a plan with gains, sets and regions under which its budget holds; or where it does not."""
     if budget.axes:
-        fitted = fit_budget(plan, gain_set, budget)
+        fitted = fit_budget(problem, plan, gain_set, budget)
         if isinstance(fitted, UnprovedTransition):
             return fitted
         plan = fitted

@@ -1,37 +1,43 @@
-"""The sets of all axes from transition to transition: from one entry set follows the next one."""
+"""All axes from transition to transition: from one entry set of a nominal motion follows the next one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from coop_drake.answers.budget import Budget
-from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, LEAVING_TIME, REST_RATE, REST_REACH
+from coop_drake.laws.axis_table import (
+    ACCELERATION_LIMIT,
+    GOAL_LOWER,
+    GOAL_UPPER,
+    LEAVING_TIME,
+    RATE_LIMIT,
+    REST_RATE,
+    REST_REACH,
+)
 from coop_drake.laws.readiness import EROSION
 from coop_drake.laws.sampling import whole_periods
+from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop, near_accelerations
 from coop_drake.planning.budget.axis_sets import AxisSets, Entry, axis_sets, conditions_of
 from coop_drake.planning.budget.axis_tube import AxisConditions
-from coop_drake.planning.budget.leaving import next_entry, rest_needed, settling_time
+from coop_drake.planning.budget.leaving import next_entry, rest_needed
 from coop_drake.planning.budget.rate_room import comes_near_limit
 from coop_drake.tree.pose import FloatArray
 
+REST_SHARE = 0.05
+"""Largest distance from the middle of a goal interval with which a nominal motion may leave a cell, over the
+interval's width [-]: the less, the smaller is the entry set of the next cell, and the longer it takes."""
+
+REST_SPEED = 0.03
+"""Largest rate with which a nominal motion may leave a cell [rad/s or m/s]."""
+
 REST_FACTOR = 1.5
-"""Departure from rest with which a cell may be left, over the largest one of a settled axis [-]. A larger
-factor leaves the cell earlier, but makes the entry set of the next cell larger."""
-
-QUICK_RATE = 0.2
-"""Rate below which a cell may be left at first, anywhere in the eroded goal interval, if that is larger
-[rad/s or m/s]: most transitions hold with it, and waiting for less costs time."""
-
-STRICTEST = 2
-"""Largest ``ProvedTransition.strictness``: the number of the last condition under which a cell may be left
-[-]."""
+"""Least distance and rate with which a cell may be left, over the largest ones of a settled motion [-]."""
 
 ENTRY_PARTS = (1, 3)
 """Parts into which the positions at an entry are cut, tried in this order [-]."""
-
-SLACK = 1e-3
-"""Fraction by which stated bounds are wider than computed ones [-]: more than another way to round needs."""
 
 
 @dataclass(frozen=True)
@@ -55,40 +61,58 @@ class ProvedTransition:
 
     Attributes:
         table: Its axes, an ``axis_table`` with the condition of rest under which the cell is left.
-        entries: The sets in which they enter.
-        sets: What follows.
-        strictness: 0 if axes may leave the cell at ``QUICK_RATE``, 1 if not, 2 if they must have settled.
+        entries: The sets in which their nominal motions enter.
+        sets: What follows for these.
+        departure: Largest departures from them, shape (axes,) [rad or m].
+        rate_departure: Largest departures of the rates, shape (axes,) [rad/s or m/s].
     """
 
     table: FloatArray
     entries: Sequence[Entry]
     sets: Sequence[AxisSets]
-    strictness: int = 0
+    departure: FloatArray
+    rate_departure: FloatArray
 
 
 def follow_transitions(
-    tables: Sequence[FloatArray], start: FloatArray, budget: Budget
+    tables: Sequence[FloatArray], start: FloatArray, loop: AxisLoop
 ) -> list[ProvedTransition] | UnprovedTransition:
-    """Follow all axes under a budget through transitions.
-
-    Where a transition does not hold, the condition under which the cell before it is left becomes stricter.
+    """Follow all axes through transitions: their nominal motions, and how far they depart from these.
 
     Args:
         tables: The axes in every transition, each an ``axis_table`` with quintic funnels.
         start: Where they rest at the beginning, shape (axes,) [rad or m].
-        budget: The departures to be tolerated.
+        loop: The loop that pulls the axes to their nominal motions, with the budget.
     """
-    conditions, proved = conditions_of(budget), list[ProvedTransition]()
-    while len(proved) < len(tables):
-        k = len(proved)
-        found = _proved(k, tables[k].copy(), _entries(proved, start, budget, conditions[0]), conditions)
-        if isinstance(found, ProvedTransition):
-            proved.append(found)
-        elif not proved or proved[-1].strictness == STRICTEST:
+    nominal = loop.budget.nominal
+    conditions, proved = conditions_of(nominal), list[ProvedTransition]()
+    for k, table in enumerate(tables):
+        found = _proved(k, table.copy(), _entries(proved, start, nominal, conditions[0]), conditions)
+        if isinstance(found, UnprovedTransition):
             return found
-        else:
-            proved[-1] = _stricter(proved[-1], conditions[0])
-    return proved
+        proved.append(found)
+    return _departing(proved, loop)
+
+
+def _departing(
+    proved: Sequence[ProvedTransition], loop: AxisLoop
+) -> list[ProvedTransition] | UnprovedTransition:
+    """Return the transitions with the departures of their axes; or where these leave a funnel or a limit."""
+    accelerations = [(1.0 + SLACK) * np.array([sets.acceleration for sets in each.sets]) for each in proved]
+    stays = [float(each.table[0, LEAVING_TIME]) for each in proved]
+    largest, result = np.max(accelerations, axis=0), []
+    for k, each in enumerate(proved):
+        near = near_accelerations(accelerations, stays, k)
+        departure, rate_departure, push = loop.departures(near, largest)
+        for axis, sets in enumerate(each.sets):
+            if not (1.0 - SLACK) * sets.distance > departure[axis]:
+                return UnprovedTransition(k, axis, "may leave its funnel")
+            if not (1.0 + SLACK) * sets.rate + rate_departure[axis] < each.table[axis, RATE_LIMIT]:
+                return UnprovedTransition(k, axis, "may exceed the limit of its rate")
+            if not accelerations[k][axis] + push[axis] <= each.table[axis, ACCELERATION_LIMIT]:
+                return UnprovedTransition(k, axis, "may exceed the limit of its acceleration")
+        result.append(replace(each, departure=departure, rate_departure=rate_departure))
+    return result
 
 
 def _entries(
@@ -102,18 +126,6 @@ def _entries(
         _widened(next_entry(row, sets, entry, conditions, periods))
         for row, sets, entry in zip(before.table, before.sets, before.entries, strict=True)
     ]
-
-
-def _stricter(passed: ProvedTransition, conditions: AxisConditions) -> ProvedTransition:
-    """Return a transition whose cell is left under the next stricter condition."""
-    table, strictness = passed.table.copy(), passed.strictness + 1
-    for row, sets in zip(table, passed.sets, strict=True):
-        reach, rate = rest_needed(sets, conditions)
-        row[REST_REACH], row[REST_RATE] = min(REST_FACTOR * reach, row[REST_REACH]), REST_FACTOR * rate
-    if strictness == STRICTEST:
-        times = [settling_time(row, sets, conditions) for row, sets in zip(table, passed.sets, strict=True)]
-        table[:, LEAVING_TIME] = max(*times, float(table[0, LEAVING_TIME]))
-    return replace(passed, table=table, strictness=strictness)
 
 
 def _proved(
@@ -134,9 +146,12 @@ def _proved(
         half = (0.5 - EROSION) * (row[GOAL_UPPER] - row[GOAL_LOWER])
         if not (1.0 + SLACK) * reach < half:
             return UnprovedTransition(k, axis, "may never come to rest in its goal interval")
-        row[REST_REACH], row[REST_RATE] = half, max(REST_FACTOR * rate, QUICK_RATE)
+        share = REST_SHARE * (row[GOAL_UPPER] - row[GOAL_LOWER])
+        row[REST_REACH] = min(half, max(REST_FACTOR * reach, share))
+        row[REST_RATE] = max(REST_FACTOR * rate, REST_SPEED)
         every.append(sets)
-    return ProvedTransition(table, entries, every)
+    nothing = np.zeros(len(table))
+    return ProvedTransition(table, entries, every, nothing, nothing)
 
 
 def _widened(entry: Entry) -> Entry:

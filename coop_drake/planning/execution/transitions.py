@@ -112,15 +112,24 @@ def keep_limits(problem: PlanningProblem, plan: Plan, gain_set: GainSet) -> Plan
     if most is not None:
         plan = timed(with_gains(plan, gain_set, plan.gain_set, accelerations=most))
     if problem.limits.any:
-        plan = _sharing_speeds(problem, plan, gain_set)
+        plan = share_speeds(problem, plan, gain_set)
     if most is not None:
         check_accelerations(plan, most)
     return plan
 
 
-def _sharing_speeds(problem: PlanningProblem, plan: Plan, gain_set: GainSet) -> Plan:
+def share_speeds(problem: PlanningProblem, plan: Plan, gain_set: GainSet, spare_rate: float = 0.0) -> Plan:
+    """Return a plan that keeps the limits of speed, the quickest of a few ways to share them among the axes.
+
+    Args:
+        problem: What was asked, with limits of speed.
+        plan: A plan with the gains of the gain set.
+        gain_set: Gains, fixed or to be scheduled.
+        spare_rate: What the rate of every axis may exceed the estimate by, for instance as its budget lets it
+            depart from its nominal motion [rad/s or m/s].
+    """
     tried = []
-    for shares in speed_shares(problem, plan):
+    for shares in speed_shares(problem, plan, spare_rate):
         limited = timed(with_gains(plan, gain_set, plan.gain_set, shares))
         tried.append(replace(limited, speeds=stated_speeds(problem, shares)))
     return min(tried, key=plan_time)
@@ -157,7 +166,8 @@ def with_gains(
         gains = _gains(gain_set, cell, transition.neck, goals, resting, limits, most)
         transitions.append(replace(transition, gains=gains, tolerance=None, governed=None))
         resting = 0.5 * (transition.goal_lower + transition.goal_upper)
-    return replace(plan, transitions=tuple(transitions), gain_set=name, budget=None, tube=None)
+    made = replace(plan, transitions=tuple(transitions), gain_set=name)
+    return replace(made, budget=None, tube=None, axis_tracking=None)
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
 """Check that a plan tolerates its budget: every stated set follows from those before it.
 
-By induction over the transitions: from the stated entry set of each, no disturbance within the budget takes
-an axis nearer to its funnel's bounds than stated, or accelerates it more; it ends settled as stated, where it
-counts as arrived; and the states in which the next cell can then be entered lie in the stated set of that.
+By induction over the transitions: from the stated entry set of each, no nominal motion is accelerated more
+than stated; it ends settled as stated, where it counts as arrived; and the states in which the next cell can
+then be entered lie in the stated set of that. No disturbance within the budget takes an axis farther from its
+nominal motion than stated, and so no nearer to its funnel's bounds.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from coop_drake.answers.budget import Budget, Tolerance
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import RefusalError
 from coop_drake.tree.pose import FloatArray
+from coop_drake.verification.budgets.axis_departure import departures
 from coop_drake.verification.budgets.axis_law import Axes
 from coop_drake.verification.budgets.entering import entering
 from coop_drake.verification.budgets.rate_room import check_rate_room
@@ -23,8 +25,7 @@ from coop_drake.verification.budgets.tubes import Disturbed, tubes
 from coop_drake.verification.checks import Check
 
 MODEL_PARTS = 3
-"""Parts into which the range of the model's error is cut [-]: within each part the factor by which
-accelerations are too large is known but for a third of the error."""
+"""Parts into which the range of the model's error is cut [-]."""
 
 ROUNDING = 1e-9
 """Differences that rounding explains, relative and absolute [rad or m, s]."""
@@ -43,16 +44,16 @@ def check_budget(plan: Plan) -> Check | None:
         RefusalError: Names the transition, the entry and the axis.
     """
     if plan.budget is None or not plan.budget.axes:
-        for k, transition in enumerate(plan.transitions):
-            if transition.tolerance is not None:
-                finding = "is stated, but the plan has no budget for the axes"
-                raise RefusalError(f"transitions[{k}].tolerance", finding)
+        parts = {f"transitions[{k}].tolerance": one.tolerance for k, one in enumerate(plan.transitions)}
+        for where, stated in (*parts.items(), ("axis_tracking", plan.axis_tracking)):
+            if stated is not None:
+                raise RefusalError(where, "is stated, but the plan has no budget for the axes")
         return None if plan.budget is None else Check("angles and joints are not part of the budget", 0)
+    _check_departures(plan)
     smallest, count, entry = np.inf, 0, None
     for k, transition in enumerate(plan.transitions):
         stated, where = transition.tolerance, f"transitions[{k}]"
-        if stated is None:
-            raise RefusalError(f"{where}.tolerance", "is missing, but the plan has a budget")
+        assert stated is not None  # _check_departures has seen that
         if transition.gains.funnel != "quintic":
             raise RefusalError(
                 f"{where}.gains.funnel", f"{transition.gains.funnel}: such a funnel never closes"
@@ -64,6 +65,28 @@ def check_budget(plan: Plan) -> Check | None:
     return Check(
         "axes stay in their funnels under the budget", count, smallest, "rad or m to a funnel's bound"
     )
+
+
+def _check_departures(plan: Plan) -> None:
+    """Check how far axes and their rates may depart from their nominal motions."""
+    stated = []
+    for k, transition in enumerate(plan.transitions):
+        if transition.tolerance is None:
+            raise RefusalError(f"transitions[{k}].tolerance", "is missing, but the plan has a budget")
+        stated.append(transition.tolerance)
+    if plan.axis_tracking is None:
+        raise RefusalError("axis_tracking", "is missing, but the plan has a budget")
+    assert plan.budget is not None  # checked by the caller
+    accelerations = np.array([one.acceleration for one in stated])
+    stays = [max(one.gains.hand_over_time, one.gains.rest.after if one.gains.rest else 0.0)
+             for one in plan.transitions]  # fmt: skip
+    found = departures(plan.axis_tracking, plan.budget, accelerations, np.array(stays))
+    for k, one in enumerate(stated):
+        for name, values in zip(("departure", "rate_departure"), found[:2], strict=True):
+            _require(getattr(one, name), values[k], False, f"transitions[{k}].tolerance.{name}")
+        most = plan.transitions[k].gains.acceleration_limit
+        if most is not None and not (one.acceleration + found[2][k] <= most).all():
+            raise RefusalError(f"transitions[{k}].tolerance", "an axis may exceed its limit of acceleration")
 
 
 def _start(plan: Plan) -> FloatArray:
@@ -106,9 +129,9 @@ def _axes(plan: Plan, k: int) -> Axes:
 
 
 def _check_transition(plan: Plan, k: int, stated: Tolerance, where: str) -> FloatArray:
-    """Check one transition; return in which states the next one can begin."""
-    budget, axes, rest = plan.budget, _axes(plan, k), plan.transitions[k].gains.rest
-    assert budget is not None  # checked by the caller
+    """Check one transition of the nominal motions; return in which states the next one can begin."""
+    assert plan.budget is not None  # checked by the caller
+    budget, axes, rest = plan.budget.nominal, _axes(plan, k), plan.transitions[k].gains.rest
     members, disturbed, middle, reach, before = _parts(axes, stated, budget)
     T = budget.period
     ended = np.maximum(5.0 / axes.decay, np.where(axes.mu > 0.0, RAMPED / np.maximum(axes.mu, 1e-9), 0.0))
@@ -128,7 +151,7 @@ def _check_transition(plan: Plan, k: int, stated: Tolerance, where: str) -> Floa
         fastest[i] = max(fastest[i], made[:n, 4, i].max())
     needed = np.maximum(needed, most)
     for name, found in (
-        ("distance", -_largest(-distance, members)),
+        ("distance", -_largest(-distance, members) - stated.departure),
         ("acceleration", _largest(fastest, members)),
         ("settled", _largest(needed[0], members)),
         ("settled_rate", _largest(needed[1], members)),

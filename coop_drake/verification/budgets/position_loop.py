@@ -23,11 +23,10 @@ PARTS = 5
 """Parts into which the range of the model's error is cut [-]."""
 
 HORIZON = 6.0
-"""Time for which responses are summed [s]; a loop that takes longer to come to rest is refused."""
+"""Responses are summed for so long [s]."""
 
 LEFT = 1e-7
-"""Part of a unit response that may be left after that [m, m/s]: a hundred times what the planner leaves, so
-that rounding refuses no plan."""
+"""What may be left of a unit response after that [m, m/s]."""
 
 COMMAND, KICK, PLACE, STEP = range(4)
 """The runs: a unit of command, of velocity, of position, and of p_G."""
@@ -111,11 +110,11 @@ def _sums(
         nominal = -stiffness * (q - goal) - damping * w
         found = np.stack(np.broadcast_arrays(p - q, v - w, feedback, nominal, w), axis=1)
         sums[[COMMAND, STEP]] += np.abs(found[[COMMAND, STEP]])
-        sums[KICK] += _mean_size(found[KICK], found[KICK] + T * found[PLACE])
+        sums[KICK] += mean_size(found[KICK], found[KICK] + T * found[PLACE])
         command = feedback + nominal
         if k == 0:
             command[COMMAND] += 1.0
-        p, v, s = _carried(p, v, s, command, 1.0 + errors, budget.lag, T)
+        p, v, s = carried(p, v, s, command, 1.0 + errors, budget.lag, T)
         q, w = goal + flow[0, 0] * (q - goal) + flow[0, 1] * w, flow[1, 0] * (q - goal) + flow[1, 1] * w
     if not max(np.abs(p - q).max(), np.abs(v - w).max()) < LEFT:
         raise RefusalError("tube.tracking_stiffness", f"the position has not come to rest after {HORIZON} s")
@@ -123,7 +122,7 @@ def _sums(
     return sums
 
 
-def _mean_size(first: FloatArray, last: FloatArray) -> FloatArray:
+def mean_size(first: FloatArray, last: FloatArray) -> FloatArray:
     """Return the mean of |x| while x goes evenly from one value to another."""
     span = np.maximum(np.abs(last - first), 1e-300)
     mean: FloatArray = np.where(
@@ -132,7 +131,7 @@ def _mean_size(first: FloatArray, last: FloatArray) -> FloatArray:
     return mean
 
 
-def _carried(
+def carried(
     p: FloatArray, v: FloatArray, s: FloatArray, command: FloatArray, factor: FloatArray, lag: float, T: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Carry position, velocity and the lagging acceleration over a period in which a command is held."""

@@ -56,6 +56,9 @@ def check_rate_room(
         asked = commanded[:, of].ravel()
         if not (rates * asked <= 0.5 * gain * (limit**2 - rates**2)).all():
             raise RefusalError(f"{where}[{axis}]", f"an axis may be damped by its limit of {limit:.6g}")
+        fastest = rates.max() + 0.5 * budget.period * stated.acceleration[axis] + stated.rate_departure[axis]
+        if not fastest <= limit:
+            raise RefusalError(f"{where}[{axis}]", f"an axis may be faster than its limit of {limit:.6g}")
 
 
 def _entry_rates(stated: Tolerance, budget: Budget, delay: int) -> FloatArray:

@@ -103,6 +103,8 @@ def _leaving(rows: Rows, members: NDArray[np.bool_], cell: int) -> tuple[FloatAr
 def rest_shares(plan: Plan, cell: int, axes: FloatArray, rates: FloatArray) -> FloatArray:
     """Departures from rest over those with which a cell may be left, per axis, the larger of both [-].
 
+    Where nominal motions are at rest, what axes may depart from them comes on top.
+
     Args:
         plan: A plan whose cells are left at rest.
         cell: The cell that is left.
@@ -112,9 +114,10 @@ def rest_shares(plan: Plan, cell: int, axes: FloatArray, rates: FloatArray) -> F
     transition = plan.transitions[cell]
     assert transition.gains.rest is not None  # the caller asks for no other plan
     away = np.abs(axes - 0.5 * (transition.goal_lower + transition.goal_upper))
-    shares: FloatArray = np.maximum(
-        away / transition.gains.rest.reach, np.abs(rates) / transition.gains.rest.rate
-    )
+    reach, rate, stated = transition.gains.rest.reach, transition.gains.rest.rate, transition.tolerance
+    if stated is not None:
+        reach, rate = reach + stated.departure, rate + stated.rate_departure
+    shares: FloatArray = np.maximum(away / reach, np.abs(rates) / rate)
     return shares
 
 

@@ -1,0 +1,23 @@
+"""The axes' part of a budget: with which gains angles and joints are pulled to their nominal motions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from coop_drake.typed_data import EXACT, Positive
+
+_Exact = Annotated[Positive, EXACT]
+
+
+@dataclass(frozen=True)
+class AxisTracking:
+    """Gains of the pull, the same for all axes and in every transition of a plan.
+
+    Attributes:
+        stiffness: K_a [1/s^2].
+        damping: zeta_a [1/s].
+    """
+
+    stiffness: _Exact
+    damping: _Exact

@@ -1,0 +1,217 @@
+"""How far an axis may depart from its nominal motion under a budget.
+
+Let e = x - x^ be the departure of an axis from its nominal motion, see ``laws/nominal_axes.py``. Robots
+command, at sample k and with measurements that are m periods old, L + q_k with the pull
+
+    q_k = -K_a (e_(k-m) + n_x) - zeta_a (e'_(k-m) + n_v),
+
+which acts with the same lag as L. With the acceleration a^ of the nominal motion, the lagged pull q and the
+factor 1 + epsilon by which the model makes accelerations too large, f being the middle of a part of its
+range,
+
+    e'' = f q + (1 + epsilon - f) q + epsilon a^ + w.
+
+The loop e'' = f q is linear and does not vary in time, so that |e| is at most the sum over all samples of
+its responses' magnitudes times the largest size of what enters: noise of a command, and accelerations. Hand-
+overs and funnels do not appear in it. Only a^ is larger in one transition than in another: what entered
+longer ago than ``MEMORY`` is counted with its largest size in the whole plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from coop_drake.answers.axis_tracking import AxisTracking
+from coop_drake.answers.budget import Budget
+from coop_drake.compiled import compiled
+from coop_drake.laws.nominal_axes import lag_factors
+from coop_drake.laws.sampling import whole_periods
+from coop_drake.tree.pose import FloatArray
+
+MODEL_PARTS = 5
+"""Parts into which the range of the model's error is cut [-]; within each only the rest is a disturbance."""
+
+HORIZON = 4.0
+"""Responses are summed for so long [s]; what is left of them then must be below ``LEFT``."""
+
+LEFT = 1e-9
+"""Largest response at the end of ``HORIZON`` to a unit departure [-]; a loop that is slower is refused."""
+
+MEMORY = 0.3
+"""Time for which the accelerations of former transitions count with their own sizes [s]: less than a
+hundredth of a response of typical gains is left after it."""
+
+STIFFNESSES = (100.0, 150.0, 200.0, 250.0, 300.0, 400.0, 500.0, 700.0, 1000.0)
+"""K_a that are tried [1/s^2]; the narrowest tube is taken."""
+
+DAMPINGS = (1.2, 1.4, 1.7, 2.0, 2.5)
+"""zeta_a over the root of K_a that are tried [-]."""
+
+TYPICAL_ACCELERATION = 8.0
+"""Acceleration of a nominal motion for which the gains are chosen [rad/s^2 or m/s^2]: two thirds of the
+largest one of a funnel's bound in the shipped rule of gains."""
+
+RATE_WEIGHT = 0.01
+"""What a departure of the rate counts beside one of the axis, where gains are chosen [s]: it takes its part
+of the limit of the rate."""
+
+SLACK = 1e-3
+"""Fraction by which stated bounds are wider than computed ones [-]: more than the responses after
+``HORIZON`` and another way to round need."""
+
+X, V, Q = range(3)
+"""What responds: e [rad or m], e' [rad/s or m/s] and the pull [rad/s^2 or m/s^2]."""
+
+COMMAND, ACCELERATION, LATE = range(3)
+"""To what: a unit of command in each period, a unit of acceleration, and one from before ``MEMORY``."""
+
+
+@dataclass(frozen=True)
+class AxisLoop:
+    """The loop of all axes under a budget.
+
+    Attributes:
+        tracking: Its gains.
+        budget: The departures to be tolerated.
+        sums: Of every part of the model's range the sums of responses, shape (parts, 3, 3).
+    """
+
+    tracking: AxisTracking
+    budget: Budget
+    sums: FloatArray
+
+    @property
+    def typical_rate(self) -> float:
+        """Largest departure of a typical axis's rate from the nominal one [rad/s or m/s]."""
+        typical = np.array([TYPICAL_ACCELERATION])
+        return float(self.departures(typical, typical)[1][0])
+
+    def departures(self, near: FloatArray, largest: FloatArray) -> FloatArray:
+        """Return the largest |e|, |e'| and |e''| of some axes, shape (3, m), with ``SLACK``.
+
+        Args:
+            near: Largest |a^| within ``MEMORY``, shape (m,) [rad/s^2 or m/s^2].
+            largest: Largest |a^| in the whole plan, of the same shape.
+        """
+        budget, T = self.budget, self.budget.period
+        noise = self.tracking.stiffness * budget.angle_noise + self.tracking.damping * budget.rate_noise
+        rest, furthest = _rest(budget), np.zeros((3, near.size))
+        for sums, factor in zip(self.sums, _factors(budget), strict=True):
+            error = abs(factor - 1.0) + rest
+            any_ = budget.acceleration_error + error * largest
+            pull = noise * (1.0 + sums[Q, COMMAND]) + any_ * sums[Q, ACCELERATION]
+            pull = pull / (1.0 - rest * sums[Q, ACCELERATION])
+            steady = budget.acceleration_error + rest * pull
+            found = np.array(
+                [
+                    noise * sums[i, COMMAND]
+                    + (steady + error * near) * (sums[i, ACCELERATION] - sums[i, LATE])
+                    + (steady + error * largest) * sums[i, LATE]
+                    for i in (X, V)
+                ]
+            )
+            between = (1.0 + budget.model_error) * pull + error * near + budget.acceleration_error
+            found += np.array([T * T / 8.0 * between, T / 2.0 * between])
+            furthest = np.maximum(furthest, np.vstack([found, between]))
+        result: FloatArray = (1.0 + SLACK) * furthest
+        return result
+
+
+def best_loop(budget: Budget) -> AxisLoop | None:
+    """Return the loop with the gains for which a typical axis departs least; None where none is stable."""
+    typical, best, least = np.array([TYPICAL_ACCELERATION]), None, inf
+    for stiffness in STIFFNESSES:
+        for damping in DAMPINGS:
+            tracking = AxisTracking(stiffness, damping * stiffness**0.5)
+            loop = axis_loop(tracking, budget)
+            if loop is None:
+                continue
+            found = float(loop.departures(typical, typical)[0][0]) + RATE_WEIGHT * loop.typical_rate
+            if found < least:
+                best, least = loop, found
+    return best
+
+
+def axis_loop(tracking: AxisTracking, budget: Budget) -> AxisLoop | None:
+    """Return the loop with some gains, None where it is not stable for every error of the model."""
+    T = budget.period
+    periods = whole_periods(budget.delay, T), whole_periods(MEMORY, T), whole_periods(HORIZON, T)
+    gains = tracking.stiffness, tracking.damping
+    sums = np.array([_sums(gains, T, budget.lag, factor, periods) for factor in _factors(budget)])
+    good = np.isfinite(sums).all() and (_rest(budget) * sums[:, Q, ACCELERATION] < 1.0).all()
+    return AxisLoop(tracking, budget, sums) if good else None
+
+
+def near_accelerations(largest: Sequence[FloatArray], stays: Sequence[float], k: int) -> FloatArray:
+    """Return the largest |a^| of transition k and of those that ended less than ``MEMORY`` before it, (m,).
+
+    Args:
+        largest: Largest |a^| of every transition, each of shape (m,) [rad/s^2 or m/s^2].
+        stays: For how long every cell is kept at least [s].
+        k: The transition.
+    """
+    near, ago = largest[k], 0.0
+    for before in range(k - 1, -1, -1):
+        near = np.maximum(near, largest[before])
+        ago += stays[before]
+        if ago >= MEMORY:
+            break
+    return near
+
+
+def _factors(budget: Budget) -> list[float]:
+    """Return f of every part of the model's range."""
+    parts = MODEL_PARTS if budget.model_error > 0.0 else 1
+    return [1.0 + budget.model_error * ((2 * part + 1) / parts - 1.0) for part in range(parts)]
+
+
+def _rest(budget: Budget) -> float:
+    """Return by how much the model's factor may differ from f within a part."""
+    return budget.model_error / (MODEL_PARTS if budget.model_error > 0.0 else 1)
+
+
+@compiled
+def _sums(
+    gains: tuple[float, float], period: float, lag: float, factor: float, periods: tuple[int, int, int]
+) -> FloatArray:
+    """Return the sums of the magnitudes of responses, shape (3, 3), infinite where one does not end.
+
+    An acceleration w within a period acts on the sample after it by (T - t) on e and by 1 on e';
+    |h_e (T - t) + h_v| is convex in t, so that its chord is above it.
+
+    Args:
+        gains: K_a [1/s^2] and zeta_a [1/s].
+        period: T [s].
+        lag: Time constant of the actuators [s].
+        factor: f [-].
+        periods: Delay, ``MEMORY`` and ``HORIZON`` in periods.
+    """
+    T, (delay, memory, n) = period, periods
+    left, in_v, in_x = lag_factors(T, lag)
+    e, v, pull = np.zeros((3, n + 1)), np.zeros((3, n + 1)), np.zeros((3, n + 1))
+    e[1, 0], v[2, 0] = 1.0, 1.0  # the runs: a unit command, a unit of e and one of e'
+    sums = np.zeros((3, 3))
+    for run in range(3):
+        q = 0.0
+        for k in range(n):
+            if k >= delay:
+                pull[run, k] = -gains[0] * e[run, k - delay] - gains[1] * v[run, k - delay]
+            u = pull[run, k] + (1.0 if run == 0 and k == 0 else 0.0)
+            gap = q - u
+            e[run, k + 1] = e[run, k] + T * v[run, k] + factor * (0.5 * T * T * u + in_x * gap)
+            v[run, k + 1] = v[run, k] + factor * (T * u + in_v * gap)
+            q = u + left * gap
+        if not abs(e[run, n]) + abs(v[run, n]) < LEFT:
+            return np.full((3, 3), np.inf)
+    for k in range(n + 1):
+        for i, h in enumerate((e, v, pull)):
+            sums[i, 0] += abs(h[0, k])
+            kick = 0.5 * T * (abs(h[1, k] * T + h[2, k]) + abs(h[2, k]))
+            sums[i, 1] += kick
+            if k >= memory:
+                sums[i, 2] += kick
+    return sums

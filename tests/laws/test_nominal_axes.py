@@ -1,0 +1,29 @@
+"""The nominal motion of an axis: carried over a period exactly, and its pull."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from coop_drake.laws.nominal_axes import carry_axes, pulled_axis
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.003])
+def test_a_period_is_carried_as_the_differential_equation_says(lag):
+    state, command, following = np.array([[0.2], [-0.7], [3.0]]), np.array([5.0]), np.empty((3, 1))
+    carry_axes(state, command, 0.01, lag, following)
+    if lag == 0.0:
+        expected = [0.2 - 0.7 * 0.01 + 0.5 * 5.0 * 1e-4, -0.7 + 0.05, 5.0]
+    else:
+        motion = solve_ivp(
+            lambda _, y: [y[1], y[2], (5.0 - y[2]) / lag], (0.0, 0.01), state[:, 0], rtol=1e-11, atol=1e-13
+        )
+        expected = motion.y[:, -1]
+    np.testing.assert_allclose(following[:, 0], expected, rtol=1e-8)
+
+
+def test_an_axis_on_its_nominal_motion_is_not_pulled():
+    assert pulled_axis(1.5, 0.3, -0.2, (0.3, -0.2), (400.0, 30.0)) == 1.5
+
+
+def test_the_pull_is_that_of_a_spring_and_a_damper():
+    assert pulled_axis(1.5, 0.31, -0.1, (0.3, -0.2), (400.0, 30.0)) == pytest.approx(1.5 - 4.0 - 3.0)
