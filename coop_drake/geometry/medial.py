@@ -98,27 +98,22 @@ def _joining(pairs: IntArray, clearance: FloatArray, count: int, start: int, end
     """
     joined_to = np.arange(count)
     for k in range(len(pairs)):
-        first, second = pairs[k, 0], pairs[k, 1]
-        while joined_to[first] != first:
-            joined_to[first] = joined_to[joined_to[first]]
-            first = joined_to[first]
-        while joined_to[second] != second:
-            joined_to[second] = joined_to[joined_to[second]]
-            second = joined_to[second]
-        joined_to[first] = second
-        one, other = start, end
-        while joined_to[one] != one:
-            joined_to[one] = joined_to[joined_to[one]]
-            one = joined_to[one]
-        while joined_to[other] != other:
-            joined_to[other] = joined_to[joined_to[other]]
-            other = joined_to[other]
-        if one == other:
+        joined_to[_root(joined_to, pairs[k, 0])] = _root(joined_to, pairs[k, 1])
+        if _root(joined_to, start) == _root(joined_to, end):
             last = k + 1
             while last < len(pairs) and clearance[last] == clearance[k]:
                 last += 1
             return last
     return 0
+
+
+@compiled
+def _root(joined_to: IntArray, node: int) -> int:
+    """The node that stands for all that a node is joined to; paths to it become shorter."""
+    while joined_to[node] != node:
+        joined_to[node] = joined_to[joined_to[node]]
+        node = joined_to[node]
+    return node
 
 
 @compiled

@@ -11,8 +11,9 @@ from manifold3d import CrossSection
 from shapely import MultiPolygon, Polygon
 
 from coop_drake.geometry.body_pairs import BodyPair, BodyPairs
+from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.geometry.convex import following
-from coop_drake.geometry.minkowski import FreeSpace
+from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.safeguards import components, meet, shared
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.tree.pose import FloatArray
@@ -57,20 +58,11 @@ class Region:
 
     def depths(self, points: FloatArray) -> FloatArray:
         """Signed distances from the boundary, positive inside (even-odd rule); shape (k, 2) to (k,) [m]."""
-        nearest = np.full(len(points), np.inf)
-        inside = np.zeros(len(points), dtype=bool)
-        x, y = points[:, :1], points[:, 1:]
-        for ring in self.rings:
-            along = following(ring) - ring
-            ax, ay = x - ring[:, 0], y - ring[:, 1]
-            length = np.maximum((along**2).sum(axis=1), 1e-18)
-            fraction = np.clip((along[:, 0] * ax + along[:, 1] * ay) / length, 0.0, 1.0)
-            away = np.hypot(ax - fraction * along[:, 0], ay - fraction * along[:, 1])
-            nearest = np.minimum(nearest, away.min(axis=1))
-            spans = (ay < 0.0) != (ay - along[:, 1] < 0.0)
-            slope = along[:, 0] / np.where(along[:, 1] == 0.0, 1.0, along[:, 1])
-            inside ^= (spans & (ax < ay * slope)).sum(axis=1) % 2 == 1
-        return np.where(inside, nearest, -nearest)
+        return self._boundary.batch(points)
+
+    @cached_property
+    def _boundary(self) -> BoundaryDistance:
+        return BoundaryDistance(to_polygon(self.section))
 
     def meets(self, other: Region, *, otherwise: bool = True) -> bool:
         """Whether both sets share more than their boundary; ``otherwise`` if geometry fails."""
