@@ -35,7 +35,13 @@ def diagnosis_figure(problem: PlanningProblem, diagnosis: Diagnosis) -> Figure |
     places = places[:MOST_PLACES]
     x_min, y_min, x_max, y_max = problem.workspace.bounds
     wide = min(2.0, max(0.5, (x_max - x_min + 0.6) / (y_max - y_min + 0.6)))
-    figure = new_figure(SIDE * (wide + len(places)) + 1.0, SIDE + 0.9, _caption(diagnosis))
+    caption = "Orange bodies collide at the goal; dark red is what lies behind a wall."
+    if diagnosis.passages is not None:
+        caption = (
+            "Orange bodies collide with a wall in the passage; dark red is what lies behind the wall here. "
+            "The blue line is the object's path with the walls moved back."
+        )
+    figure = new_figure(SIDE * (wide + len(places)) + 1.0, SIDE + 0.9, caption)
     engine = figure.get_layout_engine()
     if isinstance(engine, ConstrainedLayoutEngine):
         engine.set(rect=(0.01, 0.09, 0.98, 0.88))
@@ -75,15 +81,6 @@ def _places(diagnosis: Diagnosis) -> list[tuple[FloatArray, frozenset[str], Bloc
     ]
 
 
-def _caption(diagnosis: Diagnosis) -> str:
-    return (
-        "Orange bodies collide with a wall in the passage; dark red is what lies behind the wall here. "
-        "The blue line is the object's path with the walls moved back."
-        if diagnosis.passages is not None
-        else "Orange bodies collide at the goal; dark red is what lies behind a wall."
-    )
-
-
 def _overview(ax: Axes, problem: PlanningProblem, diagnosis: Diagnosis, places: list[FloatArray]) -> None:
     draw_workspace(ax, problem.workspace)
     if diagnosis.passages is not None and diagnosis.passages.path is not None:
@@ -95,15 +92,12 @@ def _overview(ax: Axes, problem: PlanningProblem, diagnosis: Diagnosis, places: 
     for number, z in enumerate(places, start=1):
         for footprint in team_footprints(problem.tree, z):
             draw_polygon(ax, footprint.shape, facecolor=NOT_AT_FAULT, edgecolor="none", zorder=3)
-        ax.add_patch(_ring(z, problem.tree.reach))
+        ring = Circle(_xy(z), problem.tree.reach, fill=False, edgecolor=OUTSIDE, linewidth=1.6, zorder=6)
+        ax.add_patch(ring)
         if len(places) > 1:
             ax.annotate(
                 str(number), _xy(z), ha="center", va="center", zorder=7, color=OUTSIDE, fontweight="bold"
             )
-
-
-def _ring(z: FloatArray, radius: float) -> Circle:
-    return Circle((float(z[0]), float(z[1])), radius, fill=False, edgecolor=OUTSIDE, linewidth=1.6, zorder=6)
 
 
 def _enlarged(ax: Axes, problem: PlanningProblem, z: FloatArray, bodies: frozenset[str]) -> None:
