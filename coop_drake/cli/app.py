@@ -130,8 +130,5 @@ def show_version(
 for panel, commands in _PANELS.items():
     for name, command in commands.items():
         app.command(
-            name,
-            epilog=epilog(name),
-            rich_help_panel=panel,
-            context_settings=_PASSES_ARGUMENTS_ON.get(name),
+            name, epilog=epilog(name), rich_help_panel=panel, context_settings=_PASSES_ARGUMENTS_ON.get(name)
         )(command)

@@ -20,11 +20,7 @@ if TYPE_CHECKING:
 
 _QUESTIONS: tuple[tuple[str, str, Any], ...] = (
     ("robots", "How many robots", 2),
-    (
-        "arm",
-        "Lengths of an arm's links from the base on [m], with a joint between each two",
-        "0.35,0.4",
-    ),
+    ("arm", "Lengths of an arm's links from the base on [m], with a joint between each two", "0.35,0.4"),
     ("base_radius", "Radius of a base [m]", 0.25),
     ("length", "Length of the object [m]", 0.8),
     ("width", "Width of the object [m]", 0.5),

@@ -72,12 +72,7 @@ class Fault(NamedTuple):
 
 
 def certify(
-    outline: Outline,
-    panels: Panels,
-    flat: FlatMap,
-    hole_images: FloatArray,
-    unknowns: int,
-    condition: float,
+    outline: Outline, panels: Panels, flat: FlatMap, hole_images: FloatArray, unknowns: int, condition: float
 ) -> MapCertificate:
     """Sample the residual on every panel and far down every corner of a map, evaluated as its users do.
 

@@ -14,12 +14,7 @@ from coop_drake.tree.pose import FloatArray
 
 
 def room_of_map(
-    cells: OccupancyMap,
-    file: str,
-    inside: Inside | None,
-    *,
-    unknown_is_free: bool,
-    closing: float,
+    cells: OccupancyMap, file: str, inside: Inside | None, *, unknown_is_free: bool, closing: float
 ) -> Room:
     """Find the room of connected free cells; cells that touch only at a corner are not connected.
 

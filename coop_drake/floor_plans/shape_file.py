@@ -70,10 +70,7 @@ def read_geojson(path: Path, settings: FloorPlanSettings) -> Drawing:
     for layer in settings.layers:
         if layer not in known:
             raise FloorPlanError(
-                file,
-                "layers",
-                f"no feature has the layer {layer!r}",
-                f"known: {', '.join(known) or 'none'}",
+                file, "layers", f"no feature has the layer {layer!r}", f"known: {', '.join(known) or 'none'}"
             )
     chosen = [(place, s) for place, layer, s in found if not settings.layers or layer in settings.layers]
     return _drawing(file, chosen, settings)

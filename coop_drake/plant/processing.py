@@ -6,12 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from pydrake.geometry import SceneGraph
-from pydrake.multibody.parsing import (
-    ModelDirectives,
-    PackageMap,
-    Parser,
-    ProcessModelDirectives,
-)
+from pydrake.multibody.parsing import ModelDirectives, PackageMap, Parser, ProcessModelDirectives
 from pydrake.multibody.plant import MultibodyPlant
 
 from coop_drake.scenario import Assembly

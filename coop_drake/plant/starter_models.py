@@ -82,11 +82,7 @@ Shape = tuple[str, tuple[float, float, float]]
 
 
 def _box(length: float, width: float, height: float) -> Shape:
-    moments = (
-        (width**2 + height**2) / 12,
-        (length**2 + height**2) / 12,
-        (length**2 + width**2) / 12,
-    )
+    moments = ((width**2 + height**2) / 12, (length**2 + height**2) / 12, (length**2 + width**2) / 12)
     return f"<box><size>{length:.9g} {width:.9g} {height:.9g}</size></box>", moments
 
 

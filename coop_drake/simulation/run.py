@@ -68,10 +68,7 @@ def simulate(
 
 
 def _simulated(
-    loop: ClosedLoop,
-    scenario: Scenario,
-    progress: Progress | None,
-    observer: Callable[[Sample], None] | None,
+    loop: ClosedLoop, scenario: Scenario, progress: Progress | None, observer: Callable[[Sample], None] | None
 ) -> SimulationLog:
     plan = loop.plan
     clearance = TeamClearance(scenario.workspace.polygon, read_component_tree(loop.team.as_tree))

@@ -128,7 +128,6 @@ def _arrival(plan: Plan, sample: Sample, position_tolerance: float) -> dict[str,
     margins = _places(plan, sample, position_tolerance)
     speed = float(np.hypot(*sample.rates[:2]))
     margins["the object and the joints come to rest"] = min(
-        position_arrival(0.0, speed, position_tolerance),
-        rest_margin(float(np.abs(sample.rates[2:]).max())),
+        position_arrival(0.0, speed, position_tolerance), rest_margin(float(np.abs(sample.rates[2:]).max()))
     )
     return margins

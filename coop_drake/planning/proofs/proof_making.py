@@ -37,10 +37,7 @@ TOUCHING = 1e-6
 
 
 def slices_proof(
-    question: PlanningProblem,
-    slices: Slices,
-    regions: Mapping[int, Sequence[Region]],
-    witnesses: Witnesses,
+    question: PlanningProblem, slices: Slices, regions: Mapping[int, Sequence[Region]], witnesses: Witnesses
 ) -> InfeasibilityProof | None:
     """Write an exploration's leaves down as a proof.
 
