@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -28,43 +29,23 @@ class Recorder:
         Args:
             ends: The log's fields from ``reached`` on, which are the same for all steps.
         """
-        z, rates = self._samples("z"), self._samples("rates")
+        z, rates = self._column("z"), self._column("rates")
+        known = {field.name for kind in (Sample, Margins) for field in fields(kind)} - set(ends)
+        names = [field.name for field in fields(SimulationLog) if field.name in known]
+        arrays: dict[str, Any] = {name: self._column(name) for name in names}
         return SimulationLog(
-            times=self._samples("time"),
-            cell_index=np.array([sample.cell for sample, _ in self._rows], dtype=np.int64),
-            transition_start=self._samples("entry"),
+            times=self._column("time"),
+            cell_index=self._column("cell").astype(np.int64),
+            transition_start=self._column("entry"),
             object_pose=z[:, :3],
             object_twist=rates[:, :3],
-            base_poses=self._samples("base_poses"),
             joints=z[:, 3:],
             joint_rates=rates[:, 3:],
-            accelerations=self._samples("accelerations"),
-            governor_position=self._samples("governor_position"),
-            governor_spread=self._samples("governor_spread"),
-            funnel_lower=self._samples("funnel_lower"),
-            funnel_upper=self._samples("funnel_upper"),
-            energy_margin=self._samples("energy_margin"),
-            object_wrench=self._samples("object_wrench"),
-            commanded_wrenches=self._samples("commanded_wrenches"),
-            measured_wrenches=self._samples("measured_wrenches"),
-            grasp_error=self._samples("grasp_error"),
-            base_wrenches=self._samples("base_wrenches"),
-            joint_torques=self._samples("joint_torques"),
-            ready_margins=self._samples("ready_margins"),
-            held=self._samples("held"),
-            clock_lag=self._samples("clock_lag"),
-            workspace_clearance=self._margins("workspace_clearance"),
-            body_clearance=self._margins("body_clearance"),
-            cell_clearance=self._margins("cell_clearance"),
-            funnel_margin=self._margins("funnel_margin"),
-            slice_margin=self._margins("slice_margin"),
-            acceleration_error=self._margins("acceleration_error"),
-            wrench_error=self._margins("wrench_error"),
+            **arrays,
             **ends,
         )
 
-    def _samples(self, name: str) -> FloatArray:
-        return np.array([getattr(sample, name) for sample, _ in self._rows], dtype=float)
-
-    def _margins(self, name: str) -> FloatArray:
-        return np.array([getattr(margins, name) for _, margins in self._rows], dtype=float)
+    def _column(self, name: str) -> FloatArray:
+        """Return a field of the margins of all steps, or else of their samples."""
+        rows = [margins if hasattr(margins, name) else sample for sample, margins in self._rows]
+        return np.array([getattr(row, name) for row in rows], dtype=float)
