@@ -5,18 +5,22 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from contextlib import redirect_stdout
 from dataclasses import replace
+from io import StringIO
 
 import numpy as np
 import pytest
+import typer
 from typer.testing import CliRunner
 
 from coop_drake import simulation
 from coop_drake.answers import load_plan
 from coop_drake.answers.log import SimulationLog
 from coop_drake.cli import app, run, simulate
-from coop_drake.cli.reporter import Reporter
+from coop_drake.cli.reporter import Reporter, reporting
 from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.task import read_task
 from coop_drake.errors import PlanError
 from coop_drake.viz import LiveView
 from tests.support.no_drawings import NoDrawings
@@ -146,6 +150,14 @@ def test_a_plan_made_before_is_carried_out_with_other_gains(finished, room, tmp_
     assert not (tmp_path / "plan.json").exists()
     assert [directory for _, directory in drawn] == [tmp_path]
     assert NoDrawings.order == ["recording", "figures"]
+
+
+@pytest.mark.parametrize(("deployment", "warned"), [({}, False), ({"preset": "mobile_base"}, True)])
+def test_a_plan_for_another_deployment_is_read_with_a_warning(finished, tmp_path, deployment, warned):
+    path, shown = write_scenario(tmp_path / "room.scenario.yaml", deployment=deployment), StringIO()
+    with redirect_stdout(shown), pytest.raises(typer.Exit), reporting() as reporter:
+        simulate.read_plan(read_task(path), finished[0] / "plan.json", reporter)
+    assert ("make these 17.5 ms old; `coop-drake plan`" in shown.getvalue()) == warned
 
 
 def test_people_get_the_recording_before_the_figures_which_can_be_left_out(finished, room, tmp_path, drawn):

@@ -1,8 +1,8 @@
-"""Whether a plan was made for a planning problem."""
+"""Whether a plan was made for a planning problem, and for the age of a team's commands."""
 
 from __future__ import annotations
 
-from math import remainder, tau
+from math import isclose, remainder, tau
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import PlanError
+from coop_drake.laws.gains import GainSet, ScheduledGains
 
 _SAME_GOAL = 1e-9
 """Difference of goals that rounding explains: an unwrapped angle may be turned by whole turns [m, rad]."""
@@ -44,6 +45,30 @@ def check_plan_belongs(plan: Plan, problem: PlanningProblem, path: Path) -> None
             raise PlanError(
                 f"{path}: {key}: {found} is not allowed; expected the scenario's, {expected}{reason}"
             )
+
+
+def other_age(plan: Plan, gain_set: GainSet | None) -> str:
+    """Say that a plan's gains are for another age of commands than the gain set's; empty where they are not.
+
+    A plan belongs to its deployment: delay, control rate, losses and lag make commands older.
+
+    Args:
+        plan: The plan.
+        gain_set: The scenario's gain set that the plan names; None where it has none.
+    """
+    if not isinstance(gain_set, ScheduledGains):
+        return ""
+    first = plan.transitions[0]
+    factor = plan.age_factor * (1.0 if first.tolerance is None else first.tolerance.age_factor)
+    expected = min(gain_set.age_phase / (factor * gain_set.age), gain_set.max_rate_gain)
+    if isclose(first.gains.rate_gain, expected, rel_tol=_SAME_GOAL):
+        return ""
+    found = gain_set.age_phase / (factor * first.gains.rate_gain)
+    return (
+        f"its gains are for commands that rest on measurements {1e3 * found:.4g} ms old, and the "
+        f"`deployment` and `control` of the scenario make these {1e3 * gain_set.age:.4g} ms old; "
+        "`coop-drake plan` on this scenario makes the plan for it"
+    )
 
 
 def _listed(names: tuple[str, ...]) -> str:

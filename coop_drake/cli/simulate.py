@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.markup import escape
 
 from coop_drake.cli.options import (
     BlocksName,
@@ -68,7 +69,7 @@ def read_plan(task: Task, path: Path, reporter: Reporter, *, new_gains: bool = F
         PlanError: The file is no plan, or belongs to another scenario.
     """
     from coop_drake.answers import load_plan
-    from coop_drake.answers.belonging import check_plan_belongs
+    from coop_drake.answers.belonging import check_plan_belongs, other_age
     from coop_drake.planning import reschedule
 
     found = load_plan(path)
@@ -76,6 +77,8 @@ def read_plan(task: Task, path: Path, reporter: Reporter, *, new_gains: bool = F
     if new_gains:  # Also under the same name: a file may hold other gains than those of the plan.
         name = task.scenario.selected_gains
         found = reschedule(found, task.scenario.gain_sets[name], name)
+    elif other := other_age(found, task.scenario.gain_sets.get(found.gain_set)):
+        reporter.say(f"[yellow]{escape(str(path))}: {escape(other)}; `verify` will refuse the run[/]")
     reporter.facts.update(
         answer="found", slices=0, first_plan_cpu_seconds=0.0, planning_cpu_seconds=0.0, **plan_facts(found)
     )

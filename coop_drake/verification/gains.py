@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from coop_drake.answers.belonging import other_age
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet, ScheduledGains, TransitionGains, transition_gains
@@ -35,6 +36,8 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
     """
     if plan.gain_set not in gain_sets:
         raise RefusalError("gain_set", f"{plan.gain_set!r} is none of {', '.join(sorted(gain_sets))}")
+    if other := other_age(plan, gain_sets[plan.gain_set]):
+        raise RefusalError("transitions[0].gains.rate_gain", other)
     resting = plan.start[2:]
     for k, transition in enumerate(plan.transitions):
         where = f"transitions[{k}]"

@@ -2,12 +2,14 @@
 
 import json
 from copy import deepcopy
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import shapely
 
 from coop_drake.answers import save_plan
+from coop_drake.answers.belonging import other_age
 from coop_drake.answers.document import Document
 from coop_drake.answers.plan_file import read_plan
 from coop_drake.errors import PlanError, RefusalError
@@ -194,3 +196,19 @@ def moved_target(document):
 def test_refusals_under_a_new_digest_say_what_and_where(document, tmp_path, change, message):
     with pytest.raises((RefusalError, PlanError), match=message):
         verify_file(write(change(document), tmp_path / "plan.json", signed=True), PROBLEM, GAINS)
+
+
+@pytest.mark.parametrize("factor", [1.0, 2.0])
+def test_a_plan_for_another_deployment_is_refused_with_both_ages_and_the_command(plan, factor, tmp_path):
+    gains = {"scheduled": GAINS["scheduled"].for_age(0.0175)}
+    made = replace(plan, age_factor=factor, transitions=slowed(plan, factor))
+    path = save_plan(made, tmp_path / "plan.json")
+    with pytest.raises(RefusalError, match=r"15 ms old, .* these 17\.5 ms old; `coop-drake plan`"):
+        verify_file(path, PROBLEM, gains)
+    assert other_age(made, GAINS["scheduled"]) == other_age(made, None) == ""
+
+
+def slowed(plan, factor):
+    """The transitions of a plan with a rate gain for older commands."""
+    gains = [replace(one.gains, rate_gain=one.gains.rate_gain / factor) for one in plan.transitions]
+    return tuple(replace(one, gains=own) for one, own in zip(plan.transitions, gains, strict=True))
