@@ -73,11 +73,12 @@ def prepare_simulation(scenario: Scenario) -> None:
     from pydrake.systems.framework import DiagramBuilder
 
     from coop_drake import fields, simulation
-    from coop_drake.plant import build_team_plant
+    from coop_drake.plant import build_robot_plant, build_team_plant
 
     for module, name in ((simulation, "simulate"), (fields, "HarmonicMap")):
         getattr(module, name)
-    build_team_plant(scenario, DiagramBuilder())
+    for robot in build_team_plant(scenario, DiagramBuilder()).robots:
+        build_robot_plant(scenario, robot.index)
 
 
 def _quietly(meanwhile: Callable[[], object]) -> None:

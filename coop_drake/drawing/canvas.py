@@ -38,6 +38,9 @@ _CAPTION_LINE = 0.17
 """Height of a line of a caption, whose letters have 9 points [in]."""
 
 
+DPI = 120.0
+"""Resolution of pictures [1/in]: sharp on a screen, at a tenth of a megabyte a figure."""
+
 _COMPRESSION = 3
 """Effort of compressing PNG, 0 to 9: files are a fifth larger than at 6, and take half the time."""
 
@@ -58,15 +61,25 @@ def new_figure(
     """
     figure = Figure(figsize=(width, height), layout=None if margins else "constrained")
     FigureCanvasAgg(figure)
-    lines = fill(caption, int(15 * width))
     if margins is None:
-        figure.supxlabel(lines, fontsize=9, x=0.02, ha="left", color=GREY)
-        return figure
-    left, right, top = margins
+        figure.supxlabel(_broken(caption, width), fontsize=9, x=0.02, ha="left", color=GREY)
+    else:
+        set_margins(figure, caption, margins)
+    return figure
+
+
+def set_margins(figure: Figure, caption: str, margins: tuple[float, float, float]) -> None:
+    """Write the caption under a figure of its final size, and keep the margins of ``new_figure`` [in]."""
+    (width, height), (left, right, top) = figure.get_size_inches(), margins
+    lines = _broken(caption, width)
     below = _AXIS_LABELS + _CAPTION_LINE * (1 + lines.count("\n"))
     figure.subplots_adjust(left / width, below / height, 1.0 - right / width, 1.0 - top / height)
     figure.text(0.02, 0.05 / height, lines, fontsize=9, ha="left", va="bottom", color=GREY)
-    return figure
+
+
+def _broken(caption: str, width: float) -> str:
+    """A caption in lines that fit a width [in]."""
+    return fill(caption, int(15 * width))
 
 
 def legend_above(ax: Axes, handles: list[Patch] | None = None) -> None:
@@ -77,12 +90,12 @@ def legend_above(ax: Axes, handles: list[Patch] | None = None) -> None:
     )
 
 
-def save_figure(figure: Figure, path: Path, *, dpi: float = 120) -> None:
+def save_figure(figure: Figure, path: Path, *, dpi: float = DPI) -> None:
     """Write a figure, whole or not at all: PNG of ``dpi`` points per inch, or SVG if the path ends so."""
     write_atomically(path, picture_of(figure, path.suffix, dpi=dpi))
 
 
-def picture_of(figure: Figure, ending: str = ".png", *, dpi: float = 120) -> bytes:
+def picture_of(figure: Figure, ending: str = ".png", *, dpi: float = DPI) -> bytes:
     """Return what `save_figure` writes. The same figure gives the same bytes."""
     options: dict[str, Any] = {"format": "png", "pil_kwargs": {"compress_level": _COMPRESSION}}
     if ending == ".svg":

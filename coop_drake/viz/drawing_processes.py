@@ -1,6 +1,6 @@
 """Processes that draw a run: its figures and its recording, beside the command.
 
-They import what they need while the command plans and simulates, and prepare what the plan alone shows.
+They import what they need while the command simulates, and prepare what the plan alone shows.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _MOST = 2
 
 
 class DrawingProcesses:
-    """A process for the figures, which begins with the block, and one for the recording; they end with it.
+    """A process for the figures and one for the recording of a plan; both end with the block.
 
     They have sessions of their own, so that Ctrl-C reaches only the command, which ends them.
 
@@ -51,8 +51,6 @@ class DrawingProcesses:
 
     def __enter__(self) -> DrawingProcesses:
         self._running: dict[str, tuple[BaseProcess, Connection]] = {}
-        if self._figures:
-            self._start("figures", _draw_figures)
         return self
 
     def begin(self, scenario: Scenario, problem: PlanningProblem, plan: Plan) -> None:
@@ -60,7 +58,9 @@ class DrawingProcesses:
 
         ``plan``: the plan that will be simulated.
         """
-        # Now: this process has imported Drake, and two processors had enough to do before.
+        # Now: this process has imported Drake, and two processors had enough to do while it planned.
+        if self._figures:
+            self._start("figures", _draw_figures)
         self._start("recording", _draw_recording)
         self._send((scenario, problem.workspace, problem.tree, plan))
 

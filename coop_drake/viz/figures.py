@@ -16,6 +16,7 @@ from coop_drake.files import write_atomically
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.viz import floor_figures, time_figures
 from coop_drake.viz.figure_names import joints_figure_name
+from coop_drake.viz.time_axes import TimeAxes
 
 
 def write_figures(
@@ -29,12 +30,13 @@ def write_figures(
 
 
 class RunFigures:
-    """The figures of a run. The one that shows the plan alone is drawn at once."""
+    """The figures of a run. What the plan and the team alone show is drawn at once."""
 
     def __init__(self, workspace: Polygon, tree: ComponentTree, plan: Plan) -> None:
         self._workspace, self._tree = workspace, tree
         with house_style():
             self._start_and_goal = picture_of(floor_figures.start_and_goal_figure(workspace, tree, plan))
+            self._time_axes = TimeAxes(time_figures.panel_counts(tree))
 
     def write(
         self, log: SimulationLog, directory: Path, *, numbers: Iterable[int] | None = None
@@ -59,26 +61,27 @@ class RunFigures:
 
     def _figures(self, log: SimulationLog) -> Iterator[tuple[str, Callable[[], Figure | bytes | None]]]:
         yield "fig04_start_and_goal", lambda: self._start_and_goal
-        yield from _figures(self._workspace, self._tree, log)
+        yield from _figures(self._workspace, self._tree, log, self._time_axes)
 
 
 def _figures(
-    workspace: Polygon, tree: ComponentTree, log: SimulationLog
+    workspace: Polygon, tree: ComponentTree, log: SimulationLog, axes: TimeAxes
 ) -> Iterator[tuple[str, Callable[[], Figure | None]]]:
     """Name every figure of a log, with what draws it; a robot without joints has none of them."""
     yield "fig05_path", partial(floor_figures.path_figure, workspace, tree, log)
-    yield "fig06_position", partial(time_figures.position_figure, log)
-    yield "fig07_angle", partial(time_figures.angle_figure, log)
-    curves, twist, wrench = partial(time_figures.curves_figure, log), log.object_twist, log.object_wrench
+    yield "fig06_position", partial(time_figures.position_figure, log, axes)
+    yield "fig07_angle", partial(time_figures.angle_figure, log, axes)
+    curves = partial(time_figures.curves_figure, log, axes)
+    twist, wrench = log.object_twist, log.object_wrench
     caption = "Figure 8. Linear velocity of the object."
     yield "fig08_velocity", partial(curves, caption, twist[:, :2], "x velocity [m/s]", "y velocity [m/s]")
     caption = "Figure 9. Angular velocity of the object."
     yield "fig09_angular_velocity", partial(curves, caption, twist[:, 2:], "angular velocity [rad/s]")
     for robot, name in enumerate(log.robot_names):
-        draw = partial(time_figures.joints_figure, tree, log, robot)
+        draw = partial(time_figures.joints_figure, tree, log, robot, axes)
         yield joints_figure_name(robot, name), draw
     caption = "Figure 12. Total force that the robots apply to the object."
     yield "fig12_force", partial(curves, caption, wrench[:, :2], "x force [N]", "y force [N]")
     caption = "Figure 13. Total torque that the robots apply to the object, about its centre of mass."
     yield "fig13_torque", partial(curves, caption, wrench[:, 2:], "torque [N m]")
-    yield "summary", partial(time_figures.summary_figure, log)
+    yield "summary", partial(time_figures.summary_figure, log, axes)

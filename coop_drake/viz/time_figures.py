@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -12,10 +14,19 @@ from coop_drake.drawing.canvas import legend_above
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, OBJECT, SKY, robot_colour
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
-from coop_drake.viz.time_axes import break_at_switches, time_axes
+from coop_drake.viz.time_axes import TimeAxes, break_at_switches
+
+_NONE_AHEAD = TimeAxes()
+"""Axes of which none are made before there is a log."""
 
 
-def position_figure(log: SimulationLog) -> Figure:
+def panel_counts(tree: ComponentTree) -> list[int]:
+    """Numbers of panels of all figures over time in a run of a team, in no order that matters."""
+    robots = Counter(joint.robot for joint in tree.joints)
+    return [2, 2, 2, 1, *robots.values(), 2, 1, 3]
+
+
+def position_figure(log: SimulationLog, time_axes: TimeAxes = _NONE_AHEAD) -> Figure:
     """Draw the object's position and the reference governor's over time."""
     caption = "Figure 6. Position of the object, and of the reference governor that leads it."
     figure, axes = time_axes(log, caption, ["x [m]", "y [m]"])
@@ -26,7 +37,7 @@ def position_figure(log: SimulationLog) -> Figure:
     return figure
 
 
-def angle_figure(log: SimulationLog) -> Figure:
+def angle_figure(log: SimulationLog, time_axes: TimeAxes = _NONE_AHEAD) -> Figure:
     """Draw the object's angle inside its funnel over time, and both measured from the funnel's middle."""
     caption = "Figure 7. Angle of the object between the bounds of its funnel; below, both measured from the "
     labels = ["θ [rad]", "θ, from the middle [rad]"]
@@ -39,7 +50,9 @@ def angle_figure(log: SimulationLog) -> Figure:
     return figure
 
 
-def joints_figure(tree: ComponentTree, log: SimulationLog, robot: int) -> Figure | None:
+def joints_figure(
+    tree: ComponentTree, log: SimulationLog, robot: int, time_axes: TimeAxes = _NONE_AHEAD
+) -> Figure | None:
     """Draw the joints of one robot inside their funnels over time; None for a robot without joints."""
     joints = [joint for joint in tree.joints if joint.robot == robot]
     if not joints:
@@ -55,7 +68,7 @@ def joints_figure(tree: ComponentTree, log: SimulationLog, robot: int) -> Figure
     return figure
 
 
-def summary_figure(log: SimulationLog) -> Figure:
+def summary_figure(log: SimulationLog, time_axes: TimeAxes = _NONE_AHEAD) -> Figure:
     """Draw the clearances, which must stay above zero, the speeds and the bases' forces over time."""
     caption = (
         "Summary. Smallest distance of the team to the walls and between bodies; speed of the object and of "
@@ -80,7 +93,9 @@ def summary_figure(log: SimulationLog) -> Figure:
     return figure
 
 
-def curves_figure(log: SimulationLog, caption: str, values: FloatArray, *labels: str) -> Figure:
+def curves_figure(
+    log: SimulationLog, time_axes: TimeAxes, caption: str, values: FloatArray, *labels: str
+) -> Figure:
     """Draw one curve of the object over time in every panel; values of shape (T, panels)."""
     figure, axes = time_axes(log, caption, list(labels))
     for ax, curve in zip(axes, values.T, strict=True):
