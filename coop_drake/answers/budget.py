@@ -94,8 +94,8 @@ class Tolerance:
         entry_rate_lower: Lowest rate at the entry [rad/s or m/s].
         entry_rate_upper: Highest rate at the entry [rad/s or m/s].
         entry_acceleration: Largest magnitude of acceleration and command at the entry [rad/s^2 or m/s^2].
-        entry_history: Largest magnitude of the acceleration in the time before the entry of which
-            measurements still speak [rad/s^2 or m/s^2].
+        entry_history: Largest magnitude of the acceleration before the entry, as far back as the oldest
+            measurement that is used after it [rad/s^2 or m/s^2].
         distance: Least distance of the axis to the funnel's bounds at all times [rad or m].
         acceleration: Largest magnitude of the nominal acceleration [rad/s^2 or m/s^2].
         settled: Largest distance of the nominal motion from the goal interval's middle in the end [rad or

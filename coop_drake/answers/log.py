@@ -49,7 +49,7 @@ class SimulationLog:
             (T,) [s].
         workspace_clearance: Smallest distance of any body to any wall, shape (T,) [m].
         body_clearance: Smallest distance between bodies that must not touch, shape (T,) [m].
-        cell_clearance: Signed distance of p_WL to the boundary of the cell's safe set, shape (T,) [m].
+        cell_clearance: Signed distance of p_WL to the boundary of the cell's governed set, shape (T,) [m].
         funnel_margin: Smallest distance of an axis to its funnel's bounds, shape (T,) [rad or m].
         slice_margin: Smallest distance of an axis to its slice's bounds, shape (T,) [rad or m].
         acceleration_error: Largest component of realised minus desired acceleration of the object,

@@ -81,9 +81,9 @@ BudgetName = Annotated[
     str | None,
     typer.Option(
         "--budget",
-        metavar="FILE|deployment|position",
-        help="Departures from the ideal team that the plan shall provably tolerate: a file, or those of the "
-        "scenario, for all or for the object's position alone.",
+        metavar="all|position|FILE",
+        help="Departures from the ideal team that the plan shall provably tolerate: all of the scenario, "
+        "these for the object's position alone, or those of a file.",
     ),
 ]
 ResultsFolder = Annotated[Path | None, out_folder("Where results go; out/<scenario> by default.")]

@@ -87,11 +87,11 @@ def energy_margin(energy: float, clearance: float, stiffness: float) -> float:
     """Return Delta E = K d |d| / 2 - E, (15) corrected: errata E15a and E15b [m^2/s^2].
 
     While Delta E is not negative, p stays within d of p_G, because K |p - p_G|^2 / 2 <= E <= K d^2 / 2.
-    Outside the safe set, where d is negative, Delta E is below -E.
+    Outside the governed set, where d is negative, Delta E is below -E.
 
     Args:
         energy: E [m^2/s^2].
-        clearance: d, signed distance of p_G to the boundary of the safe set, negative outside it [m].
+        clearance: d, signed distance of p_G to the boundary of the governed set, negative outside it [m].
         stiffness: K [1/s^2].
     """
     return 0.5 * stiffness * clearance * abs(clearance) - energy
@@ -106,7 +106,7 @@ def object_energy_margin(
     Args:
         object_state: Pose and twist of the object in W, shape (6,).
         governor_position: p_G in W, shape (2,) [m].
-        clearance: d, signed distance of p_G to the boundary of the safe set [m].
+        clearance: d, signed distance of p_G to the boundary of the governed set [m].
         stiffness: K [1/s^2].
     """
     x, y = object_state[0] - governor_position[0], object_state[1] - governor_position[1]
@@ -142,7 +142,7 @@ def driving_margin(margin: float, clearance: float, steady: float, stiffness: fl
 
     Args:
         margin: Delta E [m^2/s^2].
-        clearance: d, signed distance of p_G to the boundary of the safe set [m].
+        clearance: d, signed distance of p_G to the boundary of the governed set [m].
         steady: ``steady_clearance`` of the largest speed, infinity for none [m].
         stiffness: K [1/s^2].
     """

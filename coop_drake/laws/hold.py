@@ -20,8 +20,8 @@ from coop_drake.compiled import compiled
 from coop_drake.tree.pose import FloatArray
 
 HOLD_RATE = 10.0
-"""omega [1/s]: the clock goes on for 2 / omega, 0.2 s, after a team is held. A quicker one would ask for
-larger accelerations of the bounds than the funnels themselves."""
+"""omega [1/s]: after a hold begins the clock loses its pace gradually, and advances by 2 / omega = 0.2 s in
+all. A quicker one would ask for larger accelerations of the bounds than the funnels themselves."""
 
 SETTLING_TIME = 1.0
 """So long after a hold the clock's pace is 1 for all purposes [s]: at 10 / omega, b is below a thousandth."""

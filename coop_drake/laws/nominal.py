@@ -13,7 +13,7 @@ the nominal motion,
 
 each with the nominal state of the instant at which its measurements were made.
 
-Why p^ stays in the governed region: let a = root(|p^ - p_G|^2 + |p^'|^2 / K) = root(2 E / K), E being that of
+Why p^ stays in the governed set: let a = root(|p^ - p_G|^2 + |p^'|^2 / K) = root(2 E / K), E being that of
 (16). While p_G rests, E' = -zeta |p^'|^2, so that a does not grow. A step of p_G by delta changes a, and the
 distance d of p_G to the region's boundary, by at most |delta| each. Steps of at most (d - a) / 2 therefore
 keep d - a from becoming negative, and p^, which is within a of p_G, in the region.

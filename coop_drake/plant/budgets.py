@@ -8,10 +8,7 @@ from coop_drake.errors import ScenarioError
 from coop_drake.laws import ScheduledGains
 from coop_drake.plant.run_masses import moved_masses
 from coop_drake.scenario import Scenario
-from coop_drake.scenario.budget_file import FROM_DEPLOYMENT, FROM_DEPLOYMENT_POSITION, read_budget
-
-_REQUIRED = {"none": None, "position": FROM_DEPLOYMENT_POSITION, "all": FROM_DEPLOYMENT}
-"""What ``deployment.budget`` of a scenario asks for, as ``--budget`` says it."""
+from coop_drake.scenario.budget_file import read_budget
 
 
 def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) -> Budget | None:
@@ -22,11 +19,11 @@ def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) 
     Raises:
         ScenarioError: The budget cannot be read, or no budget can be shown for the scenario's gains.
     """
-    choice = _REQUIRED[scenario.deployment.budget] if choice is None else choice
-    if choice is None:
+    required = scenario.deployment.budget
+    if choice is None and required == "none":
         return None
     name = scenario.selected_gains
     if not isinstance(scenario.gain_sets[name], ScheduledGains):
         allowed = "a gain set of scheduled gains: the funnels of others never close, so that no budget holds"
         raise ScenarioError(str(scenario.path), "gains.selected", name, allowed)
-    return read_budget(choice, scenario, problem.tree, lambda: moved_masses(scenario))
+    return read_budget(choice or required, scenario, problem.tree, lambda: moved_masses(scenario))

@@ -14,10 +14,10 @@ from coop_drake.scenario.reading import read_file
 from coop_drake.tree import ComponentTree
 from coop_drake.tree.levers import axis_levers
 
-FROM_DEPLOYMENT = "deployment"
-"""The choice that stands for the scenario's own departures."""
+ALL = "all"
+"""The choice that stands for the departures of the scenario's section ``deployment``."""
 
-FROM_DEPLOYMENT_POSITION = "position"
+POSITION = "position"
 """The choice that stands for these, for the object's position alone."""
 
 PLANE_DEVIATIONS = 3.44
@@ -42,7 +42,7 @@ def read_budget(
     """Return the budget that ``plan --budget`` names.
 
     Args:
-        choice: ``deployment`` for what the scenario's section of this name departs from the ideal team by,
+        choice: ``all`` for what the scenario's section ``deployment`` departs from the ideal team by,
             ``position`` for the same without the axes, or a file with the keys of ``Budget``.
         scenario: The scenario.
         tree: The team.
@@ -52,10 +52,10 @@ def read_budget(
         ScenarioError: There is no such file, it is wrong, or the scenario has no control rate or has
             departures that no budget counts.
     """
-    if choice in (FROM_DEPLOYMENT, FROM_DEPLOYMENT_POSITION):
-        return _of_deployment(scenario, tree, masses(), axes=choice == FROM_DEPLOYMENT)
+    if choice in (ALL, POSITION):
+        return _of_deployment(scenario, tree, masses(), axes=choice == ALL)
     if not Path(choice).is_file():
-        allowed = "deployment, position, or a file with a budget"
+        allowed = "all, position, or a file with a budget"
         raise ScenarioError(str(scenario.path), "--budget", choice, allowed)
     budget: Budget = read_file(Budget, Path(choice))
     return budget

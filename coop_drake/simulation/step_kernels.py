@@ -49,7 +49,7 @@ def margins(
         team: With the next two as in ``team_distances``.
         walls: Of the floor.
         z: The configuration.
-        cell: Edges of the cell's safe set, shape (edges, 4) [m].
+        cell: Edges of the cell's governed set, shape (edges, 4) [m].
         lower: Of the cell's slice, shape (1 + n,) [rad or m].
         upper: Of the cell's slice, shape (1 + n,) [rad or m].
         funnel_lower: Lower funnel bounds, shape (1 + n,) [rad or m].

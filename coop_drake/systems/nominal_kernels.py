@@ -43,7 +43,7 @@ def nominal_margin(edges: FloatArray, stiffness: float, state: FloatArray) -> fl
     """Return Delta E of (15) with p^ in place of p [m^2/s^2].
 
     Args:
-        edges: Edges of the governed region, shape (edges, 4) [m].
+        edges: Edges of the governed set, shape (edges, 4) [m].
         stiffness: K [1/s^2].
         state: p^, p^' and p_G, shape (6,).
     """
@@ -60,7 +60,7 @@ def step_nominal(
 
     Args:
         row: The governor's row, see ``governed_gains``, shape (9,); K does not change at a hand-over.
-        edges: Edges of the governed region, shape (edges, 4) [m].
+        edges: Edges of the governed set, shape (edges, 4) [m].
         flat: The cell's map, as ``VelocityField.kernel_arguments`` has it.
         field: What the velocity field adds to the map.
         flow: What ``nominal_flow`` gives.
@@ -119,7 +119,7 @@ def show_nominal(
     """Write what ``NOMINAL_SIZE`` lists.
 
     Args:
-        edges: Edges of the governed region, shape (edges, 4) [m].
+        edges: Edges of the governed set, shape (edges, 4) [m].
         stiffness: K [1/s^2].
         target: Where p_G goes in this cell, shape (2,) [m].
         period: T [s].
@@ -143,7 +143,7 @@ def nominal_ready(
     The room d - a there may shrink by twice the way of p_G, until a report of now is no longer used.
 
     Args:
-        next_edges: Edges of the next governed region, shape (edges, 4) [m].
+        next_edges: Edges of the next governed set, shape (edges, 4) [m].
         next_stiffness: K in the next cell [1/s^2].
         nominal: What ``show_nominal`` writes.
         governor: p_G, shape (2,) [m].

@@ -137,7 +137,7 @@ def robot_ready_along(
     Args:
         table: This and the next eleven arguments are those of ``robot_ready``; see there.
         next_table: The axes in the next cell.
-        next_edges: Edges of the next governed region.
+        next_edges: Edges of the next governed set.
         next_stiffness: K with which it is entered.
         inradius: R of the transition; not used here.
         goal: Goal position.

@@ -30,7 +30,7 @@ def invoke(*arguments):
 def test_the_budget_of_a_preset(tmp_path):
     found = coop_drake.load_scenario(scenario(tmp_path))
     problem = planning_problem(found)
-    budget = budget_of("deployment", found, problem)
+    budget = budget_of("all", found, problem)
     assert budget_of(None, found, problem) is None
     assert budget_of("position", found, problem) == replace(budget, axes=False)
     assert moved_masses(found) == pytest.approx((8.5, 8.5))

@@ -195,7 +195,7 @@ def test_bad_budgets_are_bad_input(folder, tmp_path, text, key):
 
 def test_budgets_need_a_control_rate_and_scheduled_gains(folder):
     scenario = folder / "room.scenario.yaml"
-    ideal = invoke("plan", scenario, "--budget", "deployment")
+    ideal = invoke("plan", scenario, "--budget", "all")
     assert (ideal.exit_code, "control_rate" in ideal.output) == (2, True)
     fixed = invoke("plan", scenario, "--budget", folder / "budget.yaml", "--gains", "table_2")
     assert (fixed.exit_code, "scheduled gains" in " ".join(fixed.output.split())) == (2, True)

@@ -59,7 +59,7 @@ class Entry:
         acceleration: Largest magnitude of acceleration and command at the entry [rad/s^2 or m/s^2].
         history: Largest magnitude of the acceleration before the entry, over the age of the measurements and
             reports that are used at the entry [rad/s^2 or m/s^2].
-        rest: Where the axis rests in the middle of the set, for which the jump of the command is known [rad
+        rest: Position at which the last cell is left at rest, for which ``rest_jump`` is computed [rad
             or m]; the middle of the positions if not given.
     """
 
@@ -123,7 +123,7 @@ def axis_sets(row: FloatArray, conditions: Sequence[AxisConditions], entry: Entr
 
     Args:
         row: The axis, a row of an ``axis_table``, with a quintic funnel.
-        conditions: What disturbs it: in one of these ways, but in the same one all the time.
+        conditions: Alternatives for what disturbs it; one of them holds during the whole transition.
         entry: The set in which it enters.
         parts: Into how many parts the positions at the entry are cut, each with a tube of its own.
     """

@@ -24,15 +24,15 @@ class Axes:
     """Funnels and gains of many axes, each array of shape (b,): as in a plan, with the time since the entry.
 
     Attributes:
-        start: Slice, lower and upper ends, shape (2, b).
-        goal: Goal interval, lower and upper ends, shape (2, b).
-        decay: lambda.
-        kappa: Gain of the log term.
-        k1: Position gain in the end.
-        k2: Rate gain.
-        mu: Rate of the ramp.
-        share: Smallest distance over the width that the law computes with.
-        fading: Time for which the jump of the command at the switch fades.
+        start: Slice, lower and upper ends, shape (2, b) [rad or m].
+        goal: Goal interval, lower and upper ends, shape (2, b) [rad or m].
+        decay: lambda [1/s].
+        kappa: Gain of the log term [rad^2/s^2 or m^2/s^2].
+        k1: Position gain in the end [1/s].
+        k2: Rate gain [1/s].
+        mu: Rate of the ramp of k1 [1/s].
+        share: Smallest distance over the width that the law computes with [-].
+        fading: Time for which the jump of the command at the switch fades [s].
     """
 
     start: FloatArray
@@ -65,12 +65,12 @@ class Axes:
         return self.goal + shrink * left, shrink * first, shrink * second
 
     def left(self, time: float) -> FloatArray:
-        """Return what is left of the jump of the command at the switch."""
+        """Return the share of the command's jump that is left: 1 at the switch, 0 in the end, (b,) [-]."""
         u = np.minimum(time / np.maximum(self.fading, 1e-12), 1.0)
         return 1.0 - u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
 
     def ramp(self, time: float | FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return k1 now and its rate."""
+        """Return k1 at a time since the transition began [1/s] and its rate [1/s^2], shape (b,) each."""
         gone = np.exp(-self.mu * time)
         ramped = self.mu > 0.0
         value = np.where(ramped, self.k1 * (1.0 - gone - self.mu * time * gone), self.k1)

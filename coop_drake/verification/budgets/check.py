@@ -25,7 +25,8 @@ from coop_drake.verification.budgets.tubes import Disturbed, tubes
 from coop_drake.verification.checks import Check
 
 MODEL_PARTS = 3
-"""Parts into which the range of the model's error is cut [-]."""
+"""Parts into which the range of the model's error is cut [-]: within each part the factor by which
+accelerations are too large is known but for a third of the error."""
 
 ROUNDING = 1e-9
 """Differences that rounding explains, relative and absolute [rad or m, s]."""

@@ -22,15 +22,15 @@ def entering(
     rest: RestCondition,
     stated: Tolerance,
 ) -> FloatArray:
-    """Return lower and upper position and rate, acceleration and history, shape (6, axes).
+    """Return lower and upper position [rad or m] and rate, largest acceleration and history, (6, axes).
 
     Args:
         transition: The transition that ends.
         budget: The budget.
-        made: The tubes of all parts of its axes.
-        samples: How many samples of each tube there are.
-        members: Axis of each tube.
-        last: Largest |acceleration| of each tube after its end.
+        made: The tubes of all parts of its axes, as ``tubes`` returns them.
+        samples: How many samples of each tube there are, shape (b,).
+        members: Axis of each tube, shape (b,).
+        last: Largest |acceleration| of each tube after its end, shape (b,) [rad/s^2 or m/s^2].
         rest: Under which condition the cell is left.
         stated: What the transition states.
     """

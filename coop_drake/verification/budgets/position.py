@@ -78,7 +78,7 @@ def _check_tube(plan: Plan, tube: PositionTube, budget: Budget) -> None:
 
 
 def _check_region(plan: Plan, k: int, radius: float) -> float:
-    """Check the governed region of a transition; return by how much more than r it is inside its cell [m]."""
+    """Check the governed set of a transition; return by how much more than r it is inside its cell [m]."""
     cell, region, where = plan.cells[k].tidied, plan.transitions[k].governed, f"transitions[{k}].governed"
     if region is None:
         raise RefusalError(where, "is missing, but the plan has a budget")
@@ -92,20 +92,20 @@ def _check_region(plan: Plan, k: int, radius: float) -> float:
 
 
 def _check_path(plan: Plan, k: int) -> None:
-    """Check that p_G can go from where a governed region is entered to a target in this and the next one."""
+    """Check that p_G can go from where a governed set is entered to a target in this and the next one."""
     transition, where, region = plan.transitions[k], f"transitions[{k}]", plan.governed(k)
     path = LineString(transition.path)
     kept = float(shapely.distance(path, region.boundary)) - transition.neck
     entered = plan.start[:2] if k == 0 else plan.transitions[k - 1].target
     if not region.contains(path) or path.coords[0] != tuple(entered) or not kept >= -ROUNDING:
-        raise RefusalError(f"{where}.path", "does not keep its clearance in the governed region")
+        raise RefusalError(f"{where}.path", "does not keep its clearance in the governed set")
     target = Point(transition.target)
     for i in range(k, min(k + 2, len(plan.cells))):
         held = plan.governed(i)
         if not held.contains(target):
-            raise RefusalError(f"{where}.target", "is outside a governed region that it joins")
+            raise RefusalError(f"{where}.target", "is outside a governed set that it joins")
         if not float(held.boundary.distance(target)) >= transition.inradius - ROUNDING:
-            raise RefusalError(f"{where}.inradius", "is more than the governed regions leave")
+            raise RefusalError(f"{where}.inradius", "is more than the governed sets leave")
 
 
 def _check_force(tube: PositionTube, budget: Budget, limit: float) -> Check:

@@ -23,10 +23,11 @@ PARTS = 5
 """Parts into which the range of the model's error is cut [-]."""
 
 HORIZON = 6.0
-"""Responses are summed for so long [s]."""
+"""Time for which responses are summed [s]; a loop that takes longer to come to rest is refused."""
 
 LEFT = 1e-7
-"""What may be left of a unit response after that [m, m/s]."""
+"""Part of a unit response that may be left after that [m, m/s]: a hundred times what the planner leaves, so
+that rounding refuses no plan."""
 
 COMMAND, KICK, PLACE, STEP = range(4)
 """The runs: a unit of command, of velocity, of position, and of p_G."""

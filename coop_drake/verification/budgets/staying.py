@@ -42,9 +42,10 @@ def tails(disturbed: Disturbed) -> FloatArray:
 
 
 def staying(disturbed: Disturbed, closed: Closed) -> tuple[FloatArray, FloatArray]:
-    """Return which departures x and v follow from those stated, (2, b), and the largest |acceleration|, (b,).
+    """Return bounds of |x| and |v| at the next sample, (2, b), and the largest |acceleration|, (b,).
 
-    If these are no larger than stated, none ever is: what holds until a sample then holds at that sample.
+    The bounds follow if the stated ones held at all samples before. Where they are not larger than the stated
+    ones, these hold for ever, by induction.
     """
     budget, axes, stated = disturbed.budget, disturbed.axes, np.array([closed.x, closed.v])
     reach, fast = stated[0] + budget.angle_noise, stated[1] + budget.rate_noise

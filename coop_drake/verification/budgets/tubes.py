@@ -27,8 +27,8 @@ class Disturbed:
     Attributes:
         axes: The axes.
         budget: The budget.
-        factor: Factor by which accelerations are larger than commanded.
-        error: By how much that factor may differ.
+        factor: Factor by which accelerations are larger than commanded [-].
+        error: By how much that factor may differ [-].
     """
 
     axes: Axes
@@ -38,7 +38,7 @@ class Disturbed:
 
     @property
     def delay(self) -> int:
-        """Age of a measurement in whole periods."""
+        """Age of a measurement in whole periods [-]."""
         return ceil(self.budget.delay / self.budget.period - 1e-9)
 
     @property
@@ -54,14 +54,22 @@ class Disturbed:
     def command(
         self, time: float | FloatArray, x: FloatArray, reach: FloatArray, v: FloatArray, fast: FloatArray
     ) -> tuple[FloatArray, ...]:
-        """Return command, its slopes, the rest of the law and the largest command, of departures so large."""
+        """Return the command at (x, v), its linear approximation, and bounds for all states near it.
+
+        The states are all positions within ``reach`` of x and all rates within ``fast`` of v; units are those
+        of ``fit``.
+
+        Returns:
+            The command, its slopes by position and by rate, the largest remainder, and the largest |command|,
+            each of shape (b,).
+        """
         L, slope, by_rate, rest, spread = fit(self.axes, time, x, reach, v)
         rest = rest + spread * fast
         most = np.abs(L) + np.abs(slope) * reach + np.abs(by_rate) * fast + rest
         return tuple(self.factor * value for value in (L, slope, by_rate, rest, most))
 
     def errors(self, most: FloatArray) -> FloatArray:
-        """Return the error of the acceleration that a command may cause."""
+        """Return the largest error of the acceleration under commands up to ``most`` [rad/s^2 or m/s^2]."""
         return self.error / self.factor * most + self.budget.acceleration_error
 
 
