@@ -63,6 +63,7 @@ def _work(alive: int) -> NoReturn:
     except KeyboardInterrupt:
         _say_interrupted()
         code = _INTERRUPTED
+    sys.stdout.flush()
     os._exit(code)
 
 
@@ -96,7 +97,8 @@ def _leave(code: int | None) -> NoReturn:
     if code is None:
         _say_interrupted()
     elif code < 0:
-        signal.signal(-code, signal.SIG_DFL)
+        if -code != signal.SIGKILL:  # Nobody can have set another action for it.
+            signal.signal(-code, signal.SIG_DFL)
         os.kill(os.getpid(), -code)
     os._exit(_INTERRUPTED if code is None else code)
 

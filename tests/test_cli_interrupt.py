@@ -121,6 +121,11 @@ def test_ctrl_c_ends_compiled_code_and_the_first_imports(program):
     assert done.stderr.decode() == "Error: interrupted; files already written are whole\n"
 
 
+COMMAND = """
+sys.modules["coop_drake.cli"] = types.SimpleNamespace(main=command_line)
+entry_point.main()
+"""
+
 WAITING = """
 import os, sys, time, types
 from coop_drake import entry_point
@@ -140,3 +145,20 @@ def test_a_command_that_is_ended_from_outside_leaves_no_process_behind(number):
         process.send_signal(number)
         assert process.wait() == -number
         assert process.stdout.read() == b""  # It ends when no process can write any more.
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSEGV])
+def test_a_command_ends_by_the_signal_that_ends_its_work(number):
+    work = f"def command_line():\n    print('begun', flush=True)\n    os.kill(os.getpid(), {number})\n"
+    program = "import os, sys, types\nfrom coop_drake import entry_point\n" + work + COMMAND
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True)
+    assert (done.returncode, done.stdout, done.stderr) == (-number, b"begun\n", b"")
+
+
+def test_what_a_command_prints_is_whole_in_a_pipe():
+    program = (
+        "import sys, types\nfrom coop_drake import entry_point\ndef command_line():\n    print('all')\n"
+        + COMMAND
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True)
+    assert (done.returncode, done.stdout) == (0, b"all\n")
