@@ -8,6 +8,7 @@ import sys
 from contextlib import redirect_stdout
 from dataclasses import replace
 from io import StringIO
+from math import inf
 
 import numpy as np
 import pytest
@@ -22,7 +23,7 @@ from coop_drake.cli.reporter import Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import read_task
 from coop_drake.errors import PlanError
-from coop_drake.viz import LiveView
+from coop_drake.viz import LivePage
 from tests.support.no_drawings import NoDrawings
 from tests.support.scenarios import MODELS, ROOM, write_scenario
 
@@ -238,10 +239,24 @@ def test_a_live_run_is_looked_at_and_says_where_without_waiting_for_anybody(
     monkeypatch.setattr(simulation, "simulate", simulated)
     plan = finished[0] / "plan.json"
     result = invoke("simulate", room, "--plan", plan, "--out", tmp_path / "live", "--live", "--json")
-    assert isinstance(looking[0], LiveView)
+    assert isinstance(looking[0], LivePage)
     address = json.loads(result.stdout)["live_url"]
     assert address.startswith("http://localhost:")
     assert f"Live view: open {address}" in result.stderr
+
+
+def test_a_live_run_may_wait_for_a_browser_as_long_as_it_takes(finished, room, tmp_path, monkeypatch):
+    waited = []
+
+    def simulated(*_, observer, **__):
+        raise PlanError("far enough")
+
+    monkeypatch.setattr(simulation, "simulate", simulated)
+    monkeypatch.setattr(LivePage, "wait_for_viewer", lambda _, seconds: waited.append(seconds))
+    plan = finished[0] / "plan.json"
+    result = invoke("simulate", room, "--plan", plan, "--out", tmp_path / "live", "--wait", "--json")
+    assert waited == [inf]
+    assert "live_url" in json.loads(result.stdout)
 
 
 def test_warming_up_leaves_nothing_behind(room, tmp_path, monkeypatch):

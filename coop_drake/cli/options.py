@@ -102,6 +102,13 @@ Live = Annotated[
     bool,
     typer.Option("--live", help="Show the run in a browser while it is simulated, at most in real time."),
 ]
+Wait = Annotated[
+    bool,
+    typer.Option(
+        "--wait",
+        help="Show the run as --live does, and begin only when a browser shows the page.",
+    ),
+]
 NoFigures = Annotated[bool, typer.Option("--no-figures", help="Write the recording, but no figures.")]
 BlocksName = Annotated[
     Literal["named", "fused"],

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
+from coop_drake.cli.live import live_page
 from coop_drake.cli.maps import map_cells, write_certificates
 from coop_drake.cli.options import (
     BlocksName,
@@ -20,6 +20,7 @@ from coop_drake.cli.options import (
     ResultsFolder,
     ScenarioPath,
     Verbose,
+    Wait,
 )
 from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
@@ -33,9 +34,7 @@ if TYPE_CHECKING:
     from coop_drake.answers.log import SimulationLog
     from coop_drake.diagram import Blocks
     from coop_drake.fields import HarmonicMap
-
-_WAIT_FOR_VIEWER = 30.0
-"""How long a live run waits for somebody to open its address [s]; a person needs a few seconds."""
+    from coop_drake.viz import LivePage
 
 
 def run_command(
@@ -44,6 +43,7 @@ def run_command(
     gains: GainsName = None,
     fresh_maps: FreshMaps = False,
     live: Live = False,
+    wait: Wait = False,
     no_figures: NoFigures = False,
     blocks: BlocksName = "named",
     machine: Machine = False,
@@ -57,9 +57,10 @@ def run_command(
         with DrawingProcesses(figures=not no_figures) as drawing:
             plan = plan_of(task, folder, reporter, simulated=True)
             if plan:
-                reporter.code = carry_out(
-                    task, plan, folder, reporter, drawing, fresh_maps=fresh_maps, live=live, blocks=blocks
-                )
+                with live_page(task, plan, reporter, live=live, wait=wait) as page:
+                    reporter.code = carry_out(
+                        task, plan, folder, reporter, drawing, page, fresh_maps=fresh_maps, blocks=blocks
+                    )
 
 
 def carry_out(
@@ -68,19 +69,21 @@ def carry_out(
     folder: ResultFolder,
     reporter: Reporter,
     drawing: DrawingProcesses,
+    page: LivePage | None,
     *,
     fresh_maps: bool,
-    live: bool,
     blocks: Blocks,
 ) -> ExitCode:
     """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run.
 
-    Log, certificates of maps, recording and figures go to the folder.
+    Log, certificates of maps, recording and figures go to the folder; a live ``page`` shows the run, then
+    the recording.
     """
     drawing.begin(task.scenario, task.problem, plan)
     maps = map_cells(task, plan, reporter, fresh=fresh_maps)
-    observer = _open_live_view(task, plan, reporter) if live else None
-    log = _simulate(task, plan, maps, reporter, blocks, observer)
+    log = _simulate(task, plan, maps, reporter, blocks, page)
+    if page:
+        page.show_verdict(log)
     folder.begin("simulation", robots=log.robot_names)
     drawing.draw(log, folder.path)
     write_certificates(task, maps, folder)
@@ -90,6 +93,8 @@ def carry_out(
     reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
     _warn_of_unknown_limits(reporter)
     reporter.say(f"The recording is {escape(str(folder.recording))}; open it in a browser")
+    if page:
+        page.hand_over(folder.recording)
     with reporter.stage("figures", "drawing"):
         drawing.wait("figures")
     reporter.say(f"All results are in {escape(str(folder.path))}")
@@ -125,18 +130,3 @@ def _simulate(
         log = simulate(task.scenario, plan, maps, blocks=blocks, progress=progress, observer=observer)
     reporter.facts.update(simulation_facts(plan, log, task.problem), peak_memory_mb=peak_memory_mb())
     return log
-
-
-def _open_live_view(task: Task, plan: Plan, reporter: Reporter) -> Callable[..., None]:
-    """Serve the scene and show its address; on a terminal, wait a little for a browser to open it."""
-    from coop_drake.viz import LiveView
-    from coop_drake.viz.server import silent_meshcat
-
-    meshcat = silent_meshcat()
-    view = LiveView(task.scenario, plan, meshcat)
-    reporter.facts["live_url"] = meshcat.web_url()
-    reporter.say(f"[bold]Live view: open {meshcat.web_url()} in a browser[/]")
-    if sys.stdout.isatty():
-        with reporter.stage("waiting"):
-            view.wait_for_viewer(_WAIT_FOR_VIEWER)
-    return view

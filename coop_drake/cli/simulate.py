@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
+from coop_drake.cli.live import live_page
 from coop_drake.cli.options import (
     BlocksName,
     FreshMaps,
@@ -18,6 +19,7 @@ from coop_drake.cli.options import (
     ResultsFolder,
     ScenarioPath,
     Verbose,
+    Wait,
 )
 from coop_drake.cli.reporter import Reporter, reporting
 from coop_drake.cli.results import ResultFolder
@@ -45,6 +47,7 @@ def simulate_command(
     ] = None,
     fresh_maps: FreshMaps = False,
     live: Live = False,
+    wait: Wait = False,
     no_figures: NoFigures = False,
     blocks: BlocksName = "named",
     machine: Machine = False,
@@ -56,9 +59,12 @@ def simulate_command(
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "simulation")
         found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)
-        with DrawingProcesses(figures=not no_figures) as drawing:
+        with (
+            DrawingProcesses(figures=not no_figures) as drawing,
+            live_page(task, found, reporter, live=live, wait=wait) as page,
+        ):
             reporter.code = carry_out(
-                task, found, folder, reporter, drawing, fresh_maps=fresh_maps, live=live, blocks=blocks
+                task, found, folder, reporter, drawing, page, fresh_maps=fresh_maps, blocks=blocks
             )
 
 

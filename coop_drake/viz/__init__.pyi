@@ -2,11 +2,13 @@ from .block_diagram import block_diagram_figure
 from .figures import write_figures
 from .floor_figures import path_figure
 from .live import LiveView
+from .live_page import LivePage
 from .recording import inline_frame, recording_html, write_recording
 from .scene import TransportScene
 from .time_figures import angle_figure, summary_figure
 
 __all__ = [
+    "LivePage",
     "LiveView",
     "TransportScene",
     "angle_figure",

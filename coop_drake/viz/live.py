@@ -28,23 +28,26 @@ class LiveView:
         plan: What is executed.
         meshcat: Where it is shown; ``meshcat.web_url()`` is its address.
         rate: Greatest ratio of simulated time to real time; infinite not to wait at all.
+
+    Attributes:
+        scene: What is shown.
     """
 
     def __init__(self, scenario: Scenario, plan: Plan, meshcat: Meshcat, *, rate: float = 1.0) -> None:
-        self._scene = TransportScene(scenario, plan, meshcat)
-        self._scene.place_camera()
+        self.scene = TransportScene(scenario, plan, meshcat)
+        self.scene.place_camera()
         self._rate = rate
         self._began: float | None = None
         self._next, self._cell, self._pieces = 0.0, 0, 0
         self._trail = [plan.start[:2].copy()]
 
     def wait_for_viewer(self, seconds: float) -> bool:
-        """Wait for a browser to connect; return whether one did."""
+        """Wait for a browser to connect, perhaps for ever; return whether one did."""
         until = monotonic() + seconds
-        while self._scene.meshcat.GetNumActiveConnections() == 0 and monotonic() < until:
+        while self.scene.meshcat.GetNumActiveConnections() == 0 and monotonic() < until:
             sleep(0.1)
-        self._scene.meshcat.Flush()
-        return bool(self._scene.meshcat.GetNumActiveConnections())
+        self.scene.meshcat.Flush()
+        return bool(self.scene.meshcat.GetNumActiveConnections())
 
     def __call__(self, sample: Sample) -> None:
         """Show one step, unless another one was shown less than a frame before."""
@@ -52,7 +55,7 @@ class LiveView:
             return
         self._next = sample.time + 1.0 / _FRAMES_PER_SECOND
         self._keep_pace(sample.time)
-        self._scene.team.show(sample.z)
+        self.scene.team.show(sample.z)
         self._show_cell(sample.cell)
         self._show_forces(sample)
         self._show_trail(sample.z[:2])
@@ -69,14 +72,14 @@ class LiveView:
             return
         for index, visible in ((self._cell, False), (cell, True)):
             for path in cell_paths(index):
-                self._scene.meshcat.SetProperty(path, "visible", visible)
+                self.scene.meshcat.SetProperty(path, "visible", visible)
         self._cell = cell
 
     def _show_forces(self, sample: Sample) -> None:
-        meshcat, grasps = self._scene.meshcat, self._scene.team.grasp_points(sample.z)
+        meshcat, grasps = self.scene.meshcat, self.scene.team.grasp_points(sample.z)
         for index, wrench in enumerate(sample.measured_wrenches):
             path = arrow_path(index)
-            sizes = arrow_sizes(wrench[None, :2], self._scene.of_a_metre)
+            sizes = arrow_sizes(wrench[None, :2], self.scene.of_a_metre)
             direction, scales = (value[0] for value in sizes)
             R_WA = RotationMatrix.MakeZRotation(direction)
             meshcat.SetTransform(path, RigidTransform(R_WA, grasps[index] + ABOVE))
@@ -86,5 +89,5 @@ class LiveView:
         if np.linalg.norm(position - self._trail[-1]) < STEP:
             return
         self._trail.append(position.copy())
-        set_trail(self._scene.meshcat, f"/motion/trail/{self._pieces:05d}", np.array(self._trail[-2:]))
+        set_trail(self.scene.meshcat, f"/motion/trail/{self._pieces:05d}", np.array(self._trail[-2:]))
         self._pieces += 1

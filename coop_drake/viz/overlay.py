@@ -1,8 +1,9 @@
-"""What a recording shows beside the scene: headline, verdict, time, cell, key of colours, and its player."""
+"""What recordings and live views show beside the scene: headline, verdict, time, cell, key, and a player."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -37,7 +38,7 @@ def page_content(
     colours: list[Rgba],
     of_a_metre: float,
 ) -> dict[str, Any]:
-    """Return what the page's script shows, as JSON has it.
+    """Return what a recording's script shows, as JSON has it.
 
     ``duration`` is that of the animation [s], ``colours`` are the robots', and an arrow of a metre stands for
     ``of_a_metre`` [N].
@@ -45,8 +46,9 @@ def page_content(
     times = np.arange(0.0, duration + 0.5 / _RATE, 1.0 / _RATE)
     rows = np.maximum(np.searchsorted(log.times, times, side="right") - 1, 0)
     first = np.flatnonzero(np.diff(log.cell_index, prepend=-1))
+    robots = dict(zip(log.robot_names, colours, strict=True))
     return {
-        "headline": f"{scenario.name}: {len(colours)} robots carry one object",
+        **scene_content(scenario, robots, of_a_metre),
         "duration": duration,
         "switches": log.times[first].round(3).tolist(),
         "cells": log.cell_index[first].tolist(),
@@ -57,6 +59,16 @@ def page_content(
         "base_speed": np.interp(times, *_fastest_base(log)).round(3).tolist(),
         "reached": log.reached and not log.violation,
         "verdict": verdict_of(log),
+    }
+
+
+def scene_content(scenario: Scenario, robots: Mapping[str, Rgba], of_a_metre: float) -> dict[str, Any]:
+    """Return what the script of every page needs, as JSON has it: headline, key, and how to fit the floor.
+
+    ``robots`` are the robots' names and colours; an arrow of a metre stands for ``of_a_metre`` [N].
+    """
+    return {
+        "headline": f"{scenario.name}: {len(robots)} robots carry one object",
         "corners": floor_corners(scenario.workspace.polygon, scenario.visualization.wall_height),
         "fill": FILL,
         "side": _emptier_side(scenario.workspace.polygon),
@@ -67,7 +79,7 @@ def page_content(
             ("line", TRAIL_COLOUR, "trail of the object's centre"),
             *(
                 ("arrow", hex_colour(colour), f"force of {robot} on the object, {of_a_metre:g} N a metre")
-                for robot, colour in zip(log.robot_names, colours, strict=True)
+                for robot, colour in robots.items()
             ),
             ("dot", GREY, f"grasps, in their robots' colours; arrows end at {LONGEST:g} m"),
         ],
@@ -94,13 +106,13 @@ def _fastest_base(log: SimulationLog) -> tuple[FloatArray, FloatArray]:
     return (times, speeds[..., 0].max(axis=1)) if len(times) else (np.zeros(1), np.zeros(1))
 
 
-def with_overlay(page: str, content: dict[str, Any]) -> str:
-    """Add headline, key and player to a page that Drake's Meshcat wrote.
+def with_overlay(page: str, content: dict[str, Any], template: str = "overlay.html") -> str:
+    """Add headline, key and what else a template has, by default a player, to a page of Drake's Meshcat.
 
     Raises:
         CoopDrakeError: The page is not built as Drake builds it.
     """
-    overlay = rendered("coop_drake.viz", "overlay.html", content=content, style=player_style())
+    overlay = rendered("coop_drake.viz", template, content=content, style=player_style())
     body, end, rest = page.rpartition("</body>")
     if not end or not re.search(r"\bvar viewer = new MeshCat\.Viewer\b", body):
         raise CoopDrakeError("this version of Drake writes recordings in a way that coop_drake does not know")

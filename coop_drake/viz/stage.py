@@ -44,7 +44,7 @@ _BOARDS = (0.12, 0.55, 1.0)
 _BOARD, _POST = 0.02, 0.025
 """Thickness of a shelf's boards, half the width of its posts [m]."""
 
-_FIELD_OF_VIEW = 30.0
+FIELD_OF_VIEW = 30.0
 """Of the camera, from bottom to top [degrees]: narrow, so that walls look upright."""
 
 _ELEVATION = radians(56.0)
@@ -63,10 +63,10 @@ _SKY, _HORIZON = [1.0, 1.0, 1.0], [0.90, 0.92, 0.95]
 def place_camera(meshcat: Meshcat, workspace: Polygon, height: float) -> None:
     """Look at the whole workspace from above at an angle, in a narrow field of view."""
     position, target = camera_pose(
-        workspace, height, elevation=_ELEVATION, fill=FILL, field_of_view=radians(_FIELD_OF_VIEW)
+        workspace, height, elevation=_ELEVATION, fill=FILL, field_of_view=radians(FIELD_OF_VIEW)
     )
     distance = float(np.linalg.norm(position - target))
-    camera = Meshcat.PerspectiveCamera(fov=_FIELD_OF_VIEW, near=0.01 * distance, far=10.0 * distance)
+    camera = Meshcat.PerspectiveCamera(fov=FIELD_OF_VIEW, near=0.01 * distance, far=10.0 * distance)
     meshcat.SetCamera(camera)
     meshcat.SetCameraPose(position, target)
 
