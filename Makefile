@@ -32,8 +32,9 @@ bench: $(READY_TO_DEVELOP)  ## measure speed and accuracy as ratios, into out/be
 docs: $(READY_TO_DEVELOP)  ## build the documentation into out/docs, warnings being errors
 	$(BIN)/python -m docs.generate out/docs
 
-notebooks: $(READY_TO_DEVELOP)  ## execute every notebook into out/notebooks
+notebooks: $(READY_TO_DEVELOP)  ## execute every notebook into out/notebooks, and build the documentation with them
 	$(BIN)/python -m notebooks out/notebooks
+	$(BIN)/python -m docs.generate out/docs --notebooks out/notebooks
 
 $(READY): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "coop_drake needs Python 3.11 or newer; name one with make PYTHON=..." >&2; exit 1; }

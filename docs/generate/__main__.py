@@ -1,10 +1,12 @@
 """``python -m docs.generate out/docs`` builds the documentation as a site of HTML pages.
 
+With ``--notebooks DIR`` it has a page for each executed notebook in that folder, see ``make notebooks``.
 The page of scenario files is kept in ``docs``, so that it can be read without the site, too.
 """
 
 from __future__ import annotations
 
+import argparse
 import shutil
 import subprocess
 import sys
@@ -14,6 +16,7 @@ import yaml
 
 from docs.generate.api_pages import api_pages
 from docs.generate.links import for_site
+from docs.generate.notebook_pages import write_notebook_pages
 from docs.generate.scenario_page import scenario_page
 
 HERE = Path(__file__).parent
@@ -21,8 +24,11 @@ ROOT = HERE.parents[1]
 SCENARIO_PAGE = ROOT / "docs" / "reference" / "scenario.md"
 
 
-def main(site: Path) -> int:
-    """Write the sources beside the site and build it, with warnings as errors; return the exit code."""
+def main(site: Path, notebooks: Path | None = None) -> int:
+    """Write the sources beside the site and build it, with warnings as errors; return the exit code.
+
+    ``notebooks``: a folder of executed notebooks, None for a site without.
+    """
     if _updated(SCENARIO_PAGE, scenario_page()):
         print(f"{SCENARIO_PAGE.relative_to(ROOT)} was out of date and has been updated", file=sys.stderr)
         return 1
@@ -39,6 +45,9 @@ def main(site: Path) -> int:
         (sources / "pages" / page.path).write_text(page.text, encoding="utf-8")
     settings = yaml.safe_load((HERE / "mkdocs.yml").read_text(encoding="utf-8"))
     settings["site_dir"] = "site"
+    if notebooks is not None:
+        written = write_notebook_pages(notebooks, sources / "pages" / "notebooks")
+        settings["nav"].append({"Notebooks": [f"notebooks/{name}" for name in written]})
     settings["nav"].append({"API": [page.path for page in api_pages(ROOT)]})
     python = next(plugin for plugin in settings["plugins"] if "mkdocstrings" in plugin)
     handler = python["mkdocstrings"]["handlers"]["python"]
@@ -73,4 +82,7 @@ def _updated(file: Path, text: str) -> bool:
 
 
 if __name__ == "__main__":
-    sys.exit(main(Path(sys.argv[1] if len(sys.argv) > 1 else "out/docs")))
+    parser = argparse.ArgumentParser(prog="python -m docs.generate", description=main.__doc__)
+    parser.add_argument("site", type=Path, nargs="?", default=Path("out/docs"), help="folder of the site")
+    parser.add_argument("--notebooks", type=Path, metavar="DIR", help="folder of executed notebooks")
+    sys.exit(main(**vars(parser.parse_args())))
