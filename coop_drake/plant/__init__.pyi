@@ -1,5 +1,5 @@
 from .component_tree import read_component_tree
-from .configuration import base_poses, get_configuration, get_rates, set_configuration
+from .configuration import base_poses, set_configuration
 from .planar_chain import BaseChain, base_chain, robot_chain
 from .problem import planning_problem
 from .robot import RobotPlant, build_robot_plant
@@ -19,8 +19,6 @@ __all__ = [
     "build_robot_plant",
     "build_separate_team",
     "build_team_plant",
-    "get_configuration",
-    "get_rates",
     "planning_problem",
     "read_component_tree",
     "robot_chain",

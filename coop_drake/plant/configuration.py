@@ -1,4 +1,4 @@
-"""Writes configurations z of the team into a plant's context, and reads them from it."""
+"""Writes configurations z of the team into a plant's context, and reads the bases' poses from it."""
 
 import numpy as np
 from pydrake.systems.framework import Context
@@ -21,16 +21,6 @@ def set_configuration(
     """
     rates = np.zeros(len(z)) if z_rate is None else z_rate
     team.plant.SetPositionsAndVelocities(context, team.plant_state(z, rates))
-
-
-def get_configuration(team: TeamPlant, context: Context) -> FloatArray:
-    """Read z = (x, y, theta, q...), shape (3 + n,) [m, rad], from the plant's context."""
-    return np.asarray(team.plant.GetPositions(context)[team.position_index])
-
-
-def get_rates(team: TeamPlant, context: Context) -> FloatArray:
-    """Read the rates of z, shape (3 + n,), from the plant's context."""
-    return np.asarray(team.plant.GetVelocities(context)[team.velocity_index])
 
 
 def base_poses(team: TeamPlant, context: Context) -> FloatArray:

@@ -4,7 +4,8 @@ from pydrake.systems.analysis import Simulator
 
 from coop_drake.diagram import TELEMETRY, build_closed_loop
 from coop_drake.errors import PlanError
-from coop_drake.plant import get_configuration, get_rates, set_configuration
+from coop_drake.plant import set_configuration
+from tests.support.configuration import get_configuration, get_rates
 from tests.support.small_loop import TEAMS, small_loop, small_maps, small_problem
 from tests.support.small_plan import small_plan
 from tests.support.system_checks import port_sizes

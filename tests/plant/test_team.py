@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from coop_drake.plant import base_poses, get_configuration, get_rates, set_configuration
+from coop_drake.plant import base_poses, set_configuration
 from coop_drake.scenario import load_scenario
 from coop_drake.tree.pose import PlanarPose
 from tests.support.cases import GRASPS
+from tests.support.configuration import get_configuration, get_rates
 from tests.support.edited_scenario import MODELS, exchanged, shipped, team_of, write_edited, write_with_robot
 from tests.support.robot_models import Arm
 

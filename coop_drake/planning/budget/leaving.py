@@ -21,9 +21,6 @@ from coop_drake.tree.pose import FloatArray
 LOWEST, HIGHEST = [0, 2], [1, 3, 4, 5]
 """Which of the numbers of an entry set are lower bounds, and which upper ones."""
 
-SETTLED_FACTOR = 1.5
-"""An axis counts as settled while it departs from rest by so many times what it does in the end [-]."""
-
 
 def rest_needed(sets: AxisSets, conditions: AxisConditions) -> tuple[float, float]:
     """Return distance and rate within which a settled axis is measured [rad or m, rad/s or m/s]."""
@@ -68,20 +65,6 @@ def next_entry(
             bounds[HIGHEST] = np.maximum(bounds[HIGHEST], found[HIGHEST])
     low, high, slow, quick, pushed, history = bounds.tolist()
     return Entry(low, high, slow, quick, pushed, history, middle)
-
-
-def settling_time(row: FloatArray, sets: AxisSets, conditions: AxisConditions) -> float:
-    """Return the time since the entry after which an axis departs from rest no more than when settled [s].
-
-    It may depart by ``SETTLED_FACTOR`` times what it does in the end.
-    """
-    middle, samples = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]), 0
-    for tube in sets.tubes:
-        far = np.abs(tube[:, X] - middle) + tube[:, X_REACH] > SETTLED_FACTOR * sets.settled
-        fast = np.abs(tube[:, V]) + tube[:, V_REACH] > SETTLED_FACTOR * sets.settled_rate
-        moving = np.flatnonzero(far | fast)
-        samples = max(samples, int(moving[-1]) + 1) if moving.size else samples
-    return samples * conditions.period
 
 
 @compiled
