@@ -6,7 +6,7 @@ import hashlib
 import inspect
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, cached_property, partial, update_wrapper
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast, overload
 import numpy as np
 
 from coop_drake.files import cache_folder
-from coop_drake.kernel_kinds import kind_of, words_of
+from coop_drake.kernel_kinds import kind_of, layout_of, words_of
 from coop_drake.kernel_times import KERNEL_TIMES
 
 if TYPE_CHECKING:
@@ -26,6 +26,10 @@ R = TypeVar("R")
 
 _REASSOCIATED = {"contract", "reassoc"}
 """LLVM's flags for sums in any order: vector units are used; NaN and infinity keep their meaning."""
+
+
+_MAKERS = "compiled", "kernel_compiler", "kernel_kinds", "machine_code"
+"""Files of this package on whose text all machine code depends."""
 
 
 @overload
@@ -64,17 +68,33 @@ def compiled(
 def prepared(function: Callable[..., R], given: Sequence[object], *like: object) -> Callable[..., R]:
     """Return a compiled function with its first arguments given, for further ones whose types never change.
 
-    A call of it does not look at types any more. In the functions that a simulation calls most, that would
-    take longer than what they compute.
+    Only the first call looks at types. In the functions that a simulation calls most, that would take longer
+    than what they compute.
 
     Args:
         function: The compiled function.
         given: Its first arguments.
-        like: For each further argument an example. Nothing checks that a call's arguments are of these types:
-            an array needs the same type of numbers and of dimensions, and its numbers one after the other.
+        like: For each further argument an example of its type: of numbers, or of an array with this type of
+            numbers, this number of dimensions and this order in memory.
+
+    Returns:
+        The function; its first call raises a TypeError where the arguments are not of the types stated.
+        Machine code would read memory that is not theirs.
     """
-    version = function.version((*given, *like)) if isinstance(function, Kernel) else function
-    return partial(version, *given)
+    if not isinstance(function, Kernel):
+        return partial(function, *given)
+    name, expected = function._function.__qualname__, tuple(map(layout_of, like))
+    version: Callable[..., R] = function.version((*given, *like))
+    prepared_function: partial[R] = partial(function)
+
+    def first(*arguments: object) -> R:
+        if (kinds := tuple(map(layout_of, arguments))) != expected:
+            raise TypeError(f"{name} was prepared for {expected}; it is called with {kinds}")
+        prepared_function.__setstate__((version, tuple(given), {}, {}))  # type: ignore[attr-defined]
+        return version(*given, *arguments)
+
+    prepared_function.__setstate__((first, (), {}, {}))  # type: ignore[attr-defined]
+    return prepared_function
 
 
 class Kernel:
@@ -94,8 +114,7 @@ class Kernel:
         update_wrapper(self, function)
         self.loaded = 0
         KERNEL_TIMES.functions += 1
-        self._function, self._options, self._names = function, options, tuple(function.__globals__)
-        _file_digest(function.__code__.co_filename)  # Now: the file may be edited while the program runs.
+        self._function, self._options = function, options
         self._count = function.__code__.co_argcount
         self._versions: dict[tuple[object, ...], Callable[..., Any]] = {}
 
@@ -130,7 +149,7 @@ class Kernel:
     @cached_property
     def stamp(self) -> str:
         """Digest of all that the machine code depends on."""
-        return kernel_stamp(self._function, self._names)
+        return kernel_stamp(self._function, self._options)
 
     def _new_version(self, arguments: tuple[Any, ...], kinds: tuple[object, ...]) -> Callable[..., Any]:
         words = [words_of(kind) for kind in kinds]
@@ -145,9 +164,8 @@ class Kernel:
         from coop_drake.machine_code import load_machine_code, platform_stamp, write_machine_code
 
         function = self._function
-        reassociate = str(bool(self._options["fastmath"]))
-        stamp = hashlib.sha256("\n".join((self.stamp, reassociate, platform_stamp())).encode()).hexdigest()
-        ending = hashlib.sha256(words.encode()).hexdigest()[:16]
+        stamp = _digest(self.stamp, platform_stamp())
+        ending = _digest(words)[:16]
         source = Path(function.__code__.co_filename)
         name = f"{source.stem}.{function.__qualname__}.{sys.implementation.cache_tag}.{ending}.kernel"
         path = _folder(source.parent) / name
@@ -169,29 +187,44 @@ def _folder(beside: Path) -> Path:
     return beside / "__pycache__" if os.access(beside, os.W_OK) else cache_folder("kernels") / place
 
 
-def kernel_stamp(function: FunctionType, names: Iterable[str]) -> str:
-    """Return a digest of all that a function's machine code depends on.
+def kernel_stamp(function: FunctionType, options: Mapping[str, object]) -> str:
+    """Return a digest of all that a function's machine code depends on, as this process holds it in memory.
 
     Numba's own cache looks at the file that holds the function. The machine code also depends on what other
     files define: the compiled functions that it calls, the constants that it reads, and the fields of the
-    named tuples that it takes. The stamp therefore holds the stamps, values and definitions of all of these
-    that the function's module has imported, by name or as attributes of imported modules.
+    named tuples that it takes. And a file may be edited after Python has read it; machine code of the old
+    text would then be kept as that of the new one. The stamp therefore holds no digest of a file, but the
+    function's bytecode, and the stamps, values and definitions of all globals that it uses; only the files
+    that compile are taken as files.
 
     Args:
         function: The function before it is compiled.
-        names: Globals of its module when it was defined, after the module's imports.
+        options: The options that it is compiled with.
     """
-    attributes = _names_in(function.__code__)
-    parts = [_file_digest(function.__code__.co_filename)]
-    for name in sorted(names):
-        value = function.__globals__[name]
+    names = _names_in(function.__code__)
+    ways = [f"{name}: {sorted(way) if isinstance(way, set) else way}" for name, way in options.items()]
+    parts = [_makers(), _words_of_code(function.__code__), repr(function.__defaults__), *ways]
+    for name in names:
+        value = function.__globals__.get(name)
         if isinstance(value, ModuleType):
-            found = {f"{name}.{attribute}": getattr(value, attribute, None) for attribute in attributes}
+            found = {f"{name}.{attribute}": getattr(value, attribute, None) for attribute in names}
         else:
-            found = {} if name.startswith("__") else {name: value}
-        for path, part in sorted(found.items()):
-            if (description := _description(part, function.__module__)) is not None:
+            found = {name: value}
+        for path, part in found.items():
+            calls_itself = isinstance(part, Kernel) and part._function is function
+            if not calls_itself and (description := _description(part)) is not None:
                 parts.append(f"{path}={description}")
+    return _digest(*parts)
+
+
+@cache
+def _makers() -> str:
+    """Return a digest of the files that decide how machine code is made and kept."""
+    files = [Path(__file__).with_name(f"{name}.py").read_bytes() for name in _MAKERS]
+    return hashlib.sha256(b"".join(files)).hexdigest()
+
+
+def _digest(*parts: str) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()
 
 
@@ -201,20 +234,27 @@ def _names_in(code: CodeType) -> list[str]:
     return sorted({*code.co_names, *(name for part in nested for name in _names_in(part))})
 
 
-def _description(value: object, module: str) -> str | None:
-    """Return what a global adds to the stamp of a module's function; None if machine code cannot hold it."""
+def _words_of_code(code: CodeType) -> str:
+    """Return what a function does, in words that are the same in every process; not the place of its text."""
+    constants = [
+        _words_of_code(constant)
+        if isinstance(constant, CodeType)
+        else str(sorted(map(repr, constant)) if isinstance(constant, frozenset) else repr(constant))
+        for constant in code.co_consts
+    ]
+    arguments = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags
+    names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
+    return repr((code.co_code, code.co_exceptiontable, arguments, names, constants))
+
+
+def _description(value: object) -> str | None:
+    """Return what a global adds to the stamp of a function; None if machine code cannot hold it."""
     if isinstance(value, Kernel):
-        return None if value.__module__ == module else value.stamp
+        return value.stamp
     if isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields"):
-        defined_in = getattr(sys.modules.get(value.__module__), "__file__", None)
-        return f"{value._fields} {_file_digest(defined_in) if defined_in else value.__module__}"
+        return f"{value.__module__}.{value.__qualname__} {value._fields}"
     if isinstance(value, tuple):
-        return f"({', '.join(str(_description(item, module)) for item in value)})"
+        return f"({', '.join(str(_description(item)) for item in value)})"
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
     return repr(value) if isinstance(value, (bool, int, float, complex, str, np.generic)) else None
-
-
-@cache
-def _file_digest(path: str) -> str:
-    return hashlib.sha256(Path(path).read_bytes()).hexdigest()

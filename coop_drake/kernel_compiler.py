@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import pickle
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, cast
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
 
 import numba
 from numba import types
@@ -163,18 +166,28 @@ def _by_type_alone(get_call_template: Callable[..., object]) -> Callable[..., ob
     return get
 
 
-class _Index(IndexDataCacheFile):  # type: ignore[misc]
-    """Numba's index of the machine code of one function, empty where an older version of the code wrote it.
+class _Files(IndexDataCacheFile):  # type: ignore[misc]
+    """A file for each list of argument types, with the stamp beside the machine code.
 
-    An index holds the types of arguments. Numba reads them before it compares stamps, which fails if one was
-    a class that is no longer there.
+    Numba's own class writes an index before the machine code that it names, and overwrites older machine
+    code. Another process that reads in between takes the machine code of an older text, or for other types,
+    for that which it needs, and may end by a segmentation fault.
     """
 
-    def _load_index(self) -> dict[object, str]:
+    def save(self, key: object, data: object) -> None:
+        self._save_data(self._name(key), (self._source_stamp, self._dump((key, data))))
+
+    def load(self, key: object) -> object:
         try:
-            return cast(dict[object, str], super()._load_index())
-        except (ImportError, AttributeError):
-            return {}
+            stamp, kept = self._load_data(self._name(key))
+        except (OSError, ValueError, TypeError, EOFError, pickle.UnpicklingError):
+            return None
+        # What was written under another stamp may name classes that are no longer there.
+        found, data = pickle.loads(kept) if stamp == self._source_stamp else (None, None)
+        return data if found == key else None
+
+    def _name(self, key: object) -> str:
+        return f"{Path(self._index_name).stem}.{sha256(repr(key).encode()).hexdigest()[:16]}.nbc"
 
 
 class _KernelCache(FunctionCache):  # type: ignore[misc]
@@ -207,9 +220,15 @@ class _KernelCache(FunctionCache):  # type: ignore[misc]
         super().__init__(function)
         self._use = use
         self.kept: Any = None
-        self._cache_file = _Index(
+        self._cache_file = _Files(
             cache_path=self._cache_path, filename_base=self._impl.filename_base, source_stamp=stamp
         )
 
     def _index_key(self, sig: Any, codegen: Any) -> tuple[object, ...]:
-        return (*super()._index_key(sig, codegen), self._use)
+        return (*super()._index_key(sig, codegen), self._use, tuple(map(_fields, sig)))
+
+
+def _fields(kind: types.Type) -> tuple[object, ...]:
+    """Return the names in a type's named tuples; numba takes types of different names for the same."""
+    own = kind.instance_class._fields if isinstance(kind, types.BaseNamedTuple) else ()
+    return (own, *map(_fields, kind.types)) if isinstance(kind, types.BaseTuple) else ()

@@ -6,8 +6,11 @@ from typing import Any
 
 import numpy as np
 
-ARRAY_FLAGS = 0x1 | 0x2 | 0x100 | 0x400
-"""Bits of numpy's flags that machine code depends on: C order, Fortran order, aligned, writable."""
+_LAYOUT = 0x1 | 0x2 | 0x100
+"""Bits of numpy's flags for what machine code reads: C order, Fortran order, aligned."""
+
+ARRAY_FLAGS = _LAYOUT | 0x400
+"""Bits of numpy's flags that machine code depends on; the last one: writable."""
 
 _SCALARS = {float: "float", np.float64: "float", int: "int", np.int64: "int", bool: "bool", np.bool_: "bool"}
 
@@ -37,6 +40,13 @@ def kind_of(value: Any) -> object:
     return cls
 
 
+def layout_of(value: Any) -> object:
+    """Return the kind of a value but for whether an array may be written to, which is no matter of memory."""
+    if isinstance(value, np.ndarray):
+        return value.dtype, value.ndim, value.flags.num & _LAYOUT
+    return kind_of(value)
+
+
 def words_of(kind: object) -> str | None:
     """Return a kind as a text that is the same in every process; None for what is not kept."""
     if isinstance(kind, str):
@@ -49,4 +59,7 @@ def words_of(kind: object) -> str | None:
         order = "C" if flags & 0x1 else "F" if flags & 0x2 else "A"
         return f"{first.str}{dimensions}{order}{flags & 0x500:x}" if first.kind in "fiub" else None
     parts = [words_of(part) for part in rest]
-    return None if None in parts else f"{first.__module__}.{first.__qualname__}({', '.join(map(str, parts))})"
+    if None in parts:
+        return None
+    names = getattr(first, "_fields", "")
+    return f"{first.__module__}.{first.__qualname__}{names}({', '.join(map(str, parts))})"

@@ -130,14 +130,23 @@ def _loaded(found: MachineCode, name: str) -> Callable[..., Any]:
     for variable, objects in found.constants:
         environment = functions.Environment({"__name__": __name__})
         environment.consts.extend(objects)
-        ctypes.c_void_p.from_address(engine.get_global_value_address(variable)).value = id(environment)
+        ctypes.c_void_p.from_address(_known(engine.get_global_value_address(variable))).value = id(
+            environment
+        )
         environments.append(environment)
-    address = engine.get_function_address(found.entry)
+    address = _known(engine.get_function_address(found.entry))
     module = sys.modules[__name__]
     made: Callable[..., Any] = functions.make_function(
         module, name, "", address, environments[0], (engine, environments)
     )
     return made
+
+
+def _known(address: int) -> int:
+    """Refuse the address 0 of a name that machine code does not define."""
+    if not address:
+        raise LookupError
+    return address
 
 
 @ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.c_int, ctypes.c_void_p)

@@ -3,9 +3,12 @@
 import os
 import subprocess
 import sys
+from itertools import permutations
 from pathlib import Path
 
 import pytest
+
+from coop_drake import kernel_compiler
 
 CALLEE = """
 from typing import NamedTuple
@@ -92,7 +95,7 @@ def run(folder: Path, **more: str) -> list[str]:
         (
             BY_MODULE,
             "17.0",
-            [({"factor": 5.0}, "21.0"), ({"constant": 2.0}, "22.0"), ({"entry": 20.0}, "32.0")],
+            [({"factor": 5.0}, "21.0"), ({"constant": 2.0}, "22.0")],
         ),
     ],
     ids=["imported by name", "attributes of a module"],
@@ -108,6 +111,39 @@ def test_an_edit_in_another_file_compiles_its_users_anew(tmp_path, caller, first
         values |= edit
         write_callee(tmp_path, **values)
         assert run(tmp_path) == [result, str(2.0 * values["factor"]), "0"], edit
+
+
+EDITED = """
+from pathlib import Path
+
+text = Path(__file__).read_text()
+Path(__file__).write_text(text.replace("3.0 *", "5.0 *"))  # somebody saves it while Python works on it
+
+from coop_drake.compiled import compiled
+
+@compiled
+def slope(x):
+    return 3.0 * x
+
+print(slope(2.0), slope.loaded)
+"""
+
+
+def test_machine_code_of_a_file_that_is_edited_meanwhile_is_that_of_the_text_that_was_read(tmp_path):
+    (tmp_path / "caller.py").write_text(EDITED)
+    assert [run(tmp_path) for _ in range(3)] == [["6.0", "0"], ["10.0", "0"], ["10.0", "1"]]
+
+
+def test_what_several_processes_keep_at_the_same_time_is_told_apart(tmp_path):
+    """Files of two versions of the sources, each for two lists of types, written and read in any order."""
+    versions = [kernel_compiler._Files(str(tmp_path), "kernel", stamp) for stamp in ("old", "new")]
+    entries = [(files, key) for files in versions for key in ("float", "int")]
+    for order in permutations(entries):
+        for files, key in order:
+            files.save(key, (files._source_stamp, key))
+            kept = [(one.load(name), (one._source_stamp, name)) for one, name in entries]
+            assert all(found in (None, own) for found, own in kept)
+            assert files.load(key) == (files._source_stamp, key)
 
 
 GRID = """
@@ -148,8 +184,15 @@ print(called(square, 2.0))
 print(called(np.asfortranarray(square), np.float64(3.0)))
 print(called(square[:, :1], True, shift=1))
 weights = np.arange(3)[::-1]
-grid, _ = prepared(total, [Grid(square, 0.5)], weights, 0.0, 0.0)(weights, 2.0, 3.0)
-print(grid.values.sum())
+scaled = prepared(total, [Grid(square, 0.5)], weights, 0.0, 0.0)
+for other in (square, np.arange(3), weights.astype(float), 1.0):
+    try:
+        scaled(other, 2.0, 3.0)
+    except TypeError as error:
+        assert "total was prepared for" in str(error)
+    else:
+        raise AssertionError(other)
+print(*(scaled(weights, 2.0, shift)[0].values.sum() for shift in (3.0, 4.0)))
 assert pickle.loads(pickle.dumps(total)) is total
 shown = refuse(2.5)
 print(total.loaded + refuse.loaded, "numba" in sys.modules)
@@ -165,18 +208,13 @@ def write_kinds(folder: Path, first: str = "") -> None:
     (folder / "caller.py").write_text(first + KINDS)
 
 
-RESULTS = ["Grid:float64:20.0:0.5:3", "Grid:float64:26.0:0.5:3", "Grid:float64:4.0:0.5:3", "24.0"]
+RESULTS = ["Grid:float64:20.0:0.5:3", "Grid:float64:26.0:0.5:3", "Grid:float64:4.0:0.5:3", "24.0", "28.0"]
 
 
-def test_machine_code_is_loaded_without_numba_and_gives_the_same(tmp_path):
+def test_machine_code_is_loaded_without_numba_and_replaced_where_it_is_damaged(tmp_path):
     write_kinds(tmp_path)
     assert run(tmp_path) == [*RESULTS, "0", "True", "negative", "2.5"]
     assert run(tmp_path) == [*RESULTS, "4", "False", "negative", "2.5"]
-
-
-def test_damaged_machine_code_is_replaced(tmp_path):
-    write_kinds(tmp_path)
-    run(tmp_path)
     files = sorted(tmp_path.rglob("caller.total.*.kernel"))
     for file, damage in zip(files, (b"", b"no pickle", b"\x80\x04N."), strict=True):
         file.write_bytes(damage)
