@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import sqrt
 
 import numpy as np
@@ -72,9 +73,16 @@ class UnprovedPosition:
 
     Attributes:
         reason: What cannot be shown, in words.
+        whatever_cells: Whether it cannot be shown with other cells, either.
     """
 
     reason: str
+    whatever_cells: bool = False
+
+
+_UNSTABLE = UnprovedPosition(
+    "the object's position is not stable under the delay, the lag and the model's error", whatever_cells=True
+)
 
 
 def fit_position(
@@ -101,14 +109,28 @@ def fit_position(
     return min(plans, key=plan_time) if plans else tried[0]
 
 
+def unproved_position(
+    problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget
+) -> UnprovedPosition | None:
+    """Return why no tube is allowed whatever the cells are, None if one is; see ``fit_position``."""
+    stiffest = max(transition.gains.stiffness for transition in plan.transitions)
+    slowest = []
+    for share in SOFTER:
+        tubes = _tubes(share * stiffest, gain_set, budget)
+        limits = [_not_allowed(tube, budget, problem, plan) for tube in tubes]
+        if None in limits:
+            return None
+        slowest += limits[-1:]
+    found = slowest[0] if slowest else None
+    return replace(found or _UNSTABLE, whatever_cells=True)
+
+
 def _fastest(
     problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget, stiffness: float
 ) -> Plan | UnprovedPosition:
     """Return a plan with one K for all transitions, and the largest speed of p_G that holds."""
     uniform = _with_stiffness(plan, stiffness, gain_set)
-    found: Plan | UnprovedPosition = UnprovedPosition(
-        "the object's position is not stable under the delay, the lag and the model's error"
-    )
+    found: Plan | UnprovedPosition = _UNSTABLE
     for tube in _tubes(stiffness, gain_set, budget):
         found = _not_allowed(tube, budget, problem, uniform) or _within(problem, uniform, tube)
         if isinstance(found, Plan):
@@ -116,8 +138,12 @@ def _fastest(
     return found  # of the slowest motion, which has the narrowest tube
 
 
-def _tubes(stiffness: float, gain_set: ScheduledGains, budget: Budget) -> list[PositionTube]:
-    """Return the narrowest tube for each speed of p_G with which the loop is stable."""
+@lru_cache(maxsize=16)
+def _tubes(stiffness: float, gain_set: ScheduledGains, budget: Budget) -> tuple[PositionTube, ...]:
+    """Return the narrowest tube for each speed of p_G with which the loop is stable.
+
+    They are needed again where the axes have been fitted.
+    """
     damping = gain_set.damping_factor * sqrt(stiffness)
     choices = [
         PositionGains(stiffness, damping, tracking, factor * sqrt(tracking), speed)
@@ -127,7 +153,7 @@ def _tubes(stiffness: float, gain_set: ScheduledGains, budget: Budget) -> list[P
     ]
     stable = [tube for tube in position_tubes(choices, budget) if tube is not None]
     of_speed = ([tube for tube in stable if tube.speed == speed] for speed in SPEEDS)
-    return [min(tubes, key=lambda tube: tube.radius) for tubes in of_speed if tubes]
+    return tuple(min(tubes, key=lambda tube: tube.radius) for tubes in of_speed if tubes)
 
 
 def _not_allowed(

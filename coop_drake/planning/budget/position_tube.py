@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from math import ceil
 
 import numpy as np
@@ -192,15 +193,7 @@ def _loop(
     The rows give what e adds to the command, and the nominal acceleration.
     """
     stiffness, damping, tracking_stiffness, tracking_damping = loop
-    motion, size = np.zeros((6, 6)), 5 + 2 * delay
-    motion[E, V] = motion[Q, R] = 1.0
-    motion[V, Q], motion[V, R] = stiffness, damping
-    motion[R, Q], motion[R, R] = -stiffness, -damping
-    if lag > 0.0:
-        motion[V, S], motion[S, S], motion[S, 5] = 1.0 + error, -1.0 / lag, 1.0 / lag
-    else:
-        motion[V, 5] = 1.0 + error
-    flow = expm(T * motion)
+    flow, size = _flow(stiffness, damping, T, lag, error), 5 + 2 * delay
     feedback, nominal, held = np.zeros(size), np.zeros(size), np.zeros(size)
     nominal[[Q, R]] = -stiffness, -damping
     oldest = 5 + 2 * (delay - 1) if delay else E
@@ -211,3 +204,18 @@ def _loop(
     for i in range(2 * delay):  # e, e' of one period before, then those of two, and so on
         matrix[5 + i, i if i < 2 else 5 + i - 2] = 1.0
     return matrix, held, feedback, nominal
+
+
+@lru_cache(maxsize=2 * MODEL_PARTS)
+def _flow(stiffness: float, damping: float, T: float, lag: float, error: float) -> FloatArray:
+    """Return the matrix of one period without feedback, shape (6, 6); the last state is the held command."""
+    motion = np.zeros((6, 6))
+    motion[E, V] = motion[Q, R] = 1.0
+    motion[V, Q], motion[V, R] = stiffness, damping
+    motion[R, Q], motion[R, R] = -stiffness, -damping
+    if lag > 0.0:
+        motion[V, S], motion[S, S], motion[S, 5] = 1.0 + error, -1.0 / lag, 1.0 / lag
+    else:
+        motion[V, 5] = 1.0 + error
+    flow: FloatArray = expm(T * motion)
+    return flow

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 from shapely.errors import ShapelyError
 
@@ -13,7 +15,7 @@ from coop_drake.errors import GeometryError, PlanError, StallError
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
 from coop_drake.planning.budget.fitting import fit_budget
-from coop_drake.planning.budget.position_fit import UnprovedPosition, fit_position
+from coop_drake.planning.budget.position_fit import UnprovedPosition, fit_position, unproved_position
 from coop_drake.planning.budget.transitions import UnprovedTransition
 from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.progress import Progress
@@ -25,6 +27,9 @@ OVERLAPS = (0.04, 0.06, 0.09, 0.02)
 """Least overlaps of consecutive boxes that are tried, in every angle and joint [rad or m]: the wider the goal
 intervals, the larger are the departures that an axis bears in them, and the more cells a plan has. The last
 one is for passages that leave no room for wider ones."""
+
+_Tried = tuple[Plan, UnprovedTransition | UnprovedPosition]
+"""A plan, and why a budget does not hold for it."""
 
 
 @dataclass(frozen=True)
@@ -74,38 +79,66 @@ def tolerant_plan(
         PlanError: No plan can be made.
         StallError: No plan can be executed.
     """
-    tried: list[tuple[Plan, UnprovedTransition | UnprovedPosition]] = []
-    for overlap in OVERLAPS if budget.axes else (0.0,):  # the position alone asks for none
-        try:
-            plan = quickest_plan(
-                problem,
-                found,
-                gain_set,
-                gain_set_name=gain_set_name,
-                least_overlap=overlap,
-                progress=progress,
-            )
-        except (GeometryError, PlanError, StallError, ShapelyError):
-            if not tried:
-                raise
-            continue
+    tried: list[_Tried] = []
+    plans = _plans(problem, found, gain_set, gain_set_name, budget, progress)
+    for plan in plans:
         fitted = _fitted(problem, plan, gain_set, budget)
         if isinstance(fitted, Plan):
             return fitted
         tried.append((plan, fitted))
-    return _beyond(problem, tried, gain_set, budget)
+        if _is_final(fitted):
+            break
+    return _beyond(problem, tried, plans, gain_set, budget)
+
+
+def _plans(
+    problem: PlanningProblem,
+    found: Channel | CoveredPath,
+    gain_set: ScheduledGains,
+    gain_set_name: str,
+    budget: Budget,
+    progress: Progress | None,
+) -> Iterator[Plan]:
+    """Make a plan for every least overlap with which one can be made; the first one must be."""
+    count = 0
+    for overlap in OVERLAPS if budget.axes else (0.0,):  # the position alone asks for none
+        try:
+            plan = quickest_plan(
+                problem, found, gain_set, gain_set_name=gain_set_name, least_overlap=overlap,
+                progress=progress,
+            )  # fmt: skip
+        except (GeometryError, PlanError, StallError, ShapelyError):
+            if count == 0:
+                raise
+            continue
+        count += 1
+        yield plan
+
+
+def _is_final(unproved: UnprovedTransition | UnprovedPosition) -> bool:
+    """Whether other cells would not help."""
+    return isinstance(unproved, UnprovedPosition) and unproved.whatever_cells
 
 
 def _beyond(
     problem: PlanningProblem,
-    tried: list[tuple[Plan, UnprovedTransition | UnprovedPosition]],
+    tried: list[_Tried],
+    others: Iterator[Plan],
     gain_set: ScheduledGains,
     budget: Budget,
 ) -> BeyondBudget:
-    """Find the largest share of the budget that holds for one of the plans, by bisection."""
+    """Find the largest share of the budget that holds for one of the plans, by bisection.
+
+    Args:
+        problem: What was asked.
+        tried: Plans under which the budget does not hold, and why.
+        others: Further plans; they are made only where cells limit the share.
+        gain_set: The rule of the gains.
+        budget: The budget.
+    """
     best, said = 0.0, _sentence(*tried[0])
-    for plan, unproved in tried:
-        low, high, share = best, 1.0, best + SHARE_STEP
+    for plan, unproved in chain(tried, ((plan, tried[0][1]) for plan in others)):
+        low, high, share = best, 1.0, best + SHARE_STEP if best > 0.0 else 0.5
         while high - low > SHARE_STEP:
             found = _fitted(problem, plan, gain_set, budget.scaled(share))
             if isinstance(found, Plan):
@@ -115,6 +148,8 @@ def _beyond(
             share = 0.5 * (low + high)
         if low > best:
             best, said = low, _sentence(plan, unproved)
+        if _is_final(unproved):
+            break
     return BeyondBudget(said, budget, best)
 
 
@@ -122,6 +157,9 @@ def _fitted(
     problem: PlanningProblem, plan: Plan, gain_set: ScheduledGains, budget: Budget
 ) -> Plan | UnprovedTransition | UnprovedPosition:
     """Return a plan with gains, sets and regions under which its budget holds; or where it does not."""
+    unproved = unproved_position(problem, plan, gain_set, budget)  # first, for it takes far less time
+    if unproved is not None:
+        return unproved
     if budget.axes:
         fitted = fit_budget(problem, plan, gain_set, budget)
         if isinstance(fitted, UnprovedTransition):
