@@ -11,7 +11,7 @@ CODE := coop_drake tests benchmarks notebooks docs paper
 # The kernels are small; threads of BLAS would only get into each other's way.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test lint bench notebooks docs clean
+.PHONY: demo test lint lint-types lint-rest bench notebooks docs clean
 
 demo: $(READY)  ## plan, simulate and record the paper's transport
 	$(BIN)/coop-drake run models/base.scenario.yaml
@@ -19,10 +19,15 @@ demo: $(READY)  ## plan, simulate and record the paper's transport
 test: $(READY_TO_DEVELOP)  ## run every test, and show which lines none of them runs
 	$(BIN)/python -m pytest -n 2 --dist worksteal --cov --cov-report=term-missing
 
-lint: $(READY_TO_DEVELOP)  ## formatting, lint, types, direction of imports, documentation
+lint: $(READY_TO_DEVELOP)  ## formatting, lint, types, direction of imports, documentation; two of them at a time
+	@$(MAKE) --no-print-directory --jobs=2 --output-sync lint-types lint-rest
+
+lint-types:
+	$(BIN)/mypy
+
+lint-rest:
 	$(BIN)/ruff format --check $(CODE)
 	$(BIN)/ruff check $(CODE)
-	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/python -m docs.generate out/docs
 

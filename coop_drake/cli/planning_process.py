@@ -16,6 +16,7 @@ from typing import IO, TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from coop_drake.cli.kernel_clock import kernel_clock
 from coop_drake.errors import ProcessError, transferable
+from coop_drake.interrupts import uninterrupted
 from coop_drake.kernel_times import KERNEL_TIMES
 from coop_drake.progress import Progress
 
@@ -44,15 +45,15 @@ def beside(work: Callable[[Progress], R], meanwhile: Callable[[], object], progr
     if not _FORKS:
         return work(progress)
     reading, writing = os.pipe()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    # No other thread of a command holds a lock now, which the copy could wait for without end.
-    copy = os.fork()
-    if copy == 0:  # Ctrl-C stays blocked here: this process is told, and ends the copy.
-        os.close(reading)
-        _work(work, writing)
-    os.close(writing)
+    copy = 0
     try:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        with uninterrupted():
+            # No other thread of a command holds a lock now, which the copy could wait for without end.
+            copy = os.fork()
+            if copy == 0:  # Ctrl-C stays blocked here: this process is told, and ends the copy.
+                os.close(reading)
+                _work(work, writing)
+        os.close(writing)
         thread = Thread(target=_quietly, args=(meanwhile,), daemon=True)
         thread.start()
         with os.fdopen(reading, "rb") as messages:
@@ -60,8 +61,9 @@ def beside(work: Callable[[Progress], R], meanwhile: Callable[[], object], progr
         thread.join()
         return result
     finally:
-        os.kill(copy, signal.SIGKILL)
-        os.waitpid(copy, 0)
+        if copy:
+            os.kill(copy, signal.SIGKILL)
+            os.waitpid(copy, 0)
 
 
 def prepare_simulation(scenario: Scenario) -> None:

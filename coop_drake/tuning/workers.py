@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import multiprocessing
-import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
 from pathlib import Path
 
 from coop_drake.answers import Plan
 from coop_drake.fields import HarmonicMap
+from coop_drake.interrupts import uninterrupted
 from coop_drake.laws import GainSet
 from coop_drake.scenario import load_scenario
 from coop_drake.tuning.trial import GainTrial, TrialRunner, fastest_blocks
@@ -55,19 +54,9 @@ class Workers:
 
     def try_all(self, gain_sets: Sequence[GainSet]) -> Iterator[GainTrial]:
         """Simulate gain sets in parallel; trials come in the order of the gain sets."""
-        with _interrupts_blocked():
+        with uninterrupted():
             trials = [self._pool.submit(_try, gains) for gains in gain_sets]
         return (trial.result() for trial in trials)
-
-
-@contextmanager
-def _interrupts_blocked() -> Iterator[None]:
-    """Block Ctrl-C until the processes have started; they inherit the blocked signal and never get it."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _prepare(scenario: Path, plan: Plan, maps: tuple[HarmonicMap, ...], longest: float) -> None:

@@ -18,6 +18,7 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 from coop_drake.errors import ProcessError, transferable
+from coop_drake.interrupts import uninterrupted
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -94,12 +95,9 @@ class DrawingProcesses:
         # A copy holds this process's ends of all pipes, and must close them to see when this process ends.
         ends = [own, *(connection for _, connection in self._running.values())]
         process = _CONTEXT.Process(target=_work, args=(draw, other, ends), daemon=True)
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # It stays so in the process.
-        try:
+        with uninterrupted():
             process.start()
             self._running[subject] = process, own
-        finally:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         other.close()
 
     def _send(self, message: object) -> None:

@@ -1,0 +1,30 @@
+"""Starting processes so that Ctrl-C reaches neither them nor the middle of their start."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Let Ctrl-C wait until a block is over; processes that are started in it never receive it.
+
+    To block the signal in one thread is not enough. The system hands it to another one, and Python answers it
+    in the main thread, maybe between the functions that take and release locks before and after a fork. Such
+    a lock would never be released.
+    """
+    waiting: list[int] = []
+    blocked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    answers = threading.current_thread() is threading.main_thread()  # Only this thread may set what is done.
+    before = signal.signal(signal.SIGINT, lambda number, _: waiting.append(number)) if answers else None
+    try:
+        yield
+    finally:
+        if answers:
+            signal.signal(signal.SIGINT, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+        if waiting:
+            signal.raise_signal(signal.SIGINT)
