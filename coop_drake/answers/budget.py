@@ -65,11 +65,6 @@ class Budget:
         """Control period [s]."""
         return 1.0 / self.control_rate
 
-    @property
-    def nominal(self) -> Budget:
-        """What of the budget concerns a nominal motion: how often it is computed, its lag, and reports."""
-        return Budget(control_rate=self.control_rate, lag=self.lag, report_age=self.report_age)
-
     def scaled(self, factor: float) -> Budget:
         """Return the budget with every departure this many times as large, at the same control rate."""
         return replace(self, **{name: factor * getattr(self, name) for name in SCALED})
@@ -94,8 +89,6 @@ class Tolerance:
         entry_rate_lower: Lowest rate at the entry [rad/s or m/s].
         entry_rate_upper: Highest rate at the entry [rad/s or m/s].
         entry_acceleration: Largest magnitude of acceleration and command at the entry [rad/s^2 or m/s^2].
-        entry_history: Largest magnitude of the acceleration before the entry, as far back as the oldest
-            measurement that is used after it [rad/s^2 or m/s^2].
         distance: Least distance of the axis to the funnel's bounds at all times [rad or m].
         acceleration: Largest magnitude of the nominal acceleration [rad/s^2 or m/s^2].
         settled: Largest distance of the nominal motion from the goal interval's middle in the end [rad or
@@ -112,7 +105,6 @@ class Tolerance:
     entry_rate_lower: Vector
     entry_rate_upper: Vector
     entry_acceleration: Vector
-    entry_history: Vector
     distance: Vector
     acceleration: Vector
     settled: Vector

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+from coop_drake.answers.axis_tracking import AxisTracking
 from coop_drake.answers.budget import Budget
 from coop_drake.laws.sampling import whole_periods
-from coop_drake.planning.budget.axis_sets import conditions_of
+from coop_drake.planning.budget.axis_departure import axis_loop
 from coop_drake.scenario import Deployment, Measurements
 
 
@@ -20,5 +22,5 @@ def test_a_budget_and_the_gains_count_a_delay_as_the_simulation_does():
     assert whole_periods(barely_more, 0.005) == 3
     deployment = Deployment(control_rate=200.0, measurements=Measurements(delay=barely_more))
     assert deployment.whole_delay == pytest.approx(0.015)
-    budget = Budget(control_rate=200.0, delay=barely_more)
-    assert {conditions.delay for conditions in conditions_of(budget)} == {3}
+    loops = [axis_loop(AxisTracking(300.0, 30.0), Budget(delay=delay)) for delay in (barely_more, 0.015)]
+    np.testing.assert_array_equal(*(loop.sums for loop in loops))

@@ -71,7 +71,7 @@ def test_the_law_is_written_twice_and_is_the_same():
 
 DEPARTURES = {
     "delay": 0.03, "lag": 0.02, "angle_noise": 0.004, "rate_noise": 0.05, "model_error": 0.4,
-    "acceleration_error": 1.0, "report_age": 0.2, "control_rate": 60.0,
+    "acceleration_error": 1.0, "control_rate": 60.0,
 }  # fmt: skip
 
 
@@ -83,6 +83,11 @@ def test_a_larger_budget_is_refused(plan, name):
     assert "tolerance" in refusal.value.where or refusal.value.where == "axis_tracking"
 
 
+def test_old_reports_of_nominal_motions_change_nothing_here(plan):
+    """A nominal motion that is at rest stays there: the sets of axes do not grow while a report travels."""
+    assert check_budget(replace(plan, budget=replace(plan.budget, report_age=0.2))).count > 0
+
+
 def with_transition(plan, k, **changes):
     transitions = list(plan.transitions)
     transitions[k] = replace(transitions[k], **changes)
@@ -91,7 +96,7 @@ def with_transition(plan, k, **changes):
 
 ALTERED = {
     "entry_lower": 1.002, "entry_upper": -1.002, "entry_rate_lower": 0.9, "entry_rate_upper": 0.9,
-    "entry_acceleration": 0.9, "entry_history": 0.9, "distance": 1.05, "acceleration": 0.95, "settled": 0.95,
+    "entry_acceleration": 0.9, "distance": 1.05, "acceleration": 0.95, "settled": 0.95,
     "settled_rate": 0.95, "departure": 0.99, "rate_departure": 0.99,
 }  # fmt: skip
 

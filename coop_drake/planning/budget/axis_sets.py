@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
 
-from coop_drake.answers.budget import Budget
 from coop_drake.compiled import compiled
 from coop_drake.laws.axis_table import (
     DECAY_RATE,
@@ -19,7 +17,6 @@ from coop_drake.laws.axis_table import (
     track_row,
 )
 from coop_drake.laws.funnels import CLOSING
-from coop_drake.laws.sampling import whole_periods
 from coop_drake.planning.budget.axis_tube import (
     ACCELERATION,
     COLUMNS,
@@ -31,20 +28,11 @@ from coop_drake.planning.budget.axis_tube import (
     X,
     follow_tube,
 )
-from coop_drake.planning.budget.settled import Settled, settle, tail_samples
+from coop_drake.planning.budget.settled import settle, tail_samples
 from coop_drake.tree.pose import FloatArray
 
 RAMPED = 6.0
 """mu t after which the gain k1 counts as ramped in [-]: a sixtieth of it is missing then."""
-
-LATE = 1
-"""Periods for which the command of the cell before acts after a switch [-]: all robots compute at the instant
-of the switch, before they hear of it."""
-
-
-MODEL_PARTS = 3
-"""Parts into which the range of the model's error is cut [-]: within each the factor by which accelerations
-are too large is known but for a third of the error, which alone counts as a disturbance."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +45,6 @@ class Entry:
         rate_lower: Lowest rate [rad/s or m/s].
         rate_upper: Highest rate [rad/s or m/s].
         acceleration: Largest magnitude of acceleration and command at the entry [rad/s^2 or m/s^2].
-        history: Largest magnitude of the acceleration before the entry, over the age of the measurements and
-            reports that are used at the entry [rad/s^2 or m/s^2].
         rest: Position at which the last cell is left at rest, for which ``rest_jump`` is computed [rad
             or m]; the middle of the positions if not given.
     """
@@ -68,7 +54,6 @@ class Entry:
     rate_lower: float = 0.0
     rate_upper: float = 0.0
     acceleration: float = 0.0
-    history: float = 0.0
     rest: float | None = None
 
 
@@ -98,93 +83,46 @@ class AxisSets:
     parts: int = 1
 
 
-def conditions_of(budget: Budget) -> tuple[AxisConditions, ...]:
-    """Return what disturbs an axis under a budget, the range of the model's error cut into parts."""
-    parts = MODEL_PARTS if budget.model_error > 0.0 else 1
-    reach = budget.model_error / parts
-    return tuple(
-        AxisConditions(
-            budget.period,
-            whole_periods(budget.delay, budget.period),
-            budget.lag,
-            budget.angle_noise,
-            budget.rate_noise,
-            1.0 - budget.model_error + (2 * i + 1) * reach,
-            reach,
-            budget.acceleration_error,
-            LATE,
-        )
-        for i in range(parts)
-    )
-
-
-def axis_sets(row: FloatArray, conditions: Sequence[AxisConditions], entry: Entry, parts: int) -> AxisSets:
-    """Bound an axis from its entry on for all times.
+def axis_sets(row: FloatArray, conditions: AxisConditions, entry: Entry, parts: int) -> AxisSets:
+    """Bound a nominal motion from its entry on for all times.
 
     Args:
         row: The axis, a row of an ``axis_table``, with a quintic funnel.
-        conditions: Alternatives for what disturbs it; one of them holds during the whole transition.
+        conditions: How the motion is computed.
         entry: The set in which it enters.
         parts: Into how many parts the positions at the entry are cut, each with a tube of its own.
     """
-    T, delay = conditions[0].period, conditions[0].delay
+    T, middle = conditions.period, 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
     closed = max(CLOSING / row[DECAY_RATE], RAMPED / row[RAMP_RATE] if row[RAMP_RATE] > 0.0 else 0.0)
-    begin = ceil(max(closed, row[FADING_TIME]) / T) + delay
-    tail, middle = tail_samples(row, conditions[0]), 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
-    tubes, boxes, followed = [], [], (0.0, 0.0)
-    for one in conditions:
-        made = _tubes(row, one, entry, parts, begin + tail + 1)
-        if not made:
-            return AxisSets((), 0.0)
-        ends = np.array([_closed_part(tube[begin - delay :], middle, delay) for tube in made]).max(axis=0)
-        boxes.append((float(ends[0]), float(ends[1]), float(ends[2])))
-        followed = max(followed[0], float(ends[3])), max(followed[1], float(ends[4]))
-        tubes += made
-    kept = _settled(row, conditions, begin * T, boxes, followed, tail)
-    last = max(one.acceleration for one in kept)
-    most = max(last, *(float(tube[:, ACCELERATION].max()) for tube in tubes))
-    rate = max(kept[0].rate, *(float((np.abs(tube[:, V]) + tube[:, V_REACH]).max()) for tube in tubes))
+    begin, tail = ceil(max(closed, row[FADING_TIME]) / T), tail_samples(row, conditions)
+    tubes = _tubes(row, conditions, entry, parts, begin + tail + 1)
+    if not tubes:
+        return AxisSets((), 0.0)
+    ends = np.array([_closed_part(tube[begin:], middle) for tube in tubes]).max(axis=0).tolist()
+    kept = settle(row, conditions, begin * T, (ends[0], ends[1], ends[2]), (ends[3], ends[4]), tail)
+    most = max(kept.acceleration, *(float(tube[:, ACCELERATION].max()) for tube in tubes))
+    rate = max(kept.rate, *(float((np.abs(tube[:, V]) + tube[:, V_REACH]).max()) for tube in tubes))
     return AxisSets(
         tuple(tubes),
-        min(*(one.distance for one in kept), *(float(tube[:, DISTANCE].min()) for tube in tubes)),
+        min(kept.distance, *(float(tube[:, DISTANCE].min()) for tube in tubes)),
         most,
         rate + 0.5 * T * most,
-        last,
-        kept[0].x,
-        kept[0].rate,
+        kept.acceleration,
+        kept.x,
+        kept.rate,
         parts,
     )
 
 
 @compiled
-def _closed_part(tube: FloatArray, middle: float, delay: int) -> tuple[float, float, float, float, float]:
-    """Return the largest |x - middle|, |v| and |x''| of the first samples, and of all the first two."""
-    x = v = pushed = x_all = v_all = 0.0
+def _closed_part(tube: FloatArray, middle: float) -> tuple[float, float, float, float, float]:
+    """Return |x - middle|, |v| and |x''| of the first sample, and the largest of the first two of all."""
+    x = v = 0.0
     for k in range(len(tube)):
-        x_all = max(x_all, abs(tube[k, X] - middle) + tube[k, X_REACH])
-        v_all = max(v_all, abs(tube[k, V]) + tube[k, V_REACH])
-        if k <= delay:
-            x, v, pushed = x_all, v_all, max(pushed, tube[k, ACCELERATION])
-    return x, v, pushed, x_all, v_all
-
-
-def _settled(
-    row: FloatArray,
-    conditions: Sequence[AxisConditions],
-    time: float,
-    boxes: Sequence[tuple[float, float, float]],
-    followed: tuple[float, float],
-    samples: int,
-) -> list[Settled]:
-    """Return ``settle`` of every condition, for the same departures x and v."""
-    while True:
-        kept = [
-            settle(row, one, time, box, followed, samples) for one, box in zip(conditions, boxes, strict=True)
-        ]
-        largest = max(one.x for one in kept), max(one.rate for one in kept)
-        if largest == followed or not max(largest) < np.inf:
-            return kept
-        followed = largest
+        x = max(x, abs(tube[k, X] - middle) + tube[k, X_REACH])
+        v = max(v, abs(tube[k, V]) + tube[k, V_REACH])
+    first = tube[0]
+    return abs(first[X] - middle) + first[X_REACH], abs(first[V]) + first[V_REACH], first[ACCELERATION], x, v
 
 
 def _tubes(
@@ -198,7 +136,7 @@ def _tubes(
     for i in range(parts):
         tube = np.zeros((samples, COLUMNS))
         middle = float(entry.lower + (2 * i + 1) * half)
-        start = middle, fast, float(half), reach, entry.acceleration, entry.history
+        start = middle, fast, float(half), reach, entry.acceleration
         if not follow_tube(row, conditions, start, jump, tube):
             return []
         tubes.append(tube)

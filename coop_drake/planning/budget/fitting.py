@@ -88,7 +88,6 @@ def _tolerance(factor: float, passed: ProvedTransition) -> Tolerance:
         entry_rate_lower=np.array([entry.rate_lower for entry in entries]),
         entry_rate_upper=np.array([entry.rate_upper for entry in entries]),
         entry_acceleration=np.array([entry.acceleration for entry in entries]),
-        entry_history=np.array([entry.history for entry in entries]),
         distance=np.array([(1.0 - SLACK) * sets.distance for sets in every]) - passed.departure,
         acceleration=np.array([(1.0 + SLACK) * sets.acceleration for sets in every]),
         settled=np.array([(1.0 + SLACK) * sets.settled for sets in every]),

@@ -22,65 +22,51 @@ LOWEST, HIGHEST = [0, 2], [1, 3, 4, 5]
 """Which of the numbers of an entry set are lower bounds, and which upper ones."""
 
 
-def rest_needed(sets: AxisSets, conditions: AxisConditions) -> tuple[float, float]:
-    """Return distance and rate within which a settled axis is measured [rad or m, rad/s or m/s]."""
-    return sets.settled + conditions.position_noise, sets.settled_rate + conditions.rate_noise
-
-
-def next_entry(
-    row: FloatArray,
-    sets: AxisSets,
-    entry: Entry,
-    conditions: AxisConditions,
-    report_periods: int,
-) -> Entry:
+def next_entry(row: FloatArray, sets: AxisSets, conditions: AxisConditions, report_periods: int) -> Entry:
     """Return the set in which an axis can enter the next cell.
 
-    It was measured at rest; since then the measurement's delay has passed, the time for which a report may be
-    used, and a period. In that time it went no farther than its largest acceleration allows, and it has
+    Its motion was at rest when a report was made; since then the time for which reports may be used has
+    passed, and a period. In that time it went no farther than its largest acceleration allows, and it has
     stayed in its tube.
 
     Args:
         row: The axis in this cell, with the condition of rest under which the cell is left.
         sets: Its sets.
-        entry: The set in which it entered this cell.
-        conditions: What disturbs it.
+        conditions: How its motion is computed.
         report_periods: How long a report may be used, in periods.
     """
     middle = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
-    reach, fast = row[REST_REACH] + conditions.position_noise, row[REST_RATE] + conditions.rate_noise
-    since = conditions.delay + report_periods + 1
+    rest, since = (float(row[REST_REACH]), float(row[REST_RATE])), report_periods + 1
     time = since * conditions.period
     before = max(sets.last, *(float(tube[-1 - since :, ACCELERATION].max()) for tube in sets.tubes))
     x, v = sets.settled, sets.settled_rate
     bounds = np.array([middle - x, middle + x, -v, v, sets.last, before])
-    _limit(bounds, middle, reach, fast, time)
+    _limit(bounds, middle, rest, time)
     leaving = ceil(row[LEAVING_TIME] / conditions.period - 1e-6)
-    earlier = max(entry.history, entry.acceleration)
     for tube in sets.tubes:
-        found = _switching(tube, middle, (reach, fast), (since, leaving), earlier)
+        found = _switching(tube, middle, rest, (since, leaving))
         if found[0] <= found[1]:
-            _limit(found, middle, reach, fast, time)
+            _limit(found, middle, rest, time)
             bounds[LOWEST] = np.minimum(bounds[LOWEST], found[LOWEST])
             bounds[HIGHEST] = np.maximum(bounds[HIGHEST], found[HIGHEST])
-    low, high, slow, quick, pushed, history = bounds.tolist()
-    return Entry(low, high, slow, quick, pushed, history, middle)
+    low, high, slow, quick, pushed = bounds[:5].tolist()
+    return Entry(low, high, slow, quick, pushed, middle)
 
 
 @compiled
-def _limit(bounds: FloatArray, middle: float, reach: float, fast: float, time: float) -> None:
-    """Cut bounds of states to where an axis can be that was within ``reach`` and ``fast`` some time ago."""
-    history = bounds[5]
-    farther, faster = reach + time * (fast + 0.5 * time * history), fast + time * history
+def _limit(bounds: FloatArray, middle: float, rest: tuple[float, float], time: float) -> None:
+    """Cut bounds of states to where a motion can be that was at rest some time ago."""
+    farther = rest[0] + time * (rest[1] + 0.5 * time * bounds[5])
+    faster = rest[1] + time * bounds[5]
     bounds[0], bounds[1] = max(bounds[0], middle - farther), min(bounds[1], middle + farther)
     bounds[2], bounds[3] = max(bounds[2], -faster), min(bounds[3], faster)
 
 
 @compiled
 def _switching(
-    tube: FloatArray, middle: float, rest: tuple[float, float], samples: tuple[int, int], earlier: float
+    tube: FloatArray, middle: float, rest: tuple[float, float], samples: tuple[int, int]
 ) -> FloatArray:
-    """Return bounds of x and v, the largest |x''|, and that of the time before, when a tube can be left.
+    """Return bounds of x and v, the largest |x''|, and that since the report, when a tube can be left.
 
     The lowest x is above the highest one if it cannot be left before its end.
 
@@ -88,25 +74,23 @@ def _switching(
         tube: The tube.
         middle: Where the axis rests [rad or m].
         rest: Distance and rate within which the axis counts as at rest [rad or m, rad/s or m/s].
-        samples: For how many samples a report may be used, and the first sample of a switch.
-        earlier: Largest |x''| before the entry [rad/s^2 or m/s^2].
+        samples: For how many samples a report may be used, and the first sample of a report.
 
     Returns:
         Shape (6,): lowest and highest x, lowest and highest v, the two accelerations.
     """
     since, leaving = samples
     found = np.array([np.inf, -np.inf, np.inf, -np.inf, 0.0, 0.0])
-    reported = 0  # reports may rest on measurements from before the entry
-    for k in range(len(tube)):
+    reported = -since - 1
+    for k in range(leaving, len(tube)):
         x, x_reach, v, v_reach = tube[k, X] - middle, tube[k, X_REACH], tube[k, V], tube[k, V_REACH]
         if abs(x) <= rest[0] + x_reach and abs(v) <= rest[1] + v_reach:
             reported = k
-        if k < leaving or k - reported > since:
+        if k - reported > since:
             continue
         found[0], found[1] = min(found[0], middle + x - x_reach), max(found[1], middle + x + x_reach)
         found[2], found[3] = min(found[2], v - v_reach), max(found[3], v + v_reach)
         found[4] = max(found[4], tube[k, ACCELERATION])
-        found[5] = max(found[5], earlier) if k < since else found[5]
-        for i in range(max(k - since, 0), k + 1):
+        for i in range(max(k - since, leaving), k + 1):
             found[5] = max(found[5], tube[i, ACCELERATION])
     return found

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coop_drake.answers.budget import Budget
 from coop_drake.laws.axis_table import (
     ACCELERATION_LIMIT,
     GOAL_LOWER,
@@ -20,9 +19,9 @@ from coop_drake.laws.axis_table import (
 from coop_drake.laws.readiness import EROSION
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop, near_accelerations
-from coop_drake.planning.budget.axis_sets import AxisSets, Entry, axis_sets, conditions_of
+from coop_drake.planning.budget.axis_sets import AxisSets, Entry, axis_sets
 from coop_drake.planning.budget.axis_tube import AxisConditions
-from coop_drake.planning.budget.leaving import next_entry, rest_needed
+from coop_drake.planning.budget.leaving import next_entry
 from coop_drake.planning.budget.rate_room import comes_near_limit
 from coop_drake.tree.pose import FloatArray
 
@@ -84,10 +83,13 @@ def follow_transitions(
         start: Where they rest at the beginning, shape (axes,) [rad or m].
         loop: The loop that pulls the axes to their nominal motions, with the budget.
     """
-    nominal = loop.budget.nominal
-    conditions, proved = conditions_of(nominal), list[ProvedTransition]()
+    budget, proved = loop.budget, list[ProvedTransition]()
+    conditions, periods = (
+        AxisConditions(budget.period, budget.lag),
+        whole_periods(budget.report_age, budget.period),
+    )
     for k, table in enumerate(tables):
-        found = _proved(k, table.copy(), _entries(proved, start, nominal, conditions[0]), conditions)
+        found = _proved(k, table.copy(), _entries(proved, start, conditions, periods), conditions)
         if isinstance(found, UnprovedTransition):
             return found
         proved.append(found)
@@ -116,20 +118,17 @@ def _departing(
 
 
 def _entries(
-    proved: Sequence[ProvedTransition], start: FloatArray, budget: Budget, conditions: AxisConditions
+    proved: Sequence[ProvedTransition], start: FloatArray, conditions: AxisConditions, periods: int
 ) -> list[Entry]:
-    """Return the sets in which the axes enter the next transition."""
+    """Return the sets in which the axes enter the next transition, reports being used for some periods."""
     if not proved:
         return [Entry(float(x), float(x)) for x in start]
-    before, periods = proved[-1], whole_periods(budget.report_age, budget.period)
-    return [
-        _widened(next_entry(row, sets, entry, conditions, periods))
-        for row, sets, entry in zip(before.table, before.sets, before.entries, strict=True)
-    ]
+    pairs = zip(proved[-1].table, proved[-1].sets, strict=True)
+    return [_widened(next_entry(row, sets, conditions, periods)) for row, sets in pairs]
 
 
 def _proved(
-    k: int, table: FloatArray, entries: Sequence[Entry], conditions: Sequence[AxisConditions]
+    k: int, table: FloatArray, entries: Sequence[Entry], conditions: AxisConditions
 ) -> ProvedTransition | UnprovedTransition:
     """Return the sets of all axes of a transition, and write the condition of rest into its table."""
     every = []
@@ -140,9 +139,9 @@ def _proved(
                 break
         if not sets.distance > 0.0:
             return UnprovedTransition(k, axis, "may leave its funnel")
-        if comes_near_limit(row, sets, conditions, entry):
+        if comes_near_limit(row, sets):
             return UnprovedTransition(k, axis, "may come so near the limit of its rate that it is damped")
-        reach, rate = rest_needed(sets, conditions[0])
+        reach, rate = sets.settled, sets.settled_rate
         half = (0.5 - EROSION) * (row[GOAL_UPPER] - row[GOAL_LOWER])
         if not (1.0 + SLACK) * reach < half:
             return UnprovedTransition(k, axis, "may never come to rest in its goal interval")
@@ -163,5 +162,4 @@ def _widened(entry: Entry) -> Entry:
         rate_lower=entry.rate_lower - fast,
         rate_upper=entry.rate_upper + fast,
         acceleration=(1.0 + SLACK) * entry.acceleration,
-        history=(1.0 + SLACK) * entry.history,
     )

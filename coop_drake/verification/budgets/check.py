@@ -12,21 +12,17 @@ from itertools import pairwise
 
 import numpy as np
 
-from coop_drake.answers.budget import Budget, Tolerance
+from coop_drake.answers.budget import Tolerance
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import RefusalError
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.verification.budgets.axis_departure import departures
 from coop_drake.verification.budgets.axis_law import Axes
 from coop_drake.verification.budgets.entering import entering
 from coop_drake.verification.budgets.rate_room import check_rate_room
 from coop_drake.verification.budgets.staying import Closed, staying, tails
-from coop_drake.verification.budgets.tubes import Disturbed, tubes
+from coop_drake.verification.budgets.tubes import Nominal, tubes
 from coop_drake.verification.checks import Check
-
-MODEL_PARTS = 3
-"""Parts into which the range of the model's error is cut [-]: within each part the factor by which
-accelerations are too large is known but for a third of the error."""
 
 ROUNDING = 1e-9
 """Differences that rounding explains, relative and absolute [rad or m, s]."""
@@ -93,12 +89,11 @@ def _check_departures(plan: Plan) -> None:
 def _start(plan: Plan) -> FloatArray:
     """Return the set of the start: at rest."""
     rest = np.zeros_like(plan.start[2:])
-    return np.array([plan.start[2:], plan.start[2:], rest, rest, rest, rest])
+    return np.array([plan.start[2:], plan.start[2:], rest, rest, rest])
 
 
 _ENTRY = (
     "entry_lower", "entry_upper", "entry_rate_lower", "entry_rate_upper", "entry_acceleration",
-    "entry_history",
 )  # fmt: skip
 
 
@@ -132,19 +127,21 @@ def _axes(plan: Plan, k: int) -> Axes:
 def _check_transition(plan: Plan, k: int, stated: Tolerance, where: str) -> FloatArray:
     """Check one transition of the nominal motions; return in which states the next one can begin."""
     assert plan.budget is not None  # checked by the caller
-    budget, axes, rest = plan.budget.nominal, _axes(plan, k), plan.transitions[k].gains.rest
-    members, disturbed, middle, reach, before = _parts(axes, stated, budget)
-    T = budget.period
+    budget, axes, rest = plan.budget, _axes(plan, k), plan.transitions[k].gains.rest
+    members, middle, reach = _parts(stated)
+    T, motions = budget.period, Nominal(axes[members], budget.period, budget.lag)
     ended = np.maximum(5.0 / axes.decay, np.where(axes.mu > 0.0, RAMPED / np.maximum(axes.mu, 1e-9), 0.0))
-    begins = np.ceil(np.maximum(ended, axes.fading) / T).astype(int)[members] + disturbed.delay
-    follows = tails(disturbed)
+    begins = np.ceil(np.maximum(ended, axes.fading) / T).astype(int)[members]
+    follows = tails(motions)
     samples = begins + follows + 1
     rests = plan.start[2:] if k == 0 else _middles(plan, k - 1)
-    made = tubes(disturbed, int(samples.max()), middle, reach, before, rests[members])
-    box, most = _ends(made, begins, samples, disturbed)
+    made = tubes(
+        motions, int(samples.max()), middle, reach, stated.entry_acceleration[members], rests[members]
+    )
+    box, most = _ends(made, begins, samples, motions.axes)
     x, v = stated.settled[members], stated.settled_rate[members]
-    needed, last = staying(disturbed, Closed(begins * T, follows, box, x, v))
-    check_rate_room(plan.transitions[k], budget, made, last, members, disturbed.delay, where)
+    needed, last = staying(motions, Closed(begins * T, follows, box, x, v))
+    check_rate_room(plan.transitions[k], T, made, last, members, where)
     half = 0.5 * (axes.goal[1] - axes.goal[0])
     distance, fastest = half[members] - x - 0.125 * T * T * last, last.copy()
     for i, n in enumerate(samples):
@@ -160,10 +157,8 @@ def _check_transition(plan: Plan, k: int, stated: Tolerance, where: str) -> Floa
         _require(getattr(stated, name), found, name == "distance", f"{where}.{name}")
     if rest is None:
         raise RefusalError(f"transitions[{k}].gains.rest", "is missing, but the plan has a budget")
-    resting = (
-        stated.settled + budget.angle_noise <= np.minimum(rest.reach, 2.0 * (0.5 - EROSION) * half)
-    ).all()
-    resting &= (stated.settled_rate + budget.rate_noise <= rest.rate).all()
+    within = np.minimum(rest.reach, 2.0 * (0.5 - EROSION) * half)
+    resting = (stated.settled <= within).all() and (stated.settled_rate <= rest.rate).all()
     if not (stated.distance > 0.0).all() or not resting:
         raise RefusalError(where, "an axis may leave its funnel, or never count as arrived")
     return entering(plan.transitions[k], budget, made, samples, members, last, rest, stated)
@@ -175,44 +170,34 @@ def _middles(plan: Plan, k: int) -> FloatArray:
     return middles
 
 
-def _parts(
-    axes: Axes, stated: Tolerance, budget: Budget
-) -> tuple[FloatArray, Disturbed, FloatArray, FloatArray, FloatArray]:
-    """Return every part of every axis' entry set with every part of the model's range, and whose it is."""
-    pieces = MODEL_PARTS if budget.model_error > 0.0 else 1
-    members, middles, reaches, factors = [], [], [], []
+def _parts(stated: Tolerance) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return whose every part of an entry set is, shape (b,), its middle and its reach, shape (2, b)."""
+    members, middles, reaches = [], [], []
     for axis, parts in enumerate(stated.entry_parts):
         ends = np.linspace(stated.entry_lower[axis], stated.entry_upper[axis], parts + 1)
         rates = stated.entry_rate_lower[axis], stated.entry_rate_upper[axis]
         for low, high in pairwise(ends):
-            for piece in range(pieces):
-                members.append(axis)
-                middles.append((0.5 * (low + high), 0.5 * (rates[0] + rates[1])))
-                reaches.append((0.5 * (high - low), 0.5 * (rates[1] - rates[0])))
-                factors.append(1.0 + budget.model_error * ((2 * piece + 1) / pieces - 1.0))
-    of = np.array(members)
-    before = np.array([stated.entry_acceleration[of], stated.entry_history[of]])
-    error = np.full(of.size, budget.model_error / pieces)
-    disturbed = Disturbed(axes[of], budget, np.array(factors), error)
-    return of, disturbed, np.array(middles).T, np.array(reaches).T, before
+            members.append(axis)
+            middles.append((0.5 * (low + high), 0.5 * (rates[0] + rates[1])))
+            reaches.append((0.5 * (high - low), 0.5 * (rates[1] - rates[0])))
+    return np.array(members, dtype=np.intp), np.array(middles).T, np.array(reaches).T
 
 
 def _ends(
-    made: FloatArray, begins: FloatArray, samples: FloatArray, disturbed: Disturbed
+    made: FloatArray, begins: FloatArray, samples: FloatArray, axes: Axes
 ) -> tuple[FloatArray, FloatArray]:
     """Return the departures from the goal intervals' middles when funnels are closed, and the largest after.
 
     The first are those of x, v and acceleration, shape (3, b); the others those of x and v, shape (2, b).
     """
     box, most = np.empty((3, samples.size)), np.empty((2, samples.size))
-    middle = 0.5 * (disturbed.axes.goal[0] + disturbed.axes.goal[1])
+    middle = 0.5 * (axes.goal[0] + axes.goal[1])
     for i, (begin, end) in enumerate(zip(begins, samples, strict=True)):
-        late = made[begin - disturbed.delay : end, :, i]
+        late = made[begin:end, :, i]
         x, v = np.abs(late[:, 0] - middle[i]) + late[:, 1], np.abs(late[:, 2]) + late[:, 3]
-        first = slice(0, disturbed.delay + 1)
-        box[:, i], most[:, i] = (x[first].max(), v[first].max(), late[first, 4].max()), (x.max(), v.max())
+        box[:, i], most[:, i] = (x[0], v[0], late[0, 4]), (x.max(), v.max())
     return box, most
 
 
-def _largest(values: FloatArray, members: FloatArray) -> FloatArray:
+def _largest(values: FloatArray, members: IntArray) -> FloatArray:
     return np.array([values[members == axis].max() for axis in range(int(members.max()) + 1)])

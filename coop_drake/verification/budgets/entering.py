@@ -9,7 +9,7 @@ import numpy as np
 from coop_drake.answers.budget import Budget, Tolerance
 from coop_drake.answers.plan import Transition
 from coop_drake.laws.gains import RestCondition
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
 
 
 def entering(
@@ -17,12 +17,14 @@ def entering(
     budget: Budget,
     made: FloatArray,
     samples: FloatArray,
-    members: FloatArray,
+    members: IntArray,
     last: FloatArray,
     rest: RestCondition,
     stated: Tolerance,
 ) -> FloatArray:
-    """Return lower and upper position [rad or m] and rate, largest acceleration and history, (6, axes).
+    """Return lower and upper position [rad or m] and rate, and the largest acceleration, shape (5, axes).
+
+    Reports are made when a motion is at rest, not before the cell may be left.
 
     Args:
         transition: The transition that ends.
@@ -35,49 +37,48 @@ def entering(
         stated: What the transition states.
     """
     T, middle = budget.period, 0.5 * (transition.goal_lower + transition.goal_upper)
-    since = ceil(budget.delay / T - 1e-9) + ceil(budget.report_age / T - 1e-9) + 1
+    since = ceil(budget.report_age / T - 1e-9) + 1
     stay = ceil(max(transition.gains.hand_over_time, rest.after) / T - 1e-6)
-    result = np.empty((6, middle.size))
+    result = np.empty((5, middle.size))
     for axis in range(middle.size):
-        limits = rest.reach[axis] + budget.angle_noise, rest.rate[axis] + budget.rate_noise
+        limits = rest.reach[axis], rest.rate[axis]
         x, v, states = stated.settled[axis], stated.settled_rate[axis], []
         for i in np.flatnonzero(members == axis):
             tube = made[: samples[i], :, i].copy()
             tube[:, 0] -= middle[axis]
-            earlier = max(stated.entry_acceleration[axis], stated.entry_history[axis])
-            states += _switched(tube, limits, since, stay, T, earlier)
+            states += _switched(tube, limits, since, stay, T)
             history = max(last[i], tube[len(tube) - 1 - since :, 4].max())
             states.append(_limited((-x, x, -v, v, last[i], history), limits, since * T))
-        lows, highs, slow, quick, pushed, history = np.array(states).T
+        lows, highs, slow, quick, pushed, _ = np.array(states).T
         result[:, axis] = (
-            middle[axis] + lows.min(), middle[axis] + highs.max(), slow.min(), quick.max(), pushed.max(),
-            history.max(),
-        )  # fmt: skip
+            middle[axis] + lows.min(),
+            middle[axis] + highs.max(),
+            slow.min(),
+            quick.max(),
+            pushed.max(),
+        )
     return result
 
 
 def _switched(
-    tube: FloatArray, limits: tuple[float, float], since: int, stay: int, period: float, earlier: float
+    tube: FloatArray, limits: tuple[float, float], since: int, stay: int, period: float
 ) -> list[tuple[float, ...]]:
     """Return in which states a tube about the middle can be when the cell is switched before its end."""
     low, high = tube[:, [0, 2]] - tube[:, [1, 3]], tube[:, [0, 2]] + tube[:, [1, 3]]
     resting = ((low <= limits) & (high >= -np.array(limits))).all(axis=1)
-    times = np.flatnonzero(resting | (np.arange(len(tube)) == 0))
-    possible = [
-        k for k in range(stay, len(tube)) if ((times <= k) & (times >= k - since)).any()
-    ]  # fmt: skip
+    times = np.flatnonzero(resting)
+    times = times[times >= stay]
+    possible = [k for k in range(stay, len(tube)) if ((times <= k) & (times >= k - since)).any()]
     if not possible:
         return []
-    history = max(
-        max(tube[max(k - since, 0) : k + 1, 4].max(), earlier if k < since else 0.0) for k in possible
-    )
+    history = max(tube[max(k - since, stay) : k + 1, 4].max() for k in possible)
     x, v = (low[possible].min(axis=0), high[possible].max(axis=0))
     state = x[0], v[0], x[1], v[1], tube[possible, 4].max(), history
     return [_limited(state, limits, since * period)]
 
 
 def _limited(state: tuple[float, ...], limits: tuple[float, float], time: float) -> tuple[float, ...]:
-    """Return the state cut to where an axis can have gone that was measured at rest this long ago."""
+    """Return the state cut to where a motion can have gone that was at rest this long ago."""
     x_low, x_high, v_low, v_high, pushed, history = state
     far, fast = limits[0] + time * (limits[1] + 0.5 * time * history), limits[1] + time * history
     return max(x_low, -far), min(x_high, far), max(v_low, -fast), min(v_high, fast), pushed, history

@@ -1,22 +1,20 @@
-"""Whether axes under a budget stay so far below their limits of rate and acceleration that none acts."""
+"""Whether nominal motions stay so far below limits of rate and acceleration that none acts."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from coop_drake.answers.budget import Budget, Tolerance
 from coop_drake.answers.plan import Transition
 from coop_drake.errors import RefusalError
-from coop_drake.tree.pose import FloatArray
+from coop_drake.tree.pose import FloatArray, IntArray
 
 
 def check_rate_room(
     transition: Transition,
-    budget: Budget,
+    period: float,
     made: FloatArray,
     last: FloatArray,
-    members: FloatArray,
-    delay: int,
+    members: IntArray,
     where: str,
 ) -> None:
     """Refuse sets in which a limit may act on a commanded acceleration a.
@@ -26,11 +24,10 @@ def check_rate_room(
 
     Args:
         transition: The transition, with its stated sets.
-        budget: The budget.
+        period: Control period [s].
         made: Tubes of all parts, shape (samples, 6, b), see ``tubes``.
         last: Largest |acceleration| of each part after its tube's end, shape (b,).
         members: Axis of each part, shape (b,).
-        delay: Age of a measurement in periods.
         where: The transition's place.
 
     Raises:
@@ -40,28 +37,19 @@ def check_rate_room(
     gain, most = transition.gains.limit_gain, transition.gains.acceleration_limit
     if stated is None:
         return
-    commanded = np.vstack([made[:, 4], last]) / (1.0 - budget.model_error)  # the model may make less of it
+    commanded = np.vstack([made[:, 4], last])
     for axis, limit in enumerate(() if most is None else most):
         if not (commanded[:, members == axis] <= limit).all():
             raise RefusalError(f"{where}[{axis}]", f"an axis may ask for more than its limit of {limit:.6g}")
     if limits is None or gain is None:
         return
     moving = np.abs(made[:, 2]) + made[:, 3]
-    early = np.tile(_entry_rates(stated, budget, delay)[members], (delay, 1))
-    seen = np.concatenate((early, moving))[: len(moving)] + budget.rate_noise
-    settled = stated.settled_rate + budget.rate_noise
     for axis, limit in enumerate(limits):
         of = members == axis
-        rates = np.append(seen[:, of].ravel(), np.full(int(of.sum()), settled[axis]))
+        rates = np.append(moving[:, of].ravel(), np.full(int(of.sum()), stated.settled_rate[axis]))
         asked = commanded[:, of].ravel()
         if not (rates * asked <= 0.5 * gain * (limit**2 - rates**2)).all():
             raise RefusalError(f"{where}[{axis}]", f"an axis may be damped by its limit of {limit:.6g}")
-        fastest = rates.max() + 0.5 * budget.period * stated.acceleration[axis] + stated.rate_departure[axis]
+        fastest = rates.max() + 0.5 * period * stated.acceleration[axis] + stated.rate_departure[axis]
         if not fastest <= limit:
             raise RefusalError(f"{where}[{axis}]", f"an axis may be faster than its limit of {limit:.6g}")
-
-
-def _entry_rates(stated: Tolerance, budget: Budget, delay: int) -> FloatArray:
-    """The largest rates of which measurements speak at the entry, shape (1 + n,)."""
-    fastest: FloatArray = np.maximum(np.abs(stated.entry_rate_lower), np.abs(stated.entry_rate_upper))
-    return fastest + delay * budget.period * stated.entry_history

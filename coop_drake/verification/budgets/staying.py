@@ -1,4 +1,4 @@
-"""Whether axes stay within stated departures near the middle of their closed funnels for ever."""
+"""Whether nominal motions stay within stated departures near the middle of their closed funnels for ever."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coop_drake.tree.pose import FloatArray
-from coop_drake.verification.budgets.tubes import Disturbed
+from coop_drake.verification.budgets.tubes import Nominal
 
 LENGTH = 5.0
 """Length of a response in its slowest time constant [-]."""
@@ -20,7 +20,7 @@ class Closed:
     Attributes:
         time: That time [s].
         samples: Number of samples from then on.
-        box: Departures of x, v and acceleration then, and when older measurements were made, shape (3, b).
+        box: Departures of x, v and acceleration then, shape (3, b).
         x: Stated departure of x for ever [rad or m].
         v: Stated departure of v for ever [rad/s or m/s].
     """
@@ -32,81 +32,62 @@ class Closed:
     v: FloatArray
 
 
-def tails(disturbed: Disturbed) -> FloatArray:
+def tails(motions: Nominal) -> FloatArray:
     """Return for how many samples tubes go on after their funnels are closed, shape (b,)."""
-    axes, T = disturbed.axes, disturbed.budget.period
+    axes, T = motions.axes, motions.period
     damping, width = axes.k1 + axes.k2, axes.goal[1] - axes.goal[0]
     slowest = np.minimum((axes.k1 * axes.k2 + 16.0 * axes.kappa / width**2) / damping, 0.5 * damping)
-    samples: FloatArray = np.ceil(LENGTH / (slowest * T)).astype(int) + 2 * disturbed.delay + 2
+    samples: FloatArray = np.ceil(LENGTH / (slowest * T)).astype(int) + 2
     return samples
 
 
-def staying(disturbed: Disturbed, closed: Closed) -> tuple[FloatArray, FloatArray]:
+def staying(motions: Nominal, closed: Closed) -> tuple[FloatArray, FloatArray]:
     """Return bounds of |x| and |v| at the next sample, (2, b), and the largest |acceleration|, (b,).
 
     The bounds follow if the stated ones held at all samples before. Where they are not larger than the stated
     ones, these hold for ever, by induction.
     """
-    budget, axes, stated = disturbed.budget, disturbed.axes, np.array([closed.x, closed.v])
-    reach, fast = stated[0] + budget.angle_noise, stated[1] + budget.rate_noise
+    axes, (reach, fast) = motions.axes, (closed.x, closed.v)
     middle = 0.5 * (axes.goal[0] + axes.goal[1])
-    _, slope, by_rate, rest, _ = disturbed.command(closed.time, middle, reach, np.zeros_like(reach), fast)
+    _, slope, by_rate, rest, _ = motions.command(closed.time, middle, reach, np.zeros_like(reach), fast)
     k1, k1_rate = axes.ramp(closed.time)
     missing = axes.k1 - k1
     growing = (axes.k2 * missing + k1_rate) * reach + missing * (1.0 - np.log(axes.share)) * fast
-    rest = rest + disturbed.factor * growing
-    command = np.abs(slope) * reach + np.abs(by_rate) * fast + rest
-    largest = command + disturbed.errors(command)
-    size = np.abs(slope) * budget.angle_noise + np.abs(by_rate) * budget.rate_noise + largest - command + rest
-    responses = np.abs(_responses(disturbed, slope, by_rate, int(closed.samples.max())))
-    left, sums = _sums(disturbed, closed, responses, (np.abs(slope), np.abs(by_rate)), largest)
+    size = rest + growing
+    largest = np.abs(slope) * reach + np.abs(by_rate) * fast + size
+    responses = np.abs(_responses(motions, slope, by_rate, int(closed.samples.max())))
+    left, sums = _sums(closed, responses)
     return left + sums * size, np.maximum(largest, closed.box[2])
 
 
-def _responses(disturbed: Disturbed, slope: FloatArray, by_rate: FloatArray, steps: int) -> FloatArray:
+def _responses(motions: Nominal, slope: FloatArray, by_rate: FloatArray, steps: int) -> FloatArray:
     """Return x, v and a at every sample, of axes that begin with 1 in one of them, or with one command of 1.
 
     The shape is (steps, 3, 4, b); the first sample is the one after the beginning.
     """
-    matrix, enters = disturbed.carry
-    states = np.zeros((steps + 1, 3, 4, slope.size))
-    states[0, :, :3] = np.eye(3)[:, :, None]
+    matrix, enters = motions.carry
+    state, result = np.zeros((3, 4, slope.size)), np.empty((steps, 3, 4, slope.size))
+    state[:, :3] = np.eye(3)[:, :, None]
     for k in range(steps):
-        command = np.zeros((4, slope.size))
-        if k >= disturbed.delay:
-            old = states[k - disturbed.delay]
-            command = slope * old[0] + by_rate * old[1]
+        command = slope * state[0] + by_rate * state[1]
         if k == 0:
             command[3] += 1.0
-        states[k + 1] = np.tensordot(matrix, states[k], 1) + enters[:, None, None] * command
-    result: FloatArray = states[1:]
+        result[k] = state = np.tensordot(matrix, state, 1) + enters[:, None, None] * command
     return result
 
 
-def _sums(
-    disturbed: Disturbed,
-    closed: Closed,
-    responses: FloatArray,
-    slopes: tuple[FloatArray, FloatArray],
-    first: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
+def _sums(closed: Closed, responses: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return what is left of x and v after the samples, and the sums of all responses to commands, (2, b)."""
-    delay, steps = disturbed.delay, np.arange(1, len(responses) + 1)[:, None]
-    inside = steps <= closed.samples
-    followed = np.where(inside[:, None, None], responses, 0.0)
+    steps = np.arange(1, len(responses) + 1)[:, None]
+    followed = np.where((steps <= closed.samples)[:, None, None], responses, 0.0)
     sums = followed[:, :2].sum(axis=0)
-    late = inside & (steps >= closed.samples - delay)
-    ends = np.where(late[:, None, None], responses, 0.0).max(axis=0)
-    ends = np.concatenate([ends, delay * (slopes[0] * ends[:1] + slopes[1] * ends[1:2])])
-    size = np.concatenate([closed.box, delay * first[None]])
-    again = np.einsum("jib,ib->jb", ends, size)
+    ends = np.where((steps == closed.samples)[:, None, None], responses, 0.0).max(axis=0)
+    again = np.einsum("ijb,jb->ib", ends[:, :3], closed.box)
     with np.errstate(divide="ignore", invalid="ignore"):
-        kept = np.nan_to_num(again / size, nan=0.0).max(axis=0)
-        shares = np.nan_to_num(np.einsum("mjb,imb->ijb", ends, sums) / sums, nan=0.0).max(axis=(0, 1))
+        kept = np.nan_to_num(again / closed.box, nan=0.0).max(axis=0)
+        back = np.einsum("mjb,imb->ijb", ends, sums[:, :3])
+        shares = np.nan_to_num(back / sums, nan=0.0).max(axis=(0, 1))
     now = np.einsum("kijb,jb->kib", followed[:, :2, :3], closed.box)
-    commands = followed[:, :2, 3]
-    for i in range(delay):
-        now[i:] += first * commands[: len(commands) - i]
     most = np.maximum(now.max(axis=0), closed.box[:2])
     good = (kept < 0.5) & (shares < 0.5)
     return np.where(good, kept * most, np.inf), np.where(good, sums[:, 3] / (1.0 - shares), np.inf)

@@ -1,18 +1,16 @@
-"""Tubes of many axes at once, and the sets in which they stay, from the entry sets that a plan states.
+"""Tubes of the nominal motions of many axes at once, from the entry sets that a plan states.
 
-The state (x, v, a) of an axis, a being its acceleration, is carried over a period by a matrix; the command
-follows from the state some periods ago. Departures are superposed as the planner does, with all responses
-of all axes in one array.
+The state (x, v, a) of an axis, a being its acceleration, is carried over a period by a matrix. Departures are
+superposed as the planner does, with all responses of all axes in one array.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil, exp
+from math import exp
 
 import numpy as np
 
-from coop_drake.answers.budget import Budget
 from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.budgets.axis_law import Axes, fit
 
@@ -21,30 +19,23 @@ LATE = 1
 
 
 @dataclass(frozen=True)
-class Disturbed:
-    """Axes with what disturbs them: a budget, and the factor of their model, each shape (b,).
+class Nominal:
+    """Nominal motions of b axes.
 
     Attributes:
         axes: The axes.
-        budget: The budget.
-        factor: Factor by which accelerations are larger than commanded [-].
-        error: By how much that factor may differ [-].
+        period: Control period [s].
+        lag: Time constant of the actuators [s].
     """
 
     axes: Axes
-    budget: Budget
-    factor: FloatArray
-    error: FloatArray
-
-    @property
-    def delay(self) -> int:
-        """Age of a measurement in whole periods [-]."""
-        return ceil(self.budget.delay / self.budget.period - 1e-9)
+    period: float
+    lag: float
 
     @property
     def carry(self) -> tuple[FloatArray, FloatArray]:
         """The matrix that carries (x, v, a) over a period, and the vector by which the command enters."""
-        T, lag = self.budget.period, self.budget.lag
+        T, lag = self.period, self.lag
         left = exp(-T / lag) if lag > 0.0 else 0.0
         in_v = lag * (1.0 - left)
         in_x = lag * (T - in_v)
@@ -65,16 +56,11 @@ class Disturbed:
         """
         L, slope, by_rate, rest, spread = fit(self.axes, time, x, reach, v)
         rest = rest + spread * fast
-        most = np.abs(L) + np.abs(slope) * reach + np.abs(by_rate) * fast + rest
-        return tuple(self.factor * value for value in (L, slope, by_rate, rest, most))
-
-    def errors(self, most: FloatArray) -> FloatArray:
-        """Return the largest error of the acceleration under commands up to ``most`` [rad/s^2 or m/s^2]."""
-        return self.error / self.factor * most + self.budget.acceleration_error
+        return L, slope, by_rate, rest, np.abs(L) + np.abs(slope) * reach + np.abs(by_rate) * fast + rest
 
 
 def tubes(
-    disturbed: Disturbed,
+    motions: Nominal,
     samples: int,
     middle: FloatArray,
     reach: FloatArray,
@@ -84,67 +70,47 @@ def tubes(
     """Return the tubes of all axes, shape (samples, 6, b).
 
     Args:
-        disturbed: The axes.
+        motions: The axes.
         samples: Number of samples.
         middle: Middle of x and of v at the entry, shape (2, b).
         reach: How far they depart from it, shape (2, b).
-        before: Largest |command| at the entry, and largest |acceleration| before it, shape (2, b).
+        before: Largest |acceleration| and |command| at the entry, shape (b,) [rad/s^2 or m/s^2].
         rest: Where the axes rest when they are handed over, shape (b,).
 
     Returns:
         Per sample x, its reach, v, its reach, the largest |acceleration|, and the distance to the bounds.
     """
-    T, delay, count = disturbed.budget.period, disturbed.delay, middle.shape[1]
-    matrix, enters = disturbed.carry
-    past = [np.zeros((3, samples + 3, count)) for _ in range(delay + 1)]  # the oldest state first
-    nominal, reaches = [], []
-    for q in range(delay, -1, -1):
-        state = past[delay - q]
-        state[0, samples], state[0, samples + 1], state[1, samples + 1] = 1.0, -q * T, 1.0
-        nominal.append(np.array([middle[0] - q * T * middle[1], middle[1], np.zeros(count)]))
-        reaches.append(np.array([reach[0] + q * T * reach[1], reach[1], before[0]]))
-    past[-1][2, samples + 2] = 1.0
-    weight = np.zeros((samples + 3, count))
-    weight[samples:] = *reach, before[0]
+    T, count = motions.period, middle.shape[1]
+    matrix, enters = motions.carry
+    responses, weight = np.zeros((3, samples + 3, count)), np.zeros((samples + 3, count))
+    responses[:, :3], weight[:3] = np.eye(3)[:, :, None], [*reach, before]
+    now, away = np.array([*middle, np.zeros(count)]), np.array([*reach, before])
     nothing = np.zeros(count)
-    jump = -disturbed.command(0.0, rest, nothing, nothing, nothing)[0]
+    jump = -motions.command(0.0, rest, nothing, nothing, nothing)[0]
     made = np.empty((samples, 6, count))
     for k in range(samples):
-        ago = max(delay - k, 0) * T
-        x_noise = disturbed.budget.angle_noise + 0.5 * ago * ago * before[1]
-        v_noise = disturbed.budget.rate_noise + ago * before[1]
-        seen, off = nominal[k], reaches[k]
-        u, slope, by_rate, rest, most = disturbed.command(
-            k * T, seen[0], off[0] + x_noise, seen[1], off[1] + v_noise
-        )
-        size = np.abs(slope) * x_noise + np.abs(by_rate) * v_noise + rest
-        faded = disturbed.axes.left(k * T) * jump
+        u, slope, by_rate, size, most = motions.command(k * T, now[0], away[0], now[1], away[1])
+        faded = motions.axes.left(k * T) * jump
         most, u = most - np.abs(u) + np.abs(u + faded), u + faded
         if k < LATE:
-            size = most = np.maximum(most, before[0])
-            u, slope, by_rate = np.zeros(count), np.zeros(count), np.zeros(count)
-        weight[k] = size + disturbed.errors(most)
-        now, away = nominal[-1], reaches[-1]
-        fastest = np.maximum(np.abs(now[2]) + away[2], most + disturbed.errors(most))
-        made[k] = now[0], away[0], now[1], away[1], fastest, _distance(disturbed, k, now, away, fastest)
-        used = np.r_[: k + 1, samples : samples + 3]
-        old, state = past[0], past[-1]
-        response = slope * old[0, used] + by_rate * old[1, used]
-        response[k] = 1.0
-        carried = np.zeros_like(state)
-        carried[:, used] = np.tensordot(matrix, state[:, used], 1) + enters[:, None, None] * response
-        past = [*past[1:], carried]
-        nominal.append(matrix @ now + enters[:, None] * u)
-        reaches.append(np.einsum("ijk,jk->ik", np.abs(carried[:, used]), weight[used]))
+            size = most = np.maximum(most, before)
+            u, slope, by_rate = nothing, nothing, nothing
+        weight[3 + k] = size
+        fastest = np.maximum(np.abs(now[2]) + away[2], most)
+        made[k] = now[0], away[0], now[1], away[1], fastest, _distance(motions, k, now, away, fastest)
+        used = responses[:, : 4 + k]
+        answer = slope * used[0] + by_rate * used[1]
+        answer[3 + k] = 1.0
+        responses[:, : 4 + k] = np.tensordot(matrix, used, 1) + enters[:, None, None] * answer
+        now = matrix @ now + enters[:, None] * u
+        away = np.einsum("ijk,jk->ik", np.abs(responses[:, : 4 + k]), weight[: 4 + k])
     return made
 
 
-def _distance(
-    disturbed: Disturbed, k: int, now: FloatArray, away: FloatArray, fastest: FloatArray
-) -> FloatArray:
-    T = disturbed.budget.period
-    (low, high), _, bent = disturbed.axes.bounds(k * T)
-    later = disturbed.axes.bounds((k + 1) * T)[2]
+def _distance(motions: Nominal, k: int, now: FloatArray, away: FloatArray, fastest: FloatArray) -> FloatArray:
+    T = motions.period
+    (low, high), _, bent = motions.axes.bounds(k * T)
+    later = motions.axes.bounds((k + 1) * T)[2]
     bend = np.abs(np.stack([bent, later])).max(axis=(0, 1))
     inside = np.minimum(now[0] - away[0] - low, high - now[0] - away[0])
     result: FloatArray = inside - 0.125 * T * T * (fastest + bend)
