@@ -14,8 +14,8 @@ class KernelTimes:
     """Time that this process has spent on kernels, not on what they compute.
 
     Attributes:
-        wall_seconds: By the clock on the wall [s].
-        cpu_seconds: By the processor [s].
+        wall_seconds: Elapsed wall-clock time [s].
+        cpu_seconds: Elapsed CPU time [s].
         functions: How many functions of the modules imported so far can be compiled; few commands need all.
         compiling: Called with the name of each function before it is compiled, None if nobody waits for it.
     """

@@ -6,13 +6,13 @@ from typing import Any
 
 from coop_drake.checking import plane
 from coop_drake.checking.plane import ONE, Interval, Point, Region, demand, hull, numbers, points
-from coop_drake.checking.team import Question, holds, intervals, relative, settled, swept, unwrapped
+from coop_drake.checking.team import Question, free, holds, intervals, relative, swept, unwrapped
 
 ROUNDING = 10**9
 """Stated lengths may be off by one part in this; goal intervals are at least 1 m or rad over it [-]."""
 
 
-def check_plan(question: Question, answer: Any, progress: Any) -> list[tuple[str, int]]:
+def check_plan(question: Question, answer: Any, progress: plane.Progress) -> list[tuple[str, int]]:
     """Check a plan; returns the statements that hold and how often each was checked."""
     cells, transitions, entry = answer["cells"], answer["transitions"], question.start
     boxes = [intervals(cell["lower"], cell["upper"], question.axes, 1) for cell in cells]
@@ -40,7 +40,7 @@ def check_plan(question: Question, answer: Any, progress: Any) -> list[tuple[str
     ]
 
 
-def _leads_on(value: Any, where: str, entry: Point, boxes: Any, regions: list[Region]) -> Point:
+def _leads_on(value: Any, where: str, entry: Point, boxes: list[plane.Box], regions: list[Region]) -> Point:
     """Check that a transition leads from its entry to a target in its cell and the next; returns it."""
     goals = intervals(value["goal_lower"], value["goal_upper"], len(boxes[0]), ONE // ROUNDING)
     demand(all(holds(box, goals) for box in boxes), f"{where}.goal_lower", "leaves a cell or the tolerance")
@@ -66,19 +66,18 @@ def _check_free(question: Question, box: list[Interval], region: Region, where: 
     needs to be tested at one configuration for each ring of the cell: each part of it has a ring.
     """
 
-    def clear(wall: Any, moved: list[Point], gap: int) -> bool:
+    def clear(wall: tuple[Point, Point], moved: list[Point], gap: int) -> bool:
         plane.spend(5 * len(moved))
         near = [(wx - x, wy - y) for wx, wy in wall for x, y in moved]
         return plane.boxes_apart(region.box, plane.box_of(near), gap) or region.side(hull(near), gap) < 0
 
     for body, chain, corners, radius in question.pieces:
-        apart = settled(corners, radius, chain, box, question.floor.edges, clear)
+        apart = free(corners, radius, chain, box, question.floor.edges, clear)
         demand(apart, where, f"{body} may touch a wall")
         ((x, y),), error = swept(corners[:1], 0, chain, [(low, low) for low, _ in box])
         for (p, q), *_ in region.rings:
-            inside = question.floor.side([(x + p, y + q)], error) > 0
-            demand(inside, where, f"{body} stands outside the floor")
+            demand(question.floor.side([(x + p, y + q)], error) > 0, where, f"{body} is outside the floor")
     for one, other in ((question.pieces[i], question.pieces[j]) for i, j in question.pairs):
         motion, gap = relative(one.chain, other.chain), one.radius + other.radius
-        apart = settled(one.corners, gap, motion, box, [other.corners], plane.apart)
+        apart = free(one.corners, gap, motion, box, [other.corners], plane.apart)
         demand(apart, where, f"{one.body} may touch {other.body}")

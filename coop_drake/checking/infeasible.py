@@ -6,13 +6,13 @@ from typing import Any
 
 from coop_drake.checking import plane, team
 from coop_drake.checking.plane import FULL, ONE, Interval, Point, Region, demand, hull, index, points, spend
-from coop_drake.checking.team import Question, Step, intervals, settled
+from coop_drake.checking.team import Question, Step, free, intervals
 
 WIDENING = ONE >> 40
 """Slices are widened by this on either side: ends of a turn in doubles are off by less [rad, m]."""
 
 
-def check_proof(question: Question, answer: Any, progress: Any) -> list[tuple[str, int]]:
+def check_proof(question: Question, answer: Any, progress: plane.Progress) -> list[tuple[str, int]]:
     """Check a proof that no plan exists; returns the statements that hold and how often each was checked.
 
     A proof is about the positions in W of a point of a component, and about that component's angle in W.
@@ -34,7 +34,7 @@ def check_proof(question: Question, answer: Any, progress: Any) -> list[tuple[st
         for place, box, label in (starts, goals):
             wrong = [cell for its, cell in cells[k] if its == label and _meets(wide, box, chain)]
             steps, name = [*chain, Step(offset=place)], "goal" if label else "start"
-            clear = settled([point], 0, steps, box, wrong, lambda cell, *at: cell.side(*at) < 0)
+            clear = free([point], 0, steps, box, wrong, lambda cell, *at: cell.side(*at) < 0)
             demand(clear, where, f"cells may hold the {name} and have reached: {label}")
         forbidden = _forbidden(question, [Step(0, -1, offset=point), *chain], wide, value["witnesses"], where)
         edges += 0 if forbidden is None else _check_cover([cell for _, cell in cells[k]], forbidden, where)
@@ -71,7 +71,7 @@ def _forbidden(question: Question, frame: list[Step], box: list[Interval], witne
         seen = question.chains[index(witness["component"], len(question.chains))] if paired else frame
         for piece in pieces:
             motion = team.relative(seen, piece.chain)
-            inside = settled(polygon, 2 - piece.radius, motion, box, [piece.corners], _inside)
+            inside = free(polygon, 2 - piece.radius, motion, box, [piece.corners], _inside)
             demand(inside, f"{where}.witnesses", f"may leave the inside of {piece.body}")
         spend(100 * len(floor.edges) + len(question.pairs))
         x0, y0 = (sum(values) // len(polygon) for values in zip(*polygon, strict=True))
@@ -109,7 +109,7 @@ def _check_cover(cells: list[Region], forbidden: list[Region], where: str) -> in
     return count
 
 
-def _chosen(sets: list[Region], among: list[int], edge: Any) -> set[int]:
+def _chosen(sets: list[Region], among: list[int], edge: tuple[Point, Point]) -> set[int]:
     """Some sets whose stretches together cover an edge, the far-reaching first; none if they do not."""
     stretches = [(low, high, k) for k in among for low, high in sets[k].stretches(edge)]
     chosen, covered = set[int](), -1

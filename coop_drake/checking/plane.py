@@ -4,13 +4,15 @@ A point is a pair of integers; a convex set is the list of its hull's corners, c
 cosines, and places on a segment are rounded, with stated bounds.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
 Point = tuple[int, int]
 Interval = tuple[int, int]
+Box = list[Interval]
+Progress = Callable[[str, float], object]
 
 BITS = 80
 ONE, FULL = 1 << BITS, 1 << 64
@@ -100,14 +102,14 @@ def box_of(corners: Iterable[Point]) -> tuple[int, int, int, int]:
 
 
 def boxes_apart(a: Sequence[int], b: Sequence[int], gap: int) -> bool:
-    """Whether two boxes are further apart than a gap along x or along y."""
+    """Whether two boxes are further apart than a gap [2^-80 m] along x or along y."""
     return a[0] - b[2] > gap or b[0] - a[2] > gap or a[1] - b[3] > gap or b[1] - a[3] > gap
 
 
 def apart(first: Sequence[Point], second: Sequence[Point], gap: int) -> bool:
-    """Whether two convex sets are further apart than a gap: so far is the origin from all their differences.
+    """Whether the distance of two convex sets is larger than a gap [2^-80 m]: the origin's from a - b.
 
-    It is if it is so far to the right of an edge's line, or all corners are so far out towards the nearest.
+    The hull of all a - b is tested at the lines of its edges, and at its corner nearest to the origin.
     """
     demand(len(first) * len(second) <= 10**6, "corners", "are too many for two convex sets")
     corners = hull((p - x, q - y) for p, q in first for x, y in second)
@@ -139,7 +141,7 @@ class Region:
         return odd == self.odd
 
     def side(self, convex: Sequence[Point], gap: int) -> int:
-        """1 if a convex set lies inside, -1 if outside, further than a gap from all edges; 0 otherwise."""
+        """1 if a convex set is inside, -1 if outside, by more than a gap [2^-80 m] each; 0 otherwise."""
         spend(len(self.edges) + 10)
         box, pairs = box_of(convex), zip(self.edges, self.boxes, strict=True)
         if self.odd and boxes_apart(self.box, box, gap):
@@ -154,7 +156,7 @@ class Region:
         return met or any(other.has_inside(*ring[0]) for ring in self.rings)
 
     def stretches(self, segment: Sequence[Point]) -> list[Point]:
-        """Stretches of a segment that lie in the open region, as pairs of places, rounded inwards."""
+        """Stretches of a segment in the open region: pairs of places from 0 to ``FULL``, rounded inwards."""
         ((ax, ay), (bx, by)), box, cuts = segment, box_of(segment), [(FULL, FULL)]
         dx, dy = bx - ax, by - ay
         square, after = (dx * dx + dy * dy, 2) if dx or dy else (1, FULL + 1)

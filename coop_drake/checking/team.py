@@ -27,7 +27,7 @@ class Piece(NamedTuple):
 
 
 def relative(chain: list[Step], other: list[Step]) -> list[Step]:
-    """The motion from one frame to another: one's steps, then the other's backwards, without shared ones."""
+    """The motion from one frame to another: steps of the first to W, the other's in reverse, none shared."""
     while chain and other and chain[-1] == other[-1]:
         chain, other = chain[:-1], other[:-1]
     for axis, sign, angle, (u, v), (x, y) in reversed(other):
@@ -35,13 +35,13 @@ def relative(chain: list[Step], other: list[Step]) -> list[Step]:
     return chain
 
 
-def swept(corners: Any, grown: int, steps: list[Step], box: list[Interval]) -> tuple[list[Point], int]:
+def swept(corners: list[Point], grown: int, steps: list[Step], box: plane.Box) -> tuple[list[Point], int]:
     """Enclose what a grown convex set meets that is moved by steps, at all values of a box of (theta, q...).
 
     An interval of angles stands for five turned copies. Between two that differ by an angle b, a point at the
     distance r from the pivot is nowhere further than r (1 - cos(b / 2)) <= r b^2 / 8 from the segment of its
     two places. More than a turn fills a disc. A slide lies in the hull of its ends. Each copy is rounded by
-    less than 4 r / 2^80 + 3 units, each place by less than 2. Returns a hull, and how much it is grown.
+    less than 4 r / 2^80 + 3 units, each place by less than 2. Returns a hull, and its growth [2^-80 m].
     """
     for axis, sign, angle, (u, v), (x, y) in steps:
         demand(len(corners) <= 10**4, "corners", "are too many for a convex set that moves")
@@ -59,28 +59,27 @@ def swept(corners: Any, grown: int, steps: list[Step], box: list[Interval]) -> t
     return corners, grown
 
 
-def settled(corners: Any, grown: int, steps: list[Step], box: list[Interval], asked: Any, clear: Any) -> bool:
-    """Whether all that is asked is clear of what a grown convex set meets, moved by steps all over a box.
+def free(corners: list[Point], grown: int, steps: list[Step], box: plane.Box, items: Any, clear: Any) -> bool:
+    """Whether all items are clear of what a grown convex set meets, moved by steps with all values in a box.
 
-    What is not clear of an enclosure is asked again in both halves of the box; its widest axis is halved.
+    What is not clear of an enclosure is tried again in both halves of the box; its widest axis is halved.
     """
-    parts, axes = [(box, asked)], [step.axis for step in steps if step.sign or any(step.slide)]
+    parts, axes = [(box, items)], [step.axis for step in steps if step.sign or any(step.slide)]
     while parts:
-        part, asked = parts.pop()
+        part, left = parts.pop()
         enclosure = swept(corners, grown, steps, part)
-        asked = [one for one in asked if not clear(one, *enclosure)]
-        if asked:
+        if left := [one for one in left if not clear(one, *enclosure)]:
             width, axis = max([(part[axis][1] - part[axis][0], axis) for axis in axes], default=(0, 0))
             if width < 2:
                 return False
             low, high = part[axis]
             halves = (low, (low + high) // 2), ((low + high) // 2, high)
-            parts += [([*part[:axis], half, *part[axis + 1 :]], asked) for half in halves]
+            parts += [([*part[:axis], half, *part[axis + 1 :]], left) for half in halves]
     return True
 
 
 def unwrapped(angles: Interval, about: Interval) -> Interval:
-    """Angles moved by whole turns to be nearest to others; rounded inwards, by less than 2^20 units."""
+    """Angles moved by whole turns to be nearest to others; rounded inwards by less than 2^20 [2^-80 rad]."""
     turns = (sum(about) - sum(angles) + TURN) // (2 * TURN)
     return angles[0] + turns * TURN + abs(turns), angles[1] + turns * TURN - abs(turns)
 

@@ -140,7 +140,7 @@ def test_rings_that_touch_themselves_have_the_points_of_odd_parity(ring):
     across = [*ring, [0, 4], [8, 4], [0, 4]]
     assert "may touch a wall" in refused(altered(asked, across, "floor", "outer"), plan())
     twice = ring * 2
-    assert "stands outside" in refused(altered(asked, twice, "floor", "outer"), plan())
+    assert "outside the floor" in refused(altered(asked, twice, "floor", "outer"), plan())
 
 
 def test_arcs_are_what_they_are_and_not_polygons():
