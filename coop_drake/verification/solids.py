@@ -69,10 +69,10 @@ def component_stages(tree: ComponentTree, index: int) -> tuple[Stage, ...]:
     return (*[_stage(joint) for joint in joints if joint is not None], _THETA)
 
 
-def colliding_pairs(
+def checked_pairs(
     tree: ComponentTree, solids: Collection[Solid]
 ) -> tuple[tuple[Solid, Solid, int, int], ...]:
-    """Pairs of solids that must never overlap, with how many stages of each lead to what carries both."""
+    """Pairs of solids that must never overlap, each with their numbers of stages up to what carries both."""
     members: dict[tuple[int, int], list[Solid]] = {}
     for solid in solids:
         members.setdefault((solid.component, solid.body), []).append(solid)

@@ -23,7 +23,7 @@ from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.between import Between
 from coop_drake.verification.runs.placement import levers, points_in_world
 from coop_drake.verification.runs.rows import Rows
-from coop_drake.verification.solids import Solid, Stage, colliding_pairs, team_solids
+from coop_drake.verification.solids import Solid, Stage, checked_pairs, team_solids
 
 PARTS = (2, 4, 8, 16, 32, 64)
 """Into how many parts the chord between two rows is divided, tried in this order."""
@@ -124,7 +124,7 @@ def _distances(problem: PlanningProblem, z: FloatArray) -> list[_Distance]:
         )
         for solid in solids
     ]
-    for first, second, *counts in colliding_pairs(tree, solids):
+    for first, second, *counts in checked_pairs(tree, solids):
         stages = (*_moved_by(first, counts[0], z), *_moved_by(second, counts[1], z))
         name, measure = f"{first.name} and {second.name}", partial(_gaps, first, second)
         distances.append(_Distance(name, "body_clearance", measure, stages, moves=False))
