@@ -128,7 +128,7 @@ def _kernels() -> Finding:
     from numba import config
 
     home = Path(__file__).parents[1]
-    compiled = sum(1 for _ in (Path(config.CACHE_DIR) if config.CACHE_DIR else home).rglob("*.nbi"))
+    compiled = sum(1 for _ in (Path(config.CACHE_DIR) if config.CACHE_DIR else home).rglob("*.nbc"))
     remedy = "`coop-drake warm` with any scenario compiles them ahead; else the first run does, for a minute"
     return Finding("compiled kernels", f"{compiled} in the cache", True if compiled else None, remedy)
 
