@@ -22,10 +22,10 @@ test: $(READY_TO_DEVELOP)  ## run every test, and show which lines none of them 
 lint: $(READY_TO_DEVELOP)  ## formatting, lint, types, direction of imports, documentation; two of them at a time
 	@$(MAKE) --no-print-directory --jobs=2 --output-sync lint-types lint-rest
 
-lint-types:
+lint-types: $(READY_TO_DEVELOP)
 	$(BIN)/mypy
 
-lint-rest:
+lint-rest: $(READY_TO_DEVELOP)
 	$(BIN)/ruff format --check $(CODE)
 	$(BIN)/ruff check $(CODE)
 	$(BIN)/lint-imports
