@@ -5,7 +5,7 @@ They guide the search; proofs use them on over-sweeps only, in ``boxes``.
 
 from __future__ import annotations
 
-from math import hypot, sqrt
+from math import sqrt
 
 import numpy as np
 
@@ -46,12 +46,12 @@ def ring_clearance(
         most: Distances above this one do not matter [m].
     """
     x, y, reach = px + c * disc[0] - s * disc[1], py + s * disc[0] + c * disc[1], disc[2]
-    square = square_at(grid, x, y)
-    if square < 0:
+    column, row = square_at(grid, x, y)
+    if column < 0:
         return -1.0
-    mx = grid.corner[0] + (square // grid.rows + 0.5) * grid.side
-    my = grid.corner[1] + (square % grid.rows + 0.5) * grid.side
-    off = hypot(x - mx, y - my)
+    square = column * grid.rows + row
+    mx, my = grid.corner[0] + (column + 0.5) * grid.side, grid.corner[1] + (row + 0.5) * grid.side
+    off = sqrt((x - mx) * (x - mx) + (y - my) * (y - my))
     near = reach <= grid.reach
     inside = grid.inside[square] == 1
     best = min(most, grid.reach - reach) if near else most

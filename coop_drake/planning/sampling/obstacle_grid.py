@@ -87,12 +87,12 @@ def lay_grid(rings: Sequence[FloatArray], reach: float) -> ObstacleGrid:
 
 
 @compiled
-def square_at(grid: ObstacleGrid, x: float, y: float) -> int:
-    """Number of the square that holds a point, -1 if none does."""
+def square_at(grid: ObstacleGrid, x: float, y: float) -> tuple[int, int]:
+    """Column and row of the square that holds a point, -1 for both if none does."""
     column, row = np.floor((x - grid.corner[0]) / grid.side), np.floor((y - grid.corner[1]) / grid.side)
     if column < 0 or row < 0 or column >= grid.columns or row >= grid.rows:
-        return -1
-    return int(column) * grid.rows + int(row)
+        return -1, -1
+    return int(column), int(row)
 
 
 @compiled
