@@ -11,6 +11,7 @@ from shapely import MultiPolygon, Polygon
 
 from coop_drake.geometry import under_kernels
 from coop_drake.geometry.convex import following
+from coop_drake.geometry.large_floors import LARGE, fitting_on_large_floor
 from coop_drake.geometry.parts import polygon_rings
 from coop_drake.geometry.safeguards import checked_buffer, second_opinion
 from coop_drake.geometry.sum_kernels import fitting_cycles
@@ -26,7 +27,7 @@ class FreeSpace:
     The convolution of W's boundary with -F winds once around p where p + F lies inside W, and otherwise
     1 - n times, n the number of pieces of p + F beyond the walls: positions with a positive winding number
     are those of the difference. Only a part of W that lies inside p + F would count as free, so parts that
-    are smaller than F are left out. One clipping pass does all.
+    are smaller than F are left out. One clipping pass does all, but on floors with very many corners.
 
     Where the clipping library fails, the result is on the safe side: an under-space is replaced by the empty
     set, an over-space by another library's result or by a box that holds every position.
@@ -98,6 +99,8 @@ class FreeSpace:
         )
 
     def _clipped(self, footprint: FloatArray) -> CrossSection:
+        if len(self.edges) >= LARGE:
+            return fitting_on_large_floor(self.rings, self.edges, footprint)
         convex = np.ascontiguousarray(footprint, dtype=float)
         drawn, first = fitting_cycles(self._points, self._first, self._extents, convex)
         places = first.tolist()

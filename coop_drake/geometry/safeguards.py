@@ -10,6 +10,7 @@ from shapely import MultiPolygon, Polygon
 from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
+from coop_drake.geometry.large_floors import common
 from coop_drake.geometry.parts import polygon_rings
 from coop_drake.tree.pose import FloatArray
 
@@ -25,7 +26,7 @@ def shared(first: CrossSection, second: CrossSection, *, over: bool) -> CrossSec
     """
     smaller = min(first, second, key=CrossSection.area)
     try:
-        found = first ^ second
+        found = common(first, second)
         if found.area() <= (1.0 + _ROUNDING) * smaller.area():
             return found
     except _FAILURES:
@@ -49,7 +50,7 @@ def components(section: CrossSection, *, over: bool) -> list[CrossSection]:
 def meet(first: CrossSection, second: CrossSection, *, otherwise: bool) -> bool:
     """Whether two regions share more than their boundary; ``otherwise`` where clipping fails."""
     try:
-        return not (first ^ second).is_empty()
+        return not common(first, second).is_empty()
     except _FAILURES:
         return otherwise
 

@@ -5,6 +5,8 @@ from hypothesis import strategies as st
 from shapely import MultiPoint, MultiPolygon, Polygon, box, union_all
 from shapely.affinity import translate
 
+from coop_drake.geometry import large_floors, minkowski
+from coop_drake.geometry.large_floors import common
 from coop_drake.geometry.minkowski import SAFE_SIDE, FreeSpace, to_polygon
 from coop_drake.geometry.parts import polygon_rings
 from tests.support.trees import room
@@ -42,6 +44,36 @@ def test_difference_equals_the_reference_on_a_floor_with_holes(points: list[tupl
     exact = exact_difference(room(), footprint)
     found = as_shapely(FreeSpace(polygon_rings(room())).minus(footprint))
     assert found.symmetric_difference(exact).area < 1e-5
+
+
+@settings(max_examples=30)
+@given(POINTS)
+def test_the_difference_for_large_floors_equals_the_reference(points: list[tuple[float, float]]) -> None:
+    footprint = convex_ring(points)
+    if footprint is None:
+        return
+    space = FreeSpace(polygon_rings(room()))
+    found = as_shapely(large_floors.fitting_on_large_floor(space.rings, space.edges, footprint))
+    assert found.symmetric_difference(exact_difference(room(), footprint)).area < 1e-5
+
+
+def test_saw_teeth_are_subtracted_alike_by_few_and_by_many_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    teeth = large_floors.LARGE // 2
+    x = np.linspace(4.0, 0.0, 2 * teeth)
+    saw = np.column_stack([x, np.where(np.arange(2 * teeth) % 2, 3.0, 3.001)])
+    space = FreeSpace([np.vstack([[[0.0, 0.0], [4.0, 0.0]], saw])])
+    disc = 0.02 * np.array(
+        [[np.cos(a), np.sin(a)] for a in np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)]
+    )
+    few = space.minus(disc)
+    shifted = few.translate((0.013, 0.011))
+    both = common(few, shifted).area()
+    monkeypatch.setattr(minkowski, "LARGE", np.inf)
+    monkeypatch.setattr(large_floors, "LARGE", np.inf)
+    many = space.minus(disc)
+    assert few.area() == pytest.approx(many.area(), abs=1e-6)
+    assert (few - many).area() + (many - few).area() < 1e-6
+    assert both == pytest.approx(common(few, shifted).area(), abs=1e-6)
 
 
 @settings(max_examples=60)
