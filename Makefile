@@ -11,7 +11,7 @@ CODE := coop_drake tests benchmarks notebooks docs paper
 # The kernels are small; threads of BLAS would only get into each other's way.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test lint lint-types lint-rest bench notebooks docs clean
+.PHONY: demo test lint lint-types lint-rest bench notebooks docs gallery clean
 
 demo: $(READY)  ## plan, simulate and record the paper's transport
 	$(BIN)/coop-drake run models/base.scenario.yaml
@@ -36,6 +36,9 @@ bench: $(READY_TO_DEVELOP)  ## measure speed and accuracy as ratios, into out/be
 
 docs: $(READY_TO_DEVELOP)  ## build the documentation into out/docs, warnings being errors
 	$(BIN)/python -m docs.generate out/docs
+
+gallery: $(READY_TO_DEVELOP)  ## run and photograph the galleries' transports, which `make docs` then shows
+	$(BIN)/python -m docs.gallery out/gallery
 
 notebooks: $(READY_TO_DEVELOP)  ## execute every notebook into out/notebooks, and build the documentation with them
 	$(BIN)/python -m notebooks out/notebooks

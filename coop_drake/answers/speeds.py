@@ -15,6 +15,9 @@ SHORTEST = 0.005
 """Speeds of bases are means over at least this time [s]: between rows that are nearer to each other, rounding
 of their poses would count."""
 
+STOPPED, SLOW = 0.1, 0.25
+"""Speeds of the object below which it has nearly stopped, and is slow, over its mean speed in a run [-]."""
+
 
 @dataclass(frozen=True)
 class PeakSpeed:
@@ -50,6 +53,22 @@ def base_speeds(log: SimulationLog) -> tuple[FloatArray, FloatArray]:
     turned = np.diff(np.unwrap(poses[..., 2], axis=0), axis=0)
     steps = np.diff(times)[:, None]
     return times[1:], np.stack((np.hypot(moved[..., 0], moved[..., 1]) / steps, np.abs(turned) / steps), -1)
+
+
+def steadiness(log: SimulationLog) -> tuple[int, float]:
+    """Return how often the object nearly stopped between start and goal, and how long it was slow [s].
+
+    Both are judged by its speed over its mean speed, the length of its path over the time that it took.
+    """
+    steps = np.diff(log.times, append=log.times[-1])
+    speed = np.hypot(log.object_twist[:, 0], log.object_twist[:, 1])
+    path = np.hypot(*np.diff(log.object_pose[:, :2], axis=0).T).sum()
+    mean = float(path / log.times[-1]) if log.times[-1] > 0.0 else 0.0
+    stopped = speed < STOPPED * mean
+    begun = np.count_nonzero(stopped[1:] & ~stopped[:-1])
+    # The stop at the goal is none on the way; that at the start has no beginning.
+    slow = steps[speed < SLOW * mean].sum()
+    return int(begun - bool(begun and stopped[-1])), float(slow)
 
 
 def peak_speeds(log: SimulationLog, problem: PlanningProblem) -> list[PeakSpeed]:

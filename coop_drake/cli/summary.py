@@ -52,6 +52,8 @@ _MORE_ROWS: tuple[tuple[str, str, str], ...] = (
     ("their payload", "message_bytes", "{} bytes"),
     ("peak rate of base forces", "peak_base_force_rate_n_s", "{:.0f} N/s"),
     ("peak joint torque", "peak_joint_torque_nm", "{:.1f} N m"),
+    ("near stops between start and goal", "near_stops", "{}"),
+    ("time below a quarter of the mean speed", "slow_seconds", "{:.2f} s"),
     ("peak memory", "peak_memory_mb", "{:.0f} MB"),
 )
 """Rows that ``--verbose`` adds."""
@@ -120,11 +122,12 @@ def simulation_facts(plan: Plan, log: SimulationLog, problem: PlanningProblem) -
     """Return how the run went: errors at its end, smallest margins and peaks over all accepted steps."""
     import numpy as np
 
-    from coop_drake.answers.speeds import peak_speeds
+    from coop_drake.answers.speeds import peak_speeds, steadiness
     from coop_drake.simulation import communication
 
     x, y, theta = log.object_pose[-1] - plan.goal_pose
     messages = communication(log)
+    near_stops, slow_seconds = steadiness(log)
     base_forces = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1])
     return {
         "outcome": "arrived" if log.reached and not log.violation else "failed",
@@ -153,5 +156,7 @@ def simulation_facts(plan: Plan, log: SimulationLog, problem: PlanningProblem) -
         "peak_base_torque_nm": float(np.abs(log.base_wrenches[..., 2]).max()),
         "peak_joint_torque_nm": float(np.abs(log.joint_torques).max(initial=0.0)),
         "peak_speed_m_s": float(np.hypot(log.object_twist[:, 0], log.object_twist[:, 1]).max()),
+        "near_stops": near_stops,
+        "slow_seconds": slow_seconds,
         "peak_speeds": [asdict(speed) for speed in peak_speeds(log, problem)],
     }

@@ -1,7 +1,8 @@
 """``python -m docs.generate out/docs`` builds the documentation as a site of HTML pages.
 
 With ``--notebooks DIR`` it has a page for each executed notebook in that folder, see ``make notebooks``.
-The page of scenario files is kept in ``docs``, so that it can be read without the site, too.
+The page of scenario files is kept in ``docs``, so that it can be read without the site, too. The galleries
+that ``python -m docs.gallery out/gallery`` has made beside the site are part of it.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 import yaml
 
@@ -34,9 +36,8 @@ def main(site: Path, notebooks: Path | None = None) -> int:
         return 1
     sources = site.with_name(site.name + "_sources").absolute()
     shutil.rmtree(sources, ignore_errors=True)
-    shutil.copytree(
-        ROOT / "docs", sources / "pages", ignore=shutil.ignore_patterns("generate", "*.py", "__pycache__")
-    )
+    kept_out = shutil.ignore_patterns("generate", "gallery", "*.py", "__pycache__")
+    shutil.copytree(ROOT / "docs", sources / "pages", ignore=kept_out)
     for path in (sources / "pages").rglob("*.md"):
         place = PurePosixPath(path.relative_to(sources / "pages").as_posix())
         path.write_text(for_site(path.read_text(encoding="utf-8"), place), encoding="utf-8")
@@ -48,6 +49,7 @@ def main(site: Path, notebooks: Path | None = None) -> int:
     if notebooks is not None:
         written = write_notebook_pages(notebooks, sources / "pages" / "notebooks")
         settings["nav"].append({"Notebooks": [f"notebooks/{name}" for name in written]})
+    _add_galleries(site.with_name("gallery"), sources / "pages" / "gallery", settings["nav"])
     settings["nav"].append({"API": [page.path for page in api_pages(ROOT)]})
     python = next(plugin for plugin in settings["plugins"] if "mkdocstrings" in plugin)
     handler = python["mkdocstrings"]["handlers"]["python"]
@@ -70,6 +72,13 @@ def main(site: Path, notebooks: Path | None = None) -> int:
         (sources / "site").rename(site)
         print(f"{site / 'index.html'} is the first page")
     return code
+
+
+def _add_galleries(made: Path, pages: Path, nav: list[Any]) -> None:
+    """Add the galleries to the pages, if ``python -m docs.gallery`` has made them."""
+    if made.is_dir():
+        shutil.copytree(made, pages)
+        nav.insert(1, {"Gallery": "gallery/index.md"})
 
 
 def _updated(file: Path, text: str) -> bool:

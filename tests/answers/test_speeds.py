@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coop_drake.answers.speeds import SHORTEST, base_speeds, peak_speeds
+from coop_drake.answers.speeds import SHORTEST, base_speeds, peak_speeds, steadiness
 from coop_drake.plant import planning_problem
 from coop_drake.simulation import simulate
 from tests.support.small_loop import small_maps, small_problem
@@ -26,6 +26,19 @@ def test_a_base_that_turns_at_a_constant_speed_has_that_speed(run):
     np.testing.assert_allclose(speeds[..., 0], 0.5, rtol=1e-9)
     np.testing.assert_allclose(speeds[..., 1], 2.0, rtol=1e-9)
     assert np.diff(times).min() >= SHORTEST
+
+
+def test_near_stops_and_slow_times_are_those_between_start_and_goal(run):
+    """A speed of 1 - cos(2 pi t), 1 m/s in the mean: at rest at both ends and three times on the way."""
+    _, log = run
+    times = np.linspace(0.0, 4.0, len(log.times))
+    speed = 1.0 - np.cos(2.0 * np.pi * times)
+    poses = np.zeros((len(times), 3))
+    poses[:, 0] = times - np.sin(2.0 * np.pi * times) / (2.0 * np.pi)
+    twist = np.stack([speed, 0.0 * speed, 0.0 * speed], axis=-1)
+    stops, slow = steadiness(replace(log, times=times, object_pose=poses, object_twist=twist))
+    assert stops == 3
+    assert slow == pytest.approx(4.0 * np.arccos(0.75) / np.pi, abs=0.03)
 
 
 def test_every_base_and_joint_has_its_peak_and_limit(run):

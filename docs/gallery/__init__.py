@@ -1,0 +1,1 @@
+"""Two galleries for the documentation: six floors with one team, and six teams on one kind of floor."""
