@@ -123,6 +123,12 @@ def test_what_a_keyframe_shows_is_visible_then_and_never_else(shown):
         assert max(keys) == len(frames)
 
 
+def test_the_scene_of_the_page_is_as_large_as_its_pane_which_labels_are_placed_in(shown):
+    _, _, page = shown
+    assert "viewer.set_3d_pane_size(pane.clientWidth, pane.clientHeight)" in page
+    assert "new ResizeObserver(fit).observe(pane)" in page
+
+
 def test_the_page_is_small_needs_no_network_and_repeats(shown):
     recorded, frames, page = shown
     assert len(page) < 6e6
