@@ -11,12 +11,13 @@ from matplotlib.colors import to_hex
 from PIL import Image
 
 from coop_drake.answers.speeds import base_speeds
+from coop_drake.drawing.canvas import house_style, picture_of
 from coop_drake.drawing.colours import INK, OBJECT, robot_colour
 from coop_drake.viz import write_figures
 from coop_drake.viz.figures import RunFigures
 from coop_drake.viz.floor_figures import path_figure, start_and_goal_figure
-from coop_drake.viz.time_axes import break_at_switches
-from coop_drake.viz.time_figures import angle_figure, joints_figure, summary_figure
+from coop_drake.viz.time_axes import TimeAxes, break_at_switches
+from coop_drake.viz.time_figures import angle_figure, joints_figure, position_figure, summary_figure
 from tests.support.cases import case
 from tests.support.figure_names import OF_EVERY_RUN, OF_TWO_ROBOTS
 from tests.support.sliding import with_sliding_joint
@@ -55,6 +56,14 @@ def test_the_same_run_gives_the_same_picture(drawn, tmp_path):
     _, written = drawn["elbow"]
     again = draw("elbow", tmp_path)
     assert [path.read_bytes() for path in again] == [path.read_bytes() for path in written]
+
+
+def test_axes_made_ahead_give_the_same_pictures():
+    log = synthetic_log(case("elbow"))
+    with house_style():
+        ahead = TimeAxes([2, 3, 2])
+        for draw in (position_figure, angle_figure, summary_figure, position_figure):
+            assert picture_of(draw(log, ahead)) == picture_of(draw(log))
 
 
 def test_a_process_writes_only_the_figures_that_it_is_given(tmp_path):
