@@ -16,9 +16,6 @@ from typing import Any
 import typer
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
-from rich.progress import Progress as ProgressBars
-from rich.table import Table
 
 from coop_drake.cli.kernel_clock import kernel_clock
 from coop_drake.errors import (
@@ -131,6 +128,13 @@ class Reporter:
 
     @contextmanager
     def _bar(self, name: str) -> Iterator[Progress]:
+        if not self._moving:
+            yield lambda doing, fraction: None
+            return
+        # Here: to import bars and tables takes a fiftieth of a command, and not every one shows them.
+        from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeElapsedColumn
+        from rich.progress import Progress as ProgressBars
+
         columns = (
             TextColumn("{task.description:<11}"),
             BarColumn(),
@@ -138,7 +142,7 @@ class Reporter:
             TimeElapsedColumn(),
             TextColumn("[dim]{task.fields[doing]}"),
         )
-        with ProgressBars(*columns, console=self._console, disable=not self._moving) as bars:
+        with ProgressBars(*columns, console=self._console) as bars:
             bar = bars.add_task(name, total=1.0, doing="")
             drawn = ("", 0.0)
 
@@ -159,6 +163,10 @@ class Reporter:
         self, title: str, rows: Sequence[tuple[str, ...]], headings: Sequence[str] = ("",), first: str = ""
     ) -> None:
         """Show a table: of every row the label, under the first heading, then a value for each other one."""
+        if self._console.quiet:
+            return
+        from rich.table import Table
+
         table = Table(title=title, title_justify="left", show_header=any(headings))
         table.add_column(first, style="bold")
         for heading in headings:
