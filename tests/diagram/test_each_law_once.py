@@ -25,6 +25,7 @@ MOTION = {
     "governor_velocity",
     "driving_margin",
     "speed_damping",
+    "limited_row",
     "axis_bounds",
     "track_axis",
 }
