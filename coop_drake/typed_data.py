@@ -33,7 +33,10 @@ SCALARS = {bool: "true or false", int: "a whole number", float: "a finite number
 class DataError(ValueError):
     """A place where data departs from its type.
 
-    ``key``: dotted path of the key, for example ``start.joints.robot_0[1]``; empty for the whole.
+    Args:
+        key: Dotted path of the key, for example ``start.joints.robot_0[1]``; empty for the whole.
+        value: What stands there.
+        allowed: What may stand there.
     """
 
     def __init__(self, key: str, value: object, allowed: str) -> None:

@@ -58,7 +58,9 @@ _KINDS = {"reached": "b", **dict.fromkeys(_TEXTS, "U")}
 def read_arrays(path: Path, names: Sequence[str]) -> dict[str, np.ndarray[Any, Any]]:
     """Read the arrays of a log.
 
-    ``names``: which arrays it must have.
+    Args:
+        path: The file.
+        names: Which arrays it must have.
 
     Raises:
         PlanError: The file is no archive, or an array in it is missing or damaged, or of another shape or

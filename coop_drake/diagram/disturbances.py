@@ -33,7 +33,12 @@ def add_disturbances(
 ) -> OutputPort:
     """Add friction and pushes to the wrenches on all bases, and pushes on the object behind them.
 
-    ``wrenches``: wrenches on all bases in W, of size 3 N.
+    Args:
+        builder: Receives the blocks.
+        team: The team.
+        deployment: What is switched on.
+        states: True state of every robot.
+        wrenches: Wrenches on all bases in W, of size 3 N.
 
     Returns:
         Wrenches on all bases, and where there are pushes, the one on the object at L: size 3 N or 3 N + 3.

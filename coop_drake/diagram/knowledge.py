@@ -29,7 +29,11 @@ def robot_knowledge(
 ) -> list[RobotKnowledge]:
     """Return what each robot of a team knows before a run.
 
-    ``maps``: the harmonic map of every transition.
+    Args:
+        scenario: The scenario.
+        plan: A plan for it.
+        maps: The harmonic map of every transition.
+        team: The simulated team.
 
     Raises:
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.

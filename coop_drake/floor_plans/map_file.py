@@ -68,7 +68,9 @@ def read_map(path: Path, settings: FloorPlanSettings) -> OccupancyMap:
     A cell that is neither certainly free nor certainly occupied is unknown, also where the modes ``scale``
     and ``raw`` give a probability.
 
-    ``settings``: the scale multiplies the resolution and the origin.
+    Args:
+        path: The YAML file.
+        settings: The scale multiplies the resolution and the origin.
 
     Raises:
         FloorPlanError: A key or the picture is missing or wrong, or a setting is for drawings only.

@@ -14,7 +14,10 @@ from coop_drake.scenario.budget_file import read_budget
 def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) -> Budget | None:
     """Return the budget of a plan, None where none is asked for.
 
-    ``choice``: what ``plan --budget`` says; None for what the scenario requires in ``deployment.budget``.
+    Args:
+        choice: What ``plan --budget`` says; None for what the scenario requires in ``deployment.budget``.
+        scenario: The scenario.
+        problem: Its planning problem.
 
     Raises:
         ScenarioError: The budget cannot be read, or no budget can be shown for the scenario's gains.

@@ -27,7 +27,10 @@ def find_base(
 ) -> tuple[RigidBody, tuple[Joint, ...]]:
     """Find a robot's base body and its joints, and refuse models that are no holonomic planar manipulators.
 
-    ``plant``: a plant that holds the robot's models, finalized or not.
+    Args:
+        scenario: For messages.
+        robot: The robot.
+        plant: A plant that holds the robot's models, finalized or not.
 
     Returns:
         The base body, and the movable joints in the order of q_k: from the base outwards, every joint before

@@ -53,7 +53,9 @@ def import_robot(path: Path, packages: Mapping[str, Path] | None = None) -> Impo
     one robot mostly cover each other, so collisions between them are filtered: the joints' limits must
     exclude them. Sensors, transmissions and mimics are left out.
 
-    ``packages``: folders of ``package://`` addresses; folders above the model are known by their names.
+    Args:
+        path: The model.
+        packages: Folders of ``package://`` addresses; folders above the model are known by their names.
 
     Raises:
         ScenarioError: The model or a mesh cannot be read; with file, element and what is allowed.

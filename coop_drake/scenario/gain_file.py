@@ -14,7 +14,9 @@ from coop_drake.typed_data import to_plain
 def with_gains(scenario: Scenario, choice: str | None) -> Scenario:
     """Return the scenario with a gain set selected.
 
-    ``choice``: name of one of its gain sets, or a file with a ``gains`` section; None leaves the selection.
+    Args:
+        scenario: The scenario.
+        choice: Name of one of its gain sets, or a file with a ``gains`` section; None leaves the selection.
 
     Raises:
         ScenarioError: There is no such set and no such file, or the file is wrong.

@@ -75,7 +75,10 @@ class _Measured(NamedTuple):
 class Invariants:
     """Checks samples of a run against the floor, the team and the plan.
 
-    ``exact``: whether the law's equations must hold to rounding, as they do for an ideal team.
+    Args:
+        clearance: Distances of the team's bodies.
+        plan: The plan that is followed.
+        exact: Whether the law's equations must hold to rounding, as they do for an ideal team.
     """
 
     def __init__(self, clearance: TeamClearance, plan: Plan, *, exact: bool = True) -> None:

@@ -101,7 +101,9 @@ def _simulated(
 def configure_simulator(simulator: Simulator, scenario: Scenario) -> None:
     """Set a simulator's integrator as a scenario asks for.
 
-    ``simulator``: of a loop that was built for the scenario.
+    Args:
+        simulator: Of a loop that was built for the scenario.
+        scenario: The scenario.
     """
     if not scenario.plant.ideal:
         # Between two steps of the plant only governors move, at a rate that is constant but for themselves.

@@ -35,7 +35,10 @@ def patience(plan: Plan, cell: int) -> float:
 def blocking_margin(plan: Plan, sample: Sample, position_tolerance: float) -> str:
     """Return the condition that is furthest from being met in the current cell, as a phrase with its margin.
 
-    ``position_tolerance``: how close to the goal counts as arrived [m].
+    Args:
+        plan: The plan.
+        sample: The present instant.
+        position_tolerance: How close to the goal counts as arrived [m].
     """
     if sample.held:
         return f"the hold ends: {_causes_of(sample)}"

@@ -77,7 +77,9 @@ class Sample:
 class Telemetry:
     """Evaluates the ports of a closed loop, of named or of fused blocks.
 
-    ``root``: context of the whole diagram; every reading is of its present content.
+    Args:
+        loop: The closed loop.
+        root: Context of the whole diagram; every reading is of its present content.
     """
 
     def __init__(self, loop: ClosedLoop, root: Context) -> None:

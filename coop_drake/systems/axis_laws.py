@@ -41,7 +41,9 @@ class AxisLaw:
 def axis_laws(plan: Plan, axes: Sequence[int]) -> tuple[AxisLaw, ...]:
     """Return the laws of some axes in every cell of a plan.
 
-    ``axes``: indices into (theta, q...), in the order wanted.
+    Args:
+        plan: The plan.
+        axes: Indices into (theta, q...), in the order wanted.
 
     Raises:
         ValueError: The plan has no such axis.

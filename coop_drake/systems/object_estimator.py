@@ -23,7 +23,9 @@ class ObjectEstimator(Block):
 
     No state. No other robot's state is needed.
 
-    ``p_LE``: the grasp in L, shape (2,) [m].
+    Args:
+        robot: The robot's model of itself.
+        p_LE: The grasp in L, shape (2,) [m].
     """
 
     def __init__(self, robot: RobotPlant, p_LE: FloatArray) -> None:

@@ -55,7 +55,10 @@ def configuration_scale(tree: ComponentTree) -> FloatArray:
 def point_levers(tree: ComponentTree, component: int, point: tuple[float, float]) -> FloatArray:
     """Bound how far a point of a component moves per unit of (theta, q...), in all configurations.
 
-    ``point``: in the component's frame [m].
+    Args:
+        tree: The team.
+        component: Index of the component.
+        point: In the component's frame [m].
 
     Returns:
         Shape (1 + n,), in m/rad for an angle and without a unit for a prismatic joint; 0 for joints that do

@@ -29,7 +29,9 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
     The estimated time comes of a simulation and does not matter for safety: it is the only figure that
     nothing but the digest of the file protects.
 
-    ``gain_sets``: the scenario's gain sets by name.
+    Args:
+        plan: The plan.
+        gain_sets: The scenario's gain sets by name.
 
     Raises:
         RefusalError: Names the transition, the figure and what it should be.

@@ -57,7 +57,10 @@ class DrawingProcesses:
     def begin(self, scenario: Scenario, problem: PlanningProblem, plan: Plan) -> None:
         """Let the processes prepare what the plan shows.
 
-        ``plan``: the plan that will be simulated.
+        Args:
+            scenario: The scenario.
+            problem: Its planning problem.
+            plan: The plan that will be simulated.
         """
         # Now: this process has imported Drake, and two processors had enough to do while it planned.
         if self._figures:
@@ -68,7 +71,9 @@ class DrawingProcesses:
     def draw(self, log: SimulationLog, folder: Path) -> None:
         """Begin to draw the run into a folder.
 
-        ``folder``: receives ``transport.html`` and the figures.
+        Args:
+            log: The log of the run.
+            folder: Receives ``transport.html`` and the figures.
         """
         self._send((log, folder))
 

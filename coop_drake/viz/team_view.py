@@ -25,7 +25,9 @@ _GRASP = 0.07
 class TeamView:
     """A team in Meshcat, in any configuration; it has a plant of its own, apart from the simulation's.
 
-    ``scenario``: the scenario that describes the team.
+    Args:
+        scenario: The scenario that describes the team.
+        meshcat: Where it is drawn.
 
     Attributes:
         team: Its plant.

@@ -35,7 +35,9 @@ class _Messages:
 class OfflineWindow(ViewerWindow):
     """Takes the place of Meshcat's window, which would start a server process and wait for ports.
 
-    ``content``: what the page shows beside the scene; any value that JSON can represent.
+    Args:
+        title: Title of the page.
+        content: What the page shows beside the scene; any value that JSON can represent.
     """
 
     def __init__(self, title: str, content: Mapping[str, Any]) -> None:

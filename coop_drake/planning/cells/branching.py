@@ -39,7 +39,10 @@ class _Part:
 class StrongBranching:
     """Halves cells on trial for one exploration.
 
-    ``problem``: start and goal, where paths begin and end.
+    Args:
+        problem: Start and goal, where paths begin and end.
+        slices: The subdivision.
+        maker: Makes the cells of slices.
     """
 
     def __init__(self, problem: PlanningProblem, slices: Slices, maker: CellMaker) -> None:

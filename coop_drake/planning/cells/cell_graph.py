@@ -116,7 +116,9 @@ class CellGraph:
     def cheapest(self, starts: Sequence[GraphCell], goals: set[int]) -> list[GraphCell] | None:
         """Path of least total weight by Dijkstra's algorithm; of equal costs the lower index comes first.
 
-        ``goals``: indices of the cells that hold the goal.
+        Args:
+            starts: Cells that hold the start.
+            goals: Indices of the cells that hold the goal.
 
         Returns:
             Cells from a start to a goal, or None if no path joins them.

@@ -80,7 +80,10 @@ class CellMaker:
     only, so they need spaces that are too small (``FreeSpace.under``) and bodies that are too large
     (``SweptTree.over``).
 
-    ``workspace``: where the team may be; the margin is already taken off [m].
+    Args:
+        swept: Sweeps of the team's pieces.
+        pairs: Self-collision of the team.
+        workspace: Where the team may be; the margin is already taken off [m].
     """
 
     def __init__(self, swept: SweptTree, pairs: BodyPairs, workspace: Polygon | MultiPolygon) -> None:
@@ -183,6 +186,8 @@ def _shared(first: CrossSection | None, second: CrossSection | None, over: bool)
 def regions_of(section: CrossSection, *, over: bool) -> list[Region]:
     """Connected parts of a section, in a fixed order.
 
-    ``over``: whether the section is an over-approximation of the free positions; else an under-approximation.
+    Args:
+        section: A region.
+        over: Whether the section is an over-approximation of the free positions; else an under-approximation.
     """
     return sorted(map(Region.of, components(section, over=over)), key=lambda region: region.bounds)

@@ -126,7 +126,10 @@ def nearest_turn(angle: float) -> float:
 def interval_overlap(first: Interval, second: Interval, periodic: bool = False) -> float:
     """Length of the overlap of two intervals, negative for a gap [rad or m].
 
-    ``periodic``: whether they are intervals of theta, modulo 2 pi.
+    Args:
+        first: One interval.
+        second: The other interval.
+        periodic: Whether they are intervals of theta, modulo 2 pi.
     """
     halves = 0.5 * (first[1] - first[0] + second[1] - second[0])
     offset = 0.5 * (first[0] + first[1] - second[0] - second[1])

@@ -23,7 +23,9 @@ Bounds = tuple[FloatArray, FloatArray]
 def final_intervals(problem: PlanningProblem, goal_angle: float) -> Bounds:
     """Intervals of (theta, q...) in which the goal is reached; infinite for joints that are free there.
 
-    ``goal_angle``: the goal's theta, unwrapped [rad].
+    Args:
+        problem: What was asked.
+        goal_angle: The goal's theta, unwrapped [rad].
     """
     goals: list[tuple[float | None, float]] = [(goal_angle, problem.angle_tolerance)]
     goals += [(goal, problem.joint_tolerance) for goal in problem.goal_joints]

@@ -50,7 +50,9 @@ class Proofs:
     The inscribed disc is tested first. Then the whole question is explored in turns with those relaxations to
     two robots at most for which sampling finds no path. A refutation of any of them refutes the question.
 
-    ``watch``: called with the events of every exploration.
+    Args:
+        problem: The question.
+        watch: Called with the events of every exploration.
 
     Attributes:
         refutation: The proof, once there is one.

@@ -57,7 +57,9 @@ class Witnesses:
     def inner_sweeps(self, intervals: Intervals, growth: float) -> tuple[Witness, ...]:
         """Polygons that pieces cover at every configuration of a slice, without corners that do not matter.
 
-        ``growth``: how far the slice's cells reach beyond the positions that these polygons leave free [m].
+        Args:
+            intervals: The slice.
+            growth: How far the slice's cells reach beyond the positions that these polygons leave free [m].
         """
         loss = LEAST_LOSS + LOSS_PER_GROWTH * max(growth, 0.0)
         rings = [(number, self._swept.under(k, intervals)) for k, number in enumerate(self._numbers)]

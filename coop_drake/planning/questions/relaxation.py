@@ -20,7 +20,9 @@ POLE_TOLERANCE = 1e-4
 def relaxed(problem: PlanningProblem, robots: Collection[int]) -> tuple[PlanningProblem, tuple[int, ...]]:
     """The question with only some of the robots.
 
-    ``robots``: robots whose arms and bases are kept; bodies welded to the object are kept in any case.
+    Args:
+        problem: The whole question.
+        robots: Robots whose arms and bases are kept; bodies welded to the object are kept in any case.
 
     Returns:
         The relaxed question, and for each of its joints the index of that joint in the whole q.

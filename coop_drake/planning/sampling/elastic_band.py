@@ -86,7 +86,9 @@ def smoothed(
 def estimated_duration(problem: PlanningProblem, path: FloatArray) -> float:
     """Rough duration of a transport along a path, to compare candidates [s].
 
-    ``path``: configurations, theta unwrapped, shape (m, 3 + n).
+    Args:
+        problem: The question.
+        path: Configurations, theta unwrapped, shape (m, 3 + n).
     """
     scale, team = configuration_scale(problem.tree), team_arrays(problem.tree)
     samples = densified(path, scale, SPACING)

@@ -141,7 +141,9 @@ class SampledSearch:
     def with_margin(self, first: BoxSequence, progress: Callable[[float, float], None]) -> BoxSequence:
         """Move the best path away from the walls, and cover it at the largest margin that it keeps.
 
-        ``progress``: called with a margin [m] and the fraction of the path that is covered.
+        Args:
+            first: Boxes at margin zero.
+            progress: Called with a margin [m] and the fraction of the path that is covered.
 
         Returns:
             Boxes at a margin; at margin zero if no other margin is kept.
@@ -179,7 +181,9 @@ class SampledSearch:
     def covered_path(self, found: BoxSequence, spare: BoxSequence) -> CoveredPath:
         """The path of some boxes, whose polygons are made on request.
 
-        ``spare``: boxes to use if the polygons of the others cannot be made.
+        Args:
+            found: The boxes.
+            spare: Boxes to use if the polygons of the others cannot be made.
         """
 
         def channel() -> Channel:

@@ -107,7 +107,11 @@ def _answered(
 class _Search:
     """One search by samples and by cells in turns.
 
-    ``unit``: the question's unit of length, for sentences [m].
+    Args:
+        problem: The question.
+        progress: Called with a phase and the fraction of it that is done.
+        watch: Called with the events of explorations.
+        unit: The question's unit of length, for sentences [m].
     """
 
     def __init__(

@@ -19,7 +19,9 @@ def check_handovers(rows: Rows, *, exact: bool) -> tuple[Check, Check]:
     An ideal team leaves a cell in the first row in which all robots are ready, unless it is held. Otherwise
     reports travel, and every robot must have reported to be ready at some time in the cell.
 
-    ``exact``: whether the team is ideal.
+    Args:
+        rows: The log.
+        exact: Whether the team is ideal.
     """
     log, plan, last = rows.log, rows.plan, len(rows.log.times) - 1
     if log.cell_index[-1] != len(plan.cells) - 1:
