@@ -21,6 +21,7 @@ from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.ledger import Ledger, LedgerError
 from benchmarks.mapping import mapping_tasks
 from benchmarks.planner.ablation import ablation_tasks
+from benchmarks.planner.budgeted import budget_tasks
 from benchmarks.planner.contradiction import contradiction_tasks
 from benchmarks.planner.growth import growth_tasks
 from benchmarks.planner.head_to_head import Effort, head_to_head_tasks
@@ -98,6 +99,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *head_to_head_tasks(effort),
         *ablation_tasks(min(effort.limit, _ABLATION_LIMIT)),
         *stage_tasks(effort.limit),
+        *budget_tasks(effort.limit),
         *growth_tasks(effort.limit),
         *contradiction_tasks(),
         *starting_tasks(),

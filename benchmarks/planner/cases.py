@@ -9,7 +9,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers import PlanningProblem
 from coop_drake.plant import build_team_plant, planning_problem
-from coop_drake.scenario import load_scenario
+from coop_drake.scenario import Scenario, load_scenario
 
 __all__ = ["CASES", "Case"]
 
@@ -32,9 +32,13 @@ class Case:
     passable: bool = True
     folder: Path = _SHIPPED
 
+    def scenario(self) -> Scenario:
+        """Read the file."""
+        return load_scenario(str(self.folder / f"{self.name}.scenario.yaml"))
+
     def problem(self) -> PlanningProblem:
         """Read the file and its models; what the planner is asked."""
-        scenario = load_scenario(str(self.folder / f"{self.name}.scenario.yaml"))
+        scenario = self.scenario()
         return planning_problem(scenario, build_team_plant(scenario, DiagramBuilder()))
 
 

@@ -9,6 +9,7 @@ from time import process_time
 from benchmarks.planner.family import corridor_problem, first_question
 from benchmarks.planner.trees_peer import run_trees
 from coop_drake.answers import Found, PlanningProblem, PlanningResult
+from coop_drake.answers.budget import Budget
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning import warm_up
 from coop_drake.planning.planner import plan
@@ -39,17 +40,25 @@ class Planned:
     transport_seconds: float
 
 
-def plan_repeatedly(problem: PlanningProblem, runs: int, patience: float) -> tuple[Planned, ...]:
+def plan_repeatedly(
+    problem: PlanningProblem,
+    runs: int,
+    patience: float,
+    budget: Budget | None = None,
+    gain_set: ScheduledGains | None = None,
+) -> tuple[Planned, ...]:
     """Ask the same question several times; the first time also loads the compiled kernels.
 
     Args:
         problem: The question.
         runs: How often, at most.
         patience: Do not ask again once an answer took longer [CPU s].
+        budget: What the plans shall tolerate.
+        gain_set: The rule of the gains, the default one if not given.
     """
     answers: list[Planned] = []
     while len(answers) < runs and (not answers or answers[-1].cpu_seconds < patience):
-        answers.append(_planned(lambda: _ask(problem)))
+        answers.append(_planned(lambda: _ask(problem, budget, gain_set)))
     return tuple(answers)
 
 
@@ -67,8 +76,10 @@ def compile_kernels() -> None:
     run_trees(first_question(), (1,), 100)
 
 
-def _ask(problem: PlanningProblem) -> PlanningResult:
-    return plan(problem, ScheduledGains(), gain_set_name="scheduled")
+def _ask(
+    problem: PlanningProblem, budget: Budget | None = None, gain_set: ScheduledGains | None = None
+) -> PlanningResult:
+    return plan(problem, gain_set or ScheduledGains(), gain_set_name="scheduled", budget=budget)
 
 
 def _planned(ask: Callable[[], PlanningResult]) -> Planned:

@@ -18,6 +18,9 @@ from coop_drake.tree.pose import FloatArray
 
 def edges_of(polygon: Polygon) -> FloatArray:
     """Edges of every ring of a polygon as rows ``(x0, y0, x1, y1)``, shape (edges, 4) [m]."""
+    if not polygon.interiors:
+        ring = shapely.get_coordinates(polygon)
+        return np.hstack([ring[:-1], ring[1:]])
     rings = [shapely.get_coordinates(ring) for ring in (polygon.exterior, *polygon.interiors)]
     return np.vstack([np.hstack([ring[:-1], ring[1:]]) for ring in rings])
 

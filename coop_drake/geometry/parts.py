@@ -13,6 +13,8 @@ from coop_drake.tree.pose import FloatArray
 
 def parts_of(shape: BaseGeometry) -> list[Polygon]:
     """The polygons that a shape consists of; lines, points and empty polygons are dropped."""
+    if isinstance(shape, Polygon):
+        return [] if shape.is_empty else [shape]
     parts = shapely.get_parts(shape)
     return [part for part in parts if isinstance(part, Polygon) and not part.is_empty]
 
@@ -35,4 +37,7 @@ def extent_of(shape: BaseGeometry) -> float:
 
 def component_at(shape: BaseGeometry, point: Point) -> Polygon:
     """The polygon among the parts of a shape that holds a point, an empty one if none does."""
-    return next((part for part in parts_of(shape) if part.contains(point)), Polygon())
+    for part in parts_of(shape):
+        if part.contains(point):
+            return part
+    return Polygon()

@@ -36,10 +36,11 @@ MODEL_PARTS = 5
 """Parts into which the range of the model's error is cut [-]; within each only the rest is a disturbance."""
 
 HORIZON = 4.0
-"""Responses are summed for so long [s]; what is left of them then must be below ``LEFT``."""
+"""Longest time for which responses are summed [s]."""
 
 LEFT = 1e-9
-"""Largest response at the end of ``HORIZON`` to a unit departure [-]; a loop that is slower is refused."""
+"""Responses to a unit departure are followed until they are below this [-]; a loop in which they stay above
+it for ``HORIZON`` is refused."""
 
 MEMORY = 0.3
 """Time for which the accelerations of former transitions count with their own sizes [s]: less than a
@@ -99,26 +100,17 @@ class AxisLoop:
         """
         budget, T = self.budget, self.budget.period
         noise = self.tracking.stiffness * budget.angle_noise + self.tracking.damping * budget.rate_noise
-        rest, furthest = _rest(budget), np.zeros((3, near.size))
-        for sums, factor in zip(self.sums, _factors(budget), strict=True):
-            error = abs(factor - 1.0) + rest
-            any_ = budget.acceleration_error + error * largest
-            pull = noise * (1.0 + sums[Q, COMMAND]) + any_ * sums[Q, ACCELERATION]
-            pull = pull / (1.0 - rest * sums[Q, ACCELERATION])
-            steady = budget.acceleration_error + rest * pull
-            found = np.array(
-                [
-                    noise * sums[i, COMMAND]
-                    + (steady + error * near) * (sums[i, ACCELERATION] - sums[i, LATE])
-                    + (steady + error * largest) * sums[i, LATE]
-                    for i in (X, V)
-                ]
-            )
-            between = (1.0 + budget.model_error) * pull + error * near + budget.acceleration_error
-            found += np.array([T * T / 8.0 * between, T / 2.0 * between])
-            furthest = np.maximum(furthest, np.vstack([found, between]))
-        result: FloatArray = (1.0 + SLACK) * furthest
-        return result
+        rest, (noises, pushes, lates) = _rest(budget), self.sums.transpose(2, 1, 0)[..., None]
+        error = np.abs(np.array(_factors(budget)) - 1.0)[:, None] + rest
+        pull = noise * (1.0 + noises[Q]) + (budget.acceleration_error + error * largest) * pushes[Q]
+        pull = pull / (1.0 - rest * pushes[Q])
+        steady = budget.acceleration_error + rest * pull
+        between = (1.0 + budget.model_error) * pull + error * near + budget.acceleration_error
+        found = noise * noises[:Q] + (steady + error * near) * (pushes[:Q] - lates[:Q])
+        found += (steady + error * largest) * lates[:Q]
+        found += np.array([T * T / 8.0, T / 2.0])[:, None, None] * between
+        furthest: FloatArray = (1.0 + SLACK) * np.vstack([found, between[None]]).max(axis=1)
+        return furthest
 
 
 def best_loop(budget: Budget) -> AxisLoop | None:
@@ -130,7 +122,8 @@ def best_loop(budget: Budget) -> AxisLoop | None:
             loop = axis_loop(tracking, budget)
             if loop is None:
                 continue
-            found = float(loop.departures(typical, typical)[0][0]) + RATE_WEIGHT * loop.typical_rate
+            departures = loop.departures(typical, typical)[:, 0].tolist()
+            found = departures[X] + RATE_WEIGHT * departures[V]
             if found < least:
                 best, least = loop, found
     return best
@@ -194,24 +187,25 @@ def _sums(
     left, in_v, in_x = lag_factors(T, lag)
     e, v, pull = np.zeros((3, n + 1)), np.zeros((3, n + 1)), np.zeros((3, n + 1))
     e[1, 0], v[2, 0] = 1.0, 1.0  # the runs: a unit command, a unit of e and one of e'
-    sums = np.zeros((3, 3))
-    for run in range(3):
-        q = 0.0
-        for k in range(n):
+    q, sums, quiet = np.zeros(3), np.zeros((3, 3)), 0
+    for k in range(n):
+        largest = 0.0
+        for run in range(3):
             if k >= delay:
                 pull[run, k] = -gains[0] * e[run, k - delay] - gains[1] * v[run, k - delay]
             u = pull[run, k] + (1.0 if run == 0 and k == 0 else 0.0)
-            gap = q - u
+            gap = q[run] - u
             e[run, k + 1] = e[run, k] + T * v[run, k] + factor * (0.5 * T * T * u + in_x * gap)
             v[run, k + 1] = v[run, k] + factor * (T * u + in_v * gap)
-            q = u + left * gap
-        if not abs(e[run, n]) + abs(v[run, n]) < LEFT:
-            return np.full((3, 3), np.inf)
-    for k in range(n + 1):
+            q[run] = u + left * gap
+            largest = max(largest, abs(e[run, k + 1]) + abs(v[run, k + 1]))
         for i, h in enumerate((e, v, pull)):
             sums[i, 0] += abs(h[0, k])
             kick = 0.5 * T * (abs(h[1, k] * T + h[2, k]) + abs(h[2, k]))
             sums[i, 1] += kick
             if k >= memory:
                 sums[i, 2] += kick
-    return sums
+        quiet = quiet + 1 if largest < LEFT else 0
+        if quiet > delay + 1:  # nothing that is measured later differs from this
+            return sums
+    return np.full((3, 3), np.inf)

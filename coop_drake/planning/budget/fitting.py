@@ -18,7 +18,6 @@ from coop_drake.planning.budget.transitions import (
     UnprovedTransition,
     follow_transitions,
 )
-from coop_drake.planning.execution.estimate import timed
 from coop_drake.planning.execution.transitions import share_speeds, with_gains
 
 AGE_FACTORS = (1.0, 1.5, 2.0)
@@ -43,7 +42,8 @@ def fit_budget(
         budget: The departures to be tolerated.
 
     Returns:
-        The plan with these gains, the budget and what follows from it; or where it does not hold.
+        The plan with these gains, the budget and what follows from it, with the times estimated before; or
+        where it does not hold.
     """
     first, loop = None, best_loop(budget)
     if loop is None:
@@ -57,7 +57,7 @@ def fit_budget(
         found = follow_transitions(tables, plan.start[2:], loop)
         if not isinstance(found, UnprovedTransition):
             fitted = tuple(_stated(*pair, factor) for pair in zip(again.transitions, found, strict=True))
-            return timed(replace(again, transitions=fitted, budget=budget, axis_tracking=loop.tracking))
+            return replace(again, transitions=fitted, budget=budget, axis_tracking=loop.tracking)
         first = first or found
     assert first is not None  # there is a factor
     return first

@@ -54,8 +54,8 @@ MITRE_LIMIT = 2.0
 farther away."""
 
 OPENING = 0.25
-"""A region counts as tidy if an opening by this share of its passage's clearance takes off less than a square
-of that size [-]: tidying opens cells by twice as much."""
+"""A region counts as tidy if an opening by this share of its passage's clearance takes off less than two
+squares of that size [-], the tip of one sharp corner: tidying opens cells by twice as much."""
 
 KEPT = 0.6
 """A target is kept if its clearance in the regions is this share of the largest there [-]."""
@@ -231,7 +231,7 @@ def _are_tidy(regions: Sequence[Polygon], plan: Plan) -> NDArray[np.bool_]:
     """
     depth = np.array([OPENING * transition.neck for transition in plan.transitions])
     opened = _grown(_grown(regions, -depth), depth)
-    return np.asarray(shapely.area(regions) - shapely.area(opened) < depth * depth)
+    return np.asarray(shapely.area(regions) - shapely.area(opened) < 2.0 * depth * depth)
 
 
 def _no_room(k: int, tube: PositionTube) -> UnprovedPosition:
