@@ -13,6 +13,9 @@ _BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-sta
 _PATIENCE = 120.0
 """How long a browser may take to draw a page [s]; without a graphics card it takes a few seconds."""
 
+_PAGE_TIME = 20_000
+"""How long the page may run by its own clock before the picture is taken [ms]: it unpacks its scene first."""
+
 
 class BrowserError(Exception):
     """No browser is there, or it took no picture."""
@@ -38,7 +41,7 @@ def take_still(page: Path, picture: Path, time: float) -> None:
     """
     command = [
         browser(), "--headless", "--no-sandbox", "--disable-gpu", "--use-gl=angle", "--use-angle=swiftshader",
-        "--window-size=1000,700", "--timeout=25000", f"--screenshot={picture}",
+        "--window-size=1000,700", f"--virtual-time-budget={_PAGE_TIME}", f"--screenshot={picture}",
         f"{page.absolute().as_uri()}#t={time:.2f}",
     ]  # fmt: skip
     picture.unlink(missing_ok=True)
