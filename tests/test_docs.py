@@ -21,7 +21,6 @@ from docs.generate.links import for_site
 from docs.generate.port_tables import as_markdown
 from docs.generate.scenario_keys import sections
 from docs.generate.scenario_page import scenario_page
-from tests.support.scenarios import write_scenario
 from tests.support.small_loop import joint_names, small_maps, small_scenario
 from tests.support.small_plan import small_plan
 
@@ -94,27 +93,31 @@ def test_the_robot_that_is_shown_makes_a_team(tmp_path):
 def test_the_block_that_is_shown_stands_in_for_the_funnel():
     names = {}
     exec(shown("controller_block.md", "python"), names)  # the page's own code
-    block = names["SpringAxes"]([0.5, 0.1], stiffness=4.0, damping=2.0, bound=0.1)
+    plan = small_plan(joint_names(small_scenario()))
+    block = names["SpringAxes"](plan, [0, 1], stiffness=4.0, damping=2.0)
     outputs = {block.get_output_port(i).get_name() for i in range(block.num_output_ports())}
     assert outputs == set(re.findall(r"output  ``(\w+)``", AxisPpc.__doc__))
     context = block.CreateDefaultContext()
     block.GetInputPort("object_state").FixValue(context, [0, 0, 0.7, 0, 0, 0.1])
     block.GetInputPort("robot_state").FixValue(context, [1, 2, 3, 0.4, 5, 6, 7, -0.3])
-    expected = [-4 * 0.2 - 2 * 0.1, -4 * 0.3 + 2 * 0.3]
+    last = len(plan.cells) - 1
+    block.GetInputPort("current_cell").FixValue(context, [last, 3.0])
+    target = 0.5 * (plan.transitions[last].goal_lower + plan.transitions[last].goal_upper)[:2]
+    expected = -4 * (np.array([0.7, 0.4]) - target) - 2 * np.array([0.1, -0.3])
     assert block.GetOutputPort("axis_acceleration").Eval(context) == pytest.approx(expected)
-    assert block.GetOutputPort("funnels").Eval(context) == pytest.approx([0.4, 0.0, 0.6, 0.2])
+    bounds = [*plan.cells[last].lower[:2], *plan.cells[last].upper[:2]]
+    assert block.GetOutputPort("funnels").Eval(context) == pytest.approx(bounds)
 
 
-def test_a_transport_arrives_with_the_block_that_is_shown(tmp_path, monkeypatch, capsys):
+def test_a_transport_arrives_with_the_block_that_is_shown(capsys):
     block, use = all_shown("controller_block.md", "python")
     assert len([line for line in use.splitlines() if line.strip()]) <= 10
-    monkeypatch.chdir(tmp_path)
-    write_scenario(tmp_path / "room.scenario.yaml")
     names = {}
     exec(block, names)
     exec(use, names)
     assert capsys.readouterr().out.strip() == "reached: True"
-    assert np.ptp(names["log"].funnel_lower[:, 0]) == 0.0
+    log, plan = names["log"], names["plan"]
+    assert np.array_equal(log.funnel_lower[-1], plan.cells[-1].lower)  # Those of the block that is shown.
 
 
 def test_only_named_blocks_that_exist_can_be_replaced():
