@@ -13,10 +13,11 @@ from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.laws.disturbance import observer_gains
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
+from coop_drake.laws.readiness import REST_WINDOW
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.plant import RobotPlant, TeamPlant, build_robot_plant
 from coop_drake.plant.team import RobotModel
-from coop_drake.scenario import Scenario
+from coop_drake.scenario import Deployment, Scenario
 from coop_drake.systems import AxisMotion, GovernedCell, NominalMotion
 
 REPORT_PERIODS = 2
@@ -66,12 +67,19 @@ def robot_knowledge(
             sample_offset=deployment.of_robot(robot.name).sample_offset,
             predicted_periods=delay if control.predictor else 0,
             hold=control.hold,
+            rest_samples=_rest_samples(deployment),
             observer_gains=observer_gains(scenario.command_age) if control.observer else None,
             motion=_motion(scenario, plan, robot.name, 0 if control.predictor else delay),
             axis_motion=_axis_motion(scenario, plan, robot, 0 if control.predictor else delay),
         )
         for robot in team.robots
     ]
+
+
+def _rest_samples(deployment: Deployment) -> int:
+    """Return over how many samples rates are averaged, 0 where they have no noise."""
+    noisy = deployment.period is not None and deployment.measurements.rate_noise > 0.0
+    return whole_periods(REST_WINDOW, deployment.period) if noisy and deployment.period else 0
 
 
 def _robot(scenario: Scenario, index: int, factor: float) -> RobotPlant:

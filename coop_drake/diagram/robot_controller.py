@@ -66,6 +66,7 @@ class RobotKnowledge:
         predicted_periods: Age of its measurements that it predicts over, in control periods; 0 for none.
         hold: When the team is held, None for never.
         observer_gains: Gain and leak of its disturbance observer [1/s]; None for no observer.
+        rest_samples: Number of samples over which rates are averaged in the last cell, 0 for none.
         motion: The nominal motion of the position; None where p_G follows the measured position.
         axis_motion: That of the object's angle and of its joints; None where their law acts on what is
             measured.
@@ -84,6 +85,7 @@ class RobotKnowledge:
     predicted_periods: int = 0
     observer_gains: tuple[float, float] | None = None
     hold: Hold | None = None
+    rest_samples: int = 0
     motion: NominalMotion | None = None
     axis_motion: AxisMotion | None = None
 
@@ -183,6 +185,9 @@ def _blocks(knowledge: RobotKnowledge) -> dict[str, LeafSystem]:
             plan.goal_pose[:2],
             knowledge.position_tolerance,
             nominal=knowledge.motion is not None,
+            averaged=knowledge.rest_samples,
+            period=knowledge.period,
+            offset=knowledge.sample_offset,
         ),
         **_additions(knowledge, laws),
     }

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pydrake.systems.framework import BasicVector, Context
+import numpy as np
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
 from coop_drake.compiled import prepared
 from coop_drake.systems.axis_laws import AxisLaw
@@ -14,6 +15,9 @@ from coop_drake.systems.nominal_kernels import NOMINAL_SIZE
 from coop_drake.systems.ready_kernels import ready_conditions, robot_ready, robot_ready_along
 from coop_drake.systems.reference_governor import GovernedCell
 from coop_drake.tree.pose import FloatArray
+
+MOVING = 1.0
+"""Rate that counts where there are no samples yet, far beyond what counts as rest [m/s, rad/s]."""
 
 
 class ReadyMonitor(Block):
@@ -28,7 +32,10 @@ class ReadyMonitor(Block):
     output  ``ready``              2          index of the current cell, signed margin [-]
     ======= ====================== ========== ====================================================== =====
 
-    No state. The report is all that a robot sends to others: whether it is ready, and for which cell.
+    The report is all that a robot sends to others: whether it is ready, and for which cell.
+
+    State: none, or where rates are averaged one discrete group, updated every ``period`` in the last cell:
+    the rates of the last samples, which count as ``MOVING`` before there are so many.
 
     Args:
         cells: Governor's data of every cell.
@@ -37,6 +44,9 @@ class ReadyMonitor(Block):
         goal_position: Where the object shall end, shape (2,) [m].
         position_tolerance: How close to it counts as arrived [m].
         nominal: Whether the position is judged by its nominal motion.
+        averaged: Number of samples over which rates are averaged in the last cell, 0 for none.
+        period: Time between samples [s]; needed where rates are averaged.
+        offset: Time of the first sample [s].
 
     Raises:
         ValueError: The sequences are empty or differ in length, or the tolerance is not positive.
@@ -50,6 +60,10 @@ class ReadyMonitor(Block):
         goal_position: FloatArray,
         position_tolerance: float,
         nominal: bool = False,
+        *,
+        averaged: int = 0,
+        period: float | None = None,
+        offset: float = 0.0,
     ) -> None:
         super().__init__()
         if not cells or not len(cells) == len(laws) == len(inradii):
@@ -75,7 +89,29 @@ class ReadyMonitor(Block):
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self._nominal = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE) if nominal else None
+        self._averaged = averaged
+        if averaged:
+            self.DeclareDiscreteState(np.full(averaged * (3 + n), MOVING))
+            self.declare_update(self._remember, period, offset)
         self.DeclareVectorOutputPort("ready", READY_SIZE, self._write_ready)
+
+    def _remember(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
+        if index_of(self._current.Eval(context), len(self._ready)) + 1 < len(self._ready):
+            return EventStatus.DidNothing()
+        state, rates = context.get_discrete_state_vector().value(), self._object.Eval(context)[3:]
+        joints = self._state.Eval(context)[len(self._state.Eval(context)) // 2 + 3 :]
+        kept = state[len(rates) + len(joints) :]
+        discrete_state.get_mutable_vector().SetFromVector(np.concatenate((kept, rates, joints)))
+        return EventStatus.Succeeded()
+
+    def _states(self, context: Context, index: int) -> tuple[FloatArray, FloatArray]:
+        """Return the states of object and robot, in the last cell with averaged rates."""
+        seen, robot = self._object.Eval(context), self._state.Eval(context)
+        if self._averaged and index + 1 == len(self._ready):
+            mean = context.get_discrete_state_vector().value().reshape(self._averaged, -1).mean(axis=0)
+            seen, robot = seen.copy(), robot.copy()
+            seen[3:], robot[len(robot) // 2 + 3 :] = mean[:3], mean[3:]
+        return seen, robot
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
         current, report = self._current.Eval(context), output.get_mutable_value()
@@ -84,8 +120,7 @@ class ReadyMonitor(Block):
         led = () if self._nominal is None else (self._nominal.Eval(context),)
         report[1] = self._ready[index](
             context.get_time() - current[1],
-            self._object.Eval(context),
-            self._state.Eval(context),
+            *self._states(context, index),
             self._governor.Eval(context),
             *led,
         )
