@@ -6,6 +6,7 @@ from .robot import RobotPlant, build_robot_plant
 from .run_masses import run_setup
 from .separate_team import SeparateTeam, build_separate_team
 from .team import ObjectInertia, RobotModel, TeamPlant, build_team_plant
+from .turning import turning_coupling
 
 __all__ = [
     "BaseChain",
@@ -24,4 +25,5 @@ __all__ = [
     "robot_chain",
     "run_setup",
     "set_configuration",
+    "turning_coupling",
 ]

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from coop_drake.laws import Funnel, ScheduledGains, transition_gains
 from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
 from coop_drake.laws.slopes import slope_bounds
-from coop_drake.plant import build_team_plant
+from coop_drake.plant import build_team_plant, turning_coupling
 from coop_drake.plant.configuration import set_configuration
 from coop_drake.scenario import load_scenario
 
@@ -74,6 +74,15 @@ def test_turning_bends_arms_of_two_joints_more_than_arms_of_one():
     assert np.abs(elbow).max() < ScheduledGains().turning_coupling
     middles = np.linspace(-1.2, 1.2, 7)
     assert np.abs(turned("base", *((a, b) for a in middles for b in middles))).max() < 4.0
+
+
+@pytest.mark.parametrize(("name", "coupling"), [("base", 3.94), ("elbow", 12.78)])
+def test_the_coupling_of_a_team_is_the_largest_over_its_configurations(name, coupling):
+    team = build_team_plant(load_scenario(name), DiagramBuilder())
+    found = turning_coupling(team)
+    assert found == pytest.approx(coupling, abs=0.01)
+    joints = np.random.default_rng(1).uniform(-1.8, 1.8, (200, len(team.velocity_index) - 3))
+    assert 0.9 * found < np.abs(turned(name, *joints)).max() < 1.05 * found
 
 
 @pytest.mark.parametrize("age", [0.015, 0.0275])
