@@ -120,6 +120,13 @@ def _is_final(unproved: UnprovedTransition | UnprovedPosition) -> bool:
     return isinstance(unproved, UnprovedPosition) and unproved.whatever_cells
 
 
+def _narrowest_goal(plan: Plan) -> float:
+    """Return the width of a plan's narrowest goal interval [rad or m]."""
+    return min(
+        float((one.goal_upper - one.goal_lower).min()) for one in plan.transitions[:-1] or plan.transitions
+    )
+
+
 def _beyond(
     problem: PlanningProblem,
     tried: list[_Tried],
@@ -137,7 +144,8 @@ def _beyond(
         budget: The budget.
     """
     best, said = 0.0, _sentence(*tried[0])
-    for plan, unproved in chain(tried, ((plan, tried[0][1]) for plan in others)):
+    widest_first = sorted(tried, key=lambda one: -_narrowest_goal(one[0]))  # these bear most
+    for plan, unproved in chain(widest_first, ((plan, tried[0][1]) for plan in others)):
         low, high, share = best, 1.0, best + SHARE_STEP if best > 0.0 else 0.5
         while high - low > SHARE_STEP:
             found = _fitted(problem, plan, gain_set, budget.scaled(share))
