@@ -23,6 +23,9 @@ from coop_drake.progress import Progress
 SHARE_STEP = 0.01
 """The largest share of a budget is found within this [-]."""
 
+ROUNDED = 1.001
+"""Factor by which shares may differ from ``SHARE_STEP`` because they are rounded [-]."""
+
 OVERLAPS = (0.04, 0.06, 0.09, 0.02)
 """Least overlaps of consecutive boxes that are tried, in every angle and joint [rad or m]: the wider the goal
 intervals, the larger are the departures that an axis bears in them, and the more cells a plan has. The last
@@ -147,7 +150,7 @@ def _beyond(
     widest_first = sorted(tried, key=lambda one: -_narrowest_goal(one[0]))  # these bear most
     for plan, unproved in chain(widest_first, ((plan, tried[0][1]) for plan in others)):
         low, high, share = best, 1.0, best + SHARE_STEP if best > 0.0 else 0.5
-        while high - low > SHARE_STEP:
+        while high - low > ROUNDED * SHARE_STEP:
             found = _fitted(problem, plan, gain_set, budget.scaled(share))
             if isinstance(found, Plan):
                 low = share
