@@ -28,6 +28,7 @@ def main() -> None:
     try:
         if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
             _command_line()
+            return
         alive, ending = os.pipe()
         copy = os.fork()  # Nothing has been imported that a copy could not use.
         if copy == 0:

@@ -156,10 +156,10 @@ def test_a_command_ends_by_the_signal_that_ends_its_work(number):
     assert (done.returncode, done.stdout, done.stderr) == (-number, b"begun\n", b"")
 
 
-def test_what_a_command_prints_is_whole_in_a_pipe():
-    program = (
-        "import sys, types\nfrom coop_drake import entry_point\ndef command_line():\n    print('all')\n"
-        + COMMAND
-    )
+@pytest.mark.parametrize("action", ["SIG_IGN", "default_int_handler"])
+def test_what_a_command_prints_is_whole_in_a_pipe(action):
+    begin = f"import signal, sys, types\nsignal.signal(signal.SIGINT, signal.{action})\n"
+    work = "from coop_drake import entry_point\ndef command_line():\n    print('all')\n"
+    program = begin + work + COMMAND
     done = subprocess.run([sys.executable, "-c", program], capture_output=True)
     assert (done.returncode, done.stdout) == (0, b"all\n")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import pty
+import shlex
 import subprocess
 import sys
 from dataclasses import replace
@@ -63,7 +64,7 @@ def test_help_keeps_what_stands_in_brackets():
 
 @pytest.mark.parametrize("line", [line for examples in EXAMPLES.values() for line, _ in examples])
 def test_examples_are_commands_as_they_are(line):
-    name, *arguments = line.split()
+    name, *arguments = shlex.split(line)
     context = COMMAND.commands[name].make_context(name, arguments)
     scenario = context.params.get("scenario")
     assert scenario is None or scenario in TYPED

@@ -34,7 +34,7 @@ class ReadyMonitor(Block):
 
     The report is all that a robot sends to others: whether it is ready, and for which cell.
 
-    State: none, or where rates are averaged one discrete group, updated every ``period`` in the last cell:
+    No state, unless rates are averaged: then one discrete group, updated every ``period`` in the last cell,
     the rates of the last samples, which count as ``MOVING`` before there are so many.
 
     Args:

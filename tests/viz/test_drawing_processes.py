@@ -66,13 +66,17 @@ def test_a_process_that_is_ended_is_named(drawing, tmp_path):
         processes.wait("recording", "figures")
 
 
-def test_both_end_with_the_block_and_with_the_command(tmp_path):
+def test_both_end_with_the_block_and_with_the_command():
+    problem, scenario = case("base"), load_scenario(MODELS / "base.scenario.yaml")
     with DrawingProcesses() as processes:
-        ((process, _),) = processes._running.values()
-        assert process.is_alive()
-    assert not process.is_alive()
+        processes.begin(scenario, problem, synthetic_plan(problem))
+        begun = [process for process, _ in processes._running.values()]
+        assert [process.is_alive() for process in begun] == [True, True]
+    assert not any(process.is_alive() for process in begun)
     with DrawingProcesses() as processes:
-        ((process, connection),) = processes._running.values()
-        connection.close()  # As the end of the command closes it.
-        process.join(timeout=300)
-        assert process.exitcode == 0
+        processes.begin(scenario, problem, synthetic_plan(problem))
+        for _, connection in processes._running.values():
+            connection.close()  # As the end of the command closes it.
+        for process, _ in processes._running.values():
+            process.join(timeout=300)
+            assert process.exitcode == 0
