@@ -109,11 +109,9 @@ def _scenarios() -> Finding:
 
 
 def _meshcat() -> Finding:
-    from pydrake.geometry import MeshcatParams
-
     from coop_drake.viz.server import silent_meshcat
 
-    return Finding("Meshcat", f"opens port {silent_meshcat(MeshcatParams(host='localhost')).port()}")
+    return Finding("Meshcat", f"opens port {silent_meshcat().port()}")
 
 
 def _fonts() -> Finding:

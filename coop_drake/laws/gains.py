@@ -269,7 +269,7 @@ class ScheduledGains:
         return IDEAL_AGE if self.command_age is None else self.command_age
 
     def slowed(self, factor: float) -> "ScheduledGains":
-        """Return the rules for commands that are so many times as old."""
+        """Return the rules for commands that are older by a factor [-], which makes motions slower."""
         return self if factor == 1.0 else replace(self, command_age=factor * self.age)
 
     def for_age(self, age: float) -> "ScheduledGains":

@@ -72,7 +72,10 @@ def component_stages(tree: ComponentTree, index: int) -> tuple[Stage, ...]:
 def checked_pairs(
     tree: ComponentTree, solids: Collection[Solid]
 ) -> tuple[tuple[Solid, Solid, int, int], ...]:
-    """Pairs of solids that must never overlap, each with their numbers of stages up to what carries both."""
+    """Pairs of solids that must never overlap.
+
+    With each pair stand, for both solids, the number of joints up to the component that carries the two.
+    """
     members: dict[tuple[int, int], list[Solid]] = {}
     for solid in solids:
         members.setdefault((solid.component, solid.body), []).append(solid)

@@ -55,7 +55,7 @@ class LivePage:
         self._cells = len(plan.cells)
         self._recording: Path | None = None
         self._asked, self._loading, self._lock = -_ABSENT, 0, Lock()
-        self._server = ThreadingHTTPServer(("", 0), _handler(self))
+        self._server = ThreadingHTTPServer(("localhost", 0), _handler(self))
         self._server.daemon_threads = True
 
     @property

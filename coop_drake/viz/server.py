@@ -1,4 +1,4 @@
-"""Starts a Meshcat server without the line that Drake writes to standard error."""
+"""Starts a Meshcat server for this machine, without the line that Drake writes to standard error."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from pydrake.geometry import Meshcat, MeshcatParams
 def silent_meshcat(parameters: MeshcatParams | None = None) -> Meshcat:
     """Start a Meshcat server and log no address; ``web_url()`` returns it.
 
+    Args:
+        parameters: Its settings; by default only browsers on this machine can open its page.
+
     Raises:
         RuntimeError: No port is free.
     """
     logger = logging.getLogger("drake")
     logger.addFilter(_is_no_address)
     try:
-        return Meshcat(parameters or MeshcatParams())
+        return Meshcat(parameters or MeshcatParams(host="localhost"))
     finally:
         logger.removeFilter(_is_no_address)
 
