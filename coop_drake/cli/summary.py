@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from math import pi, remainder
+from string import Formatter
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -15,56 +16,71 @@ if TYPE_CHECKING:
     from coop_drake.answers.log import SimulationLog
     from coop_drake.fields import HarmonicMap
 
-_ROWS: tuple[tuple[str, str, str], ...] = (
-    ("answer", "answer", "{}"),
-    ("transport", "outcome", "{}"),
-    ("cells", "cells", "{}"),
-    ("planning took", "planning_wall_seconds", "{:.2f} s"),
-    ("estimated transport", "estimated_seconds", "{:.1f} s"),
-    ("its budget holds for", "budget_holds_for", "{}"),
-    ("departure of the object under it", "tube_radius_m", "{:.4f} m at most"),
-    ("base force for the position under it", "tube_force_n", "{:.1f} N at most"),
-    ("simulated transport", "simulated_seconds", "{:.2f} s"),
-    ("smallest clearance to walls", "min_workspace_clearance_m", "{:.4f} m"),
-    ("smallest clearance between bodies", "min_body_clearance_m", "{:.4f} m"),
-    ("peak speed of the object", "peak_speed_m_s", "{:.2f} m/s"),
-    ("peak base force", "peak_base_wrench_n", "{:.1f} N"),
-    ("final position error", "final_position_error_m", "{:.4f} m"),
-    ("final angle error", "final_angle_error_rad", "{:.4f} rad"),
+_ROWS = (
+    ("answer", "{answer}"),
+    ("transport", "{outcome}"),
+    ("cells", "{cells}"),
+    ("planning took", "{planning_wall_seconds:.2f} s"),
+    ("estimated transport", "{estimated_seconds:.1f} s"),
+    ("its budget holds for", "{budget_holds_for}"),
+    ("simulated transport", "{simulated_seconds:.2f} s, estimated {estimated_seconds:.1f} s"),
+    ("smallest clearance to walls", "{min_workspace_clearance_m:.4f} m"),
+    ("smallest clearance between bodies", "{min_body_clearance_m:.4f} m"),
+    ("peak base force", "{peak_base_wrench_n:.1f} N"),
+    ("nearest to a limit of speed", "{nearest_to_a_limit}"),
+    ("error at the end", "{final_position_error_m:.4f} m, {final_angle_error_rad:.4f} rad"),
 )
-"""Label, fact and format of every row of the closing table, in its order; unknown facts have no row."""
-_MORE_ROWS: tuple[tuple[str, str, str], ...] = (
-    ("slices made", "slices", "{}"),
-    ("smallest path clearance in a cell", "narrowest_neck_m", "{:.3f} m"),
-    ("gains", "gains", "{}"),
-    ("first plan certified after", "first_plan_cpu_seconds", "{:.2f} s"),
-    ("mapping took", "mapping_wall_seconds", "{:.2f} s"),
-    ("maps read from the cache", "maps_read", "{}"),
-    ("largest map residual", "max_map_residual", "{:.1e}"),
-    ("unknowns of the largest map", "max_map_unknowns", "{}"),
-    ("simulating took", "simulation_wall_seconds", "{:.2f} s"),
-    ("smallest energy margin", "min_delta_e", "{:.2e} m²/s²"),
-    ("smallest funnel margin", "min_funnel_margin", "{:.4f} rad"),
-    ("largest acceleration error", "max_acceleration_error", "{:.1e} m/s²"),
-    ("largest wrench error", "max_wrench_error_n", "{:.1e} N"),
-    ("largest grasp error", "max_grasp_error_m", "{:.1e} m"),
-    ("messages between robots", "messages", "{}"),
-    ("their payload", "message_bytes", "{} bytes"),
-    ("peak rate of base forces", "peak_base_force_rate_n_s", "{:.0f} N/s"),
-    ("peak joint torque", "peak_joint_torque_nm", "{:.1f} N m"),
-    ("near stops between start and goal", "near_stops", "{}"),
-    ("time below a quarter of the mean speed", "slow_seconds", "{:.2f} s"),
-    ("peak memory", "peak_memory_mb", "{:.0f} MB"),
+"""Label and format, with the names of its facts, of every row of the closing table, in its order. A row has a
+place where all its facts are known."""
+
+_UNTIL_RUN = ("answer", "estimated transport")
+"""Rows that those of the simulation replace."""
+
+_MORE_ROWS = (
+    ("departure of the object under its budget", "{tube_radius_m:.4f} m at most"),
+    ("base force for the position under it", "{tube_force_n:.1f} N at most"),
+    ("peak speed of the object", "{peak_speed_m_s:.2f} m/s"),
+    ("slices made", "{slices}"),
+    ("smallest path clearance in a cell", "{narrowest_neck_m:.3f} m"),
+    ("gains", "{gains}"),
+    ("first plan certified after", "{first_plan_cpu_seconds:.2f} s"),
+    ("mapping took", "{mapping_wall_seconds:.2f} s"),
+    ("maps read from the cache", "{maps_read}"),
+    ("largest map residual", "{max_map_residual:.1e}"),
+    ("unknowns of the largest map", "{max_map_unknowns}"),
+    ("simulating took", "{simulation_wall_seconds:.2f} s"),
+    ("smallest energy margin", "{min_delta_e:.2e} m²/s²"),
+    ("smallest funnel margin", "{min_funnel_margin:.4f} rad"),
+    ("largest acceleration error", "{max_acceleration_error:.1e} m/s²"),
+    ("largest wrench error", "{max_wrench_error_n:.1e} N"),
+    ("largest grasp error", "{max_grasp_error_m:.1e} m"),
+    ("messages between robots", "{messages}"),
+    ("their payload", "{message_bytes} bytes"),
+    ("peak rate of base forces", "{peak_base_force_rate_n_s:.0f} N/s"),
+    ("peak joint torque", "{peak_joint_torque_nm:.1f} N m"),
+    ("near stops between start and goal", "{near_stops}"),
+    ("time below a quarter of the mean speed", "{slow_seconds:.2f} s"),
+    ("peak memory", "{peak_memory_mb:.0f} MB"),
 )
 """Rows that ``--verbose`` adds."""
 
 
 def summary_rows(facts: Mapping[str, Any], *, verbose: bool = False) -> list[tuple[str, str]]:
-    """Return label and value of every row whose fact is known; of more rows if ``verbose``."""
-    rows = (*_ROWS, *_MORE_ROWS) if verbose else _ROWS
-    known = [(label, form.format(facts[key])) for label, key, form in rows if facts.get(key) is not None]
-    speeds = [speed for speed in facts.get("peak_speeds", ()) if verbose or "turn rate" not in speed["name"]]
-    return known + [(f"peak {speed['name']}", _beside_limit(speed)) for speed in speeds]
+    """Return label and value of every row whose facts are known; of more rows if ``verbose``."""
+    known = {key: value for key, value in facts.items() if value is not None}
+    speeds = facts.get("peak_speeds", ())
+    limited = [speed for speed in speeds if speed["limit"]]
+    if limited:
+        nearest = max(limited, key=lambda speed: speed["peak"] / speed["limit"])
+        known["nearest_to_a_limit"] = f"{nearest['name']}, {_beside_limit(nearest)}"
+    rows = [
+        (label, form.format_map(known))
+        for label, form in (*_ROWS, *_MORE_ROWS)[: None if verbose else len(_ROWS)]
+        if known.keys() >= {field for _, field, _, _ in Formatter().parse(form) if field}
+        and not ("outcome" in known and label in _UNTIL_RUN)
+    ]
+    every = [(f"peak {speed['name']}", _beside_limit(speed)) for speed in speeds if verbose]
+    return rows + every
 
 
 def _beside_limit(speed: Mapping[str, Any]) -> str:
