@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.common import RandomGenerator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import RandomSource
 
-from coop_drake.diagram.radio import seed_of
 from coop_drake.diagram.robot_controller import TELEMETRY
 from coop_drake.diagram.wrapping import Holding, Wrapping
 from coop_drake.scenario import Deployment
@@ -23,26 +20,19 @@ class DeployedController:
     Attributes:
         diagram: The whole; it has the same ports as the controller inside.
         controller: The controller inside.
-        noises: Sources of noise.
         delays: Blocks that hold measurements, in the order of the signals.
-        seed: Of the sources of noise.
     """
 
     diagram: Diagram
     controller: Diagram
-    noises: tuple[RandomSource, ...]
     delays: tuple[Holding, ...]
-    seed: int
 
     def prepare(self, root: Context) -> None:
-        """Seed the noise, and set p_G and held measurements to their values at the start."""
+        """Set p_G and held measurements to their values at the start."""
         pose = self.diagram.GetInputPort("object_pose").Eval(self.diagram.GetMyContextFromRoot(root))
         if self.controller.HasSubsystemNamed("governor_state"):
             governor = self.controller.GetSubsystemByName("governor_state")
             governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), pose[:2])
-        generator = RandomGenerator(self.seed)
-        for noise in self.noises:
-            noise.SetRandomContext(noise.GetMyMutableContextFromRoot(root), generator)
         for delay in self.delays:
             context = delay.GetMyMutableContextFromRoot(root)
             now, state = delay.get_input_port(0).Eval(context), context.get_mutable_discrete_state_vector()
@@ -85,7 +75,5 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int, name: str) -
     return DeployedController(
         builder.Build(),
         controller,
-        tuple(wrapping.noises),
         tuple(wrapping.delays),
-        seed_of(deployment, robot),
     )

@@ -6,15 +6,12 @@ from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
 import numpy as np
-from pydrake.common import RandomDistribution
 from pydrake.systems.framework import DiagramBuilder, InputPort, LeafSystem, OutputPort
 from pydrake.systems.primitives import (
-    Adder,
     AffineSystem,
     DiscreteTimeDelay,
     FirstOrderLowPassFilter,
     Gain,
-    RandomSource,
     Saturation,
     ZeroOrderHold,
 )
@@ -22,11 +19,17 @@ from pydrake.systems.primitives import (
 from coop_drake.diagram.radio import build_radio, seed_of
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.scenario import Deafness, Deployment, Messages, PoseBias, RobotDepartures, Silence
-from coop_drake.systems import Interruption, LossyMeasurement
+from coop_drake.systems import Interruption, LossyMeasurement, MeasurementNoise
 from coop_drake.tree.pose import FloatArray
 
 Holding: TypeAlias = DiscreteTimeDelay | ZeroOrderHold | LossyMeasurement
 """Blocks that hold measurements."""
+
+NOISE_USES = {"object_pose": 5, "robot_state": 6}
+"""Uses of the seeds of the noise of what is measured, see ``seed_of``."""
+
+LOSS_USES = {"object_pose": 1, "robot_state": 2}
+"""Uses of the seeds of its losses."""
 
 _STRONGEST = 1e5
 """Limit of every effort where the scenario gives none [N, N m]. A controller outside its funnel may ask for
@@ -43,7 +46,6 @@ class Wrapping:
     def __init__(self, builder: DiagramBuilder, deployment: Deployment, robot: int, name: str) -> None:
         self._builder, self._deployment, self._robot = builder, deployment, robot
         self._own = deployment.of_robot(name)
-        self.noises: list[RandomSource] = []
         self.delays: list[Holding] = []
 
     def measure(self, entry: InputPort) -> None:
@@ -52,7 +54,7 @@ class Wrapping:
         measurements = self._deployment.measurements
         blocks = [(f"{name}_biased", _distortion(self._own, name, size))]
         if period is not None:
-            blocks.append((f"{name}_measured", self._noise(name, size)))
+            blocks.append((f"{name}_measured", self._noise(name, size, period)))
             delays = self._delays(size, whole_periods(measurements.delay, period))
             blocks.extend((f"{name}_delay{i or ''}", delay) for i, delay in enumerate(delays))
             blocks.append((f"{name}_received", self._losses(name, size, period)))
@@ -132,18 +134,12 @@ class Wrapping:
             entry = block.get_input_port(0)
         self._builder.ExportInput(entry, name)
 
-    def _noise(self, name: str, size: int) -> Adder | None:
-        """Add a source of noise for a measured port, and return the block that adds it; None for no noise."""
-        deviations = _deviations(self._deployment, name, size)
+    def _noise(self, name: str, size: int, period: float) -> MeasurementNoise | None:
+        """Return the block that adds noise to a measured port, None for no noise."""
+        deviations = measurement_deviations(self._deployment, name, size)
         if not deviations.any():
             return None
-        noise = RandomSource(RandomDistribution.kGaussian, size, self._deployment.period or 0.0)
-        self._builder.AddNamedSystem(f"{name}_noise", noise)
-        self.noises.append(noise)
-        scaled = self._append(noise.get_output_port(), [(f"{name}_deviations", Gain(deviations))])
-        adder = self._builder.AddNamedSystem(f"{name}_measured", Adder(2, size))
-        self._builder.Connect(scaled, adder.get_input_port(1))
-        return adder
+        return MeasurementNoise(deviations, period, seed_of(self._deployment, self._robot, NOISE_USES[name]))
 
     def _delays(self, size: int, periods: int) -> list[Holding]:
         """Return the blocks that delay a signal by a number of control periods.
@@ -170,7 +166,7 @@ class Wrapping:
             late=m.late,
             late_by=m.late_by,
             offset=self._own.sample_offset,
-            seed=seed_of(self._deployment, self._robot, 1 + (name == "robot_state")),
+            seed=seed_of(self._deployment, self._robot, LOSS_USES[name]),
         )
 
     def _interruption(self, size: int, silence: Silence | Deafness, *, held: bool) -> Interruption:
@@ -184,7 +180,7 @@ class Wrapping:
         )
 
 
-def _deviations(deployment: Deployment, name: str, size: int) -> FloatArray:
+def measurement_deviations(deployment: Deployment, name: str, size: int) -> FloatArray:
     """Return the standard deviations of (x, y, angle), or of (x, y, angle, joints..., their rates)."""
     m = deployment.measurements
     count = 3 if name == "object_pose" else size // 2

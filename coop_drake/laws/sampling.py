@@ -19,3 +19,19 @@ def whole_periods(time: float, period: float) -> int:
         period: The control period [s].
     """
     return ceil(time / period - _ROUNDING)
+
+
+_LATE = 1e-6
+"""Share of a period by which a sample may seem to be early [-]: times of samples are multiples of the period
+up to rounding errors, which are far smaller."""
+
+
+def period_of(time: float, period: float, offset: float = 0.0) -> int:
+    """Return the number of the control period that a time is in, 0 for the first one.
+
+    Args:
+        time: The time [s].
+        period: The control period [s].
+        offset: When the first period begins [s].
+    """
+    return max(int((time - offset) / period + _LATE), 0)

@@ -13,6 +13,7 @@ from coop_drake.systems.hold_receiver import HoldReceiver
 from coop_drake.systems.hold_supervisor import HoldSupervisor
 from coop_drake.systems.interruption import Interruption
 from coop_drake.systems.lossy_measurement import LossyMeasurement
+from coop_drake.systems.measurement_noise import MeasurementNoise
 from coop_drake.systems.message_channel import MessageChannel, clear_channel
 from coop_drake.systems.nominal_axes import AxisMotion, NominalAxes
 from coop_drake.systems.nominal_governor import NominalGovernor, NominalMotion
@@ -48,6 +49,7 @@ __all__ = [
     "HoldSupervisor",
     "Interruption",
     "LossyMeasurement",
+    "MeasurementNoise",
     "MessageChannel",
     "NominalAxes",
     "NominalGovernor",

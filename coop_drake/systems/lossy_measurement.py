@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from random import Random
-
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 
-from coop_drake.laws.sampling import whole_periods
+from coop_drake.laws.random_draws import uniform_pair
+from coop_drake.laws.sampling import period_of, whole_periods
 from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray
 
@@ -33,7 +32,7 @@ class LossyMeasurement(Block):
         late: Probability that one which is not lost arrives late [-].
         late_by: How much later, rounded up to whole periods, at least one [s].
         offset: Time of the first measurement [s].
-        seed: Seed of the random losses.
+        seed: Seed of the random losses, from 0 to 2^32 - 1.
 
     Raises:
         ValueError: The period is not positive, the delay negative, or a probability not in [0, 1].
@@ -70,10 +69,9 @@ class LossyMeasurement(Block):
 
     def _thrown(self, context: Context) -> tuple[int, bool, bool]:
         """Return the number of the present measurement, whether it is lost, and whether it is late if not."""
-        # A small part of a period makes up for rounding of times that are whole periods.
-        number = max(int((context.get_time() - self._offset) / self._period + 1e-6), 0)
-        dice = Random(self._seed << 32 | number)
-        return number, dice.random() < self._loss, dice.random() < self._late
+        number = period_of(context.get_time(), self._period, self._offset)
+        lost, late = uniform_pair(self._seed, number)
+        return number, lost < self._loss, late < self._late
 
     def _receive(self, context: Context, discrete_state: DiscreteValues) -> None:
         kept = context.get_discrete_state_vector().value().reshape(self._rows, -1)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from random import Random
-
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 from pydrake.systems.primitives import LinearSystem
 
-from coop_drake.laws.sampling import whole_periods
+from coop_drake.laws.random_draws import uniform_pair
+from coop_drake.laws.sampling import period_of, whole_periods
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import READY_SIZE
 
@@ -33,7 +32,7 @@ class MessageChannel(Block):
         delay: Time that a report travels, rounded up to whole periods [s].
         loss: Probability that a report is lost [-].
         repeat: Probability that a report which is not lost arrives twice [-].
-        seed: Seed of the random losses and delays.
+        seed: Seed of the random losses and delays, from 0 to 2^32 - 1.
 
     Raises:
         ValueError: The period is not positive, the delay negative, or a probability not in [0, 1].
@@ -74,8 +73,8 @@ class MessageChannel(Block):
         """Return whether a report arrives, and whether it is repeated, drawn with their probabilities."""
         if self._loss == 0.0 and self._repeat == 0.0:
             return True, False
-        dice = Random(self._seed << 32 | round(context.get_time() / self._period))
-        return dice.random() >= self._loss, dice.random() < self._repeat
+        lost, repeated = uniform_pair(self._seed, period_of(context.get_time(), self._period))
+        return lost >= self._loss, repeated < self._repeat
 
     def _write_heard(self, context: Context, output: BasicVector) -> None:
         output.SetFromVector(context.get_discrete_state_vector().value()[:READY_SIZE])

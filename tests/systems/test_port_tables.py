@@ -34,7 +34,7 @@ BLOCKS = sorted(
 
 EVERYTHING = Deployment(
     control_rate=100.0,
-    measurements=Measurements(loss=0.1, delay=0.02),
+    measurements=Measurements(loss=0.1, delay=0.02, angle_noise=1e-3),
     messages=Messages(loss=0.1),
     robots={"*": RobotDepartures(silence=Silence(1.0))},
     floor=Floor(coulomb_friction=1.0),
