@@ -54,7 +54,7 @@ MILD = {
     "late reports": Deployment(control_rate=RATE, messages=Messages(delay=0.2)),
     "repeated reports": Deployment(control_rate=RATE, messages=Messages(repeat=1.0, delay=0.05)),
     "lost measurements": at_200_hz(measurements=Measurements(loss=0.1)),
-    "late measurements": at_200_hz(measurements=Measurements(late=0.3, late_by=0.02)),
+    "late measurements": at_200_hz(measurements=Measurements(late=0.2, late_by=0.02)),
     "a biased pose in one robot": in_one(pose_bias=PoseBias(x=0.005)),
     "a biased pose in all": at_200_hz(robots={"*": RobotDepartures(pose_bias=PoseBias(x=0.005))}),
     "odometry": in_one(odometry_scale=0.05),
@@ -77,7 +77,10 @@ HARSH = {
         "to its funnel is",
     ),
     "lag": (Deployment(actuators=ActuatorLimits(lag=0.1)), "to its funnel is"),
-    "noise": (Deployment(control_rate=RATE, measurements=Measurements(0.02, 0.01, 0.02)), "to its funnel is"),
+    "noise": (
+        Deployment(control_rate=RATE, measurements=Measurements(0.03, 0.015, 0.03)),
+        "to its funnel is",
+    ),
     "delay": (Deployment(control_rate=RATE, measurements=Measurements(delay=0.1)), "to its funnel is"),
     "model error": (Deployment(mass_error=-0.98), "distance of object angle to its funnel is -"),
     "lost reports": (
