@@ -6,7 +6,9 @@ _EXTRAS = {
     "cma": "tune",
     "collada": "robots",
     "defusedxml": "robots",
+    "distributed": "campaign",
     "ezdxf": "floor-plans",
+    "pyarrow": "campaign",
     "svgelements": "floor-plans",
     "trimesh": "robots",
 }

@@ -1,0 +1,98 @@
+"""The campaign file as typed data."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from coop_drake.campaign.distributions import Count, Distribution
+from coop_drake.errors import ScenarioError
+from coop_drake.scenario.reading import read_file
+from coop_drake.typed_data import EXACT, Codec, DataError, Limits, Positive
+
+Tier = Literal["drake", "compiled"]
+"""Which loop a run is made by."""
+
+Plain = Annotated[Any, Codec(lambda value, key: value, lambda value: value)]
+"""A value as it would stand in a scenario file; the scenario's own key says what is allowed."""
+
+Seed = Annotated[int, Limits(at_least=0), EXACT]
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Runs of transports whose scenarios vary.
+
+    Attributes:
+        scenarios: Scenario files, relative to the campaign file, or names of shipped scenarios.
+        count: How many runs of every scenario and every combination of the grid.
+        set: Values of keys of the scenario in every run and in the plan, by their dotted keys.
+        vary: From what the values of keys of the scenario are drawn, by their dotted keys.
+        grid: Values of keys of the scenario of which every combination is run, by their dotted keys. Plans
+            do not know what vary and grid say of deployment, control, plant and simulator.
+        seed: Seed of all that is drawn.
+        tier: ``drake`` for the loop of Drake's systems, ``compiled`` for the compiled loop, ``both`` for
+            every run in each of them.
+        paired: With ``compiled``, how many of the first runs of every scenario are made by Drake's loop,
+            too, so that the report can say how far the tiers differ.
+        budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it; null for what
+            every scenario requires.
+        batch: Runs that one process makes, and one file holds.
+        time_limit: Longest that a process may take for each of its runs, besides its start [s].
+        keep: Of which of Drake's runs the log is kept, too; any run can be made again later.
+    """
+
+    scenarios: tuple[str, ...]
+    count: Count
+    set: dict[str, Plain] = field(default_factory=dict)
+    vary: dict[str, Distribution] = field(default_factory=dict)
+    grid: dict[str, tuple[Plain, ...]] = field(default_factory=dict)
+    seed: Seed = 0
+    tier: Literal["drake", "compiled", "both"] = "drake"
+    paired: Annotated[int, Limits(at_least=0)] = 20
+    budget: str | None = None
+    batch: Count = 20
+    time_limit: Positive = 120.0
+    keep: Literal["none", "lost", "all"] = "none"
+
+    def __post_init__(self) -> None:
+        if not self.scenarios:
+            raise DataError("scenarios", [], "at least one scenario")
+        for key, values in self.grid.items():
+            if not values:
+                raise DataError(f"grid.{key}", [], "at least one value")
+            if key in self.vary:
+                raise DataError(f"grid.{key}", list(values), "a key that vary does not have, too")
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """What a campaign does; it has at least one section.
+
+    Attributes:
+        runs: Runs of transports; null for none.
+        path: The file it was read from.
+    """
+
+    runs: Runs | None = None
+    path: Path = field(default=Path("campaign.yaml"), metadata={"in_file": False})
+
+    @property
+    def name(self) -> str:
+        """The file's name without ``.campaign.yaml``."""
+        return self.path.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".campaign")
+
+
+def load_campaign(path: Path | str) -> Campaign:
+    """Read a campaign file; what its scenarios allow is checked by :mod:`coop_drake.campaign.variation`.
+
+    Raises:
+        ScenarioError: With file, key, value and what is allowed there.
+    """
+    file = Path(path)
+    campaign = dataclasses.replace(read_file(Campaign, file), path=file)
+    if campaign == Campaign(path=file):
+        raise ScenarioError(str(file), "the file", "no section", "at least one section, such as runs")
+    return campaign
