@@ -15,7 +15,7 @@ from coop_drake.laws.disturbance import observer_gains
 from coop_drake.laws.governor import FIELD_SPEED, slowdown_radius
 from coop_drake.laws.readiness import REST_WINDOW
 from coop_drake.laws.sampling import whole_periods
-from coop_drake.plant import RobotPlant, TeamPlant, build_robot_plant
+from coop_drake.plant import RobotPlant, TeamPlant, base_chain, build_robot_plant
 from coop_drake.plant.team import RobotModel
 from coop_drake.scenario import Deployment, Scenario
 from coop_drake.systems import AxisMotion, GovernedCell, NominalMotion
@@ -70,7 +70,7 @@ def robot_knowledge(
             rest_samples=_rest_samples(deployment),
             observer_gains=observer_gains(scenario.command_age) if control.observer else None,
             motion=_motion(scenario, plan, robot.name, 0 if control.predictor else delay),
-            axis_motion=_axis_motion(scenario, plan, robot, 0 if control.predictor else delay),
+            axis_motion=_axis_motion(scenario, plan, team, robot, 0 if control.predictor else delay),
         )
         for robot in team.robots
     ]
@@ -110,7 +110,9 @@ def _motion(scenario: Scenario, plan: Plan, robot: str, age: int) -> NominalMoti
     )
 
 
-def _axis_motion(scenario: Scenario, plan: Plan, robot: RobotModel, age: int) -> AxisMotion | None:
+def _axis_motion(
+    scenario: Scenario, plan: Plan, team: TeamPlant, robot: RobotModel, age: int
+) -> AxisMotion | None:
     """Return the nominal motion of a robot's axes, None where the plan's budget has none."""
     deployment, tracking = scenario.deployment, plan.axis_tracking
     if plan.budget is None or tracking is None or deployment.period is None:
@@ -122,6 +124,7 @@ def _axis_motion(scenario: Scenario, plan: Plan, robot: RobotModel, age: int) ->
         period=deployment.period,
         lag=plan.budget.lag,
         measurement_periods=age,
+        mounting=base_chain(team, robot).mounting,
         offset=deployment.of_robot(robot.name).sample_offset,
     )
 

@@ -261,6 +261,9 @@ _NOMINAL = {"object_state": "nominal_object", "robot_state": "nominal_robot"}
 _FOLLOWERS = ("axis_ppc", "ready_monitor")
 """Blocks that act on this nominal motion."""
 
+_AHEAD = {"object_state": "object_ahead", "robot_state": "robot_ahead"}
+"""Which signals the blocks that command get then: measured angles and rates would be late and noisy."""
+
 _COMPENSATED = ("wrench_law", "robot_effort")
 """Blocks that command; all others take the accelerations that the law wants."""
 
@@ -275,7 +278,11 @@ def _connect_by_name(
         if "state_predictor" in blocks and label != "state_predictor":
             renamed |= _REPLACED["state_predictor"]
         if "nominal_axes" in blocks and label != "nominal_axes":
-            renamed |= _NOMINAL if label in _FOLLOWERS else {"axis_acceleration": "pulled_axes"}
+            if label in _FOLLOWERS:
+                renamed |= _NOMINAL
+            else:
+                renamed["axis_acceleration"] = "pulled_axes"
+                renamed |= _AHEAD if label in _COMPENSATED else {}
         if "disturbance_observer" in blocks and label in _COMPENSATED:
             renamed |= _REPLACED["disturbance_observer"]
         for port in (block.get_input_port(i) for i in range(block.num_input_ports())):

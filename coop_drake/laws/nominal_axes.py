@@ -13,6 +13,9 @@ to its nominal motion by the command
 
 each with the nominal state of the instant at which its measurements were made. The departure x - x^ obeys a
 linear equation that does not vary in time, whatever the law.
+
+The angles and rates with which desired accelerations become efforts are nominal ones, too: the base of a
+robot turns with the object and against its joints, so that its yaw follows from its axes.
 """
 
 from __future__ import annotations
@@ -72,3 +75,51 @@ def pulled_axis(
     """
     away, fast = position - expected[0], rate - expected[1]
     return command + governed_acceleration(away, fast, 0.0, gains[0], gains[1])
+
+
+@compiled
+def pull_axes(
+    commands: FloatArray,
+    object_state: FloatArray,
+    robot_state: FloatArray,
+    expected: FloatArray,
+    gains: tuple[float, float],
+    pulled: FloatArray,
+) -> None:
+    """Write u, the commands of one robot's axes with the pull towards their nominal motion.
+
+    Args:
+        commands: L(t, x^, x^') of the object's angle and of the joints now, [rad/s^2 or m/s^2], (1 + n,).
+        object_state: Pose and twist of the object as measured, shape (6,).
+        robot_state: (z_k, z_k') as measured, shape (2 (3 + n),); not read where the robot has no joints.
+        expected: x^ and x^' of the axes when these were measured, shape (2, 1 + n).
+        gains: K_a [1/s^2] and zeta_a [1/s].
+        pulled: Receives u, shape (1 + n,) [rad/s^2 or m/s^2].
+    """
+    n = commands.size - 1
+    for i in range(1 + n):
+        x = robot_state[2 + i] if i else object_state[2]
+        rate = robot_state[5 + n + i] if i else object_state[5]
+        pulled[i] = pulled_axis(commands[i], x, rate, (expected[0, i], expected[1, i]), gains)
+
+
+@compiled
+def place_on_axes(axes: FloatArray, mounting: FloatArray, robot_state: FloatArray) -> None:
+    """Write the angles of a robot whose object and joints stand and move as given: yaw, joints, and rates.
+
+    Its base turns with the object and against its joints: yaw = theta + offset + sum of turn_i q_i. The
+    base's position and velocity are left as they are.
+
+    Args:
+        axes: (theta, q_k) and their rates, shape (2, 1 + n) or more rows.
+        mounting: Yaw of the base in the object where all joints are at zero [rad], then what a unit of every
+            joint turns the base by in the object [-], shape (1 + n,).
+        robot_state: (z_k, z_k'), shape (2 (3 + n),).
+    """
+    n, half = axes.shape[1] - 1, 2 + axes.shape[1]
+    for row in range(2):
+        yaw = axes[row, 0] + (mounting[0] if row == 0 else 0.0)
+        for i in range(1, 1 + n):
+            yaw += mounting[i] * axes[row, i]
+            robot_state[row * half + 2 + i] = axes[row, i]
+        robot_state[row * half + 2] = yaw

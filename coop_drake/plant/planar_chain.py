@@ -45,6 +45,12 @@ class BaseChain:
     yaw: float
     joints: IntArray
 
+    @property
+    def mounting(self) -> FloatArray:
+        """The yaw, then what a unit of every joint turns the base by in the object [-], shape (1 + n,)."""
+        turns = dict(zip(self.chain[1:-1, POSITION], self.chain[1:-1, TURN], strict=True))
+        return np.array([self.yaw, *(turns.get(place, 0.0) for place in self.joints[0])])
+
 
 def robot_chain(robot: RobotPlant) -> FloatArray:
     """The chain of a robot's own model, from its base to its end effector; masses are those of its context.

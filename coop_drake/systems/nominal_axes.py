@@ -8,7 +8,7 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
 from coop_drake.answers.axis_tracking import AxisTracking
-from coop_drake.laws.nominal_axes import carry_axes, pulled_axis
+from coop_drake.laws.nominal_axes import carry_axes, place_on_axes, pull_axes
 from coop_drake.systems.block import Block
 from coop_drake.tree.pose import FloatArray
 
@@ -23,6 +23,8 @@ class AxisMotion:
         period: T, the control period [s].
         lag: Time constant of the actuators that the plan's budget states [s].
         measurement_periods: Age of the measurements in periods [-].
+        mounting: Yaw of the base in the object where all joints are at zero [rad], then what a unit of every
+            joint turns the base by in the object [-], shape (1 + n,).
         offset: Time of the first computation [s].
     """
 
@@ -31,6 +33,7 @@ class AxisMotion:
     period: float
     lag: float
     measurement_periods: int
+    mounting: FloatArray
     offset: float = 0.0
 
 
@@ -42,14 +45,20 @@ class NominalAxes(Block):
     input   ``robot_state``          2 (3 + n)  z_k and its rate as measured                           W
     input   ``axis_acceleration``    1 + n      what the law asks for, of the nominal motion           W
     output  ``nominal_object``       6          ``object_state`` with the nominal angle and its rate   W
-    output  ``nominal_robot``        2 (3 + n)  ``robot_state`` with the nominal joints and rates      W
+    output  ``nominal_robot``        2 (3 + n)  ``robot_state`` with the nominal yaw of the base,      W
+                                                joints and rates of both
+    output  ``object_ahead``         6          as ``nominal_object``, half a period and a lag later   W
+    output  ``robot_ahead``          2 (3 + n)  as ``nominal_robot``, half a period and a lag later    W
     output  ``pulled_axes``          1 + n      desired accelerations of the object's angle [rad/s^2], W
                                                 of the joints [rad/s^2 or m/s^2], with the pull
     ======= ======================== ========== ====================================================== =====
 
     State: one discrete group (x^, x^', a^ of all axes, then x^ and x^' of the last m samples, m being the age
-    of measurements in periods, the latest first), updated every period. ``robot_state`` is not read where the
-    robot has no joints.
+    of measurements in periods, the latest first), updated every period. ``robot_state`` is not read for
+    ``pulled_axes`` where the robot has no joints.
+
+    An effort acts half a period and a lag after it was computed, on average. The blocks that turn
+    accelerations into efforts therefore take the angles and rates of then.
     """
 
     def __init__(self, motion: AxisMotion) -> None:
@@ -63,16 +72,17 @@ class NominalAxes(Block):
         past = [motion.start, rest] * motion.measurement_periods
         group = self.DeclareDiscreteState(np.concatenate([motion.start, rest, rest, *past]))
         ports = self._object, self._robot, self._law
-        measured_object, measured_robot, asked = (self.input_port_ticket(port.get_index()) for port in ports)
+        of_object, of_robot, asked = (self.input_port_ticket(port.get_index()) for port in ports)
         nominal = self.discrete_state_ticket(group)
         # Without these the law's answer would seem to depend on itself.
-        self.DeclareVectorOutputPort("nominal_object", 6, self._write_object, {measured_object, nominal})
-        self.DeclareVectorOutputPort(
-            "nominal_robot", 2 * (2 + axes), self._write_robot, {measured_robot, nominal}
-        )
-        self.DeclareVectorOutputPort(
-            "pulled_axes", axes, self._write_pulled, {measured_object, measured_robot, asked, nominal}
-        )
+        for name, size, calc, read in (
+            ("nominal_object", 6, self._write_object, {of_object}),
+            ("nominal_robot", 2 * (2 + axes), self._write_robot, {of_robot}),
+            ("object_ahead", 6, self._write_object_ahead, {of_object, asked}),
+            ("robot_ahead", 2 * (2 + axes), self._write_robot_ahead, {of_robot, asked}),
+            ("pulled_axes", axes, self._write_pulled, {of_object, of_robot, asked}),
+        ):
+            self.DeclareVectorOutputPort(name, size, calc, read | {nominal})
         self.declare_update(self._step, motion.period, motion.offset)
 
     def _states(self, context: Context) -> FloatArray:
@@ -80,24 +90,40 @@ class NominalAxes(Block):
         state: FloatArray = context.get_discrete_state_vector().value()
         return state.reshape(-1, self._motion.start.size)
 
+    def _ahead(self, context: Context) -> FloatArray:
+        """Return x^, x^' and a^ half a period and a lag later, shape (3, 1 + n)."""
+        later, motion = np.empty((3, self._motion.start.size)), self._motion
+        time = 0.5 * motion.period + motion.lag
+        carry_axes(self._states(context)[:3], self._law.Eval(context), time, motion.lag, later)
+        return later
+
     def _write_object(self, context: Context, output: BasicVector) -> None:
-        shown, states = output.get_mutable_value(), self._states(context)
+        self._show_object(context, self._states(context), output)
+
+    def _write_object_ahead(self, context: Context, output: BasicVector) -> None:
+        self._show_object(context, self._ahead(context), output)
+
+    def _show_object(self, context: Context, states: FloatArray, output: BasicVector) -> None:
+        shown = output.get_mutable_value()
         shown[:] = self._object.Eval(context)
         shown[2], shown[5] = states[0, 0], states[1, 0]
 
     def _write_robot(self, context: Context, output: BasicVector) -> None:
-        shown, states, n = output.get_mutable_value(), self._states(context), self._motion.start.size - 1
+        self._show_robot(context, self._states(context), output)
+
+    def _write_robot_ahead(self, context: Context, output: BasicVector) -> None:
+        self._show_robot(context, self._ahead(context), output)
+
+    def _show_robot(self, context: Context, states: FloatArray, output: BasicVector) -> None:
+        shown = output.get_mutable_value()
         shown[:] = self._robot.Eval(context)
-        shown[3 : 3 + n], shown[6 + n :] = states[0, 1:], states[1, 1:]
+        place_on_axes(states, self._motion.mounting, shown)
 
     def _write_pulled(self, context: Context, output: BasicVector) -> None:
-        states, pulled, n = self._states(context), output.get_mutable_value(), self._motion.start.size - 1
+        states, law, seen = self._states(context), self._law.Eval(context), self._object.Eval(context)
         expected = states[-2:] if self._motion.measurement_periods else states[:2]
-        law, measured = self._law.Eval(context), self._object.Eval(context)
-        robot = self._robot.Eval(context) if n else measured
-        for i in range(1 + n):
-            x, v = (measured[2], measured[5]) if i == 0 else (robot[2 + i], robot[5 + n + i])
-            pulled[i] = pulled_axis(law[i], x, v, (expected[0, i], expected[1, i]), self._gains)
+        robot = self._robot.Eval(context) if states.shape[1] > 1 else seen
+        pull_axes(law, seen, robot, expected, self._gains, output.get_mutable_value())
 
     def _step(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         motion, states = self._motion, self._states(context)

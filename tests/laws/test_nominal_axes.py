@@ -2,9 +2,13 @@
 
 import numpy as np
 import pytest
+from pydrake.systems.framework import DiagramBuilder
 from scipy.integrate import solve_ivp
 
-from coop_drake.laws.nominal_axes import carry_axes, pulled_axis
+from coop_drake.laws.nominal_axes import carry_axes, place_on_axes, pulled_axis
+from coop_drake.laws.robot_dynamics import read_robot
+from coop_drake.plant import base_chain, build_team_plant
+from coop_drake.scenario import load_scenario
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.003])
@@ -27,3 +31,19 @@ def test_an_axis_on_its_nominal_motion_is_not_pulled():
 
 def test_the_pull_is_that_of_a_spring_and_a_damper():
     assert pulled_axis(1.5, 0.31, -0.1, (0.3, -0.2), (400.0, 30.0)) == pytest.approx(1.5 - 4.0 - 3.0)
+
+
+def test_the_base_of_every_robot_turns_with_the_object_and_against_its_joints():
+    team = build_team_plant(load_scenario("elbow"), DiagramBuilder())
+    n, generator = team.plant.num_positions(), np.random.default_rng(0)
+    state, away = generator.uniform(-1.0, 1.0, 2 * n), np.array([7.0, 8.0])
+    axes = np.array([state[team.position_index[2:]], state[n + team.velocity_index[2:]]])
+    for robot in team.robots:
+        base, expected, found = base_chain(team, robot), np.empty(10), np.empty(10)
+        read_robot(base.chain, base.yaw, base.joints, state, expected)
+        own = np.ascontiguousarray(axes[:, [0, *range(1 + robot.q_slice.start, 1 + robot.q_slice.stop)]])
+        found[[0, 1]], found[[5, 6]] = away, away
+        place_on_axes(own, base.mounting, found)
+        found[2] = np.angle(np.exp(1j * found[2]))
+        np.testing.assert_allclose(found[[2, 3, 4, 7, 8, 9]], expected[[2, 3, 4, 7, 8, 9]], atol=1e-12)
+        np.testing.assert_array_equal(found[[0, 1, 5, 6]], [*away, *away])

@@ -11,9 +11,14 @@ from tests.support.system_checks import context_with, evaluate, port_sizes
 START = np.array([0.4, -0.2, 0.7])
 """The object's angle and two joints."""
 
+MOUNTING = np.array([0.3, -1.0, 0.0])
+"""The base's yaw at zero; the first joint turns it backwards, the second one slides."""
+
 
 def block(periods=2, axes=3):
-    return NominalAxes(AxisMotion(AxisTracking(500.0, 38.0), START[:axes], 0.005, 0.005, periods))
+    return NominalAxes(
+        AxisMotion(AxisTracking(500.0, 38.0), START[:axes], 0.005, 0.005, periods, MOUNTING[:axes])
+    )
 
 
 def measured(angle=0.41, joints=(-0.21, 0.69), law=(1.0, -2.0, 3.0)):
@@ -33,7 +38,7 @@ def stepped(system, context, steps):
 def test_ports():
     assert port_sizes(block()) == (
         {"object_state": 6, "robot_state": 10, "axis_acceleration": 3},
-        {"nominal_object": 6, "nominal_robot": 10, "pulled_axes": 3},
+        {"nominal_object": 6, "nominal_robot": 10, "object_ahead": 6, "robot_ahead": 10, "pulled_axes": 3},
     )
 
 
@@ -51,13 +56,20 @@ def test_the_motion_follows_the_law_alone():
     np.testing.assert_array_equal(states[0][:9].reshape(3, 3), state)
 
 
-def test_the_law_gets_nominal_axes_and_the_rest_as_measured():
-    system = block()
+@pytest.mark.parametrize(
+    ("names", "ahead"),
+    [(("nominal_object", "nominal_robot"), 0.0), (("object_ahead", "robot_ahead"), 0.0075)],
+)
+def test_angles_and_rates_are_nominal_and_the_rest_as_measured(names, ahead):
+    system, state = block(), np.empty((3, 3))
     context = stepped(system, context_with(system, measured()), 3)
-    state = context.get_discrete_state_vector().CopyToVector().reshape(-1, 3)
-    shown, robot = (system.GetOutputPort(f"nominal_{name}").Eval(context) for name in ("object", "robot"))
-    np.testing.assert_array_equal(shown, [3.0, 4.0, state[0, 0], 0.1, 0.2, state[1, 0]])
-    np.testing.assert_array_equal(robot, [1.0, 2.0, 0.5, *state[0, 1:], 0.1, 0.2, 0.3, *state[1, 1:]])
+    now = context.get_discrete_state_vector().CopyToVector()[:9].reshape(3, 3)
+    carry_axes(now, np.array([1.0, -2.0, 3.0]), ahead, 0.005, state)
+    shown, robot = (system.GetOutputPort(name).Eval(context) for name in names)
+    np.testing.assert_allclose(shown, [3.0, 4.0, state[0, 0], 0.1, 0.2, state[1, 0]], rtol=1e-14)
+    yaw, rate = state[0, 0] + 0.3 - state[0, 1], state[1, 0] - state[1, 1]
+    expected = [1.0, 2.0, yaw, *state[0, 1:], 0.1, 0.2, rate, *state[1, 1:]]
+    np.testing.assert_allclose(robot, expected, rtol=1e-14)
 
 
 @pytest.mark.parametrize("periods", [0, 2])
