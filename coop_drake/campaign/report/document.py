@@ -1,0 +1,96 @@
+"""All numbers of a report, gathered once for the page and for machines."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from coop_drake.campaign.report.agreement import Agreement, agreement
+from coop_drake.campaign.report.columns import Runs
+from coop_drake.campaign.report.distributions import Group, summarise
+from coop_drake.campaign.report.influences import Influence, influences
+from coop_drake.campaign.report.questions import Questions, summarise_questions
+from coop_drake.campaign.report.rates import CONFIDENCE, Rate, loss_rate
+from coop_drake.campaign.report.worst import WorstRun, worst_runs
+from coop_drake.campaign.search.findings import BreakingPoint, Finding
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a campaign found.
+
+    Attributes:
+        title: Name of the campaign.
+        facts: What was asked for: name and value, in the order shown.
+        rate: How many of all runs were lost; None without runs.
+        groups: The runs of every scenario and tier.
+        influences: How margins depend on keys that vary.
+        agreements: How far two tiers agree.
+        worst: The worst runs.
+        questions: How the planner answered; empty without questions.
+        findings: What searches for lost runs found.
+        breaking: Multiples of what is certified at which runs are lost.
+    """
+
+    title: str
+    facts: tuple[tuple[str, str], ...]
+    rate: Rate | None
+    groups: tuple[Group, ...]
+    influences: tuple[Influence, ...]
+    agreements: tuple[Agreement, ...]
+    worst: tuple[WorstRun, ...]
+    questions: tuple[Questions, ...]
+    findings: tuple[Finding, ...]
+    breaking: tuple[BreakingPoint, ...]
+
+    def to_json(self) -> str:
+        """Return all numbers as JSON; numbers that are not finite are null."""
+        return json.dumps(_finite(asdict(self)), indent=1, ensure_ascii=False) + "\n"
+
+
+def make_report(
+    title: str,
+    runs: Any = None,
+    questions: Any = None,
+    *,
+    facts: Sequence[tuple[str, str]] = (),
+    findings: Sequence[Finding] = (),
+    breaking: Sequence[BreakingPoint] = (),
+    confidence: float = CONFIDENCE,
+) -> Report:
+    """Compute a report from the tables of a campaign.
+
+    Args:
+        title: Name of the campaign.
+        runs: A pyarrow table with the columns of ``RunRecord``, None for no runs.
+        questions: A pyarrow table with the columns of ``QuestionRecord``, None for no questions.
+        facts: What was asked for: name and value.
+        findings: What searches for lost runs found.
+        breaking: Multiples of what is certified at which runs are lost.
+        confidence: Probability with which the interval of a rate contains the true one, at least [-].
+    """
+    known = None if runs is None or runs.num_rows == 0 else Runs(runs)
+    asked = questions is not None and questions.num_rows > 0
+    return Report(
+        title,
+        tuple(facts),
+        None if known is None else loss_rate(int(known.lost.sum()), known.count, confidence),
+        () if known is None else summarise(known, confidence),
+        () if known is None else influences(known),
+        () if known is None else agreement(known),
+        () if known is None else worst_runs(known),
+        summarise_questions(questions) if asked else (),
+        tuple(findings),
+        tuple(breaking),
+    )
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,59 @@
+"""What searches leave: the worst run that one found, and the multiple at which runs are first lost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Finding:
+    """The worst run that a search found.
+
+    Attributes:
+        scenario: Name of the scenario.
+        tier: Which loop simulated the runs.
+        seed: Seed of the search.
+        evaluations: Runs simulated.
+        margin: Name of the column that was driven down.
+        before: Its value in the first run, without errors [unit of the column].
+        least: Its smallest value [unit of the column].
+        arrived: Whether the worst run arrived.
+        reason: Why not; empty if it arrived.
+        file: Scenario file of the worst run; empty where none was written.
+    """
+
+    scenario: str
+    tier: str
+    seed: int
+    evaluations: int
+    margin: str
+    before: float
+    least: float
+    arrived: bool
+    reason: str
+    file: str = ""
+
+
+@dataclass(frozen=True)
+class BreakingPoint:
+    """The multiple of a certified departure at which runs are first lost, found by bisection.
+
+    Attributes:
+        scenario: Name of the scenario.
+        tier: Which loop simulated the runs.
+        departure: Name of the departure.
+        certified: What is certified, in the departure's unit; the runs have this times the multiple.
+        kept: Largest multiple tried at which no run was lost [-].
+        lost: Smallest multiple tried at which a run was lost [-]; infinity where none was.
+        runs: Runs at every multiple.
+        reason: Why the first run was lost.
+    """
+
+    scenario: str
+    tier: str
+    departure: str
+    certified: float
+    kept: float
+    lost: float
+    runs: int
+    reason: str

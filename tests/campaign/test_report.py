@@ -1,0 +1,161 @@
+import json
+from html.parser import HTMLParser
+from math import inf, isnan
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from scipy.stats import beta
+
+from coop_drake.campaign.records import QuestionRecord, table_of
+from coop_drake.campaign.report import make_report, write_report
+from coop_drake.campaign.report.page import headline, render_page
+from coop_drake.campaign.report.rates import loss_rate
+from coop_drake.campaign.search import BreakingPoint, Finding
+from tests.support.campaign_table import run_table
+
+
+def replay(run):
+    return f"replay {run.run}"
+
+
+@pytest.fixture(scope="module")
+def both_tiers():
+    return make_report("both", run_table(300, tiers=("drake", "compiled"), lost=(7,)))
+
+
+def test_no_loss_gives_an_upper_bound_with_all_of_the_error_on_one_side():
+    rate = loss_rate(0, 10_000)
+    assert (rate.lower, rate.upper) == (0.0, pytest.approx(1.0 - 0.05**1e-4))
+    assert rate.sentence.startswith("None of 10,000 runs was lost. With 95 % confidence, at most 0.03 %")
+
+
+@pytest.mark.parametrize(("lost", "runs", "confidence"), [(1, 20, 0.95), (7, 50, 0.99), (19, 20, 0.9)])
+def test_bounds_of_a_rate_are_those_of_clopper_and_pearson(lost, runs, confidence):
+    rate, tail = loss_rate(lost, runs, confidence), (1.0 - confidence) / 2.0
+    assert rate.lower == pytest.approx(beta.ppf(tail, lost, runs - lost + 1), rel=1e-6)
+    assert rate.upper == pytest.approx(beta.ppf(1.0 - tail, lost + 1, runs - lost), rel=1e-6)
+
+
+def test_the_intervals_contain_the_true_share_as_often_as_they_say():
+    generator, share, runs = np.random.default_rng(3), 0.1, 40
+    counts = np.bincount(generator.binomial(runs, share, 2000), minlength=runs + 1)
+    inside = [loss_rate(lost, runs).lower <= share <= loss_rate(lost, runs).upper for lost in range(20)]
+    assert counts[:20] @ inside / 2000 >= 0.95
+
+
+def test_distributions_are_those_of_the_columns(both_tiers):
+    table = run_table(300, tiers=("drake", "compiled"), lost=(7,)).to_pylist()
+    for group in both_tiers.groups:
+        own = [row for row in table if (row["scenario"], row["tier"]) == (group.scenario, group.tier)]
+        margins = np.array([row["funnel_margin"] for row in own])
+        times = np.array([row["time"] for row in own if row["arrived"]])
+        assert group.measures["funnel_margin"].least == margins.min()
+        assert group.measures["time"].median == pytest.approx(np.median(times))
+        assert sum(group.measures["time"].heights) == times.size == group.measures["time"].count
+        assert group.rate.lost == sum(not row["arrived"] for row in own)
+        assert "budget_share" not in group.measures
+    assert {group.reasons for group in both_tiers.groups} == {(), (("left the funnel of the angle", 1),)}
+
+
+def test_the_fault_that_takes_the_margin_is_found_and_no_other(both_tiers):
+    clear = {(one.key, one.measure): one for one in both_tiers.influences if one.clear}
+    assert list(clear) == [("deployment.mass_error", "funnel_margin")]
+    (found,) = clear.values()
+    assert found.worst > 0.1
+    assert found.correlation < -0.9
+    assert found.taken == pytest.approx(0.0075 * (found.values[-1] - found.values[0]), rel=0.1)
+
+
+def test_tiers_are_compared_run_by_run(both_tiers):
+    rows = {(row["run"], row["tier"]): row for row in run_table(300, tiers=("drake", "compiled")).to_pylist()}
+    base, tight = both_tiers.agreements
+    assert (base.scenario, base.pairs, base.verdicts, tight.verdicts) == ("base", 150, 0, 0)
+    differences = [abs(rows[i, "drake"]["time"] - rows[i, "compiled"]["time"]) for i in range(0, 300, 2)]
+    assert base.largest["time"] == pytest.approx(max(differences))
+    assert make_report("one tier", run_table(10)).agreements == ()
+
+
+def test_lost_runs_come_first_among_the_worst_and_the_smallest_share_next(both_tiers):
+    lost = [run for run in both_tiers.worst if not run.arrived]
+    assert [run.run for run in both_tiers.worst[:2]] == [run.run for run in lost] == [7, 7]
+    shares = [run.share for run in both_tiers.worst[2:]]
+    assert shares == sorted(shares)
+    assert len(both_tiers.worst) == 10
+    assert all(run.measure == "funnel_margin" for run in both_tiers.worst)
+
+
+def test_a_tier_without_a_column_leaves_it_empty():
+    table = run_table(30)
+    empty = pa.array([float("nan")] * 30)
+    for name in ("wall_clearance", "body_clearance"):
+        table = table.set_column(table.schema.get_field_index(name), name, empty)
+    report = make_report("no clearance", table)
+    assert all("wall_clearance" not in group.measures for group in report.groups)
+    assert "nan" not in render_page(report, replay)
+
+
+def questions():
+    rows = [("corridor", "plan", True, False), ("corridor", "infeasible", True, True),
+            ("corridor", "plan", False, False), ("rooms", "undecided", False, True)]  # fmt: skip
+    records = [
+        QuestionRecord(i, i, "boxes", 2, 2, kind, verdict, 1.0 + i, verified=verified, peer_found=found)
+        for i, (kind, verdict, verified, found) in enumerate(rows)
+    ]
+    return table_of(records, QuestionRecord)
+
+
+def test_refused_answers_and_contradicted_proofs_are_wrong():
+    report = make_report("questions", questions=questions())
+    corridor, rooms, every = report.questions
+    assert (corridor.kind, corridor.plans, corridor.infeasible, corridor.wrong) == ("corridor", 2, 1, 2)
+    assert (rooms.undecided, rooms.peer_found, rooms.wrong) == (1, 1, 0)
+    assert (every.count, every.seconds.largest) == (4, 4.0)
+    assert headline(report) == "4 questions: 2 wrong answers, 1 undecided."
+
+
+class Links(HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.needed, self.opened = [], []
+
+    def handle_starttag(self, tag, attributes):
+        self.opened.append(tag)
+        self.needed += [value for name, value in attributes if name in ("src", "href", "data")]
+
+
+def test_the_page_stands_alone_and_has_every_section(both_tiers, tmp_path):
+    found = [Finding("base", "drake", 1, 40, "funnel_margin", 5e-3, 3e-3, True, "", "<found>.yaml")]
+    breaking = [BreakingPoint("base", "drake", "mass_error", 0.2, 3.0, inf, 5, "")]
+    report = make_report(
+        "a < b", run_table(60), questions(), facts=[("seed", "1")], findings=found, breaking=breaking
+    )
+    page, numbers = write_report(report, tmp_path / "new", replay)
+    parser, text = Links(), page.read_text()
+    parser.feed(text)
+    assert all(link.startswith("#") for link in parser.needed)
+    assert "script" not in parser.opened
+    assert parser.opened.count("svg") == 3
+    assert parser.opened.count("h2") == 8
+    assert "a &lt; b" in text
+    assert "&lt;found&gt;.yaml" in text
+    assert "replay " in text
+    read = json.loads(numbers.read_text())
+    assert read["rate"]["lost"] == 0
+    assert read["breaking"][0]["lost"] is None
+    assert len(read["worst"]) == 10
+
+
+def test_the_same_results_give_the_same_bytes(tmp_path):
+    for name in ("one", "two"):
+        write_report(make_report("same", run_table(40)), tmp_path / name, replay)
+    for file in ("report.html", "report.json"):
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
+
+
+def test_a_campaign_without_results_says_so():
+    report = make_report("nothing", run_table(0))
+    assert headline(report) == "There are no results yet."
+    assert report.rate is None
+    assert "There are no results yet." in render_page(report, replay)
+    assert not any(isnan(run.share) for run in report.worst)
