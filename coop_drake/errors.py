@@ -135,5 +135,9 @@ class ProcessError(CoopDrakeError):
     """A process that works for a command was ended before it was done; the message names it."""
 
 
+class MessagingError(CoopDrakeError):
+    """Processes cannot speak with each other, or one is missing; the message says which, and why."""
+
+
 class TuningError(CoopDrakeError):
     """The options of tuning are wrong, or its optimizer is missing; the message says what is expected."""

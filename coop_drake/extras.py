@@ -11,6 +11,7 @@ _EXTRAS = {
     "pyarrow": "campaign",
     "svgelements": "floor-plans",
     "trimesh": "robots",
+    "zmq": "apart",
 }
 """The extra of coop-drake that installs a package which only some commands import."""
 

@@ -27,6 +27,7 @@ WITHOUT_DRAKE = [
     "diagnosis",
     "watching",
     "floor_plans",
+    "messages",
 ]
 
 

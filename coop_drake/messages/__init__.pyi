@@ -1,0 +1,65 @@
+from .address_book import AddressBook, dump_address_book, load_address_book, local_book
+from .agreement import Question
+from .client import MessageClient
+from .ends import RobotEnd, SupervisorEnd, WorldEnd, name_of
+from .keys import KeyPair, load_keys, make_keys, save_keys
+from .refusals import Reason, Refusals
+from .schema import (
+    SUPERVISOR,
+    WORLD,
+    Effort,
+    Goodbye,
+    Hello,
+    Hold,
+    HoldRequest,
+    Present,
+    Ready,
+    Reference,
+    ReferenceRequest,
+    Sample,
+    Status,
+    Switch,
+    Telemetry,
+    Tick,
+    TurnedAway,
+    Welcome,
+)
+from .server import MessageServer
+
+__all__ = [
+    "SUPERVISOR",
+    "WORLD",
+    "AddressBook",
+    "Effort",
+    "Goodbye",
+    "Hello",
+    "Hold",
+    "HoldRequest",
+    "KeyPair",
+    "MessageClient",
+    "MessageServer",
+    "Present",
+    "Question",
+    "Ready",
+    "Reason",
+    "Reference",
+    "ReferenceRequest",
+    "Refusals",
+    "RobotEnd",
+    "Sample",
+    "Status",
+    "SupervisorEnd",
+    "Switch",
+    "Telemetry",
+    "Tick",
+    "TurnedAway",
+    "Welcome",
+    "WorldEnd",
+    "dump_address_book",
+    "load_address_book",
+    "load_keys",
+    "local_book",
+    "make_keys",
+    "name_of",
+    "save_keys",
+]

@@ -1,0 +1,168 @@
+"""Messages to bytes and back; what departs from the schema is refused before it is read.
+
+All numbers are little-endian. A message is its header, then its fixed part, then its lists. The fixed part
+has the fields in their order, a list as its number of items (2 bytes). The length of the whole must be what
+these say.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Collection, Hashable
+from functools import cache
+from typing import Any, NamedTuple, get_args, get_type_hints
+
+import coop_drake.messages.schema  # noqa: F401  (registers all messages)
+from coop_drake.messages.refusals import Reason, RefusedError
+from coop_drake.messages.wire import KINDS, MESSAGES, MOST_ITEMS, Wire
+
+MAGIC = 0xCD0D
+"""The first two bytes of every message."""
+
+VERSION = 1
+"""Version of the schema; grows when a message of the same bytes would mean something else."""
+
+HEADER = struct.Struct("<HBBBII")
+"""Magic, version, kind, sender, session, number of the message in its session."""
+
+LONGEST = 65536
+"""No message is longer [bytes]."""
+
+
+class Header(NamedTuple):
+    """What stands before every message, without magic and version.
+
+    Attributes:
+        kind: Code of the message's class.
+        sender: Index of a robot, or that of the world or supervisor.
+        session: What the server drew for this session, 0 before.
+        sequence: Number of the message in its session and direction, from 1 on; 0 before a session.
+    """
+
+    kind: int
+    sender: int
+    session: int
+    sequence: int
+
+
+class Layout(NamedTuple):
+    """How the fields of a class of messages stand in its bytes.
+
+    Attributes:
+        fixed: All of the fixed part.
+        wires: The fields by name.
+        lists: Which of the fields are lists.
+        checked: Whether some field needs a check of its values.
+    """
+
+    fixed: struct.Struct
+    wires: dict[str, Wire]
+    lists: tuple[int, ...]
+    checked: bool
+
+
+@cache
+def layout_of(cls: Hashable) -> Layout:
+    """Return the layout of a class of messages."""
+    hints = get_type_hints(cls, include_extras=True)
+    wires = {name: get_args(hint)[1] for name, hint in hints.items()}
+    fixed = struct.Struct("<" + "".join("H" if wire.listed else wire.code for wire in wires.values()))
+    lists = tuple(k for k, wire in enumerate(wires.values()) if wire.listed)
+    return Layout(fixed, wires, lists, any(wire.code in "d?" for wire in wires.values()))
+
+
+def encode(message: Any, sender: int, session: int, sequence: int) -> bytes:
+    """Return a message as bytes.
+
+    Args:
+        message: A message of the schema.
+        sender: Who sends it.
+        session: The session.
+        sequence: Number of the message in it.
+
+    Raises:
+        ValueError: A field has a value that the schema does not allow.
+    """
+    cls: Any = type(message)
+    layout = layout_of(cls)
+    head = HEADER.pack(MAGIC, VERSION, KINDS[cls].code, sender, session, sequence)
+    try:
+        if not layout.lists:
+            return head + layout.fixed.pack(*message)
+        counted = list(message)
+        parts = []
+        for k, wire in enumerate(layout.wires.values()):
+            if wire.listed:
+                counted[k] = len(message[k])
+                parts.append(struct.pack(f"<{len(message[k])}{wire.code}", *message[k]))
+        return head + layout.fixed.pack(*counted) + b"".join(parts)
+    except struct.error as error:
+        raise ValueError(f"{message}: {error}") from error
+
+
+def header_of(data: bytes) -> Header:
+    """Read the header of a message.
+
+    Raises:
+        RefusedError: It is no message of this version of the schema.
+    """
+    if not HEADER.size <= len(data) <= LONGEST:
+        raise RefusedError(Reason.LENGTH)
+    magic, version, *rest = HEADER.unpack_from(data)
+    if magic != MAGIC:
+        raise RefusedError(Reason.MAGIC)
+    if version != VERSION:
+        raise RefusedError(Reason.VERSION)
+    return Header(*rest)
+
+
+def decode(data: bytes, kind: int, allowed: Collection[int]) -> Any:
+    """Read what follows the header of a message.
+
+    Args:
+        data: The whole message.
+        kind: Code from its header.
+        allowed: Codes that its sender may send.
+
+    Raises:
+        RefusedError: The kind is not allowed, the length is not that of the kind, or a value is not allowed.
+    """
+    if kind not in allowed or kind not in MESSAGES:
+        raise RefusedError(Reason.KIND)
+    cls = MESSAGES[kind]
+    layout = layout_of(cls)
+    end = HEADER.size + layout.fixed.size
+    if len(data) < end:
+        raise RefusedError(Reason.LENGTH)
+    values = list(layout.fixed.unpack_from(data, HEADER.size))
+    wires = tuple(layout.wires.values())
+    if layout.lists:
+        sizes = [values[k] * struct.calcsize(wires[k].code) for k in layout.lists]
+        if any(values[k] > MOST_ITEMS for k in layout.lists) or len(data) != end + sum(sizes):
+            raise RefusedError(Reason.LENGTH)
+        for k, size in zip(layout.lists, sizes, strict=True):
+            values[k] = struct.unpack_from(f"<{values[k]}{wires[k].code}", data, end)
+            end += size
+    elif len(data) != end:
+        raise RefusedError(Reason.LENGTH)
+    if layout.checked:
+        _check(data, values, layout)
+    return cls._make(values)
+
+
+def _check(data: bytes, values: list[Any], layout: Layout) -> None:
+    """Refuse real numbers that a field does not allow, and truth values other than 0 and 1."""
+    at = HEADER.size
+    for value, wire in zip(values, layout.wires.values(), strict=True):
+        if wire.code == "d" and wire.real != "any":
+            allowed = math.isfinite if wire.real == "finite" else _is_number
+            if not (all(map(allowed, value)) if wire.listed else allowed(value)):
+                raise RefusedError(Reason.VALUE)
+        elif wire.code == "?" and data[at] > 1:
+            raise RefusedError(Reason.VALUE)
+        at += 2 if wire.listed else struct.calcsize("<" + wire.code)
+
+
+def _is_number(value: float) -> bool:
+    return not math.isnan(value)

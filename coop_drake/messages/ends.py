@@ -1,0 +1,274 @@
+"""What each process of a team has of the three channels."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any, Literal
+
+from coop_drake.errors import MessagingError
+from coop_drake.messages.address_book import AddressBook
+from coop_drake.messages.agreement import ANY_QUESTION, Question, Tap
+from coop_drake.messages.client import MessageClient
+from coop_drake.messages.keys import KeyPair
+from coop_drake.messages.refusals import Refusals
+from coop_drake.messages.schema import SUPERVISOR, WORLD
+from coop_drake.messages.server import MessageServer
+from coop_drake.messages.sockets import wait_for
+
+
+def name_of(index: int) -> str:
+    """Return the name of a process by its index in messages."""
+    return {WORLD: "the world", SUPERVISOR: "the supervisor"}.get(index, f"robot {index}")
+
+
+class _End:
+    """Several sockets of one process, waited for together.
+
+    Attributes:
+        servers: Ends that listen.
+        clients: Ends that connect.
+    """
+
+    def __init__(self, servers: list[MessageServer], clients: list[MessageClient]) -> None:
+        self.servers, self.clients = servers, clients
+        self._all: tuple[MessageServer | MessageClient, ...] = (*servers, *clients)
+        self._arrived: deque[tuple[int, Any]] = deque()
+
+    def receive(self, limit: float = 0.0) -> tuple[int, Any] | None:
+        """Return the index of a sender and its message, None where nothing is there in time.
+
+        Messages of one channel come in their order, those of several channels in any.
+
+        Args:
+            limit: Longest time to wait [s].
+        """
+        deadline = time.monotonic() + limit
+        while not self._arrived:
+            self._poll()
+            left = deadline - time.monotonic()
+            if not self._arrived and left <= 0.0:
+                return None
+            if not self._arrived:
+                self._wait(left)
+        return self._arrived.popleft()
+
+    @property
+    def refusals(self) -> Refusals:
+        """What was refused on all channels."""
+        both = Refusals()
+        for end in self._all:
+            both.counts.update(end.refusals.counts)
+        return both
+
+    def close(self) -> None:
+        """Close all sockets."""
+        for end in self._all:
+            end.close()
+
+    def _poll(self) -> None:
+        """Take one message of every end, so that none waits for another."""
+        for server in self.servers:
+            if (taken := server.receive()) is not None:
+                self._arrived.append(taken)
+        for client in self.clients:
+            if (message := client.poll()) is not None:
+                self._arrived.append((client.server, message))
+
+    def _wait(self, seconds: float) -> None:
+        sockets = [socket for end in self._all for socket in end.sockets]
+        soon = [client.patience for client in self.clients]
+        wait_for(sockets, min([seconds, *soon]))
+
+    def _wait_until(self, done: Callable[[], bool], limit: float, complaint: Callable[[], str]) -> None:
+        """Poll until something holds; messages that arrive meanwhile are kept for :meth:`receive`.
+
+        Raises:
+            MessagingError: It does not hold in time.
+        """
+        deadline = time.monotonic() + limit
+        while not done():
+            before = len(self._arrived)
+            self._poll()
+            left = deadline - time.monotonic()
+            if left <= 0.0 and not done():
+                raise MessagingError(f"{complaint()} (waited for {limit:g} s)")
+            if len(self._arrived) == before and not done():
+                self._wait(left)
+
+    def _open_clients(self, limit: float) -> None:
+        def complaint() -> str:
+            return "; ".join(
+                f"{name_of(client.server)} at {client.address}: {client.trouble}"
+                for client in self.clients
+                if not client.session
+            )
+
+        self._wait_until(lambda: all(client.session for client in self.clients), limit, complaint)
+
+
+class WorldEnd(_End):
+    """The world's ends: it listens on the channels of measurements and of efforts.
+
+    Args:
+        book: Who listens where.
+        question: What all must agree on.
+        keys: The world's keys, None where the book has none.
+    """
+
+    def __init__(
+        self, book: AddressBook, question: Question = ANY_QUESTION, keys: KeyPair | None = None
+    ) -> None:
+        known = {k: book.key_of(k) for k in (*range(len(book.robots)), SUPERVISOR)}
+        self.sensors, self.efforts = (
+            MessageServer(address, known, channel=channel, sender=WORLD, question=question, keys=keys)
+            for address, channel in _channels(book)
+        )
+        super().__init__([self.sensors, self.efforts], [])
+
+    def present(self) -> set[int]:
+        """Return the indices of the processes that have a session on both channels."""
+        return {
+            index
+            for index, peer in self.sensors.peers.items()
+            if peer.session and self.efforts.peers[index].session
+        }
+
+    def open(self, limit: float) -> None:
+        """Wait until all robots and the supervisor have sessions.
+
+        Raises:
+            MessagingError: Some have none in time; it says who.
+        """
+        everyone = set(self.sensors.peers)
+        self._wait_until(
+            lambda: self.present() == everyone, limit, lambda: _missing(everyone - self.present())
+        )
+
+    def send(self, peer: int, message: Any) -> bool:
+        """Send a message to a robot or the supervisor; False where it has no session or takes no more."""
+        return self.sensors.send(peer, message)
+
+    def receive_all(self, kinds: Mapping[int, type[Any]], number: int, limit: float) -> dict[int, Any]:
+        """Return one message of every sender about a sample, for lock-step; others are dropped meanwhile.
+
+        Args:
+            kinds: Which class is expected of which sender.
+            number: Number of the sample.
+            limit: Longest time to wait [s].
+
+        Raises:
+            MessagingError: Some sent none in time; it says who.
+        """
+        found: dict[int, Any] = {}
+        deadline = time.monotonic() + limit
+        while len(found) < len(kinds):
+            taken = self.receive(deadline - time.monotonic())
+            if taken is None:
+                raise MessagingError(f"{_missing(set(kinds) - set(found))} (waited for {limit:g} s)")
+            sender, message = taken
+            if type(message) is kinds.get(sender) and message.number == number:
+                found[sender] = message
+        return found
+
+
+class RobotEnd(_End):
+    """A robot's ends: it connects to the world on two channels, and to the supervisor on the team's.
+
+    Args:
+        book: Who listens where.
+        robot: Its index.
+        question: What all must agree on.
+        keys: Its keys, None where the book has none.
+    """
+
+    def __init__(
+        self, book: AddressBook, robot: int, question: Question = ANY_QUESTION, keys: KeyPair | None = None
+    ) -> None:
+        self.sensors, self.efforts = _world_clients(book, robot, question, keys)
+        self.team = MessageClient(
+            book.supervisor.team,
+            SUPERVISOR,
+            channel="team",
+            sender=robot,
+            question=question,
+            keys=keys,
+            server_key=book.supervisor.key,
+        )
+        super().__init__([], [self.sensors, self.efforts, self.team])
+
+    def open(self, limit: float) -> None:
+        """Wait for sessions on all channels.
+
+        Raises:
+            MessagingError: There are none in time; it says where and why.
+        """
+        self._open_clients(limit)
+
+
+class SupervisorEnd(_End):
+    """The supervisor's ends: it connects to the world on two channels, and listens on the team's.
+
+    Args:
+        book: Who listens where.
+        question: What all must agree on.
+        keys: Its keys, None where the book has none.
+        tap: Is shown every message of the team's channel.
+    """
+
+    def __init__(
+        self,
+        book: AddressBook,
+        question: Question = ANY_QUESTION,
+        keys: KeyPair | None = None,
+        tap: Tap | None = None,
+    ) -> None:
+        self.sensors, self.efforts = _world_clients(book, SUPERVISOR, question, keys)
+        self.team = MessageServer(
+            book.supervisor.team,
+            {k: robot.key for k, robot in enumerate(book.robots)},
+            channel="team",
+            sender=SUPERVISOR,
+            question=question,
+            keys=keys,
+            tap=tap,
+        )
+        super().__init__([self.team], [self.sensors, self.efforts])
+
+    def open(self, limit: float) -> None:
+        """Wait for sessions with the world; robots come when they come.
+
+        Raises:
+            MessagingError: There are none in time; it says where and why.
+        """
+        self._open_clients(limit)
+
+    def send_to_all(self, message: Any) -> list[int]:
+        """Send a message to every robot that has a session; return those to which it went."""
+        return [robot for robot in self.team.peers if self.team.send(robot, message)]
+
+
+def _channels(book: AddressBook) -> tuple[tuple[str, Literal["sensors", "efforts"]], ...]:
+    return (book.world.sensors, "sensors"), (book.world.efforts, "efforts")
+
+
+def _world_clients(
+    book: AddressBook, sender: int, question: Question, keys: KeyPair | None
+) -> list[MessageClient]:
+    return [
+        MessageClient(
+            address,
+            WORLD,
+            channel=channel,
+            sender=sender,
+            question=question,
+            keys=keys,
+            server_key=book.world.key,
+        )
+        for address, channel in _channels(book)
+    ]
+
+
+def _missing(indices: set[int]) -> str:
+    return "no message came from " + ", ".join(name_of(index) for index in sorted(indices))

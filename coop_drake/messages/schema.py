@@ -1,0 +1,254 @@
+"""Every message between the world, the robots and their supervisor; codec.py lays out its bytes."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from coop_drake.messages.wire import Codes, Flag, Index, Number, Numbers, Seconds, Small, Wire, Word, message
+
+WORLD, SUPERVISOR = 255, 254
+"""Who sends, in the header of a message; a robot sends its own index k."""
+
+MOST_ROBOTS = 64
+"""Largest number of robots of a team."""
+
+Pose = Annotated[tuple[float, ...], Wire("d", "m, m, rad", listed=True)]
+State = Annotated[tuple[float, ...], Wire("d", "m, rad, m/s, rad/s", listed=True)]
+Efforts = Annotated[tuple[float, ...], Wire("d", "N, N m", listed=True)]
+Values = Annotated[tuple[float, ...], Wire("d", listed=True, real="any")]
+Place = Annotated[tuple[float, ...], Wire("d", "m", listed=True)]
+Reals = Annotated[tuple[float, ...], Wire("d", listed=True)]
+Margin = Annotated[float, Wire("d", real="infinite")]
+
+
+@message(1, "any", "client")
+class Hello(NamedTuple):
+    """A process asks to be heard.
+
+    Attributes:
+        nonce: Random; the answer repeats it.
+        scenario: First eight bytes of a digest of the scenario; both ends must have the same.
+        plan: The same of the plan.
+    """
+
+    nonce: Number
+    scenario: Word
+    plan: Word
+
+
+@message(2, "any", "server")
+class Welcome(NamedTuple):
+    """The answer: all further messages carry this random session in their header, in both directions.
+
+    Attributes:
+        nonce: That of the ``Hello``.
+        session: Random, new for every ``Welcome``.
+    """
+
+    nonce: Number
+    session: Number
+
+
+@message(3, "any", "server")
+class TurnedAway(NamedTuple):
+    """The answer to a ``Hello`` that cannot be granted.
+
+    Attributes:
+        nonce: That of the ``Hello``.
+        reason: 1: another process of this name is being heard; 2: the scenarios differ; 3: the plans differ;
+            4: another key belongs to the name.
+    """
+
+    nonce: Number
+    reason: Small
+
+
+@message(4, "any", "both")
+class Present(NamedTuple):
+    """The client's first message of a session; later a sign of life of either end that sends nothing else."""
+
+
+@message(5, "any", "server")
+class Goodbye(NamedTuple):
+    """The run is over; the process that receives this ends.
+
+    Attributes:
+        outcome: 0: the team has arrived; 1: a check failed or it did not arrive; 2: the run was interrupted.
+    """
+
+    outcome: Small
+
+
+@message(16, "sensors", "world")
+class Sample(NamedTuple):
+    """What one robot measures.
+
+    Attributes:
+        number: Number of the sample.
+        time: Simulated time.
+        step: Whether the robot updates its state now; else it only shows its outputs, for the log.
+        team_messages: In lock-step, the robot computes once it has so many messages of the supervisor in
+            their session.
+        object_pose: Pose (x, y, angle) of the object's frame L in W, angle unwrapped.
+        robot_state: The robot's own (z_k, z_k'), z_k = (x, y, yaw of Bk, q_k), in W.
+    """
+
+    number: Number
+    time: Seconds
+    step: Flag
+    team_messages: Number
+    object_pose: Pose
+    robot_state: State
+
+
+@message(17, "sensors", "world")
+class Tick(NamedTuple):
+    """The same for the supervisor, which measures nothing.
+
+    Attributes:
+        number: Number of the sample.
+        time: Simulated time.
+        step: Whether the supervisor updates its state now; else it only shows its outputs.
+        team_messages: In lock-step, it decides once it has so many messages of each robot in their session.
+    """
+
+    number: Number
+    time: Seconds
+    step: Flag
+    team_messages: Numbers
+
+
+@message(32, "efforts", "robot")
+class Effort(NamedTuple):
+    """What one robot applies.
+
+    Attributes:
+        number: Number of the sample that it was computed from.
+        team_messages: How many messages this robot has sent to the supervisor in this session.
+        state: State of the process: 0: it follows the plan; 1: it holds; 2: it waits for the present cell;
+            3: it ends.
+        efforts: Base wrench and joint torques, shape (3 + n_k,).
+    """
+
+    number: Number
+    team_messages: Number
+    state: Small
+    efforts: Efforts
+
+
+@message(33, "efforts", "robot")
+class Telemetry(NamedTuple):
+    """What one robot shows to the log alone.
+
+    Attributes:
+        number: Number of the sample.
+        time: Simulated time.
+        values: In the order of the robot's outputs for the log.
+    """
+
+    number: Number
+    time: Seconds
+    values: Values
+
+
+@message(34, "efforts", "supervisor")
+class Status(NamedTuple):
+    """What the supervisor shows to the log alone.
+
+    Attributes:
+        number: Number of the sample.
+        time: Simulated time.
+        team_messages: How many messages it has sent to each robot in their session.
+        cell: Index of the current cell.
+        entry: Simulated time at which it was entered.
+        arrived: Whether all robots are ready to leave the last cell.
+        causes: Why the team is held, as the block ``hold_supervisor`` shows it: the order, then each robot.
+    """
+
+    number: Number
+    time: Seconds
+    team_messages: Numbers
+    cell: Index
+    entry: Seconds
+    arrived: Flag
+    causes: Codes
+
+
+@message(48, "team", "robot")
+class Ready(NamedTuple):
+    """A robot's report, sent when its cell or the sign of its margin changes.
+
+    Attributes:
+        cell: Index of the cell that it is about.
+        margin: Margin of readiness; the robot is ready where it is not negative.
+    """
+
+    cell: Index
+    margin: Margin
+
+
+@message(49, "team", "robot")
+class HoldRequest(NamedTuple):
+    """A robot's request that the team be held, in every period where a scenario has holds.
+
+    Attributes:
+        asks: Whether it asks for a hold.
+        number: Number of the request, which grows.
+    """
+
+    asks: Flag
+    number: Number
+
+
+@message(50, "team", "supervisor")
+class Switch(NamedTuple):
+    """The current cell, sent when it changes and to a robot that joins.
+
+    Attributes:
+        cell: Index of the cell.
+        entry: Simulated time at which it was entered.
+    """
+
+    cell: Index
+    entry: Seconds
+
+
+@message(51, "team", "supervisor")
+class Hold(NamedTuple):
+    """The supervisor's bit, in every period where a scenario has holds.
+
+    Attributes:
+        held: Whether the team is held.
+        number: Number of the message, which grows.
+    """
+
+    held: Flag
+    number: Number
+
+
+@message(52, "team", "supervisor")
+class ReferenceRequest(NamedTuple):
+    """A robot has joined late: the robot that receives this answers with its ``Reference``.
+
+    Attributes:
+        robot: Index of the robot that has joined.
+    """
+
+    robot: Small
+
+
+@message(53, "team", "both")
+class Reference(NamedTuple):
+    """What all robots keep alike, from a robot to the supervisor, and from there to one that joins late.
+
+    Attributes:
+        robot: Index of the robot that has joined.
+        time: Simulated time of the sample that it belongs to.
+        position: The reference point p_G in W, shape (2,).
+        clock: State of the block ``funnel_clock``, empty where a scenario has no holds.
+    """
+
+    robot: Small
+    time: Seconds
+    position: Place
+    clock: Reals
