@@ -8,6 +8,7 @@ from coop_drake.diagram.robot_controller import (
     build_robot_controller,
 )
 from coop_drake.diagram.station import TransportStation, build_station
+from coop_drake.diagram.world import World, build_world, control_period
 
 __all__ = [
     "TELEMETRY",
@@ -16,7 +17,10 @@ __all__ = [
     "Replacements",
     "RobotKnowledge",
     "TransportStation",
+    "World",
     "build_closed_loop",
     "build_robot_controller",
     "build_station",
+    "build_world",
+    "control_period",
 ]

@@ -18,7 +18,8 @@ from coop_drake.diagram.station import TransportStation, build_driven_station, b
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import TeamPlant, set_configuration
 from coop_drake.scenario import Scenario
-from coop_drake.systems import Block, CellPlanner, HoldSupervisor
+from coop_drake.systems import CellPlanner, HoldSupervisor
+from coop_drake.systems.block import release_all
 
 Blocks = Literal["named", "fused"]
 """How the controllers are built: a block for each law of each robot, or one block for them all."""
@@ -72,15 +73,7 @@ class ClosedLoop:
 
     def release(self) -> None:
         """Free all memory after the last context is gone; no part of the loop may be used any more."""
-        _release(self.diagram)
-
-
-def _release(diagram: Diagram) -> None:
-    for system in diagram.GetSystems():
-        if isinstance(system, Block):
-            system.release()
-        elif isinstance(system, Diagram):
-            _release(system)
+        release_all(self.diagram)
 
 
 def build_closed_loop(

@@ -6,16 +6,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import PassThrough
 
 from coop_drake.diagram.robot_controller import TELEMETRY
 from coop_drake.diagram.wrapping import Holding, Wrapping
 from coop_drake.scenario import Deployment
-from coop_drake.systems import LossyMeasurement
+from coop_drake.systems import LossyMeasurement, build_selector
 
 
 @dataclass(frozen=True)
 class DeployedController:
-    """A controller behind its sensors, actuators and radio.
+    """A controller behind its radio, and behind its sensors and actuators unless these are part of the world.
 
     Attributes:
         diagram: The whole; it has the same ports as the controller inside.
@@ -33,15 +34,67 @@ class DeployedController:
         if self.controller.HasSubsystemNamed("governor_state"):
             governor = self.controller.GetSubsystemByName("governor_state")
             governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), pose[:2])
-        for delay in self.delays:
-            context = delay.GetMyMutableContextFromRoot(root)
-            now, state = delay.get_input_port(0).Eval(context), context.get_mutable_discrete_state_vector()
-            lossy = isinstance(delay, LossyMeasurement)
-            at_rest = delay.state_at_rest(now) if lossy else np.tile(now, state.size() // len(now))
-            state.SetFromVector(at_rest)
+        _prepare(self.delays, root)
 
 
-def deploy(controller: Diagram, deployment: Deployment, robot: int, name: str) -> DeployedController:
+def _prepare(delays: tuple[Holding, ...], root: Context) -> None:
+    """Set held measurements to their values at the start."""
+    for delay in delays:
+        context = delay.GetMyMutableContextFromRoot(root)
+        now, state = delay.get_input_port(0).Eval(context), context.get_mutable_discrete_state_vector()
+        lossy = isinstance(delay, LossyMeasurement)
+        at_rest = delay.state_at_rest(now) if lossy else np.tile(now, state.size() // len(now))
+        state.SetFromVector(at_rest)
+
+
+@dataclass(frozen=True)
+class Body:
+    """The sensors and actuators of a robot whose controller runs elsewhere.
+
+    ======= ======================== ========= ==========================================================
+    input   ``object_pose``          3         the object's pose
+    input   ``robot_state``          2 (3 + n) the robot's state
+    input   ``effort_command``       3 + n     what its controller asks for, held between samples
+    output  ``measured_object_pose`` 3         as the controller gets it
+    output  ``measured_robot_state`` 2 (3 + n) as the controller gets it
+    output  ``robot_effort``         3 + n     what the actuators give
+    ======= ======================== ========= ==========================================================
+
+    Attributes:
+        diagram: The whole.
+        delays: Blocks that hold measurements, in the order of the signals.
+    """
+
+    diagram: Diagram
+    delays: tuple[Holding, ...]
+
+    def prepare(self, root: Context) -> None:
+        """Set held measurements to their values at the start."""
+        _prepare(self.delays, root)
+
+
+_MEASURED = ("object_pose", "robot_state")
+"""What a controller measures."""
+
+
+def build_body(deployment: Deployment, robot: int, name: str, joints: int) -> Body:
+    """Build the sensors and actuators of a robot with a number of joints; arguments as for :func:`deploy`."""
+    builder, sizes = DiagramBuilder(), {"object_pose": 3, "robot_state": 2 * (3 + joints)}
+    wrapping = Wrapping(builder, deployment, robot, name)
+    for entry in _MEASURED:
+        elements = {f"measured_{entry}": [(0, i) for i in range(sizes[entry])]}
+        given = builder.AddNamedSystem(f"given_{entry}", build_selector({entry: sizes[entry]}, elements))
+        wrapping.measure(given.get_input_port(0))
+        builder.ExportOutput(given.get_output_port(0), f"measured_{entry}")
+    command = builder.AddNamedSystem("effort_command", PassThrough(3 + joints))
+    builder.ExportInput(command.get_input_port(), "effort_command")
+    builder.ExportOutput(wrapping.actuate(command.get_output_port()), "robot_effort")
+    return Body(builder.Build(), tuple(wrapping.delays))
+
+
+def deploy(
+    controller: Diagram, deployment: Deployment, robot: int, name: str, *, bodiless: bool = False
+) -> DeployedController:
     """Add an effort limit to a robot's controller, and what else a deployment puts round it.
 
     In the order of the signals: ``robot_state`` and ``object_pose`` get their constant errors, noise, a delay
@@ -56,14 +109,19 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int, name: str) -
         deployment: What is switched on.
         robot: Index k of the robot; every robot has noise and losses of its own.
         name: Name of the robot.
+        bodiless: Whether sensors, limits and lag are those of a :class:`Body` in another Diagram.
     """
     builder = DiagramBuilder()
     builder.AddNamedSystem("controller", controller)
     wrapping = Wrapping(builder, deployment, robot, name)
-    for entry in ("object_pose", "robot_state"):
-        wrapping.measure(controller.GetInputPort(entry))
+    for entry in _MEASURED:
+        if bodiless:
+            builder.ExportInput(controller.GetInputPort(entry), entry)
+        else:
+            wrapping.measure(controller.GetInputPort(entry))
     wrapping.hear(controller.GetInputPort("current_cell"))
-    builder.ExportOutput(wrapping.actuate(controller.GetOutputPort("robot_effort")), "robot_effort")
+    effort = wrapping.command(controller.GetOutputPort("robot_effort"))
+    builder.ExportOutput(effort if bodiless else wrapping.actuate(effort), "robot_effort")
     builder.ExportOutput(wrapping.send(controller.GetOutputPort("ready")), "ready")
     held = controller.HasOutputPort("hold_request")
     if held:
@@ -72,8 +130,4 @@ def deploy(controller: Diagram, deployment: Deployment, robot: int, name: str) -
         builder.ExportOutput(request, "hold_request")
     for output in (*TELEMETRY, *(["clock"] if held else [])):
         builder.ExportOutput(controller.GetOutputPort(output), output)
-    return DeployedController(
-        builder.Build(),
-        controller,
-        tuple(wrapping.delays),
-    )
+    return DeployedController(builder.Build(), controller, tuple(wrapping.delays))

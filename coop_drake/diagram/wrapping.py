@@ -81,16 +81,22 @@ class Wrapping:
             blocks.append(("deafness", self._interruption(entry.size(), deaf, held=True)))
         self._lead(entry, blocks)
 
-    def actuate(self, effort: OutputPort) -> OutputPort:
-        """Return the effort after failures, hold, limits and lag."""
+    def command(self, effort: OutputPort) -> OutputPort:
+        """Return the effort that a robot asks of its actuators in each period: after failures, held."""
         size, period, silence = effort.size(), self._deployment.period, self._own.silence
+        if period is None:
+            return effort
         blocks: list[tuple[str, LeafSystem]] = []
-        if period is not None:
-            if silence is not None and silence.motors != "working":
-                blocks.append(("motors", self._interruption(size, silence, held=silence.motors == "held")))
-            blocks.append(("effort_hold", ZeroOrderHold(period, size, self._own.sample_offset)))
+        if silence is not None and silence.motors != "working":
+            blocks.append(("motors", self._interruption(size, silence, held=silence.motors == "held")))
+        blocks.append(("effort_hold", ZeroOrderHold(period, size, self._own.sample_offset)))
+        return self._append(effort, blocks)
+
+    def actuate(self, effort: OutputPort) -> OutputPort:
+        """Return the effort of the actuators: after limits and lag."""
+        size = effort.size()
         limits = _limits(self._deployment, size - 3)
-        blocks.append(("actuator_limits", Saturation(-limits, limits)))
+        blocks: list[tuple[str, LeafSystem]] = [("actuator_limits", Saturation(-limits, limits))]
         if lag := self._deployment.actuators.lag:
             blocks.append(("effort_in_kilonewtons", Gain(1.0 / _KILO, size)))
             blocks.append(("actuator_lag", FirstOrderLowPassFilter(lag, size)))

@@ -2,7 +2,7 @@ from .clearance import Clearance, TeamClearance
 from .invariants import ACCELERATION_TOLERANCE, WRENCH_TOLERANCE, Invariants, Margins
 from .maps import build_maps, certificate_rows
 from .message_statistics import MessageStatistics, communication
-from .run import configure_simulator, simulate
+from .run import configure_simulator, run_loop, simulate
 from .telemetry import Sample
 
 __all__ = [
@@ -18,5 +18,6 @@ __all__ = [
     "certificate_rows",
     "communication",
     "configure_simulator",
+    "run_loop",
     "simulate",
 ]

@@ -11,7 +11,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_digest
-from coop_drake.diagram import Blocks, ClosedLoop, Replacements, build_closed_loop
+from coop_drake.diagram import Blocks, ClosedLoop, Replacements, World, build_closed_loop
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import read_component_tree
 from coop_drake.progress import Progress
@@ -57,7 +57,7 @@ def simulate(
     """
     loop = build_closed_loop(scenario, plan, maps, blocks=blocks, replacements=replacements)
     try:
-        return _simulated(loop, scenario, progress, observer)
+        return run_loop(loop, scenario, progress=progress, observer=observer)
     finally:
         loop.release()
         del loop
@@ -67,9 +67,14 @@ def simulate(
         gc.collect(1)
 
 
-def _simulated(
-    loop: ClosedLoop, scenario: Scenario, progress: Progress | None, observer: Callable[[Sample], None] | None
+def run_loop(
+    loop: ClosedLoop | World,
+    scenario: Scenario,
+    *,
+    progress: Progress | None = None,
+    observer: Callable[[Sample], None] | None = None,
 ) -> SimulationLog:
+    """Run a closed loop, or a world whose robots run elsewhere, as :func:`simulate` does."""
     plan = loop.plan
     clearance = TeamClearance(scenario.workspace.polygon, read_component_tree(loop.team.as_tree))
     root = loop.create_context()

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydrake.systems.framework import Context, System
 
-from coop_drake.diagram import TELEMETRY, ClosedLoop
+from coop_drake.diagram import TELEMETRY, ClosedLoop, World
 from coop_drake.laws import total_wrench
 from coop_drake.simulation.step_kernels import largest_difference
 from coop_drake.systems.team_kernels import telemetry_parts
@@ -82,13 +82,13 @@ class Telemetry:
         root: Context of the whole diagram; every reading is of its present content.
     """
 
-    def __init__(self, loop: ClosedLoop, root: Context) -> None:
+    def __init__(self, loop: ClosedLoop | World, root: Context) -> None:
         self._team, self._root = loop.team, root
         self._plant_context = self._team.plant.GetMyContextFromRoot(root)
         self._grasps = np.array([[robot.X_LE.x, robot.X_LE.y] for robot in self._team.robots])
         self._rates = self._team.plant.num_positions() + self._team.velocity_index
         self._ports = _PortRow(root)
-        self._places = _fused_places(loop, self._ports) if loop.fused else _named_places(loop, self._ports)
+        self._places = _places(loop, self._ports)
 
     def read(self) -> Sample:
         """Read the present instant."""
@@ -164,12 +164,18 @@ class _Places(NamedTuple):
     causes: Any
 
 
+def _places(loop: ClosedLoop | World, ports: _PortRow) -> _Places:
+    if isinstance(loop, World):
+        return _world_places(loop, ports)
+    return _fused_places(loop, ports) if loop.fused else _named_places(loop, ports)
+
+
 def _instant(loop: ClosedLoop, ports: _PortRow) -> Any:
     """Add the current cell, its time of entry and whether the team has arrived."""
     return np.concatenate([ports.add(loop.cell_planner, name) for name in ("current_cell", "arrived")])
 
 
-def _realised(loop: ClosedLoop, ports: _PortRow) -> Any:
+def _realised(loop: ClosedLoop | World, ports: _PortRow) -> Any:
     """Add the accelerations of z in the plant, shape (3 + n,)."""
     return ports.add(loop.station.diagram, "generalized_acceleration")[loop.team.velocity_index]
 
@@ -237,6 +243,36 @@ def _fused_places(loop: ClosedLoop, ports: _PortRow) -> _Places:
         ready_margins=ports.add(fused.driver, "ready")[1::2],
         clock_lag=np.array(clock[:1], dtype=np.intp),
         causes=np.array(_causes(loop, ports), dtype=np.intp),
+    )
+
+
+def _world_places(world: World, ports: _PortRow) -> _Places:
+    """Add what robots and supervisor of a world report for the log, and what the world has itself."""
+    robots = world.team.robots
+    added, records, at = ports.add(world.link, "records"), [], 0
+    for names in world.records:
+        ends = at + np.cumsum([*names.values()])
+        records.append(dict(zip(names, np.split(added[at : ends[-1]], ends[:-1] - at), strict=True)))
+        at = ends[-1]
+    *own, supervisor = records
+    states = [ports.add(world.station.diagram, f"robot_{robot.index}_state") for robot in robots]
+    efforts = [ports.add(body.diagram, "robot_effort") for body in world.bodies]
+    bounds = [np.split(record["funnels"], 2) for record in own]
+    return _Places(
+        instant=np.concatenate([supervisor["current_cell"], supervisor["arrived"]]),
+        base_poses=np.array([state[:3] for state in states]),
+        governors=np.array([record["governor_position"] for record in own]),
+        funnel_lower=np.concatenate([bounds[0][0][:1], *(lower[1:] for lower, _ in bounds)]),
+        funnel_upper=np.concatenate([bounds[0][1][:1], *(upper[1:] for _, upper in bounds)]),
+        energy_margins=np.concatenate([record["energy_margin"] for record in own]),
+        commanded_wrenches=np.array([record["hand_command"][3:] for record in own]),
+        base_wrenches=np.array([effort[:3] for effort in efforts]),
+        joint_torques=np.concatenate([effort[3:] for effort in efforts]),
+        accelerations=np.array([record["object_acceleration"] for record in own]),
+        realised=_realised(world, ports),
+        ready_margins=np.array([record["ready"][1] for record in own]),
+        clock_lag=own[0]["clock"][:1],
+        causes=supervisor["causes"],
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pydrake.systems.framework import Context, EventStatus
 
 from coop_drake.answers.plan import Plan
-from coop_drake.diagram import ClosedLoop
+from coop_drake.diagram import ClosedLoop, World
 from coop_drake.simulation.invariants import Invariants
 from coop_drake.simulation.recorder import Recorder
 from coop_drake.simulation.stall import at_goal, blocking_margin, narrowest_funnel, patience
@@ -28,7 +28,7 @@ class Watch:
 
     def __init__(
         self,
-        loop: ClosedLoop,
+        loop: ClosedLoop | World,
         invariants: Invariants,
         position_tolerance: float,
         root: Context,

@@ -26,6 +26,7 @@ from coop_drake.systems.sensors import TeamSensor, build_separate_sensor
 from coop_drake.systems.state_predictor import StatePredictor
 from coop_drake.systems.team_controller import TeamController
 from coop_drake.systems.team_kernels import FusedCell, FusedTeam
+from coop_drake.systems.team_link import Exchange, TeamLink, robot_record, supervisor_record
 from coop_drake.systems.wrench_law import WrenchLaw
 
 __all__ = [
@@ -39,6 +40,7 @@ __all__ = [
     "Block",
     "CellPlanner",
     "DisturbanceObserver",
+    "Exchange",
     "FloorFriction",
     "FunnelClock",
     "FusedCell",
@@ -60,10 +62,13 @@ __all__ = [
     "RobotEffort",
     "StatePredictor",
     "TeamController",
+    "TeamLink",
     "TeamSensor",
     "WrenchLaw",
     "axis_laws",
     "build_selector",
     "build_separate_sensor",
     "clear_channel",
+    "robot_record",
+    "supervisor_record",
 ]

@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import LeafSystem
+from pydrake.systems.framework import Diagram, LeafSystem
 
 NUMBER, VECTOR = 0.0, np.zeros(1)
 """Examples for `coop_drake.compiled.prepared`: a number, and the value of a port."""
@@ -63,6 +63,15 @@ class Block(LeafSystem):
         callback = partial(method)
         self._callbacks.append(callback)
         return callback
+
+
+def release_all(diagram: Diagram) -> None:
+    """Release every block of a Diagram, also in the Diagrams inside."""
+    for system in diagram.GetSystems():
+        if isinstance(system, Block):
+            system.release()
+        elif isinstance(system, Diagram):
+            release_all(system)
 
 
 def _nothing(*_: object) -> None:

@@ -1,0 +1,126 @@
+"""The world alone: the team with its sensors and actuators, without controllers and without a supervisor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+
+from coop_drake.answers.plan import Plan
+from coop_drake.diagram.deployment import Body, build_body
+from coop_drake.diagram.station import TransportStation, build_station
+from coop_drake.errors import ScenarioError
+from coop_drake.plant import TeamPlant, set_configuration
+from coop_drake.scenario import Scenario
+from coop_drake.systems import Exchange, TeamLink, robot_record, supervisor_record
+from coop_drake.systems.block import release_all
+
+
+@dataclass(frozen=True)
+class World:
+    """A team whose controllers and supervisor run elsewhere.
+
+    Attributes:
+        diagram: The Diagram of the world.
+        station: The simulated team.
+        bodies: Sensors and actuators of every robot.
+        link: The block that is connected to the controllers and the supervisor.
+        records: Names and sizes of what each robot reports for the log, then of what the supervisor does.
+        plan: The plan that they follow.
+    """
+
+    diagram: Diagram
+    station: TransportStation
+    bodies: tuple[Body, ...]
+    link: TeamLink
+    records: tuple[dict[str, int], ...]
+    plan: Plan
+
+    @property
+    def team(self) -> TeamPlant:
+        """The simulated team."""
+        return self.station.team
+
+    def create_context(self) -> Context:
+        """Create a context at the plan's start, at rest."""
+        context = self.diagram.CreateDefaultContext()
+        team = self.team
+        set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.plan.start)
+        for body in self.bodies:
+            body.prepare(context)
+        return context
+
+    def release(self) -> None:
+        """Free all memory after the last context is gone; no part of the world may be used any more."""
+        release_all(self.diagram)
+
+
+def control_period(scenario: Scenario) -> float:
+    """Return the control period of a team whose robots compute apart from each other [s].
+
+    Raises:
+        ScenarioError: Robots compute in continuous time, or not all at the same time.
+    """
+    deployment, period = scenario.deployment, scenario.deployment.period
+    if period is None:
+        allowed = "a number of Hz, such as 200: controllers apart from each other compute at samples"
+        raise ScenarioError(str(scenario.path), "deployment.control_rate", None, allowed)
+    for name, departures in deployment.robots.items():
+        if departures.sample_offset:
+            key = f"deployment.robots.{name}.sample_offset"
+            allowed = "0: robots apart from each other compute at the same samples"
+            raise ScenarioError(str(scenario.path), key, departures.sample_offset, allowed)
+    return period
+
+
+def record_sizes(scenario: Scenario, joints: Sequence[int]) -> tuple[dict[str, int], ...]:
+    """Return names and sizes of what robots with numbers of joints, then their supervisor, report."""
+    holds = scenario.control.hold is not None
+    robots = (robot_record(n, holds=holds) for n in joints)
+    return (*robots, supervisor_record(len(joints), holds=holds))
+
+
+def build_world(scenario: Scenario, plan: Plan, exchange: Exchange) -> World:
+    """Build the world of a scenario.
+
+    Args:
+        scenario: The scenario.
+        plan: The plan that the robots follow.
+        exchange: Carries measurements to the robots and brings their efforts.
+
+    Raises:
+        ScenarioError: The models do not make a team, or robots do not compute at common samples.
+    """
+    period, builder = control_period(scenario), DiagramBuilder()
+    station = build_station(scenario)
+    team = station.team
+    builder.AddNamedSystem("transport_station", station.diagram)
+    joints = [len(robot.joints) for robot in team.robots]
+    records = record_sizes(scenario, joints)
+    size = sum(sum(record.values()) for record in records)
+    link = builder.AddNamedSystem("team_link", TeamLink(joints, period, exchange, size))
+    bodies = []
+    for k, robot in enumerate(team.robots):
+        body = build_body(scenario.deployment, k, robot.name, joints[k])
+        diagram = builder.AddNamedSystem(f"robot_{k}_body", body.diagram)
+        for output, receiver in (
+            (station.diagram.GetOutputPort("object_pose"), diagram.GetInputPort("object_pose")),
+            (station.diagram.GetOutputPort(f"robot_{k}_state"), diagram.GetInputPort("robot_state")),
+            (
+                diagram.GetOutputPort("measured_object_pose"),
+                link.GetInputPort(f"robot_{k}_object_pose"),
+            ),
+            (diagram.GetOutputPort("measured_robot_state"), link.GetInputPort(f"robot_{k}_state")),
+            (
+                link.GetOutputPort(f"robot_{k}_effort_command"),
+                diagram.GetInputPort("effort_command"),
+            ),
+            (
+                diagram.GetOutputPort("robot_effort"),
+                station.diagram.GetInputPort(f"robot_{k}_effort"),
+            ),
+        ):
+            builder.Connect(output, receiver)
+        bodies.append(body)
+    return World(builder.Build(), station, tuple(bodies), link, records, plan)
