@@ -51,6 +51,10 @@ def _measured(**values: object) -> dict[str, Any]:
     return {"measurements": values}
 
 
+def _waves(size: float) -> dict[str, Any]:
+    return {name: {"size": size, "period": 0.3} for name in ("angle", "joints")}
+
+
 def _first(**values: object) -> dict[str, Any]:
     return {"robots": {"robot_0": values}}
 
@@ -66,6 +70,7 @@ CASES: Mapping[str, Case] = {
     "lag": Case({"actuators": {"lag": 0.02}}, {"actuators": {"lag": 0.05}}, known=False),
     "model error": Case({"mass_error": 0.3}, {"mass_error": -0.9}),
     "noise": Case(_measured(**_NOISE), _measured(**{name: 20.0 * size for name, size in _NOISE.items()})),
+    "bounded errors": Case(_measured(waves=_waves(0.0015)), _measured(waves=_waves(0.04))),
     "delay": Case(_measured(delay=0.02), _measured(delay=0.05), known=False),
     "lost measurements": Case(_measured(loss=0.3), _measured(loss=0.8)),
     "late measurements": Case(_measured(late=0.5, late_by=0.02), _measured(late=0.8, late_by=0.5)),

@@ -141,11 +141,13 @@ class Wrapping:
         self._builder.ExportInput(entry, name)
 
     def _noise(self, name: str, size: int, period: float) -> MeasurementNoise | None:
-        """Return the block that adds noise to a measured port, None for no noise."""
+        """Return the block that adds noise and waves to a measured port, None if there are neither."""
         deviations = measurement_deviations(self._deployment, name, size)
-        if not deviations.any():
+        waves = measurement_waves(self._deployment, name, size, period)
+        if not deviations.any() and not waves[:, 0].any():
             return None
-        return MeasurementNoise(deviations, period, seed_of(self._deployment, self._robot, NOISE_USES[name]))
+        seed = seed_of(self._deployment, self._robot, NOISE_USES[name])
+        return MeasurementNoise(deviations, waves, period, seed)
 
     def _delays(self, size: int, periods: int) -> list[Holding]:
         """Return the blocks that delay a signal by a number of control periods.
@@ -192,6 +194,12 @@ def measurement_deviations(deployment: Deployment, name: str, size: int) -> Floa
     count = 3 if name == "object_pose" else size // 2
     positions = [m.position_noise, m.position_noise, *[m.angle_noise] * (count - 2)]
     return np.array([*positions, *[m.rate_noise] * (size - count)])
+
+
+def measurement_waves(deployment: Deployment, name: str, size: int, period: float) -> FloatArray:
+    """Return size, length in periods and phase of the waves of these components, shape (size, 3)."""
+    waves = deployment.measurements.waves.of_port(name, size)
+    return np.array([[wave.size, wave.period / period, wave.phase] for wave in waves])
 
 
 def _distortion(own: RobotDepartures, name: str, size: int) -> AffineSystem | None:

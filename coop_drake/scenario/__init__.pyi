@@ -28,6 +28,7 @@ from .model import (
     Workspace,
 )
 from .packages import package_map
+from .waves import Wave, Waves
 
 __all__ = [
     "ActuatorLimits",
@@ -54,6 +55,8 @@ __all__ = [
     "Start",
     "Tolerances",
     "VisualizationSettings",
+    "Wave",
+    "Waves",
     "Workspace",
     "assemble",
     "dump_gains",

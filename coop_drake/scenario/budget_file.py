@@ -9,10 +9,10 @@ from pathlib import Path
 from coop_drake.answers.budget import Budget
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.deployment import Floor
+from coop_drake.scenario.measured_bounds import rate_levers, wave_bounds
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.reading import read_file
 from coop_drake.tree import ComponentTree
-from coop_drake.tree.levers import axis_levers
 
 ALL = "all"
 """The choice that stands for the departures of the scenario's section ``deployment``."""
@@ -71,14 +71,15 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: Sequence[flo
     share = hypot(*masses) / sum(masses)  # errors of several robots rarely add up
     mean = PLANE_DEVIATIONS * share
     lost = REPORTS_LOST * deployment.period if messages.loss > 0.0 else 0.0
+    waves = wave_bounds(measured.waves, tree)
     return Budget(
         control_rate=deployment.control_rate,
         delay=measured.delay,
         lag=deployment.actuators.lag,
-        angle_noise=DEVIATIONS * measured.angle_noise,
-        rate_noise=DEVIATIONS * measured.rate_noise,
-        position_noise=mean * measured.position_noise,
-        velocity_noise=mean * measured.rate_noise * _rate_levers(tree),
+        angle_noise=DEVIATIONS * measured.angle_noise + waves.angle,
+        rate_noise=DEVIATIONS * measured.rate_noise + waves.rate,
+        position_noise=mean * measured.position_noise + waves.position,
+        velocity_noise=mean * measured.rate_noise * rate_levers(tree) + waves.velocity,
         single_noise=1.0 / share,
         model_error=abs(deployment.mass_error),
         acceleration_error=DISAGREEMENT,
@@ -109,26 +110,3 @@ def _refuse_uncounted(scenario: Scenario) -> None:
                 "nothing where a budget is asked for: none counts this; state a budget in a file instead"
             )
             raise ScenarioError(str(scenario.path), f"deployment.{key}", value, allowed)
-
-
-def _rate_levers(tree: ComponentTree) -> float:
-    """Return the error of the object's velocity over that of the rates of a robot, by which it is known [-].
-
-    The velocity of the base counts once, that of every angle by its largest distance from the object; their
-    errors are independent.
-    """
-    reach, levers = axis_levers(tree)[0], [0.0] * len(tree.components)
-    longest = 0.0
-    for index, component in enumerate(tree.components):
-        if component.joint is None or component.parent is None:
-            continue
-        pose = component.joint.X_PJ
-        levers[index] = levers[component.parent] + hypot(pose.x, pose.y)
-        joints = (tree.components[i].joint for i in tree.ancestors[index])
-        own = [
-            levers[i] if joint.kind == "revolute" else 1.0
-            for i, joint in zip(tree.ancestors[index], joints, strict=True)
-            if joint is not None
-        ]
-        longest = max(longest, hypot(1.0, reach, *own))
-    return longest or hypot(1.0, reach)

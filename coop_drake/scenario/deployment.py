@@ -18,6 +18,7 @@ from typing import Annotated, Literal
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.scenario.limits import ALL_ROBOTS
 from coop_drake.scenario.presets import Preset, with_preset
+from coop_drake.scenario.waves import Waves
 from coop_drake.typed_data import Limits, NotNegative, Positive
 
 Delay = Annotated[float, Limits(at_least=0.0, at_most=10.0)]
@@ -52,6 +53,7 @@ class Measurements:
         late: Probability that a measurement which is not lost arrives late, and is used from then on unless
             a newer one has arrived [-].
         late_by: How much later, rounded up to whole control periods, at least one [s].
+        waves: Bounded errors that change their sign, instead of noise or besides.
     """
 
     position_noise: NotNegative = 0.0
@@ -61,6 +63,7 @@ class Measurements:
     loss: Probability = 0.0
     late: Probability = 0.0
     late_by: Delay = 0.0
+    waves: Waves = field(default_factory=Waves)
 
 
 @dataclass(frozen=True)

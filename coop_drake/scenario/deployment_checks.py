@@ -1,7 +1,7 @@
 """Checks that relate the values of a deployment to each other and to the team."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import fields
 
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.limits import ALL_ROBOTS
@@ -27,8 +27,9 @@ def _without_rate(scenario: Scenario) -> Iterator[tuple[str, object, str]]:
     if deployment.control_rate is not None:
         return
     for section in ("measurements", "messages"):
-        for name, value in asdict(getattr(deployment, section)).items():
-            if value != 0.0:
+        values = getattr(deployment, section)
+        for name, value in ((one.name, getattr(values, one.name)) for one in fields(values)):
+            if value:
                 yield f"{section}.{name}", value, "0 without deployment.control_rate"
     if deployment.budget != "none":
         yield "budget", deployment.budget, "none without deployment.control_rate"

@@ -18,6 +18,8 @@ from coop_drake.scenario import (
     Push,
     RobotDepartures,
     Silence,
+    Wave,
+    Waves,
 )
 from coop_drake.simulation import configure_simulator, simulate
 from coop_drake.typed_data import convert_class
@@ -48,6 +50,7 @@ MILD = {
     "saturation": Deployment(actuators=ActuatorLimits(base_force=50.0)),
     "lag": Deployment(control_rate=200.0, actuators=ActuatorLimits(lag=0.005)),
     "noise": Deployment(control_rate=RATE, measurements=Measurements(1e-3, 5e-4, 1e-3)),
+    "waves": at_200_hz(measurements=Measurements(waves=Waves(angle=Wave(1e-3, 0.3), turn_rate=Wave(5e-3)))),
     "delay": Deployment(control_rate=200.0, measurements=Measurements(delay=0.005)),
     "model error": Deployment(mass_error=0.5),
     "lost reports": Deployment(control_rate=RATE, messages=Messages(loss=0.7)),
@@ -80,6 +83,10 @@ HARSH = {
     "noise": (
         Deployment(control_rate=RATE, measurements=Measurements(0.03, 0.015, 0.03)),
         "to its funnel is",
+    ),
+    "waves": (
+        at_200_hz(measurements=Measurements(waves=Waves(joints=Wave(0.1, 0.3)))),
+        "come to rest (margin",
     ),
     "delay": (Deployment(control_rate=RATE, measurements=Measurements(delay=0.1)), "to its funnel is"),
     "model error": (Deployment(mass_error=-0.98), "distance of object angle to its funnel is -"),

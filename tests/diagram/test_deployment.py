@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from coop_drake.diagram import build_closed_loop
-from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages
+from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages, Wave, Waves
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.system_checks import port_sizes
 
@@ -38,6 +38,10 @@ def test_an_ideal_team_has_nothing_round_its_controllers():
         (
             {"control_rate": 200.0, "measurements": NOISE},
             {"effort_hold", "radio", "object_pose_measured", "robot_state_measured"},
+        ),
+        (
+            {"control_rate": 200.0, "measurements": Measurements(waves=Waves(joints=Wave(0.001)))},
+            {"effort_hold", "radio", "robot_state_measured"},
         ),
         (
             {"control_rate": 200.0, "measurements": Measurements(delay=0.01)},
@@ -153,6 +157,22 @@ def test_actuators_follow_their_commands_with_a_lag():
     expected = (np.array(wanted) - given[2]) / lag
     np.testing.assert_allclose((given[2] - given[1]) / 1e-5, expected, rtol=1e-2, atol=0.1)
     assert np.abs(expected).max() > 10.0
+
+
+def test_a_controller_gets_the_waves_of_what_it_measures():
+    waves = Waves(*[Wave(0.001 * (1 + i), period=0.02, phase=0.5) for i in range(8)])
+    loop = loop_of(control_rate=100.0, measurements=Measurements(waves=waves))
+    root, expected = loop.create_context(), loop_of(control_rate=100.0)
+    exact = expected.create_context()
+    for port, errors in (
+        ("object_pose", [1, 2, 3]),
+        ("robot_state", [0, 0, 0, 4, 5, 6, 7, 8]),
+    ):
+        read = [
+            law.GetInputPort(port).Eval(law.GetMyContextFromRoot(context))
+            for law, context in ((loop.bare_controllers[0], root), (expected.bare_controllers[0], exact))
+        ]
+        np.testing.assert_allclose(read[0] - read[1], -0.001 * np.array(errors), atol=1e-12)
 
 
 @pytest.mark.parametrize("periods", [1, 2, 4])

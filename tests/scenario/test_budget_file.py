@@ -14,6 +14,7 @@ from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of
 from coop_drake.plant.run_masses import moved_masses
 from coop_drake.scenario import Deployment, Measurements
+from coop_drake.tree.levers import axis_levers
 from tests.support.scenarios import write_scenario
 
 PRESET = {"preset": "mobile_base"}
@@ -39,6 +40,22 @@ def test_the_budget_of_a_preset(tmp_path):
     assert budget.position_noise == pytest.approx(3.44 * 0.001 / sqrt(2.0))  # two robots of the same mass
     levers = budget.velocity_noise / (3.44 * 0.01 / sqrt(2.0))
     assert 1.5 < levers < 2.0  # the base's velocity, its yaw about 1.2 m away, the elbow 0.8 m away
+
+
+def test_a_budget_counts_bounded_errors_with_their_worst_signs(tmp_path):
+    waves = {name: {"size": 0.001 * (1 + i)} for i, name in enumerate(("x", "y", "angle", "joints"))}
+    waves |= {"velocity_x": {"size": 0.01}, "turn_rate": {"size": 0.02}, "joint_rates": {"size": 0.03}}
+    with_waves = coop_drake.load_scenario(scenario(tmp_path, measurements={"waves": waves}))
+    budget = budget_of("all", with_waves, planning_problem(with_waves))
+    plain = coop_drake.load_scenario(scenario(tmp_path))
+    usual = budget_of("all", plain, planning_problem(plain))
+    assert budget.angle_noise - usual.angle_noise == pytest.approx(0.004)
+    assert budget.rate_noise - usual.rate_noise == pytest.approx(0.02 + 0.03)  # one joint to each base
+    assert budget.position_noise - usual.position_noise == pytest.approx(sqrt(5.0) * 0.001)
+    reach, lever = axis_levers(planning_problem(plain).tree)[0], 0.8
+    assert budget.velocity_noise - usual.velocity_noise == pytest.approx(
+        0.01 + 0.02 * reach + 0.03 * lever, rel=0.05
+    )
 
 
 def test_a_required_budget_is_planned_for_without_an_option(tmp_path):

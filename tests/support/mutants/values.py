@@ -56,6 +56,7 @@ _POSITIVE = [
     "simulator.accuracy",
     "visualization.frames_per_second",
     "visualization.wall_height",
+    "deployment.measurements.waves.joint_rates.period",
 ]
 _NOT_NEGATIVE = [
     "planner.margin",
@@ -72,6 +73,7 @@ _NOT_NEGATIVE = [
     "deployment.measurements.loss",
     "deployment.measurements.late",
     "deployment.measurements.late_by",
+    "deployment.measurements.waves.angle.size",
     "deployment.floor.coulomb_friction",
     "deployment.floor.viscous_friction",
 ]
@@ -92,6 +94,7 @@ _BEYOND = {
     "deployment.actuators.joint_effort": (0.0, "nothing would move"),
     "deployment.actuators.lag": (60.0, "a motor does not take minutes"),
     "deployment.measurements.loss": (1.5, "it is a probability"),
+    "deployment.measurements.waves.x.phase": (1.5, "it is a part of a period"),
     "deployment.floor.slope": (30.0, "it is an angle in radians"),
     "planner.strategy": ("astar", "no strategy has this name"),
     "simulator.integration_scheme": ("runge_kutta7", "no integrator has this name"),
