@@ -25,13 +25,13 @@ from benchmarks.planner.budgeted import budget_tasks
 from benchmarks.planner.contradiction import contradiction_tasks
 from benchmarks.planner.growth import growth_tasks
 from benchmarks.planner.head_to_head import Effort, head_to_head_tasks
-from benchmarks.planner.ompl_peer import has_ompl
 from benchmarks.planner.ours import compile_kernels
 from benchmarks.planner.stages import stage_tasks
 from benchmarks.simulating import simulating_tasks
 from benchmarks.starting import starting_tasks
 from benchmarks.table import show
 from benchmarks.tasks import Task, chosen, worked
+from coop_drake.campaign.questions.ompl_peer import has_ompl
 
 __all__ = ["app"]
 

@@ -11,15 +11,16 @@ from dataclasses import dataclass
 from typing import Any
 
 from benchmarks.isolated import in_own_process
+from benchmarks.planner.compiled_ompl import run_compiled_ompl
 from benchmarks.planner.family import corridor_problem
-from benchmarks.planner.ompl_peer import has_ompl, run_ompl
 from benchmarks.planner.ours import plan_repeatedly
-from benchmarks.planner.path_check import fault_of
-from benchmarks.planner.peer import PeerRun
-from benchmarks.planner.trees_peer import run_trees
 from benchmarks.rows import Row
 from benchmarks.tasks import Rows, Task
 from coop_drake.answers import PlanningProblem
+from coop_drake.campaign.questions.ompl_peer import has_ompl
+from coop_drake.campaign.questions.path_check import fault_of
+from coop_drake.campaign.questions.peer import PeerRun
+from coop_drake.campaign.questions.trees_peer import run_trees
 
 __all__ = ["QUESTIONS", "Patience", "contradiction_rows", "contradiction_tasks"]
 
@@ -85,7 +86,7 @@ def contradiction_rows(name: str, problem: PlanningProblem, spent: Patience) -> 
     seeds = tuple(range(1, 1 + spent.runs))
     runs = _runs(run_trees, problem, seeds, spent.checks, limit=START_UP + spent.trees * len(seeds))
     if has_ompl():
-        runs += _runs(run_ompl, problem, seeds, spent.ompl, limit=START_UP + spent.ompl * len(seeds))
+        runs += _runs(run_compiled_ompl, problem, seeds, spent.ompl, limit=START_UP + spent.ompl * len(seeds))
     paths = [run.path for run in runs if run.found]
     good = sum(not fault_of(problem, path) for path in paths)
     seconds = sum(run.cpu_seconds for run in runs)

@@ -8,14 +8,15 @@ from statistics import median
 
 from benchmarks.isolated import in_own_process
 from benchmarks.planner.cases import CASES, Case
-from benchmarks.planner.ompl_peer import has_ompl, run_ompl
+from benchmarks.planner.compiled_ompl import run_compiled_ompl
 from benchmarks.planner.ours import plan_repeatedly
-from benchmarks.planner.path_check import fault_of
-from benchmarks.planner.peer import PeerRun
-from benchmarks.planner.trees_peer import CHECKS, run_trees
 from benchmarks.rows import Row
 from benchmarks.tasks import Rows, Task
 from coop_drake.answers import PlanningProblem
+from coop_drake.campaign.questions.ompl_peer import has_ompl
+from coop_drake.campaign.questions.path_check import fault_of
+from coop_drake.campaign.questions.peer import PeerRun
+from coop_drake.campaign.questions.trees_peer import CHECKS, run_trees
 
 __all__ = ["Effort", "head_to_head_tasks", "judged"]
 
@@ -86,7 +87,7 @@ def _ompl_task(case: Case, seeds: Sequence[int], budget: float) -> Task:
     def measure(rows: Rows) -> Rows:
         problem = case.problem()
         limit = START_UP + (budget + 1.0) * len(seeds)
-        runs = in_own_process(run_ompl, problem, tuple(seeds), budget, limit=limit).value or ()
+        runs = in_own_process(run_compiled_ompl, problem, tuple(seeds), budget, limit=limit).value or ()
         shares = [run.check_seconds / run.cpu_seconds for run in runs if run.check_seconds is not None]
         share = [Row(f"{name}/check_share", median(shares), "of time")] if shares else []
         return [*judged(name, problem, runs, f"{budget:g} CPU s"), *share]

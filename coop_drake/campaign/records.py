@@ -72,17 +72,20 @@ class QuestionRecord:
         floor: Kind of floor.
         robots: Number of robots.
         joints: Number of joints of the whole team.
-        kind: Kind of question, as its generator names it.
-        verdict: ``plan``, ``infeasible`` or ``undecided``.
+        kind: Shape of the object, and whether any joint slides.
+        verdict: ``plan``, ``infeasible``, ``undecided``, or ``failed`` where the planner raised an error.
         cpu_seconds: Processor time of the planner [s].
         first_plan_seconds: Processor time until the first plan was certified; NaN if none was [s].
         cells: Cells of the plan.
         verified: Whether the exact checker accepted the answer; false for ``undecided``.
         sampled_margin: Smallest clearance of configurations sampled along the plan; NaN without one [m].
-        peer: The other planner that searched for a way; empty if none did.
-        peer_found: Whether it found one.
-        peer_seconds: Processor time of the other planner; NaN if none searched [s].
+        peer: The other planners that searched for a way; the last one found it if any did. Empty if none did.
+        peer_found: Whether one was found.
+        peer_seconds: Processor time of the other planners together; NaN if none searched [s].
         reason: Why the question is undecided or the answer is wrong; else empty.
+        corners: Number of corners of the floor.
+        width_ratio: Width of the floor's passages over that of the narrowest straight corridor in which the
+            team is known to fit; NaN on floors without passages of one width [-].
     """
 
     question: int
@@ -101,6 +104,8 @@ class QuestionRecord:
     peer_found: bool = False
     peer_seconds: float = nan
     reason: str = ""
+    corners: int = 0
+    width_ratio: float = nan
 
 
 Record = RunRecord | QuestionRecord

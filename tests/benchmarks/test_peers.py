@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from benchmarks.planner.family import corridor_problem, first_question
-from benchmarks.planner.footprint import compiled_check, free_goals
 from benchmarks.planner.head_to_head import judged
-from benchmarks.planner.ompl_peer import run_ompl
-from benchmarks.planner.path_check import fault_of
-from benchmarks.planner.peer import PeerRun
-from benchmarks.planner.trees_peer import run_trees
+from coop_drake.campaign.questions.footprint import free_goals, prepared_check
+from coop_drake.campaign.questions.ompl_peer import run_ompl
+from coop_drake.campaign.questions.path_check import fault_of
+from coop_drake.campaign.questions.peer import PeerRun
+from coop_drake.campaign.questions.trees_peer import run_trees
 
 EASY = first_question()
 STILL = np.zeros((0, 5))
@@ -40,7 +40,7 @@ def test_a_peer_gives_up_when_its_budget_is_spent(run, budget):
 
 
 def test_goals_keep_joints_that_are_asked_for():
-    check = compiled_check(EASY)
+    check = prepared_check(EASY)
     free = free_goals(EASY, check, 5, seed=1)
     assert free.shape == (5, 5)
     assert (free[:, :3] == EASY.goal_pose).all()

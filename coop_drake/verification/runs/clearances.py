@@ -91,6 +91,20 @@ def check_clearances(
     )
 
 
+def least_distances(problem: PlanningProblem, z: FloatArray) -> FloatArray:
+    """Return the smallest distance of any body to a wall or to a body that it must not meet.
+
+    Args:
+        problem: The floor and the team.
+        z: Configurations (x, y, theta, q...), shape (T, 3 + n).
+
+    Returns:
+        Distances, zero or less where something touches, shape (T,) [m].
+    """
+    least: FloatArray = np.min([distance.measure(z) for distance in _distances(problem, z)], axis=0)
+    return least
+
+
 def _least_between(rows: Rows, between: Between, distance: _Distance, gaps: FloatArray) -> float:
     """Lower bound of a distance between rows [m]; refuses a log that is too sparse for one above zero."""
     ends = np.minimum(gaps[1:], gaps[:-1])

@@ -4,38 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numba
 import numpy as np
 
 from coop_drake.answers import PlanningProblem
+from coop_drake.compiled import prepared
 from coop_drake.planning.sampling.collision_kernels import is_free
 from coop_drake.planning.sampling.obstacle_grid import grid_for_team
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import team_arrays
 
-__all__ = ["compiled_check", "free_goals"]
+__all__ = ["free_goals", "prepared_check"]
 
 _TRIES_PER_GOAL = 40
 """Random values of the free joints that are tried for each goal configuration."""
 
 
-def compiled_check(problem: PlanningProblem) -> Callable[..., bool]:
-    """Compile ``check(x, y, theta, q...)`` for one question: is this configuration free?
+def prepared_check(problem: PlanningProblem) -> Callable[..., bool]:
+    """Prepare ``check(x, y, theta, q...)`` for one question: is this configuration free?
 
-    The team and the walls are constants of the compiled code. A call from Python then costs as little as
-    a call can; handing thirteen arrays over at every call would cost three times the check itself.
+    The team and the floor are handed over once, which makes a call three times as quick.
     """
     team = team_arrays(problem.tree)
     grid = grid_for_team(problem.workspace, team)
-
-    @numba.njit
-    def check(*values: float) -> bool:
-        free: bool = is_free(team, grid, np.array(values), 0.0)
-        return free
-
-    check(*map(float, problem.start))
-    compiled: Callable[..., bool] = check
-    return compiled
+    check = prepared(is_free, (team, grid), problem.start.astype(float), 0.0)
+    return lambda *values: check(np.array(values), 0.0)
 
 
 def free_goals(problem: PlanningProblem, check: Callable[..., bool], count: int, seed: int) -> FloatArray:

@@ -1,0 +1,15 @@
+from .answering import answer, ask, is_wrong
+from .peers import Searched, search_by_peers
+from .question import Question, random_question
+from .settings import QuestionSettings
+
+__all__ = [
+    "Question",
+    "QuestionSettings",
+    "Searched",
+    "answer",
+    "ask",
+    "is_wrong",
+    "random_question",
+    "search_by_peers",
+]

@@ -1,0 +1,150 @@
+"""Answers one random question, and judges the answer by checks that share no computation with the planner."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import replace
+from math import nan
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import process_time
+
+import shapely
+
+from coop_drake.answers import Found, Infeasible, PlanningResult, Undecided
+from coop_drake.answers.search_report import SearchReport
+from coop_drake.campaign.questions.peers import Searched, search_by_peers
+from coop_drake.campaign.questions.question import Question, random_question
+from coop_drake.campaign.questions.sampled_cells import sampled_margin
+from coop_drake.campaign.questions.settings import QuestionSettings
+from coop_drake.campaign.records import QuestionRecord
+from coop_drake.errors import CoopDrakeError, RefusalError
+from coop_drake.files import write_atomically
+from coop_drake.planning.planner import plan
+from coop_drake.verification import verify_plan, verify_proof
+
+
+class _OutOfTimeError(CoopDrakeError):
+    """The planner used its time."""
+
+
+def ask(number: int, settings: QuestionSettings, cases: Path | None = None) -> QuestionRecord:
+    """Draw one question, answer it and judge the answer.
+
+    Args:
+        number: Number of the question.
+        settings: What is drawn, and how it is judged.
+        cases: Folder that receives the scenario, its models and what was found, if the answer is wrong, or is
+            undecided although another planner finds a way; None to keep nothing.
+    """
+    with TemporaryDirectory() as folder:
+        question = random_question(settings, number, Path(folder))
+        record, found = answer(question, settings)
+        if cases is not None and (is_wrong(record) or record.peer_found or record.verdict == "undecided"):
+            _keep(question, record, found, cases / f"{settings.seed}_{number}")
+    return record
+
+
+def answer(question: Question, settings: QuestionSettings) -> tuple[QuestionRecord, Searched]:
+    """Answer a question with the planner, check the answer, and let other planners search against a "no".
+
+    A plan and a proof are given to the exact checker; the cells of a plan are sampled, too.
+
+    Args:
+        question: The question.
+        settings: Limits of time, and how many configurations are sampled.
+
+    Returns:
+        The record, and what the other planners found.
+    """
+    began = process_time()
+    result, failure = _planned(question, settings.time_limit)
+    record = replace(_described(question, result), cpu_seconds=process_time() - began)
+    if failure:
+        record = replace(record, verdict="failed", reason=failure)
+    refusal = _refusal(question, result)
+    record = replace(record, verified=refusal == "", reason=record.reason or refusal or "")
+    if isinstance(result, Found):
+        margin = sampled_margin(question.problem, result.plan, settings.samples, question.number)
+        return replace(record, sampled_margin=margin), Searched()
+    seconds = settings.peer_time if isinstance(result, Infeasible) else settings.patient_peer_time
+    if seconds == 0.0:
+        return record, Searched()
+    found = search_by_peers(question.problem, seconds, 1 + question.number)
+    searched = replace(
+        record, peer=", ".join(found.planners), peer_found=found.path is not None, peer_seconds=found.seconds
+    )
+    return searched, found
+
+
+def is_wrong(record: QuestionRecord) -> bool:
+    """Whether an answer is shown to be wrong: refused, refuted by a path, in contact, or an error."""
+    if record.verdict == "undecided":
+        return False
+    refuted = record.verdict == "infeasible" and record.peer_found
+    return not record.verified or refuted or record.sampled_margin <= 0.0
+
+
+def _planned(question: Question, limit: float) -> tuple[PlanningResult, str]:
+    """The planner's answer, undecided if it takes longer than the limit; and the error that it raised."""
+    end = process_time() + limit
+
+    def check_time(phase: str, fraction: float) -> None:
+        if process_time() > end:
+            raise _OutOfTimeError(f"not answered within {limit:g} s, when it was {phase}")
+
+    scenario = question.scenario
+    name = scenario.selected_gains
+    gains = scenario.gain_sets[name]
+    try:
+        return plan(question.problem, gains, gain_set_name=name, progress=check_time), ""
+    except _OutOfTimeError as error:
+        return Undecided(str(error), SearchReport(0)), ""
+    except Exception as error:  # Whatever it is, it is a fault of the planner, to be counted as one.
+        return Undecided("", SearchReport(0)), f"{type(error).__name__}: {error}"
+
+
+def _described(question: Question, result: PlanningResult) -> QuestionRecord:
+    problem = question.problem
+    verdict = {Found: "plan", Infeasible: "infeasible", Undecided: "undecided"}[type(result)]
+    first = result.report.first_plan_cpu_seconds
+    return QuestionRecord(
+        question.number,
+        question.seed,
+        question.floor,
+        question.robots,
+        len(problem.tree.joints),
+        question.kind,
+        verdict,
+        first_plan_seconds=nan if first is None else first,
+        cells=len(result.plan.cells) if isinstance(result, Found) else 0,
+        reason=result.reason if isinstance(result, Undecided) else "",
+        # Every ring repeats its first corner at its end.
+        corners=int(shapely.get_num_coordinates(problem.workspace)) - 1 - len(problem.workspace.interiors),
+        width_ratio=question.width_ratio,
+    )
+
+
+def _refusal(question: Question, result: PlanningResult) -> str | None:
+    """Why the exact checker refuses an answer, empty if it accepts it; None if there is nothing to check."""
+    try:
+        if isinstance(result, Found):
+            verify_plan(result.plan, question.problem, question.scenario.gain_sets)
+        elif isinstance(result, Infeasible):
+            if result.proof is None:
+                return "there is no proof that no plan exists"
+            verify_proof(result.proof, question.problem)
+        else:
+            return None
+    except RefusalError as refusal:
+        return str(refusal)
+    return ""
+
+
+def _keep(question: Question, record: QuestionRecord, found: Searched, folder: Path) -> None:
+    """Copy the scenario and its models, and write the record and the other planner's path beside them."""
+    shutil.copytree(question.scenario.path.parent, folder, dirs_exist_ok=True)
+    path = None if found.path is None else found.path.tolist()
+    text = json.dumps({"record": record.__dict__, "path": path}, indent=1) + "\n"
+    write_atomically(folder / "found.json", text.encode())

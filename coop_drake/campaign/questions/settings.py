@@ -1,0 +1,43 @@
+"""The section ``questions`` of a campaign file: random planning questions, and how answers are judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from coop_drake.typed_data import EXACT, Limits, NotNegative, Positive
+
+FloorKind = Literal["room", "corridor", "door", "warehouse", "rooms"]
+
+Count = Annotated[int, Limits(above=0)]
+
+
+@dataclass(frozen=True)
+class QuestionSettings:
+    """Random planning questions.
+
+    Attributes:
+        count: How many are asked.
+        seed: Seed of all that is drawn; the seed and its number determine a question.
+        floors: Kinds of floors; each is as frequent as the others.
+        robots: Numbers of robots; each is a third as frequent as the one before.
+        most_joints: Largest number of joints of a robot; each number is a third as frequent as the one
+            before.
+        time_limit: An answer that takes longer counts as undecided [CPU s].
+        samples: Configurations of every cell at which the distances of a plan are computed.
+        peer_time: How long each other planner searches for a path where it is proved that none exists
+            [CPU s].
+        patient_peer_time: How long each other planner searches where the answer is undecided [CPU s].
+        batch: Questions that one process answers, and one file holds.
+    """
+
+    count: Count = 100
+    seed: Annotated[int, Limits(at_least=0), EXACT] = 0
+    floors: tuple[FloorKind, ...] = ("room", "corridor", "door", "warehouse", "rooms")
+    robots: tuple[Annotated[int, Limits(at_least=2, at_most=5)], ...] = (2, 3, 4, 5)
+    most_joints: Annotated[int, Limits(at_least=1, at_most=3)] = 3
+    time_limit: Positive = 60.0
+    samples: Count = 40
+    peer_time: NotNegative = 1.0
+    patient_peer_time: NotNegative = 60.0
+    batch: Count = 20
