@@ -84,7 +84,7 @@ def search(
     """
     found = Search(objective)
     found.add(before)
-    strategy = _strategy(to_fractions(before.gains, parameters), runs, seed)
+    strategy = evolution_strategy(to_fractions(before.gains, parameters), runs, seed)
     try:
         while len(found.trials) <= runs and not strategy.stop():
             asked = strategy.ask()[: runs + 1 - len(found.trials)]
@@ -115,8 +115,18 @@ def load_optimizer() -> Any:
         raise TuningError(message) from error
 
 
-def _strategy(start: np.ndarray, runs: int, seed: int) -> Any:
-    """Return the strategy, ready for its first generation."""
+def evolution_strategy(start: np.ndarray, runs: int, seed: int, *, first_step: float = _FIRST_STEP) -> Any:
+    """Return a strategy for numbers between 0 and 1, ready for its first generation.
+
+    Args:
+        start: Where it begins.
+        runs: Largest number of trials.
+        seed: Its seed; numpy's global generator is not touched.
+        first_step: Standard deviation of the first generation [-].
+
+    Raises:
+        TuningError: The package ``cma`` is not installed.
+    """
     random = np.random.default_rng(seed)
     options = {
         "bounds": [0.0, 1.0],
@@ -125,4 +135,4 @@ def _strategy(start: np.ndarray, runs: int, seed: int) -> Any:
         "maxfevals": runs,
         "verbose": -9,
     }
-    return load_optimizer().CMAEvolutionStrategy(start, _FIRST_STEP, options)
+    return load_optimizer().CMAEvolutionStrategy(start, first_step, options)
