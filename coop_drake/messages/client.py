@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import secrets
-import time
-from collections.abc import Callable
+from time import monotonic
 from typing import Any
 
 import zmq
@@ -41,7 +40,6 @@ class MessageClient:
         server_key: The server's public key, None for no encryption.
         context: Of ZeroMQ; a new one by default. The address ``inproc://...`` needs a common one.
         tap: Is shown every message.
-        clock: Time that never goes back [s].
 
     Attributes:
         address: Where the server listens.
@@ -68,12 +66,11 @@ class MessageClient:
         server_key: str | None = None,
         context: zmq.Context[Any] | None = None,
         tap: Tap | None = None,
-        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.address, self.session, self.sessions, self.sent, self.unsent = address, 0, 0, 0, 0
-        self.incoming, self.refusals, self.heard = Incoming(math.inf), Refusals(), -math.inf
+        self.incoming, self.refusals, self.heard = Incoming(None), Refusals(), -math.inf
         self.server, self.trouble = server, "nothing answers there"
-        self._sender, self._question, self._tap, self._clock = sender, question, tap, clock
+        self._sender, self._question, self._tap = sender, question, tap
         role: Role = "world" if server == WORLD else "supervisor"
         self._allowed = allowed_kinds(channel, ("server", "both", role))
         self._nonce, self._asked = 0, -math.inf
@@ -103,9 +100,9 @@ class MessageClient:
         Args:
             limit: Longest time to wait [s].
         """
-        deadline = self._clock() + limit
+        deadline = monotonic() + limit
         while True:
-            message, left = self.poll(), deadline - self._clock()
+            message, left = self.poll(), deadline - monotonic()
             if message is not None or left <= 0.0:
                 return message
             wait_for(self.sockets, min(left, self.patience))
@@ -119,7 +116,7 @@ class MessageClient:
                 self.session = 0  # The next server may be another process, which does not know the session.
             elif not self.session:
                 self._asked = -math.inf
-        if not self.session and self._clock() - self._asked >= _AGAIN:
+        if not self.session and monotonic() - self._asked >= _AGAIN:
             self._ask()
         for _ in range(_READ_AT_ONCE):
             parts = next_parts(self._socket)
@@ -138,6 +135,8 @@ class MessageClient:
 
     def close(self) -> None:
         """Close everything; what was sent may leave for a fifth of a second."""
+        if self._socket.closed:
+            return
         self._socket.disable_monitor()
         self._monitor.close()
         self._socket.close()
@@ -145,7 +144,7 @@ class MessageClient:
             self._own_context.term()
 
     def _ask(self) -> None:
-        self._nonce, self._asked = secrets.randbits(32), self._clock()
+        self._nonce, self._asked = secrets.randbits(32), monotonic()
         self._put(encode(Hello(self._nonce, *self._question), self._sender, 0, 0))
 
     def _take(self, parts: list[zmq.Frame]) -> Any | None:
@@ -164,12 +163,12 @@ class MessageClient:
                 return None
             if not self.session or header.session != self.session:
                 raise RefusedError(Reason.SESSION)
-            self.incoming.judge(header.sequence, self._clock())
             message = decode(data, header.kind, self._allowed)
+            self.incoming.take(header.sequence)
         except RefusedError as refused:
             self.refusals.add(refused.reason)
             return None
-        self.heard = self._clock()
+        self.heard = monotonic()
         return message
 
     def _answered(self, answer: Any) -> None:
@@ -179,8 +178,8 @@ class MessageClient:
         if isinstance(answer, TurnedAway):
             self.trouble = REASONS.get(answer.reason, "it does not know this process")
             return
-        self.session, self.sent, self.incoming = answer.session, 0, Incoming(math.inf)
-        self.sessions, self.heard = self.sessions + 1, self._clock()
+        self.session, self.sent, self.incoming = answer.session, 0, Incoming(None)
+        self.sessions, self.heard = self.sessions + 1, monotonic()
         self.send(Present())
 
     def _put(self, data: bytes) -> bool:

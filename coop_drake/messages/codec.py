@@ -155,14 +155,9 @@ def _check(data: bytes, values: list[Any], layout: Layout) -> None:
     """Refuse real numbers that a field does not allow, and truth values other than 0 and 1."""
     at = HEADER.size
     for value, wire in zip(values, layout.wires.values(), strict=True):
-        if wire.code == "d" and wire.real != "any":
-            allowed = math.isfinite if wire.real == "finite" else _is_number
-            if not (all(map(allowed, value)) if wire.listed else allowed(value)):
+        if wire.code == "d" and wire.finite:
+            if not (all(map(math.isfinite, value)) if wire.listed else math.isfinite(value)):
                 raise RefusedError(Reason.VALUE)
         elif wire.code == "?" and data[at] > 1:
             raise RefusedError(Reason.VALUE)
         at += 2 if wire.listed else struct.calcsize("<" + wire.code)
-
-
-def _is_number(value: float) -> bool:
-    return not math.isnan(value)

@@ -17,7 +17,7 @@ class Incoming:
     """Judges the messages of one session by their numbers and their rate.
 
     Args:
-        rate: Largest rate in the long run [1/s].
+        rate: Largest rate in the long run [1/s], None for any.
 
     Attributes:
         last: Number of the last message that was taken, 0 before the first.
@@ -25,25 +25,35 @@ class Incoming:
         lost: How many never came, or came too late.
     """
 
-    def __init__(self, rate: float = RATE) -> None:
+    def __init__(self, rate: float | None = RATE) -> None:
         self.last = self.received = self.lost = 0
         self._rate, self._allowance, self._judged = rate, float(BURST), -math.inf
 
-    def judge(self, sequence: int, now: float) -> None:
-        """Take a message.
+    def limit(self, now: float) -> None:
+        """Count a message against the rate, before it is read.
 
         Args:
-            sequence: Its number.
             now: Time of a clock that never goes back [s].
 
         Raises:
-            RefusedError: Its number has been passed, or its sender sends too much.
+            RefusedError: Its sender sends too much.
         """
-        gained = self._rate * (now - self._judged)
-        self._allowance, self._judged = min(BURST, self._allowance + gained), now
-        if self._allowance < 1.0:
-            raise RefusedError(Reason.FLOOD)
-        self._allowance -= 1.0
+        if self._rate is not None:
+            gained = self._rate * (now - self._judged)
+            self._allowance, self._judged = min(BURST, self._allowance + gained), now
+            if self._allowance < 1.0:
+                raise RefusedError(Reason.FLOOD)
+            self._allowance -= 1.0
+
+    def take(self, sequence: int) -> None:
+        """Take a message that is well formed.
+
+        Args:
+            sequence: Its number.
+
+        Raises:
+            RefusedError: Its number has been passed.
+        """
         if sequence <= self.last:
             raise RefusedError(Reason.SEQUENCE)
         self.lost += sequence - self.last - 1

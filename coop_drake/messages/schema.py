@@ -15,10 +15,9 @@ MOST_ROBOTS = 64
 Pose = Annotated[tuple[float, ...], Wire("d", "m, m, rad", listed=True)]
 State = Annotated[tuple[float, ...], Wire("d", "m, rad, m/s, rad/s", listed=True)]
 Efforts = Annotated[tuple[float, ...], Wire("d", "N, N m", listed=True)]
-Values = Annotated[tuple[float, ...], Wire("d", listed=True, real="any")]
+Values = Annotated[tuple[float, ...], Wire("d", listed=True, finite=False)]
 Place = Annotated[tuple[float, ...], Wire("d", "m", listed=True)]
 Reals = Annotated[tuple[float, ...], Wire("d", listed=True)]
-Margin = Annotated[float, Wire("d", real="infinite")]
 
 
 @message(1, "any", "client")
@@ -176,15 +175,15 @@ class Status(NamedTuple):
 
 @message(48, "team", "robot")
 class Ready(NamedTuple):
-    """A robot's report, sent when its cell or the sign of its margin changes.
+    """A robot's report, sent when it changes.
 
     Attributes:
         cell: Index of the cell that it is about.
-        margin: Margin of readiness; the robot is ready where it is not negative.
+        ready: Whether the robot is ready to leave it, or has arrived where it is the last one.
     """
 
     cell: Index
-    margin: Margin
+    ready: Flag
 
 
 @message(49, "team", "robot")
@@ -206,11 +205,11 @@ class Switch(NamedTuple):
 
     Attributes:
         cell: Index of the cell.
-        entry: Simulated time at which it was entered.
+        sample: Number of the control period at whose begin it was entered.
     """
 
     cell: Index
-    entry: Seconds
+    sample: Number
 
 
 @message(51, "team", "supervisor")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from time import monotonic
 from typing import Any
 
 import zmq
 
+from coop_drake.errors import MessagingError
 from coop_drake.messages.agreement import (
     ANY_QUESTION,
     OTHER_KEY,
@@ -19,6 +20,7 @@ from coop_drake.messages.agreement import (
 )
 from coop_drake.messages.codec import Header, decode, encode, header_of
 from coop_drake.messages.doorkeeper import Doorkeeper
+from coop_drake.messages.incoming import RATE
 from coop_drake.messages.keys import KeyPair
 from coop_drake.messages.peers import Peer
 from coop_drake.messages.refusals import Reason, Refusals, RefusedError
@@ -45,7 +47,10 @@ class MessageServer:
         keys: Its own keys, None for no encryption.
         context: Of ZeroMQ; a new one by default. The address ``inproc://...`` needs a common one.
         tap: Is shown every message.
-        clock: Time that never goes back [s].
+        rate: Largest rate of the messages of each process in the long run [1/s].
+
+    Raises:
+        MessagingError: It cannot listen at the address.
 
     Attributes:
         address: Where it listens, with its port.
@@ -64,11 +69,11 @@ class MessageServer:
         keys: KeyPair | None = None,
         context: zmq.Context[Any] | None = None,
         tap: Tap | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        rate: float = RATE,
     ) -> None:
-        self.peers = {index: Peer(index, key) for index, key in peers.items()}
+        self.peers = {index: Peer(index, key, rate) for index, key in peers.items()}
         self.refusals = Refusals()
-        self._sender, self._question, self._tap, self._clock = sender, question, tap, clock
+        self._sender, self._question, self._tap = sender, question, tap
         self._allowed = {
             index: allowed_kinds(
                 channel, ("client", "both", "supervisor" if index == SUPERVISOR else "robot")
@@ -87,7 +92,11 @@ class MessageServer:
             # Without these nobody would be asked about keys if the thread that answers were not there.
             self._socket.zap_domain, self._socket.zap_enforce_domain = b"team", 1
         self._monitor = watch_socket(self._socket)
-        self._socket.bind(address)
+        try:
+            self._socket.bind(address)
+        except zmq.ZMQError as error:
+            self.close()
+            raise MessagingError(f"{address}: cannot listen there: {error.strerror.lower()}") from error
         self.address = self._socket.getsockopt_string(zmq.LAST_ENDPOINT)
 
     @property
@@ -103,7 +112,7 @@ class MessageServer:
         Args:
             limit: Longest time to wait [s].
         """
-        deadline = self._clock() + limit
+        deadline = monotonic() + limit
         while True:
             for _ in range(_READ_AT_ONCE):
                 parts = next_parts(self._socket)
@@ -113,7 +122,7 @@ class MessageServer:
                     return taken
             while next_event(self._monitor) is not None:
                 self.refusals.add(Reason.HANDSHAKE)
-            left = deadline - self._clock()
+            left = deadline - monotonic()
             if left <= 0.0:
                 return None
             wait_for(self.sockets, left)
@@ -130,6 +139,8 @@ class MessageServer:
 
     def close(self) -> None:
         """Close everything; what was sent may leave for a fifth of a second."""
+        if self._socket.closed:
+            return
         if self._doorkeeper is not None:
             self._doorkeeper.close()
         self._socket.disable_monitor()
@@ -152,12 +163,13 @@ class MessageServer:
                 self._greet(route, header, data, parts[1])
                 return None
             peer = self._session(peer, route, header)
-            peer.incoming.judge(header.sequence, self._clock())
+            peer.incoming.limit(monotonic())
             message = decode(data, header.kind, self._allowed[peer.sender])
+            peer.incoming.take(header.sequence)
         except RefusedError as refused:
             self.refusals.add(refused.reason)
             return None
-        peer.heard = self._clock()
+        peer.heard = monotonic()
         return peer.sender, message
 
     def _session(self, peer: Peer | None, route: bytes, header: Header) -> Peer:
@@ -167,7 +179,7 @@ class MessageServer:
         if header.sender != peer.sender:
             raise RefusedError(Reason.SENDER)
         if peer.offers.get(route) == header.session:
-            if peer.taken(route, self._clock()):
+            if peer.taken(route, monotonic()):
                 raise RefusedError(Reason.SENDER)
             if peer.route not in (None, route):
                 self._routes.pop(peer.route or b"", None)
@@ -207,7 +219,7 @@ class MessageServer:
             return OTHER_SCENARIO
         if hello.plan != self._question.plan:
             return OTHER_PLAN
-        return TAKEN if peer.taken(route, self._clock()) else 0
+        return TAKEN if peer.taken(route, monotonic()) else 0
 
     def _put(self, peer: Peer, route: bytes, data: bytes) -> bool:
         """Send bytes to a connection; False where it is gone or full."""

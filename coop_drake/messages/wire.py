@@ -22,13 +22,13 @@ class Wire(NamedTuple):
         code: Format of one number, as the module struct writes it.
         unit: Unit, "-" for none.
         listed: Whether the field is a list, of which the fixed part of the message has the length.
-        real: Which real numbers are allowed: ``finite`` ones, also infinite ones, or ``any`` bits.
+        finite: Whether only finite real numbers are allowed, else any bits.
     """
 
     code: Literal["?", "B", "H", "I", "Q", "d"]
     unit: str = "-"
     listed: bool = False
-    real: Literal["finite", "infinite", "any"] = "finite"
+    finite: bool = True
 
 
 Flag = Annotated[bool, Wire("?")]

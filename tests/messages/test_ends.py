@@ -83,11 +83,11 @@ def test_samples_and_efforts_cross_in_lock_step(team):
 
 def test_the_teams_channel_carries_reports_and_switches(team):
     for robot in team.robots:
-        assert robot.team.send(Ready(3, 0.25))
+        assert robot.team.send(Ready(3, True))
     heard = dict(team.supervisor.receive(LIMIT) for _ in range(2))
-    assert heard == {0: Ready(3, 0.25), 1: Ready(3, 0.25)}
-    assert team.supervisor.send_to_all(Switch(4, 1.5)) == [0, 1]
-    assert [robot.receive(LIMIT) for robot in team.robots] == [(SUPERVISOR, Switch(4, 1.5))] * 2
+    assert heard == {0: Ready(3, True), 1: Ready(3, True)}
+    assert team.supervisor.send_to_all(Switch(4, 300)) == [0, 1]
+    assert [robot.receive(LIMIT) for robot in team.robots] == [(SUPERVISOR, Switch(4, 300))] * 2
     # What each side has sent is what the other one has: lock-step waits for these numbers.
     assert [robot.team.sent for robot in team.robots] == [2, 2]
     assert [peer.incoming.last for peer in team.supervisor.team.peers.values()] == [2, 2]
