@@ -15,12 +15,11 @@ from coop_drake.scenario import load_scenario
 from coop_drake.scenario.model import Scenario
 from coop_drake.systems import AxisPpc
 from coop_drake.typed_data import field_types
-from docs.generate.__main__ import SCENARIO_PAGE
+from docs.generate.__main__ import PAGES
 from docs.generate.api_pages import api_pages
 from docs.generate.links import for_site
 from docs.generate.port_tables import as_markdown
 from docs.generate.scenario_keys import sections
-from docs.generate.scenario_page import scenario_page
 from tests.support.small_loop import joint_names, small_maps, small_scenario
 from tests.support.small_plan import small_plan
 
@@ -156,8 +155,10 @@ def test_links_lead_somewhere_beside_the_sources():
     assert [f"{page}: {to}" for page in pages for to in links[page] if not (page.parent / to).exists()] == []
 
 
-def test_the_page_of_scenario_files_is_up_to_date():
-    assert SCENARIO_PAGE.read_text(encoding="utf-8") == scenario_page(), "`make docs` writes it anew"
+@pytest.mark.parametrize("name", PAGES)
+def test_the_pages_of_files_are_up_to_date(name):
+    written = (ROOT / "docs" / "reference" / name).read_text(encoding="utf-8")
+    assert written == PAGES[name](), "`make docs` writes it anew"
 
 
 def test_in_the_site_a_room_is_its_page_of_the_api():

@@ -29,7 +29,7 @@ class Runs:
         scenarios: Scenario files, relative to the campaign file, or names of shipped scenarios.
         count: How many runs of every scenario and every combination of the grid.
         set: Values of keys of the scenario in every run and in the plan, by their dotted keys.
-        vary: From what the values of keys of the scenario are drawn, by their dotted keys.
+        vary: Distributions from which every run draws the values of keys of the scenario, by dotted keys.
         grid: Values of keys of the scenario of which every combination is run, by their dotted keys. Plans
             do not know what vary and grid say of deployment, control, plant and simulator.
         seed: Seed of all that is drawn.
@@ -85,14 +85,18 @@ class Campaign:
         return self.path.name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".campaign")
 
 
-def load_campaign(path: Path | str) -> Campaign:
+def load_campaign(path: Path | str, original: Path | None = None) -> Campaign:
     """Read a campaign file; what its scenarios allow is checked by :mod:`coop_drake.campaign.variation`.
+
+    Args:
+        path: The file.
+        original: Where the file that this is a copy of is: names of scenarios are relative to it.
 
     Raises:
         ScenarioError: With file, key, value and what is allowed there.
     """
     file = Path(path)
-    campaign = dataclasses.replace(read_file(Campaign, file), path=file)
-    if campaign == Campaign(path=file):
+    campaign = dataclasses.replace(read_file(Campaign, file), path=original or file)
+    if campaign == Campaign(path=campaign.path):
         raise ScenarioError(str(file), "the file", "no section", "at least one section, such as runs")
     return campaign

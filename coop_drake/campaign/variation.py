@@ -185,6 +185,8 @@ class Variation:
         Raises:
             ScenarioError: With file, key, value and what is allowed there.
         """
+        if self.runs.tier != "drake":
+            raise ScenarioError(str(self.campaign.path), "runs.tier", self.runs.tier, "drake")
         choices = {**self.runs.grid, **{key: one.extremes() for key, one in self.runs.vary.items()}}
         usual = {key: values[0] for key, values in choices.items()}
         for scenario in range(len(self.scenarios)):

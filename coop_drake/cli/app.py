@@ -1,6 +1,7 @@
 """The commands and the headings that the help lists them under.
 
-A command is a function in the module of its name: ``coop-drake plan`` is ``plan_command`` in ``plan.py``.
+A command is a function in the module of its name: ``coop-drake plan`` is ``plan_command`` in ``plan.py``; one
+with commands of its own is a ``Typer``.
 It imports Drake, the planner and matplotlib when it is called, so that no command waits for what it does not
 need.
 
@@ -21,6 +22,7 @@ from typing import Annotated
 import typer
 
 from coop_drake.cli.bench import bench_command
+from coop_drake.cli.campaign import campaign_app
 from coop_drake.cli.compare import compare_command
 from coop_drake.cli.diagram import diagram_command
 from coop_drake.cli.doctor import doctor_command
@@ -44,13 +46,14 @@ from coop_drake.cli.warm import warm_command
 from coop_drake.cli.watch import watch_command
 from coop_drake.cli.why import why_command
 
-_PANELS: dict[str, dict[str, Callable[..., None]]] = {
+_PANELS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     "Carrying objects": {
         "run": run_command,
         "plan": plan_command,
         "simulate": simulate_command,
         "tune": tune_command,
         "compare": compare_command,
+        "campaign": campaign_app,
     },
     "A case of your own": {
         "new": new_command,
@@ -129,6 +132,8 @@ def show_version(
 
 for panel, commands in _PANELS.items():
     for name, command in commands.items():
-        app.command(
-            name, epilog=epilog(name), rich_help_panel=panel, context_settings=_PASSES_ARGUMENTS_ON.get(name)
-        )(command)
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name, epilog=epilog(name), rich_help_panel=panel)
+            continue
+        settings = _PASSES_ARGUMENTS_ON.get(name)
+        app.command(name, epilog=epilog(name), rich_help_panel=panel, context_settings=settings)(command)

@@ -40,6 +40,12 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("schema", "the same on standard output"),
     ),
     "compare": ((f"compare {_BASE}", "rigid grasps beside grasps as constraints"),),
+    "campaign": (
+        ("campaign many.campaign.yaml", "make all runs, or those that are missing, into out/campaigns/many/"),
+        ("campaign status many.campaign.yaml", "how far it is, what was lost, the least margins"),
+        ("campaign report many.campaign.yaml", "a page with rates, distributions and the worst runs"),
+        ("campaign replay many.campaign.yaml 17", "one of its runs again, with recording and figures"),
+    ),
     "tune": (
         (f"tune {_BASE}", "less force in no more time, into out/base/tuned/gains.yaml"),
         (f'tune {_BASE} --criterion time --limit "peak_force<=1x"', "less time with no more force"),

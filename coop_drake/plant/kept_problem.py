@@ -55,7 +55,7 @@ def kept_problem(scenario: Scenario, folder: Path) -> PlanningProblem | None:
         content = json.loads(_file(scenario, folder).read_bytes())
         if content["digest"] != content_digest(content) or content["code"] != _code():
             return None
-        if any(_digest(Path(path)) != digest for path, digest in content["files"].items()):
+        if any(file_digest(Path(path)) != digest for path, digest in content["files"].items()):
             return None
         # A floor plan may have been read from a file that only its reader knows.
         if content["workspace"] != repr(scenario.workspace):
@@ -74,7 +74,7 @@ def keep_problem(scenario: Scenario, problem: PlanningProblem, folder: Path) -> 
         problem: Its planning problem.
         folder: Where problems are kept; it is made when the first one is written.
     """
-    files = _files(scenario)
+    files = source_files(scenario)
     if files is None:
         return
     counts = [
@@ -82,7 +82,7 @@ def keep_problem(scenario: Scenario, problem: PlanningProblem, folder: Path) -> 
     ]
     content = {
         "code": _code(),
-        "files": {str(path): _digest(path) for path in sorted(files.paths)},
+        "files": {str(path): file_digest(path) for path in sorted(files.paths)},
         "workspace": repr(scenario.workspace),
         "joints": dict(zip(files.robots, counts, strict=True)),
         "tree": _plain(problem.tree),
@@ -112,13 +112,13 @@ def _code() -> str:
     return digest.hexdigest()
 
 
-def _digest(path: Path) -> str:
+def file_digest(path: Path) -> str:
     """SHA-256 of a file, an empty text where there is none."""
     return hashlib.sha256(path.read_bytes()).hexdigest() if path.is_file() else ""
 
 
 @dataclasses.dataclass(frozen=True)
-class _Sources:
+class Sources:
     """What a scenario's models were read from.
 
     Attributes:
@@ -130,7 +130,7 @@ class _Sources:
     paths: frozenset[Path]
 
 
-def _files(scenario: Scenario) -> _Sources | None:
+def source_files(scenario: Scenario) -> Sources | None:
     """The files of a scenario, or None if it names a folder, whose content is not followed."""
     from coop_drake.scenario.assembly import assemble
     from coop_drake.scenario.packages import package_files
@@ -146,7 +146,7 @@ def _files(scenario: Scenario) -> _Sources | None:
         if path not in found:
             found.add(path)
             waiting += _named_in(path, assembly.packages)
-    return _Sources(tuple(robot.name for robot in assembly.robots), frozenset(found))
+    return Sources(tuple(robot.name for robot in assembly.robots), frozenset(found))
 
 
 def _named_in(path: Path, packages: Any) -> Iterator[Path]:

@@ -1,8 +1,8 @@
 """``python -m docs.generate out/docs`` builds the documentation as a site of HTML pages.
 
 With ``--notebooks DIR`` it has a page for each executed notebook in that folder, see ``make notebooks``.
-The page of scenario files is kept in ``docs``, so that it can be read without the site, too. The galleries
-that ``python -m docs.gallery out/gallery`` has made beside the site are part of it.
+The pages of scenario and campaign files are kept in ``docs``, so that they can be read without the site, too.
+The galleries that ``python -m docs.gallery out/gallery`` has made beside the site are part of it.
 """
 
 from __future__ import annotations
@@ -19,11 +19,12 @@ import yaml
 from docs.generate.api_pages import api_pages
 from docs.generate.links import for_site
 from docs.generate.notebook_pages import write_notebook_pages
-from docs.generate.scenario_page import scenario_page
+from docs.generate.scenario_page import campaign_page, scenario_page
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
-SCENARIO_PAGE = ROOT / "docs" / "reference" / "scenario.md"
+PAGES = {"scenario.md": scenario_page, "campaign.md": campaign_page}
+"""The pages of ``docs/reference`` that are made here, and how."""
 
 
 def main(site: Path, notebooks: Path | None = None) -> int:
@@ -31,8 +32,9 @@ def main(site: Path, notebooks: Path | None = None) -> int:
 
     ``notebooks``: a folder of executed notebooks, None for a site without.
     """
-    if _updated(SCENARIO_PAGE, scenario_page()):
-        print(f"{SCENARIO_PAGE.relative_to(ROOT)} was out of date and has been updated", file=sys.stderr)
+    old = [name for name, page in PAGES.items() if _updated(ROOT / "docs" / "reference" / name, page())]
+    if old:
+        print(f"out of date and updated in docs/reference: {', '.join(old)}", file=sys.stderr)
         return 1
     sources = site.with_name(site.name + "_sources").absolute()
     shutil.rmtree(sources, ignore_errors=True)

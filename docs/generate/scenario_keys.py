@@ -94,6 +94,8 @@ def _kind(kind: Any) -> str:
     if kind in SCALARS:
         return SCALARS[kind].replace("finite ", "")
     if origin is typing.Annotated:
+        if arguments[0] is Any:
+            return "any value"
         noun = "whole number" if arguments[0] is int else "number"
         limits = [extra.describe(noun) for extra in arguments[1:] if isinstance(extra, Limits)]
         return limits[0] if limits else f"Drake's `{arguments[0].__name__}`"

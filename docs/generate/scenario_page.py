@@ -1,10 +1,11 @@
-"""The page of scenario files."""
+"""The pages of scenario files and of campaign files."""
 
 from __future__ import annotations
 
+from coop_drake.campaign.settings import Campaign
 from docs.generate.scenario_keys import Section, sections
 
-__all__ = ["scenario_page"]
+__all__ = ["campaign_page", "scenario_page"]
 
 _TOP = """# Scenario files
 
@@ -17,9 +18,21 @@ angles radians, frames those of the [conventions](../conventions.md).
 """
 
 
+_CAMPAIGN = """# Campaign files
+
+A campaign is one YAML file that ends in `.campaign.yaml`; [how to run one](../how_to/campaign.md). A key that
+is not listed is refused. `make docs` makes this page from the classes that hold the values.
+"""
+
+
 def scenario_page() -> str:
-    """Return the page: one table for each section."""
+    """Return the page of scenario files: one table for each section."""
     return "\n".join([_TOP, *map(_section, sections())])
+
+
+def campaign_page() -> str:
+    """Return the page of campaign files, likewise."""
+    return "\n".join([_CAMPAIGN, *map(_section, sections(Campaign))])
 
 
 def _section(section: Section) -> str:

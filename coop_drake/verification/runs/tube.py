@@ -6,6 +6,9 @@ start at rest it is carried from sample to sample as an oscillator about p_G.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from math import nan
+
 import numpy as np
 import shapely
 
@@ -32,29 +35,62 @@ def check_budget_used(rows: Rows) -> list[Check]:
     return checks
 
 
+def budget_share(rows: Rows) -> float:
+    """Return the largest share that a run used of what its plan's budget states [-]; NaN without a budget.
+
+    That of the position is its distance from the nominal motion over the tube's radius. That of an axis is
+    the least distance to its funnel's bounds that the budget states over the one that the axis kept.
+
+    Raises:
+        RefusalError: The log does not have all samples that the nominal motion depends on.
+    """
+    plan = rows.plan
+    if plan.budget is None or plan.tube is None:
+        return nan
+    share = float(_off_nominal(rows, *_samples(rows))[1].max() / plan.tube.radius)
+    if plan.budget.axes:
+        for _, stated, kept in _distances(rows):
+            with np.errstate(divide="ignore"):
+                share = max(share, float(np.max(stated / np.maximum(kept, 0.0))))
+    return share
+
+
+def _samples(rows: Rows) -> tuple[IntArray, FloatArray, IntArray]:
+    """Return of every row the sample before it and the time since then [s], and the samples' first rows."""
+    times, period = rows.log.times, rows.plan.budget.period if rows.plan.budget else nan
+    sample = np.floor(times / period + SAME_TIME / period).astype(np.int64)
+    late = times - sample * period
+    first = np.flatnonzero(np.abs(late) <= SAME_TIME)
+    known = np.isin(sample, sample[first]) & (np.diff(sample, prepend=0) <= 1)
+    rows.require(known, "times", "is not in a period whose first instant is in the log, too")
+    return sample, late, first
+
+
+def _off_nominal(
+    rows: Rows, sample: IntArray, late: FloatArray, first: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the nominal position in every row, (T, 2), and the object's distance from it, (T,) [m]."""
+    nominal = _nominal(rows, rows.log.governor_position[first], first, sample, late)
+    return nominal, np.hypot(*(rows.log.object_pose[:, :2] - nominal).T)
+
+
 def _check_tube(rows: Rows, radius: float, speed: float) -> Check:
     """Check p_G at every sample, and the object's distance from its nominal motion in every row."""
     log, plan = rows.log, rows.plan
     assert plan.budget is not None  # checked by the caller
-    period = plan.budget.period
-    sample = np.floor(log.times / period + SAME_TIME / period).astype(np.int64)
-    late = log.times - sample * period
-    first = np.flatnonzero(np.abs(late) <= SAME_TIME)
-    known = np.isin(sample, sample[first]) & (np.diff(sample, prepend=0) <= 1)
-    rows.require(known, "times", "is not in a period whose first instant is in the log, too")
+    sample, late, first = _samples(rows)
     p_G = log.governor_position[first]
     steps = np.hypot(*np.diff(p_G, axis=0, prepend=p_G[:1]).T)
     text = "moved by {:.6g} m in a period, beyond the plan's largest speed"
     within = np.ones(len(log.times), dtype=np.bool_)
-    within[first] = steps <= period * speed + ROUNDING
+    within[first] = steps <= plan.budget.period * speed + ROUNDING
     moved = np.zeros(len(log.times))
     moved[first] = steps
     rows.require(within, "governor_position", text, moved)
-    nominal = _nominal(rows, p_G, first, sample, late)
+    nominal, off = _off_nominal(rows, sample, late, first)
     for k in range(len(plan.cells)):
         inside = (log.cell_index != k) | shapely.contains_xy(plan.governed(k), nominal[:, 0], nominal[:, 1])
         rows.require(inside, "governor_position", f"has led the nominal motion out of the region of cell {k}")
-    off = np.hypot(*(log.object_pose[:, :2] - nominal).T)
     rows.require(off <= radius + ROUNDING, "object_pose", "is {:.6g} m from its nominal position", off)
     return Check(
         "the object stayed in the tube of its budget",
@@ -85,16 +121,21 @@ def _nominal(rows: Rows, p_G: FloatArray, first: IntArray, sample: IntArray, lat
     return positions
 
 
+def _distances(rows: Rows) -> Iterator[tuple[IntArray, FloatArray, FloatArray]]:
+    """Yield of every cell with a budget its rows, the stated distances, (1 + n,), and those kept there."""
+    log, axes = rows.log, rows.z[:, 2:]
+    kept = np.minimum(axes - log.funnel_lower, log.funnel_upper - axes)
+    for k, transition in enumerate(rows.plan.transitions):
+        inside = np.flatnonzero(log.cell_index == k)
+        if transition.tolerance is not None and len(inside):
+            yield inside, transition.tolerance.distance, kept[inside]
+
+
 def _check_distances(rows: Rows) -> Check:
     """Check that every axis kept the distance to its funnel's bounds that the budget states."""
-    log, plan, least = rows.log, rows.plan, np.inf
-    axes = rows.z[:, 2:]
-    kept = np.minimum(axes - log.funnel_lower, log.funnel_upper - axes)
-    for k, transition in enumerate(plan.transitions):
-        stated = transition.tolerance
-        if stated is None:
-            continue
-        spare = np.where((log.cell_index == k)[:, None], kept - stated.distance, np.inf)
-        rows.require(spare >= -ROUNDING, "angle, joints", "is {:.6g} nearer to a bound than stated", -spare)
-        least = min(least, float(spare.min()))
-    return Check("axes kept the distances that the budget states", kept.size, least, "rad or m to spare")
+    spare = np.full((len(rows.log.times), rows.z.shape[1] - 2), np.inf)
+    for inside, stated, kept in _distances(rows):
+        spare[inside] = kept - stated
+    rows.require(spare >= -ROUNDING, "angle, joints", "is {:.6g} nearer to a bound than stated", -spare)
+    least = float(spare.min())
+    return Check("axes kept the distances that the budget states", spare.size, least, "rad or m to spare")

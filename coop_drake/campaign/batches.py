@@ -1,0 +1,83 @@
+"""The batches of a campaign: consecutive runs that one process makes, and one file holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, get_args
+
+from coop_drake.answers.digest import content_digest
+from coop_drake.campaign.plans import Plans, scenario_content
+from coop_drake.campaign.settings import Tier
+from coop_drake.campaign.variation import Variation
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Consecutive runs of one scenario in one tier.
+
+    Attributes:
+        scenario: Index of the scenario in the campaign file.
+        tier: By which loop they are made.
+        first: Index of the first run.
+        stop: Index behind the last run.
+        digest: SHA-256 of all that their results depend on; names their file.
+    """
+
+    scenario: int
+    tier: Tier
+    first: int
+    stop: int
+    digest: str
+
+    @property
+    def file(self) -> Path:
+        """The file of its records, in the campaign's folder."""
+        return Path("runs") / f"{self.digest}.parquet"
+
+    @property
+    def costs(self) -> Path:
+        """The file that says what it took; other than the records it is never the same twice."""
+        return Path("costs") / f"{self.digest}.json"
+
+
+class Batching:
+    """Divides a campaign into batches.
+
+    Args:
+        variation: Its runs.
+        plans: Their plans.
+    """
+
+    def __init__(self, variation: Variation, plans: Plans) -> None:
+        self._variation, self._plans = variation, plans
+        self._content = cache(self._content_of)
+
+    def batches(self) -> Iterator[Batch]:
+        """Yield all batches: Drake's first, because they take longest."""
+        for tier in get_args(Tier):
+            for scenario in range(len(self._variation.scenarios)):
+                indices, size = self._variation.indices(scenario, tier), self._variation.runs.batch
+                for first in range(indices.start, indices.stop, size):
+                    yield self.batch(scenario, tier, first, min(first + size, indices.stop))
+
+    def batch(self, scenario: int, tier: Tier, first: int, stop: int) -> Batch:
+        """Return one batch; the arguments are those of `Batch`."""
+        content = {**self._content(scenario), "tier": tier, "first": first, "stop": stop}
+        return Batch(scenario, tier, first, stop, content_digest(content))
+
+    def _content_of(self, scenario: int) -> dict[str, Any]:
+        """Return what the results of a scenario's runs depend on, but for their tier and indices."""
+        runs = self._variation.runs
+        first = self._variation.run(scenario * self._variation.runs_of_scenario)
+        return {
+            **scenario_content(self._variation.scenarios[scenario]),
+            "plan": self._plans.digest_of(first),
+            "vary": {key: repr(one) for key, one in runs.vary.items()},
+            "grid": {key: list(values) for key, values in runs.grid.items()},
+            "runs of a combination": runs.count if runs.grid else None,
+            "seed": runs.seed,
+            "keep": runs.keep,
+        }

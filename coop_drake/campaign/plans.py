@@ -1,0 +1,104 @@
+"""The plans that runs follow, each made once and kept in the campaign's folder."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from coop_drake.answers import Found, Plan, load_plan, save_plan
+from coop_drake.answers.digest import content_digest
+from coop_drake.campaign.variation import Run, Variation
+from coop_drake.errors import PlanError
+from coop_drake.fields import HarmonicMap, MapStore
+from coop_drake.files import cache_folder
+from coop_drake.plant import planning_problem
+from coop_drake.plant.budgets import budget_of
+from coop_drake.plant.kept_problem import file_digest, source_files
+from coop_drake.progress import Progress
+from coop_drake.scenario.model import Scenario
+from coop_drake.simulation import build_maps
+from coop_drake.typed_data import to_plain
+
+Maps = tuple[HarmonicMap, ...]
+"""The harmonic map of every cell of a plan."""
+
+_KEPT = 4
+"""Plans with their maps that a process keeps in memory; runs of one batch mostly have one."""
+
+
+def versions() -> dict[str, str]:
+    """Return the versions that a result depends on."""
+    return {name: version(name) for name in ("coop-drake", "drake", "numpy")}
+
+
+def scenario_content(scenario: Scenario) -> dict[str, Any]:
+    """Return all that a scenario says, with the digests of its models' files, as plain data."""
+    sources = source_files(scenario)
+    files = sorted(sources.paths - {scenario.path.resolve()}) if sources else []
+    return {
+        "scenario": to_plain(scenario, Scenario),
+        "files": sorted(file_digest(path) for path in files if path.is_file()),
+        "versions": versions(),
+    }
+
+
+class Plans:
+    """The plans of a campaign.
+
+    Args:
+        variation: Its runs.
+        folder: Where plans are kept.
+    """
+
+    def __init__(self, variation: Variation, folder: Path) -> None:
+        self.variation, self._folder = variation, folder
+        self._ready: dict[str, tuple[Plan, Maps]] = {}
+
+    def digest_of(self, run: Run) -> str:
+        """Return the digest of what a run's plan is made from."""
+        scenario = self.variation.scenario_to_plan(run)
+        return content_digest({**scenario_content(scenario), "budget": self.variation.runs.budget})
+
+    def plan_of(self, run: Run, progress: Progress | None = None) -> Plan:
+        """Return the plan that a run follows, from the folder if it is there.
+
+        Raises:
+            PlanError: There is none; the message says why.
+        """
+        path = self._folder / f"{self.digest_of(run)}.json"
+        if path.exists():
+            return load_plan(path)
+        found = _planned(self.variation.scenario_to_plan(run), self.variation.runs.budget, progress)
+        save_plan(found, path)
+        return load_plan(path)  # Runs follow what the file says, to the last bit.
+
+    def with_maps(self, run: Run, progress: Progress | None = None) -> tuple[Plan, Maps]:
+        """Return the plan that a run follows, and its maps.
+
+        Raises:
+            PlanError: There is no plan; the message says why.
+            FieldError: A cell cannot be mapped.
+        """
+        digest = self.digest_of(run) if self.variation.planned_values(run) else f"of {run.scenario}"
+        if digest not in self._ready:
+            plan = self.plan_of(run, progress)
+            tolerance = self.variation.scenario_to_plan(run).maps.tolerance
+            store = MapStore(cache_folder("maps"))
+            maps = build_maps(plan, tolerance=tolerance, store=store, workers=1, progress=progress)
+            while len(self._ready) >= _KEPT:
+                del self._ready[next(iter(self._ready))]
+            self._ready[digest] = plan, maps
+        return self._ready[digest]
+
+
+def _planned(scenario: Scenario, budget: str | None, progress: Progress | None) -> Plan:
+    from coop_drake.planning.planner import plan
+
+    name, problem = scenario.selected_gains, planning_problem(scenario)
+    tolerated = budget_of(budget, scenario, problem)
+    gains = scenario.gain_sets[name]
+    result = plan(problem, gains, gain_set_name=name, budget=tolerated, progress=progress)
+    if isinstance(result, Found):
+        return result.plan
+    raise PlanError(f"no plan for {scenario.path.name}: {result.reason}")

@@ -1,0 +1,89 @@
+"""The folder of a campaign's results: one Parquet file for each batch, whole or not there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coop_drake.campaign.batches import Batch
+from coop_drake.campaign.records import RunRecord, schema_of, table_of
+from coop_drake.files import write_atomically
+
+if TYPE_CHECKING:
+    import pyarrow
+
+
+@dataclass(frozen=True)
+class CampaignFolder:
+    """Where the results of a campaign are.
+
+    Attributes:
+        path: The folder; it is made when the first result is there.
+    """
+
+    path: Path
+
+    @property
+    def campaign(self) -> Path:
+        """The campaign file as it was when the command began."""
+        return self.path / "campaign.yaml"
+
+    @property
+    def plans(self) -> Path:
+        """The plans that runs follow, named by digests."""
+        return self.path / "plans"
+
+    @property
+    def lock(self) -> Path:
+        """The file that a command which works in the folder holds a lock of."""
+        return self.path / ".lock"
+
+    def write(self, batch: Batch, records: Iterable[RunRecord]) -> None:
+        """Write the records of a batch, whole or not at all.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
+        write_table(self.path / batch.file, table_of(records, RunRecord))
+
+    def has(self, batch: Batch) -> bool:
+        """Whether the records of a batch are there; a damaged file counts as missing."""
+        import pyarrow.parquet
+
+        try:
+            metadata = pyarrow.parquet.read_metadata(self.path / batch.file)
+        except (OSError, pyarrow.ArrowInvalid):
+            return False
+        return bool(metadata.num_rows == batch.stop - batch.first)
+
+    def missing(self, batches: Iterable[Batch]) -> list[Batch]:
+        """Return the batches whose records are not there."""
+        return [batch for batch in batches if not self.has(batch)]
+
+    def table(self, batches: Sequence[Batch]) -> pyarrow.Table:
+        """Return the records of those batches that are there, sorted by run and tier."""
+        import pyarrow
+        import pyarrow.parquet
+
+        there = [pyarrow.parquet.read_table(self.path / one.file) for one in batches if self.has(one)]
+        table = pyarrow.concat_tables(there) if there else schema_of(RunRecord).empty_table()
+        return table.sort_by([("run", "ascending"), ("tier", "ascending")])
+
+    def costs(self, batches: Iterable[Batch]) -> list[dict[str, Any]]:
+        """Return what the batches took whose costs are known, as `note` was told."""
+        files = [self.path / batch.costs for batch in batches]
+        return [json.loads(file.read_bytes()) for file in files if file.exists()]
+
+    def note(self, batch: Batch, costs: dict[str, Any]) -> None:
+        """Write what a batch took."""
+        write_atomically(self.path / batch.costs, json.dumps(costs, sort_keys=True).encode() + b"\n")
+
+
+def write_table(path: Path, table: pyarrow.Table) -> None:
+    """Write a table as a Parquet file, whole or not at all; the same rows give the same bytes."""
+    import pyarrow.parquet
+
+    write_atomically(path, lambda stream: pyarrow.parquet.write_table(table, stream))

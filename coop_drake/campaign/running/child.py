@@ -1,0 +1,68 @@
+"""A process that makes the runs of one batch, writes a line for each, and ends.
+
+``python -m coop_drake.campaign.running.child ORDER`` with the order as JSON. Drake keeps some memory of every
+plant, which ends with the process. Lines on standard output are JSON: ``["begun", record]`` and ``["ended",
+record]`` for each run, ``["costs", mapping]`` at the end, ``["error", message]`` where nothing can be run.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+from dataclasses import asdict
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+from coop_drake.errors import CoopDrakeError
+
+
+def main(order: dict[str, Any]) -> int:
+    """Make the runs of an order, the fields of `Order`; return the exit code."""
+    threading.Thread(target=_end_with_supervisor, daemon=True).start()
+    try:
+        _make(order)
+    except CoopDrakeError as error:
+        _say("error", str(error))
+        return 1
+    return 0
+
+
+def _make(order: dict[str, Any]) -> None:
+    from coop_drake.campaign.batches import Batching
+    from coop_drake.campaign.plans import Plans
+    from coop_drake.campaign.results import CampaignFolder
+    from coop_drake.campaign.running.making import RunMaker
+    from coop_drake.campaign.settings import load_campaign
+    from coop_drake.campaign.variation import Variation
+    from coop_drake.memory import peak_memory_mb
+
+    folder, batch = CampaignFolder(Path(order["folder"])), order["batch"]
+    variation = Variation(load_campaign(folder.campaign, Path(order["campaign"])))
+    plans = Plans(variation, folder.plans)
+    place = batch["scenario"], batch["tier"], batch["first"], batch["stop"]
+    if Batching(variation, plans).batch(*place).digest != batch["digest"]:
+        raise CoopDrakeError(f"{order['campaign']}: a scenario or a model was changed while the campaign ran")
+    maker = RunMaker(variation, plans, batch["tier"], folder.path / "logs")
+    for index in range(order["begin"], batch["stop"]):
+        run = variation.run(index)
+        _say("begun", asdict(maker.begun(run)))
+        _say("ended", asdict(maker.record(run)))
+    _say("costs", {"cpu_seconds": process_time(), "peak_memory_mb": peak_memory_mb()})
+
+
+def _say(kind: str, content: object) -> None:
+    sys.stdout.write(json.dumps([kind, content]) + "\n")
+    sys.stdout.flush()
+
+
+def _end_with_supervisor() -> None:
+    """End this process when the one that started it has ended, however that was."""
+    os.read(sys.stdin.fileno(), 1)  # It returns when no process can write any more.
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    sys.exit(main(json.loads(sys.argv[1])))

@@ -1,0 +1,73 @@
+"""Makes single runs of a campaign and measures them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from coop_drake.answers.digest import content_digest
+from coop_drake.answers.log import SimulationLog
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.plan_file import plan_digest
+from coop_drake.campaign.measuring import record_of_log
+from coop_drake.campaign.plans import Maps, Plans, versions
+from coop_drake.campaign.records import RunRecord
+from coop_drake.campaign.settings import Tier
+from coop_drake.campaign.variation import Run, Variation
+from coop_drake.scenario.digest import scenario_digest
+from coop_drake.scenario.model import Scenario
+
+
+class RunMaker:
+    """Makes the runs of a campaign in one process.
+
+    Args:
+        variation: The runs.
+        plans: Their plans.
+        tier: By which loop they are made.
+        logs: Where logs that the campaign keeps are written.
+    """
+
+    def __init__(self, variation: Variation, plans: Plans, tier: Tier, logs: Path) -> None:
+        self._variation, self._plans, self._tier, self._logs = variation, plans, tier, logs
+
+    def begun(self, run: Run) -> RunRecord:
+        """Return the record of a run that has not ended."""
+        name = self._variation.scenarios[run.scenario].name
+        return RunRecord(run.index, name, self._tier, run.seed, run.text, arrived=False)
+
+    def record(self, run: Run) -> RunRecord:
+        """Make a run; one that cannot be made is lost for the reason that its error names.
+
+        Raises:
+            OSError: A log cannot be written, or the system refuses something.
+            MemoryError: There is not enough memory.
+        """
+        begun = self.begun(run)
+        try:
+            plan, maps = self._plans.with_maps(run)
+            scenario = self._variation.scenario_of(run)
+            log = simulated(scenario, plan, maps)
+            record = record_of_log(run, begun.scenario, log, plan, run_digest(scenario, plan, self._tier))
+        except (OSError, MemoryError):
+            raise
+        except Exception as error:
+            return replace(begun, reason=f"{type(error).__name__}: {error}")
+        keep = self._variation.runs.keep
+        if keep == "all" or (keep == "lost" and not record.arrived):
+            log.save(self._logs / f"{run.index}.npz")
+        return record
+
+
+def simulated(scenario: Scenario, plan: Plan, maps: Maps) -> SimulationLog:
+    """Simulate a run by Drake's loop, with fused blocks where they know all that the scenario asks for."""
+    from coop_drake.simulation import simulate
+    from coop_drake.tuning.trial import fastest_blocks
+
+    return simulate(scenario, plan, maps, blocks=fastest_blocks(scenario, plan, maps))
+
+
+def run_digest(scenario: Scenario, plan: Plan, tier: Tier) -> str:
+    """Return the digest of what a run of a scenario along a plan depends on."""
+    parts = {"scenario": scenario_digest(scenario), "plan": plan_digest(plan), "tier": tier}
+    return content_digest({**parts, "versions": versions()})

@@ -1,0 +1,92 @@
+"""Places batches on workers by Dask: on a cluster of this machine alone, or on one that exists."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from coop_drake.campaign.batches import Batch
+from coop_drake.campaign.running.supervising import Order, make_batch
+from coop_drake.errors import ProcessError
+from coop_drake.interrupts import uninterrupted
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+_WAITING = 1000
+"""Batches that the scheduler holds at a time: it keeps some kilobytes of each."""
+
+_SETTINGS = {
+    "distributed.scheduler.allowed-failures": 100,
+    "distributed.scheduler.worker-ttl": "60s",
+    "distributed.worker.daemon": True,
+}
+"""A batch is tried again when its worker was lost, and given to another worker when its own has been silent
+for a minute; settings of the user's own in Dask's configuration stand above these."""
+
+
+def place(
+    orders: Sequence[Order], workers: int | None, scheduler: str | None, done: Callable[[Batch], None]
+) -> None:
+    """Have batches made, and say which is done.
+
+    Args:
+        orders: The batches.
+        workers: How many are made at a time on this machine; one a core by default.
+        scheduler: Address of a scheduler that exists, with workers of its own; else a cluster is started
+            here, reachable from this machine alone, and ended with this call.
+        done: Called with every batch whose file is there.
+
+    Raises:
+        ProcessError: Workers or the scheduler were lost for good.
+        OSError: Records cannot be written.
+    """
+    import distributed
+
+    waiting = iter(orders)
+    with _client(workers, scheduler) as client:
+
+        def submit(order: Order) -> distributed.Future:
+            return client.submit(make_batch, order, key=f"batch-{order.batch.digest}", pure=False)
+
+        batches = {f"batch-{order.batch.digest}": order.batch for order in orders}
+        futures = distributed.as_completed([submit(order) for order in islice(waiting, _WAITING)])
+        for future in futures:
+            try:
+                future.result()
+            except (distributed.KilledWorker, distributed.CancelledError) as error:
+                where = f"at {scheduler}" if scheduler else "of this command"
+                raise ProcessError(
+                    f"workers {where} were lost; the same command goes on from here"
+                ) from error
+            done(batches[future.key])
+            for order in islice(waiting, 1):
+                futures.add(submit(order))
+
+
+@contextmanager
+def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
+    """Connect to a scheduler, or start one with workers that end with the block."""
+    import dask
+    import distributed
+
+    if scheduler is not None:
+        with distributed.Client(scheduler) as client:
+            yield client
+        return
+    dask.config.update_defaults(_SETTINGS)
+    with uninterrupted():  # Ctrl-C is for this process, which ends the others.
+        cluster = distributed.LocalCluster(
+            n_workers=workers or os.cpu_count() or 1,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address=None,
+            memory_limit=0,  # Runs use their memory in processes that the workers start.
+            silence_logs=50,
+        )
+        client = distributed.Client(cluster)
+    with cluster, client:
+        yield client

@@ -1,0 +1,83 @@
+"""How far a campaign is: for every scenario and tier what is done, what was lost, and the least margins."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from math import isnan, nan
+from typing import Any
+
+import numpy as np
+
+from coop_drake.campaign.batches import Batch
+from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.settings import Campaign
+from coop_drake.campaign.variation import Variation
+
+
+@dataclass(frozen=True)
+class State:
+    """Runs of one scenario in one tier.
+
+    Attributes:
+        scenario: Name of the scenario.
+        tier: The tier.
+        runs: How many there shall be.
+        done: How many are there.
+        lost: How many of these did not arrive.
+        funnel_margin: Least distance of an axis to a bound of its funnel, NaN if none is known [rad or m].
+        clearance: Least distance to walls and between bodies, NaN if none is known [m].
+        cpu_seconds: Processor time of a run, with its share of starting processes, NaN if not known [s].
+    """
+
+    scenario: str
+    tier: str
+    runs: int
+    done: int
+    lost: int
+    funnel_margin: float
+    clearance: float
+    cpu_seconds: float
+
+    def facts(self) -> dict[str, Any]:
+        """Return all by name; null where nothing is known."""
+        content = asdict(self)
+        return {key: None if isinstance(v, float) and isnan(v) else v for key, v in content.items()}
+
+    def cells(self) -> tuple[str, ...]:
+        """Return a row of a table."""
+        margins = (f"{self.funnel_margin:.4f} rad", f"{self.clearance:.4f} m", f"{self.cpu_seconds:.3f} s")
+        shown = ("" if text.startswith("nan") else text for text in margins)
+        return f"{self.scenario}, {self.tier}", str(self.runs), str(self.done), str(self.lost), *shown
+
+
+def state_of(campaign: Campaign, folder: CampaignFolder, batches: Sequence[Batch]) -> tuple[State, ...]:
+    """Return the state of every scenario and tier that a campaign has runs of."""
+    rows = []
+    for key in dict.fromkeys((batch.scenario, batch.tier) for batch in batches):
+        mine = [batch for batch in batches if (batch.scenario, batch.tier) == key]
+        table = folder.table(mine)
+        costs = folder.costs(mine)
+        counted = sum(entry["runs"] for entry in costs)
+        column = {name: table.column(name).to_numpy() for name in ("funnel_margin", "arrived", *_CLEARANCES)}
+        rows.append(
+            State(
+                Variation(campaign).scenarios[key[0]].name,
+                key[1],
+                sum(batch.stop - batch.first for batch in mine),
+                table.num_rows,
+                int((~column["arrived"]).sum()),
+                _least(column["funnel_margin"]),
+                _least(np.concatenate([column[name] for name in _CLEARANCES])),
+                sum(entry["cpu_seconds"] for entry in costs) / counted if counted else nan,
+            )
+        )
+    return tuple(rows)
+
+
+_CLEARANCES = ("wall_clearance", "body_clearance")
+
+
+def _least(values: np.ndarray) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.min()) if known.size else nan

@@ -1,0 +1,162 @@
+"""The command campaign: many runs by seed, their state, their report, and any of them once more."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from rich.markup import escape
+from typer.core import TyperGroup
+
+from coop_drake.cli.options import Machine, NoFigures, Quiet, out_folder
+from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+
+if TYPE_CHECKING:
+    from coop_drake.campaign import Campaign
+    from coop_drake.campaign.batches import Batch
+    from coop_drake.campaign.results import CampaignFolder
+
+
+class _RunByDefault(TyperGroup):
+    """Takes ``campaign FILE`` for ``campaign run FILE``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the command ``run`` before arguments that begin with no command."""
+        if args and args[0] not in self.commands and args[0] != "--help":
+            args = ["run", *args]
+        return super().parse_args(ctx, args)
+
+
+campaign_app = typer.Typer(
+    cls=_RunByDefault,
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    help="Make thousands of runs by seed on this machine or on many, and report margins and losses.",
+)
+"""The command with those below it."""
+
+CampaignFile = Annotated[
+    Path, typer.Argument(metavar="FILE", dir_okay=False, help="Campaign file (*.campaign.yaml).")
+]
+CampaignOut = Annotated[
+    Path | None, out_folder("Folder of the results; out/campaigns and the file's name by default.")
+]
+
+
+@campaign_app.command("run")
+def run_command(
+    file: CampaignFile,
+    out: CampaignOut = None,
+    workers: Annotated[
+        int | None,
+        typer.Option("--workers", metavar="N", min=1, help="Batches at a time here; one a core by default."),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            "--scheduler",
+            metavar="ADDRESS",
+            help="A Dask scheduler that exists, in place of workers that are started here.",
+        ),
+    ] = None,
+    machine: Machine = False,
+    quiet: Quiet = False,
+) -> None:
+    """Make all runs of a campaign, or those that are missing after an interruption.
+
+    `campaign FILE` means the same. The exit code is 1 if a run was lost.
+    """
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        campaign, folder = _read(file, out)
+        from coop_drake.campaign.running import run_campaign
+
+        with reporter.stage("campaign", "campaign") as progress:
+            outcome = run_campaign(
+                campaign, folder.path, workers=workers, scheduler=scheduler, progress=progress
+            )
+        reporter.facts["batches_made"] = outcome.made
+        _show(campaign, folder, outcome.batches, reporter)
+
+
+@campaign_app.command("status")
+def status_command(
+    file: CampaignFile, out: CampaignOut = None, machine: Machine = False, quiet: Quiet = False
+) -> None:
+    """Show how far a campaign is, and what it has found so far."""
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        campaign, folder, batches = _with_batches(file, out)
+        _show(campaign, folder, batches, reporter)
+        reporter.code = ExitCode.DONE
+
+
+@campaign_app.command("report")
+def report_command(
+    file: CampaignFile, out: CampaignOut = None, machine: Machine = False, quiet: Quiet = False
+) -> None:
+    """Write report.html and report.json: rates with bounds, distributions, the worst runs."""
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        from coop_drake.campaign.report import make_report, write_report
+
+        campaign, folder, batches = _with_batches(file, out)
+        report = make_report(campaign.name, folder.table(batches))
+        at = "" if out is None else f" --out {out}"
+        written = write_report(
+            report,
+            folder.path,
+            lambda run: f"coop-drake campaign replay {file} {run.run} --tier {run.tier}{at}",
+        )
+        reporter.facts["files"] = [str(path) for path in written]
+        reporter.say(f"The report is {escape(str(written[0]))}; open it in a browser")
+
+
+@campaign_app.command("replay")
+def replay_command(
+    file: CampaignFile,
+    run: Annotated[int, typer.Argument(metavar="RUN", min=0, help="Index of the run in the campaign.")],
+    out: CampaignOut = None,
+    no_figures: NoFigures = False,
+    machine: Machine = False,
+    quiet: Quiet = False,
+) -> None:
+    """Make one run again, to the last bit as it was counted, with its recording and figures."""
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        from coop_drake.cli.campaign_replay import replay
+
+        campaign, folder, batches = _with_batches(file, out)
+        reporter.code = replay(campaign, folder, batches, run, reporter, figures=not no_figures)
+
+
+def _read(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolder]:
+    """Read a campaign file, and say where its results go."""
+    from coop_drake.campaign import load_campaign
+    from coop_drake.campaign.results import CampaignFolder
+
+    campaign = load_campaign(file)
+    return campaign, CampaignFolder((out or Path("out") / "campaigns" / campaign.name).absolute())
+
+
+def _with_batches(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolder, tuple[Batch, ...]]:
+    from coop_drake.campaign.running.command import batches_of
+
+    campaign, folder = _read(file, out)
+    return campaign, folder, batches_of(campaign, folder)
+
+
+def _show(campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter) -> None:
+    """Show the state of every scenario in every tier; a lost run makes the command fail."""
+    from coop_drake.campaign.state import state_of
+
+    rows = state_of(campaign, folder, batches)
+    reporter.facts.update(
+        folder=str(folder.path),
+        runs=sum(row.runs for row in rows),
+        done=sum(row.done for row in rows),
+        lost=sum(row.lost for row in rows),
+        rows=[row.facts() for row in rows],
+    )
+    headings = ("runs", "done", "lost", "least funnel margin", "least clearance", "CPU time of a run")
+    reporter.table(campaign.name, [row.cells() for row in rows], headings, "scenario, tier")
+    reporter.say(f"All results are in {escape(str(folder.path))}")
+    if reporter.facts["lost"]:
+        reporter.code = ExitCode.FAILED_RUN

@@ -1,0 +1,77 @@
+"""Makes one run of a campaign again, as `run` makes one, and compares it with what was counted."""
+
+from __future__ import annotations
+
+from math import isnan
+from typing import TYPE_CHECKING, Any
+
+from coop_drake.cli.reporter import ExitCode, Reporter
+from coop_drake.cli.results import ResultFolder
+from coop_drake.cli.run import carry_out
+from coop_drake.cli.task import Task
+from coop_drake.errors import ProcessError
+from coop_drake.viz.drawing_processes import DrawingProcesses
+
+if TYPE_CHECKING:
+    from coop_drake.campaign import Campaign, RunRecord
+    from coop_drake.campaign.batches import Batch
+    from coop_drake.campaign.results import CampaignFolder
+
+
+def replay(
+    campaign: Campaign,
+    folder: CampaignFolder,
+    batches: tuple[Batch, ...],
+    index: int,
+    reporter: Reporter,
+    *,
+    figures: bool,
+) -> ExitCode:
+    """Make a run again by Drake's loop, with recording and figures, below the campaign's folder.
+
+    Raises:
+        ScenarioError: There is no such run.
+        ProcessError: The run differs from the one that was counted.
+    """
+    from coop_drake.answers.log import SimulationLog
+    from coop_drake.campaign.measuring import record_of_log
+    from coop_drake.campaign.plans import Plans
+    from coop_drake.campaign.running.making import run_digest
+    from coop_drake.campaign.variation import Variation
+    from coop_drake.plant import planning_problem
+    from coop_drake.tuning.trial import fastest_blocks
+
+    assert campaign.runs is not None  # or there would be no batches
+    variation = Variation(campaign)
+    run = variation.run(index)
+    scenario = variation.scenario_of(run)
+    plan, maps = Plans(variation, folder.plans).with_maps(run)
+    task = Task(scenario, planning_problem(scenario))
+    results = ResultFolder.of(task.name, folder.path / "replays" / str(index), "simulation")
+    blocks = fastest_blocks(scenario, plan, maps)
+    with DrawingProcesses(figures=figures) as drawing:
+        code = carry_out(task, plan, results, reporter, drawing, None, fresh_maps=False, blocks=blocks)
+    log = SimulationLog.load(results.path / "log.npz")
+    again = record_of_log(run, scenario.name, log, plan, run_digest(scenario, plan, "drake"))
+    _compare(again, folder, batches, reporter)
+    return code
+
+
+def _compare(
+    again: RunRecord, folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter
+) -> None:
+    mine = [one for one in batches if one.tier == "drake" and one.first <= again.run < one.stop]
+    counted = [row for row in folder.table(mine).to_pylist() if row["run"] == again.run]
+    reporter.facts.update(run=again.run, counted=bool(counted))
+    if not counted:
+        reporter.say(f"Run {again.run} has not been counted by Drake's loop yet")
+        return
+    differing = [name for name, value in counted[0].items() if not _same(value, getattr(again, name))]
+    if differing:
+        raise ProcessError(f"run {again.run} differs from the one that was counted in {', '.join(differing)}")
+    reporter.say(f"Run {again.run} is the one that was counted, to the last bit")
+
+
+def _same(first: Any, second: Any) -> bool:
+    both = isinstance(first, float) and isinstance(second, float)
+    return first == second or (both and isnan(first) and isnan(second))
