@@ -11,7 +11,7 @@ from coop_drake.laws.gain_schedule import Schedule
 from coop_drake.planning.boxes.box_kernels import BoxArrays, clearances_in_box
 from coop_drake.planning.execution.transport_kernels import PERIOD
 from coop_drake.planning.improvement.box_crossing import cross_box
-from coop_drake.planning.improvement.object_motion import object_motion, smallest, soonest_exit
+from coop_drake.planning.improvement.object_motion import ObjectMotion, object_motion, smallest, soonest_exit
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.planning.travel_time import SETTLING_TIME
 from coop_drake.tree.pose import FloatArray, IntArray
@@ -32,6 +32,9 @@ DENSE_ENDS, SPARSE_STEP = 8, 3
 
 LARGEST_CLEARANCE = 1.0
 """Larger clearances count as this one [m]: the object has reached its highest speed."""
+
+ROUNDING = 1e-9
+"""Differences of times may be wrong by this [s]: of equally quick boxes the one that begins first is used."""
 
 
 class Waypoints(NamedTuple):
@@ -62,12 +65,42 @@ class Waypoints(NamedTuple):
     tolerance: float
 
 
+class _Sequences(NamedTuple):
+    """The fastest box sequence to every waypoint, for every padding of the box that follows.
+
+    Attributes:
+        time: When each waypoint is reached, by the next box's padding, shape (n, p) [s].
+        states: States in which that happens, shape (n, p, 3 + 2 m).
+        before: First waypoint and padding of the box before, -1 for none, shape (n, p, 2).
+    """
+
+    time: FloatArray
+    states: FloatArray
+    before: IntArray
+
+
+class _Boxes(NamedTuple):
+    """The boxes that begin at each waypoint, as far as they have been followed.
+
+    Attributes:
+        lower: Least values of (theta, q...) from each waypoint on, shape (n, m) [rad, m].
+        upper: Greatest values, shape (n, m).
+        held: 1 where the box with each padding may hold further waypoints, shape (n, p).
+    """
+
+    lower: FloatArray
+    upper: FloatArray
+    held: IntArray
+
+
 @compiled
 def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
     """Find the sequence of boxes along waypoints that is crossed in the shortest time.
 
     Each box holds some consecutive waypoints, padded by one of a few widths. By dynamic programming, for
     every waypoint and every width of the next box, the fastest sequence and its final state are stored.
+    Of the boxes that end at a waypoint the motion of the object comes first: it bounds the time from below.
+    The axes are simulated only in boxes whose bound is less than the fastest time known.
 
     Args:
         waypoints: The waypoints.
@@ -77,37 +110,117 @@ def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
         waypoint, index of the padding).
     """
     n, count, m = len(waypoints.path), len(waypoints.pads), waypoints.path.shape[1] - 2
-    best, states = np.empty((n, count)), np.zeros((n, count, 3 + 2 * m))
-    before = np.empty((n, count, 2), np.int64)
+    found = _Sequences(
+        np.full((n, count), np.inf), np.zeros((n, count, 3 + 2 * m)), np.full((n, count, 2), -1)
+    )
+    boxes = _Boxes(waypoints.path[:, 2:].copy(), waypoints.path[:, 2:].copy(), np.ones((n, count), np.int64))
     for p in range(count):
-        for i in range(n):
-            best[i, p] = np.inf if i > 0 else 0.0
-            before[i, p, 0], before[i, p, 1] = -1, -1
+        found.time[0, p] = 0.0
         for a in range(m):
-            states[0, p, 3 + a] = waypoints.path[0, 2 + a]
-    low, high, lower, upper = np.empty(m), np.empty(m), np.empty(m), np.empty(m)
+            found.states[0, p, 3 + a] = waypoints.path[0, 2 + a]
     checks = np.empty((int(LONGEST / PERIOD) + 2, 3))
-    for i in range(n - 1):
+    first = 0
+    for j in range(1, n):
         for p in range(count):
-            if not best[i, p] < smallest(best[i]) + LARGEST_DELAY:
+            if not found.time[j - 1, p] < smallest(found.time[j - 1]) + LARGEST_DELAY:
+                boxes.held[j - 1, p] = 0
+        while first < j and boxes.held[first].sum() == 0:
+            first += 1
+        _end_boxes(waypoints, first, j, boxes, found, checks)
+    return found.time[n - 1, 0], _box_rows(found.before)
+
+
+@compiled
+def _end_boxes(
+    waypoints: Waypoints, first: int, j: int, boxes: _Boxes, found: _Sequences, checks: FloatArray
+) -> None:
+    """Find the fastest sequences that reach waypoint j, by boxes that begin at waypoint ``first`` or later.
+
+    Args:
+        waypoints: The waypoints.
+        first: No box that begins before holds waypoint j.
+        j: Where boxes end.
+        boxes: All boxes; those that do not hold waypoint j are not followed any further.
+        found: The fastest sequences to the waypoints before; those to j are written.
+        checks: Memory for the object's motion, as in ``object_motion``.
+    """
+    m = boxes.lower.shape[1]
+    lower, upper = np.empty(m), np.empty(m)
+    begins, soonest, clearances_of = [(0, 0)][:0], [0.0][:0], [np.empty(0)][:0]
+    for i in range(first, j):
+        for a in range(m):
+            boxes.lower[i, a] = min(boxes.lower[i, a], waypoints.path[j, 2 + a])
+            boxes.upper[i, a] = max(boxes.upper[i, a], waypoints.path[j, 2 + a])
+        if j - i > DENSE_ENDS and (j - i) % SPARSE_STEP != 0 and j + 1 < len(waypoints.path):
+            continue
+        for p in range(boxes.held.shape[1]):
+            if boxes.held[i, p] == 0:
                 continue
-            for a in range(m):
-                low[a], high[a] = waypoints.path[i, 2 + a], waypoints.path[i, 2 + a]
-            for j in range(i + 1, n):
-                for a in range(m):
-                    low[a] = min(low[a], waypoints.path[j, 2 + a])
-                    high[a] = max(high[a], waypoints.path[j, 2 + a])
-                    lower[a] = max(waypoints.boxes.lower[a], low[a] - waypoints.pads[p])
-                    upper[a] = min(waypoints.boxes.upper[a], high[a] + waypoints.pads[p])
-                if j - i > DENSE_ENDS and (j - i) % SPARSE_STEP != 0 and j + 1 < n:
-                    continue
-                clearances = clearances_in_box(
-                    waypoints.boxes, waypoints.grid, lower, upper, waypoints.path, i, j, LARGEST_CLEARANCE
-                )
-                if len(clearances) == 0 or smallest(clearances) < waypoints.least_clearance:
-                    break
-                _reach(waypoints, i, p, j, lower, upper, clearances, best, states, before, checks)
-    return best[n - 1, 0], _box_rows(before)
+            _widened(waypoints, boxes, i, p, lower, upper)
+            clearances = clearances_in_box(
+                waypoints.boxes, waypoints.grid, lower, upper, waypoints.path, i, j, LARGEST_CLEARANCE
+            )
+            boxes.held[i, p] = len(clearances) > 0 and smallest(clearances) >= waypoints.least_clearance
+            if boxes.held[i, p] == 0:
+                continue
+            motion = _motion(waypoints, found, i, p, j, clearances, checks)
+            crossed = soonest_exit(motion, LONGEST)
+            if crossed == np.inf:
+                if j - i > DENSE_ENDS:  # Only near ends can have less clearance than further ones.
+                    boxes.held[i, p] = 0
+                continue
+            begins.append((i, p))
+            soonest.append(found.time[i, p] + BOX_COST / waypoints.pads[p] + crossed)
+            clearances_of.append(clearances)
+    for _ in range(len(begins)):
+        k = 0
+        for other in range(1, len(begins)):
+            if soonest[other] < soonest[k]:
+                k = other
+        i, p = begins[k]
+        if not _is_useful(soonest[k], j, found):
+            break
+        _widened(waypoints, boxes, i, p, lower, upper)
+        motion = _motion(waypoints, found, i, p, j, clearances_of[k], checks)
+        _reach(waypoints, i, p, j, lower, upper, motion, soonest[k], found)
+        soonest[k] = np.inf
+
+
+@compiled
+def _is_useful(soonest: float, j: int, found: _Sequences) -> bool:
+    """Whether a sequence that reaches waypoint j at a time would be the fastest for some next padding."""
+    nexts = 1 if j + 1 == len(found.time) else found.time.shape[1]
+    useful = False
+    for q in range(nexts):
+        useful = useful or soonest <= found.time[j, q]
+    return useful
+
+
+@compiled
+def _widened(
+    waypoints: Waypoints, boxes: _Boxes, i: int, p: int, lower: FloatArray, upper: FloatArray
+) -> None:
+    """Write the ends of the box that begins at waypoint i, with padding p, shape (m,) each [rad, m]."""
+    for a in range(len(lower)):
+        lower[a] = max(waypoints.boxes.lower[a], boxes.lower[i, a] - waypoints.pads[p])
+        upper[a] = min(waypoints.boxes.upper[a], boxes.upper[i, a] + waypoints.pads[p])
+
+
+@compiled
+def _motion(
+    waypoints: Waypoints,
+    found: _Sequences,
+    i: int,
+    p: int,
+    j: int,
+    clearances: FloatArray,
+    checks: FloatArray,
+) -> ObjectMotion:
+    """Begin the object's motion through the box with padding p from waypoint i to j."""
+    return object_motion(
+        found.states[i, p], waypoints.places[i : j + 1], clearances, waypoints.schedule, waypoints.limits[0],
+        waypoints.tolerance if j + 1 == len(waypoints.path) else 0.0, checks,
+    )  # fmt: skip
 
 
 @compiled
@@ -118,11 +231,9 @@ def _reach(
     j: int,
     lower: FloatArray,
     upper: FloatArray,
-    clearances: FloatArray,
-    best: FloatArray,
-    states: FloatArray,
-    before: IntArray,
-    checks: FloatArray,
+    motion: ObjectMotion,
+    soonest: float,
+    found: _Sequences,
 ) -> None:
     """Cross a box from waypoint i to j for every padding of the next box, and keep what is faster.
 
@@ -133,26 +244,16 @@ def _reach(
         j: Waypoint where it ends.
         lower: Its lower ends, shape (m,) [rad, m].
         upper: Its upper ends, shape (m,).
-        clearances: Clearances at its waypoints, shape (j - i + 1,) [m].
-        best: Earliest time at which each waypoint is reached, by the next box's padding, shape (n, p) [s].
-        states: States in which that happens, shape (n, p, 3 + 2 m).
-        before: First waypoint and padding of the box before, shape (n, p, 2).
-        checks: Memory for the object's motion, as in ``object_motion``.
+        motion: The motion of the object through it.
+        soonest: When the object may leave it [s].
+        found: The fastest sequences.
     """
     last = j + 1 == len(waypoints.path)
     m, nexts = len(lower), 1 if last else len(waypoints.pads)
     ends, state = np.empty((2, m)), np.empty(3 + 2 * m)
-    begun = best[i, p] + BOX_COST / waypoints.pads[p]
-    latest = 0.0
+    begun = found.time[i, p] + BOX_COST / waypoints.pads[p]
     for q in range(nexts):
-        latest = max(latest, best[j, q])
-    motion = object_motion(
-        states[i, p], waypoints.places[i : j + 1], clearances, waypoints.schedule, waypoints.limits[0],
-        waypoints.tolerance if last else 0.0, checks,
-    )  # fmt: skip
-    soonest = begun + soonest_exit(motion, min(LONGEST, latest - begun))
-    for q in range(nexts):
-        if soonest >= best[j, q]:
+        if soonest > found.time[j, q]:
             continue
         for a in range(m):
             if last:
@@ -164,16 +265,19 @@ def _reach(
                 )
             ends[0, a], ends[1, a] = max(lower[a], low), min(upper[a], high)
         for k in range(len(state)):
-            state[k] = states[i, p, k]
+            state[k] = found.states[i, p, k]
         time = begun + cross_box(
             state, motion, lower, upper, ends, waypoints.path[i, 2:], waypoints.schedule,
-            waypoints.limits[1:], min(LONGEST, best[j, q] - begun),
+            waypoints.limits[1:], min(LONGEST, found.time[j, q] - begun + ROUNDING),
         )  # fmt: skip
-        if time < best[j, q]:
-            best[j, q] = time
+        begins_before = i < found.before[j, q, 0] or (
+            i == found.before[j, q, 0] and p < found.before[j, q, 1]
+        )
+        if time < found.time[j, q] or (time == found.time[j, q] and begins_before):
+            found.time[j, q] = time
             for k in range(len(state)):
-                states[j, q, k] = state[k]
-            before[j, q, 0], before[j, q, 1] = i, p
+                found.states[j, q, k] = state[k]
+            found.before[j, q, 0], found.before[j, q, 1] = i, p
 
 
 @compiled

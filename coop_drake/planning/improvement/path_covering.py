@@ -29,6 +29,9 @@ LENGTH_STEP, ANGLE_STEP = 0.3, 0.15
 """Waypoints are no farther apart than this in position [m] and in every angle or joint [rad or m]: twice as
 many would make the choice of boxes four times as slow."""
 
+LONG_WAY, LONG_WAY_STEP = 30.0, 0.6
+"""On a path longer than this [m] waypoints may be this far apart [m]: most boxes are much longer there."""
+
 HALVINGS = 6
 """Times that the path between two waypoints is halved until one box holds both."""
 
@@ -127,7 +130,9 @@ def _waypoints(
     None if no box holds two waypoints after ``HALVINGS`` halvings.
     """
     moves = np.abs(np.diff(path, axis=0))
-    paces = np.hypot(moves[:, 0], moves[:, 1]) / LENGTH_STEP, moves[:, 2:].max(axis=1) / ANGLE_STEP
+    lengths = np.hypot(moves[:, 0], moves[:, 1])
+    step = LONG_WAY_STEP if lengths.sum() > LONG_WAY else LENGTH_STEP
+    paces = lengths / step, moves[:, 2:].max(axis=1) / ANGLE_STEP
     at = np.concatenate([[0.0], np.cumsum(np.maximum(*paces))])
 
     def configuration(s: float) -> FloatArray:
