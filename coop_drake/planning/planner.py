@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from shapely.errors import ShapelyError
 
 from coop_drake.answers.budget import Budget
+from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import Found, Infeasible, Plan, PlanningResult, Undecided
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.search_report import SearchReport
@@ -16,6 +19,7 @@ from coop_drake.errors import GeometryError, PlanError, StallError, TooQuickErro
 from coop_drake.laws import GainSet, ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
 from coop_drake.planning.improvement.quickest import quickest_plan
+from coop_drake.planning.sampling.local_floor import local_question
 from coop_drake.planning.search.search import find_path
 from coop_drake.progress import Progress
 
@@ -44,6 +48,9 @@ def plan(
     minutes. The search is then repeated with a smaller margin, which gives other cells. If that does not
     help, the answer is Undecided.
 
+    On a large floor a plan is looked for near a short route first, so that time grows with the length of the
+    way. What is free on that part of the floor is free on the floor.
+
     Args:
         problem: What is asked.
         gain_set: Gains, fixed or to be scheduled.
@@ -54,9 +61,26 @@ def plan(
     Returns:
         Found with the plan, Infeasible with the reason, or Undecided with the reason.
     """
+    local = local_question(problem)
+    if local is not None:
+        near = _answer(local, gain_set, gain_set_name, budget, progress, partial(find_path, routed=True))
+        if isinstance(near, Found):
+            return Found(replace(near.plan, problem=problem_digest(problem)), near.report)
+    return _answer(problem, gain_set, gain_set_name, budget, progress, find_path)
+
+
+def _answer(
+    problem: PlanningProblem,
+    gain_set: GainSet,
+    gain_set_name: str,
+    budget: Budget | None,
+    progress: Progress | None,
+    search: Callable[..., tuple[CoveredPath | Channel | NoChannel, SearchReport]],
+) -> PlanningResult:
+    """Answer a question by a search, with smaller margins where its paths cannot be executed."""
     question, report, stall = problem, SearchReport(0), ""
     for _ in range(1 + FINER_ATTEMPTS):
-        answer, latest = find_path(question, progress)
+        answer, latest = search(question, progress)
         report = _added(report, latest)
         if isinstance(answer, NoChannel):
             if answer.proved:

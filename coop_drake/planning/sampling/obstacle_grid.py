@@ -82,7 +82,7 @@ def lay_grid(rings: Sequence[FloatArray], reach: float) -> ObstacleGrid:
     columns, rows = (int(count) + 2 for count in size / side)
     radius = reach + 0.5 * sqrt(2.0) * side
     first, listed, away = _lists(edges, corner, side, rows, columns, radius)
-    inside = _insides(edges, corner, side, rows, columns)
+    inside = centres_inside(edges, corner, side, rows, columns)
     return ObstacleGrid(edges, corner, side, rows, columns, reach, first, listed, away, inside)
 
 
@@ -137,8 +137,19 @@ def _lists(
 
 
 @compiled
-def _insides(edges: FloatArray, corner: FloatArray, side: float, rows: int, columns: int) -> IntArray:
-    """Whether the middle of each square lies on the floor, by the even-odd rule along its row."""
+def centres_inside(edges: FloatArray, corner: FloatArray, side: float, rows: int, columns: int) -> IntArray:
+    """Whether the middle of each square lies on the floor, by the even-odd rule along its row.
+
+    Args:
+        edges: Edges (x0, y0, x1, y1) of closed rings, shape (E, 4) [m].
+        corner: Lower corner of the squares, shape (2,) [m].
+        side: Side of a square [m].
+        rows: Number of squares along y.
+        columns: Number of squares along x.
+
+    Returns:
+        1 inside, 0 outside, squares along y first, shape (rows * columns,).
+    """
     inside = np.zeros(rows * columns, np.int64)
     for e in range(len(edges)):
         x0, y0, x1, y1 = edges[e, 0], edges[e, 1], edges[e, 2], edges[e, 3]
@@ -146,10 +157,19 @@ def _insides(edges: FloatArray, corner: FloatArray, side: float, rows: int, colu
         north = min(rows, int((max(y0, y1) - corner[1]) / side) + 1)
         for row in range(south, north):
             y = corner[1] + (row + 0.5) * side
-            for column in range(columns):
-                if not ray_crosses(corner[0] + (column + 0.5) * side, y, x0, y0, x1, y1):
-                    break
-                inside[column * rows + row] ^= 1
+            if (y0 > y) == (y1 > y):
+                continue
+            # The edge is crossed by the rays from the middles of all columns before this one.
+            crossing = x0 + (y - y0) / (y1 - y0) * (x1 - x0)
+            before = min(max(int((crossing - corner[0]) / side + 0.5), 0), columns)
+            while before > 0 and not ray_crosses(corner[0] + (before - 0.5) * side, y, x0, y0, x1, y1):
+                before -= 1
+            while before < columns and ray_crosses(corner[0] + (before + 0.5) * side, y, x0, y0, x1, y1):
+                before += 1
+            if before > 0:
+                inside[(before - 1) * rows + row] ^= 1
+    for square in range(rows * (columns - 1) - 1, -1, -1):
+        inside[square] ^= inside[square + rows]
     return inside
 
 

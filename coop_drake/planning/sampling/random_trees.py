@@ -9,18 +9,13 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.planning.sampling.collision_kernels import is_free, segment_is_free
+from coop_drake.planning.sampling.guided_samples import draw_near, furthest_row, guide_row
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
 
 _SQUARES = 2_500
 """Squares of the grid in which nodes are found again: some nodes in each of them."""
-
-_GUIDED = 0.85
-"""Fraction of the samples that are drawn around the guiding path [-]; the others are uniform."""
-
-_LEAST_SPREAD = 0.1
-"""Smallest fraction of the spread that a guided sample uses [-]: some samples stay close to the guide."""
 
 
 class _Tree(NamedTuple):
@@ -140,28 +135,6 @@ def _grow(
 
 
 @compiled
-def _draw(
-    u: FloatArray, guide: FloatArray, spread: FloatArray, lower: FloatArray, upper: FloatArray
-) -> FloatArray:
-    """One sample: around the guide for most of the draws, uniform otherwise and on axes without spread.
-
-    Some keep closer to the guide than others: what is narrow for the guide is narrower for what it guides.
-    """
-    z = np.empty(len(lower))
-    for k in range(len(z)):
-        z[k] = lower[k] + u[2 + k] * (upper[k] - lower[k])
-    if len(guide) > 0 and u[0] < _GUIDED:
-        at = min(len(guide) - 1, int(u[1] * len(guide)))
-        fraction = _LEAST_SPREAD + (1.0 - _LEAST_SPREAD) * u[0] / _GUIDED
-        for k in range(len(z)):
-            if spread[k] > 0.0:
-                z[k] = guide[at, k] + (2.0 * u[2 + k] - 1.0) * fraction * spread[k]
-                if k > 2:
-                    z[k] = min(upper[k], max(lower[k], z[k]))
-    return z
-
-
-@compiled
 def connect(
     team: TeamArrays,
     grid: ObstacleGrid,
@@ -202,14 +175,16 @@ def connect(
     for side in range(2):
         for k in range(counts[side]):
             _add(trees[side], k, start if side == 0 else roots[k], -1)
-    side = 0
+    side, fronts = 0, np.array([0, len(guide) - 1])
     for row in range(len(uniforms)):
-        z = _draw(uniforms[row], guide, spread, lower, upper)
+        at = guide_row(uniforms[row, 1], fronts[side], len(guide))
+        z = draw_near(uniforms[row], at, guide, spread, lower, upper)
         other = 1 - side
         before = counts[side]
         counts[side], _ = _grow(team, grid, trees[side], before, z, 40.0 * step, gap, scale, step)
         if counts[side] > before:
             z = trees[side].nodes[before]
+            fronts[side] = furthest_row(guide, fronts[side], side, z)
             counts[other], met = _grow(team, grid, trees[other], counts[other], z, np.inf, gap, scale, step)
             if met:
                 return _join(trees[0], trees[1], counts), row + 1

@@ -107,8 +107,7 @@ class Sampler:
         """
         robots, subsystem = self._hierarchy.robots, self._hierarchy.subsystem
         steps = 2 + 2 * len(robots)
-        disc, _ = self._guide(self._hierarchy.disc, None, DISC_SAMPLES_FACTOR * samples)
-        disc = None if disc is None else replace(disc, has_theta=False)
+        disc = self._disc_path(samples)
         self._report(1 / steps)
         found = (self._guide(subsystem(()), disc, samples)[0] for _ in range(choices))
         best = min((guide for guide in found if guide is not None), key=_least_duration, default=None)
@@ -132,6 +131,14 @@ class Sampler:
             if best is None:
                 return _NO_PATH
         return _NO_PATH if best is None else best.path
+
+    def _disc_path(self, samples: int) -> GuidePath | None:
+        """Path of the disc: the route if there is one, else sampled."""
+        route = self._hierarchy.route
+        if route is not None:
+            return GuidePath(np.column_stack((route, np.zeros(len(route)))), (), has_theta=False)
+        disc, _ = self._guide(self._hierarchy.disc, None, DISC_SAMPLES_FACTOR * samples)
+        return None if disc is None else replace(disc, has_theta=False)
 
     def _guide(
         self, subsystem: Subsystem, around: GuidePath | None, samples: int

@@ -10,6 +10,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.questions.relaxation import inscribed_disc, relaxed
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape
 from coop_drake.tree.levers import configuration_scale
+from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, team_arrays
 
 DISC_TOLERANCE, DISC_SHRINKAGE = 1e-3, 0.98
@@ -35,16 +36,22 @@ class Subsystem:
 class SubsystemHierarchy:
     """The subsystems of one question, from a disc to the whole team; made once for all samplers.
 
+    Args:
+        problem: The question.
+        route: A route for the disc, shape (k, 2) [m], where random trees would take long to find one.
+
     Attributes:
         robots: All robots, ascending.
         disc: The largest disc inside one piece of the object.
+        route: As given.
     """
 
-    def __init__(self, problem: PlanningProblem) -> None:
+    def __init__(self, problem: PlanningProblem, route: FloatArray | None = None) -> None:
+        self.route = route
         self.robots = tuple(sorted({joint.robot for joint in problem.tree.joints}))
         self._problem = problem
         self._subsystems: dict[tuple[int, ...], Subsystem] = {}
-        self.disc = Subsystem(_disc_question(relaxed(problem, ())[0]), ())
+        self.disc = Subsystem(disc_question(relaxed(problem, ())[0]), ())
 
     def subsystem(self, robots: tuple[int, ...]) -> Subsystem:
         """The object with some of the robots, given in ascending order."""
@@ -53,7 +60,7 @@ class SubsystemHierarchy:
         return self._subsystems[robots]
 
 
-def _disc_question(question: PlanningProblem) -> PlanningProblem:
+def disc_question(question: PlanningProblem) -> PlanningProblem:
     """The question for the largest disc inside one piece of the object, a relaxation of the team."""
     bodies = [body for body in question.tree.components[0].bodies if body.robot is None]
     discs = [_guiding_disc(shape) for body in bodies for shape in body.shapes]

@@ -19,6 +19,7 @@ from coop_drake.planning.boxes.channel import Channel, CoveredPath
 from coop_drake.planning.questions.margins import exact_footprint, marginal_workspace
 from coop_drake.planning.sampling.clear_paths import best_candidate, margins_to_try, moved_from_obstacles
 from coop_drake.planning.sampling.elastic_band import smoothed
+from coop_drake.planning.sampling.local_floor import object_route
 from coop_drake.planning.sampling.narrow_passages import repaired, widened_floor
 from coop_drake.planning.sampling.sampler import Sampler
 from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
@@ -70,17 +71,21 @@ class SampledSearch:
 
     What it finds is proved by the boxes, whatever was sampled. If it finds nothing, that is no proof.
 
+    Args:
+        problem: The question.
+        routed: Whether the object is sampled along a route for a disc that is computed, not sampled.
+
     Attributes:
         slices: Boxes tried so far.
         object_blocked: Number of attempts in a row in which no path was found even for the object alone.
     """
 
-    def __init__(self, problem: PlanningProblem) -> None:
+    def __init__(self, problem: PlanningProblem, *, routed: bool = False) -> None:
         self._problem = problem
         self._swept = SweptTree(problem.tree)
         self._pairs = BodyPairs(self._swept)
         self._scale = configuration_scale(problem.tree)
-        self._hierarchy = SubsystemHierarchy(problem)
+        self._hierarchy = SubsystemHierarchy(problem, object_route(problem) if routed else None)
         self._start_inside = problem.workspace.contains(exact_footprint(problem.tree, problem.start))
         self._attempts = 0
         self.slices = 0

@@ -36,6 +36,9 @@ from coop_drake.tree.usual_unit import usual_unit
 ATTEMPTS_PER_ROUND = 4
 """Sampled attempts in every round of the search."""
 
+ROUTED_ATTEMPTS = 2
+"""Sampled attempts along a route, one for each clearance."""
+
 ENOUGH_BLOCKED_ATTEMPTS = 2
 """If so many attempts in a row find no path for the object alone, a proof is more likely than a path."""
 
@@ -70,12 +73,22 @@ def find_channel(
 
 
 def find_path(
-    problem: PlanningProblem, progress: Progress | None = None, watch: Watch | None = None
+    problem: PlanningProblem,
+    progress: Progress | None = None,
+    watch: Watch | None = None,
+    *,
+    routed: bool = False,
 ) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
     """Find a path that boxes cover, or prove that there is none; then look for a larger margin.
 
     Only explorations of cells may answer "infeasible", and only at margin zero. Budgets are counted in
     samples and slices, never in time, so the same question has the same answer.
+
+    Args:
+        problem: The question.
+        progress: Called with a phase and the fraction of it that is done.
+        watch: Called with the events of explorations.
+        routed: Whether only paths along a route for a disc are sampled, and nothing is proved.
 
     Returns:
         A sampled path, the channel of an exploration, or why there is neither, and a report.
@@ -90,18 +103,23 @@ def find_path(
         return NoChannel(True, beyond, proof), SearchReport(slices)
     unit = usual_unit(problem.tree)
     if unit == 1.0:
-        return _answered(problem, progress, watch)
+        return _answered(problem, progress, watch, routed=routed)
     scale = Rescaling(problem, unit)
-    answer, report = _answered(scale.question(), progress, scale.watched(watch), unit)
+    answer, report = _answered(scale.question(), progress, scale.watched(watch), unit, routed=routed)
     return scale.answer(answer), report
 
 
 def _answered(
-    problem: PlanningProblem, progress: Progress | None, watch: Watch | None, unit: float = 1.0
+    problem: PlanningProblem,
+    progress: Progress | None,
+    watch: Watch | None,
+    unit: float = 1.0,
+    *,
+    routed: bool,
 ) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
     if problem.settings.strategy != "portfolio":
         return search_by_cells(problem, progress, watch)
-    return _Search(problem, progress, watch, unit).run()
+    return _Search(problem, progress, watch, unit, routed=routed).run()
 
 
 class _Search:
@@ -112,22 +130,35 @@ class _Search:
         progress: Called with a phase and the fraction of it that is done.
         watch: Called with the events of explorations.
         unit: The question's unit of length, for sentences [m].
+        routed: Whether only paths along a route are sampled.
     """
 
     def __init__(
-        self, problem: PlanningProblem, progress: Progress | None, watch: Watch | None, unit: float
+        self,
+        problem: PlanningProblem,
+        progress: Progress | None,
+        watch: Watch | None,
+        unit: float,
+        *,
+        routed: bool,
     ) -> None:
-        self._began, self._unit = thread_time(), unit
+        self._began, self._unit, self._routed = thread_time(), unit, routed
         self._first_plan: float | None = None
         self._problem, self._progress = problem, progress
-        self._samples = SampledSearch(problem)
+        self._samples = SampledSearch(problem, routed=routed)
         self._proofs = Proofs(problem, watch)
         self._other_slices = 0
 
     def run(self) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
         """Sample, then prove and sample in turns."""
-        answer = self._answer()
+        answer = self._routed_answer() if self._routed else self._answer()
         return answer, SearchReport(self._slices(), self._first_plan)
+
+    def _routed_answer(self) -> CoveredPath | NoChannel:
+        found = self._sampled(ROUTED_ATTEMPTS)
+        return (
+            NoChannel(False, "no path along a route was found") if found is None else self._with_margin(found)
+        )
 
     def _answer(self) -> CoveredPath | Channel | NoChannel:
         found = self._sampled(1)
