@@ -34,7 +34,7 @@ SMALL = QuestionSettings(seed=3, robots=(2,), most_joints=1, floors=("room",), p
 
 @pytest.fixture(scope="module")
 def question(tmp_path_factory):
-    return random_question(SMALL, 0, tmp_path_factory.mktemp("question"))
+    return random_question(SMALL, 5, tmp_path_factory.mktemp("question"))
 
 
 def files(folder):
@@ -42,7 +42,7 @@ def files(folder):
 
 
 def test_a_seed_and_a_number_determine_all_files(question, tmp_path):
-    again = random_question(SMALL, 0, tmp_path / "again")
+    again = random_question(SMALL, 5, tmp_path / "again")
     other = random_question(SMALL, 1, tmp_path / "other")
     before = files(question.scenario.path.parent)
     assert files(again.scenario.path.parent) == before
@@ -105,21 +105,22 @@ def test_the_narrowest_corridor_of_a_bar_is_as_wide_as_the_bar():
 
 @pytest.fixture(scope="module")
 def planned(question):
+    """The answer that the planner gives, once for all tests."""
     found = plan(question.problem, question.scenario.gain_sets["scheduled"], gain_set_name="scheduled")
     assert isinstance(found, Found)
-    return question.problem, found.plan
+    return found
 
 
-def test_sampled_cells_keep_bodies_apart_and_moved_ones_do_not(planned):
-    problem, plan = planned
+def test_sampled_cells_keep_bodies_apart_and_moved_ones_do_not(question, planned):
+    problem, plan = question.problem, planned.plan
     assert sampled_margin(problem, plan, 40, 1) > 0.0
     moved = plan.cells[0].tidied.buffer(0.05, join_style="mitre")
     forged = replace(plan, cells=(replace(plan.cells[0], tidied=moved), *plan.cells[1:]))
     assert sampled_margin(problem, forged, 40, 1) <= 0.0
 
 
-def test_a_wider_interval_than_proved_is_found_by_sampling(planned):
-    problem, plan = planned
+def test_a_wider_interval_than_proved_is_found_by_sampling(question, planned):
+    problem, plan = question.problem, planned.plan
     wider = [replace(cell, upper=cell.upper + 0.5) for cell in plan.cells]
     assert sampled_margin(problem, replace(plan, cells=tuple(wider)), 40, 1) <= 0.0
 
@@ -136,17 +137,18 @@ def test_other_planners_find_an_easy_path_and_none_through_a_wall(question):
     assert nothing.planners[0] == "trees"
 
 
-def test_an_answer_is_checked_and_sampled(question, planned):
+def test_an_answer_is_checked_and_sampled(question, planned, monkeypatch):
+    answered(monkeypatch, planned)
     record, found = answer(question, SMALL)
-    assert (record.verdict, record.cells, record.verified) == ("plan", len(planned[1].cells), True)
-    assert 0.0 < record.first_plan_seconds < record.cpu_seconds
+    assert (record.verdict, record.cells, record.verified) == ("plan", len(planned.plan.cells), True)
+    assert record.first_plan_seconds == planned.report.first_plan_cpu_seconds
     assert record.sampled_margin > 0.0
     assert found == Searched()
     assert not is_wrong(record)
 
 
 def test_a_plan_for_another_question_is_wrong(question, planned, monkeypatch):
-    _, right = planned
+    right = planned.plan
     answered(monkeypatch, Found(replace(right, start=right.start + 0.1), SearchReport(1, 0.5)))
     record, _ = answer(question, SMALL)
     assert not record.verified
@@ -172,11 +174,11 @@ def test_an_error_of_the_planner_is_wrong_and_kept(monkeypatch, tmp_path):
         raise ZeroDivisionError("no luck")
 
     monkeypatch.setattr(answering, "plan", broken)
-    record = ask(0, SMALL, tmp_path)
+    record = ask(5, SMALL, tmp_path)
     assert (record.verdict, record.reason) == ("failed", "ZeroDivisionError: no luck")
     assert is_wrong(record)
-    kept = tmp_path / "3_0"
-    assert load_scenario(kept).path.name == "question_3_0.scenario.yaml"
+    kept = tmp_path / "3_5"
+    assert load_scenario(kept).path.name == "question_3_5.scenario.yaml"
     assert "no luck" in (kept / "found.json").read_text()
 
 
@@ -191,10 +193,10 @@ def test_an_undecided_question_for_which_a_peer_finds_a_way_is_kept(monkeypatch,
     answered(monkeypatch, Undecided("too narrow", SearchReport(7)))
     path = np.zeros((2, 5))
     monkeypatch.setattr(answering, "search_by_peers", lambda *given: Searched(("trees",), path, 0.2))
-    record = ask(0, SMALL, tmp_path)
+    record = ask(5, SMALL, tmp_path)
     assert (record.peer, record.peer_found, record.peer_seconds) == ("trees", True, 0.2)
     assert record.reason == "too narrow"
-    kept = json.loads((tmp_path / "3_0" / "found.json").read_text())
+    kept = json.loads((tmp_path / "3_5" / "found.json").read_text())
     assert kept["path"] == path.tolist()
     assert kept["record"]["reason"] == "too narrow"
 

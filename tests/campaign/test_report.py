@@ -1,4 +1,5 @@
 import json
+from dataclasses import replace
 from html.parser import HTMLParser
 from math import inf, isnan
 
@@ -99,19 +100,43 @@ def questions():
     rows = [("corridor", "plan", True, False), ("corridor", "infeasible", True, True),
             ("corridor", "plan", False, False), ("rooms", "undecided", False, True)]  # fmt: skip
     records = [
-        QuestionRecord(i, i, "boxes", 2, 2, kind, verdict, 1.0 + i, verified=verified, peer_found=found)
-        for i, (kind, verdict, verified, found) in enumerate(rows)
-    ]
+        QuestionRecord(i, i, floor, 2 + i % 2, 2, "bar", verdict, 1.0 + i, verified=verified,
+                       peer_found=found, corners=12 + i, width_ratio=[0.9, 1.1, 1.1, np.nan][i])
+        for i, (floor, verdict, verified, found) in enumerate(rows)
+    ]  # fmt: skip
     return table_of(records, QuestionRecord)
 
 
 def test_refused_answers_and_contradicted_proofs_are_wrong():
     report = make_report("questions", questions=questions())
-    corridor, rooms, every = report.questions
-    assert (corridor.kind, corridor.plans, corridor.infeasible, corridor.wrong) == ("corridor", 2, 1, 2)
+    corridor, rooms, *_, every = report.questions
+    assert (corridor.group, corridor.plans, corridor.infeasible, corridor.wrong) == ("corridor", 2, 1, 2)
     assert (rooms.undecided, rooms.peer_found, rooms.wrong) == (1, 1, 0)
     assert (every.count, every.seconds.largest) == (4, 4.0)
     assert headline(report) == "4 questions: 2 wrong answers, 1 undecided."
+
+
+def test_plans_with_contact_and_errors_of_the_planner_are_wrong():
+    record = QuestionRecord(0, 0, "room", 2, 2, "bar", "plan", 1.0, verified=True, sampled_margin=1e-6)
+    touching, failed = replace(record, sampled_margin=0.0), replace(record, verdict="failed", verified=False)
+    report = make_report("questions", questions=table_of([record, touching, failed], QuestionRecord))
+    assert (report.questions[-1].contact, report.questions[-1].refused, report.questions[-1].wrong) == (
+        1,
+        1,
+        2,
+    )
+
+
+def test_questions_are_grouped_by_what_makes_them_hard():
+    report = make_report("questions", questions=questions())
+    groups = {(one.axis, one.group): one.count for one in report.questions}
+    assert groups == {
+        ("floor", "corridor"): 3, ("floor", "rooms"): 1, ("robots", "2"): 2, ("robots", "3"): 2,
+        ("joints", "1 to 2"): 4, ("corners", "0 to 12"): 1, ("corners", "13 to 24"): 3,
+        ("width", "0.8 to 1"): 1, ("width", "1 to 1.2"): 2, ("all", "all"): 4,
+    }  # fmt: skip
+    page = render_page(report, replay)
+    assert "width: 1 to 1.2" in page
 
 
 class Links(HTMLParser):
@@ -135,7 +160,7 @@ def test_the_page_stands_alone_and_has_every_section(both_tiers, tmp_path):
     parser.feed(text)
     assert all(link.startswith("#") for link in parser.needed)
     assert "script" not in parser.opened
-    assert parser.opened.count("svg") == 3
+    assert parser.opened.count("svg") == 4
     assert parser.opened.count("h2") == 8
     assert "a &lt; b" in text
     assert "&lt;found&gt;.yaml" in text

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from coop_drake.campaign.report.columns import MEASURES, Measure
 from coop_drake.campaign.report.distributions import Distribution, Group
+from coop_drake.campaign.report.questions import ALL, Questions
 from coop_drake.campaign.search.findings import BreakingPoint
 from coop_drake.drawing.canvas import house_style, picture_of
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION
@@ -58,6 +59,24 @@ def breaking_svg(points: Sequence[BreakingPoint]) -> str:
     ax.axvline(1.0, color=INK, linewidth=1.5)
     ax.set_xlim(0.0, 1.25 * max(1.0, ends.max()))
     ax.set_xlabel("largest multiple of what is certified at which no run was lost [-]")
+    return _svg(figure)
+
+
+def growth_svg(questions: Sequence[Questions]) -> str:
+    """Draw the planner's CPU time in every group of questions; empty without questions."""
+    groups = [one for one in questions if one.axis != ALL]
+    if not groups:
+        return ""
+    names = [f"{one.axis}: {one.group}" for one in groups]
+    figure, (ax,) = _panels(1, len(groups), names, width=5.0)
+    places = np.arange(len(groups))[::-1] + 0.35
+    for place, one in zip(places, groups, strict=True):
+        times = one.seconds
+        ax.plot([times.low, times.high], [place, place], color=BLUE, alpha=0.45, linewidth=5.0)
+        ax.plot(times.median, place, "o", color=BLUE, markersize=4.5)
+        ax.plot(times.largest, place, "D", color=ORANGE, markersize=5.0)
+    ax.set_xscale("log")
+    ax.set_xlabel("CPU time of an answer [s]")
     return _svg(figure)
 
 

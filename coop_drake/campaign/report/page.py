@@ -10,7 +10,7 @@ from typing import Any
 from coop_drake.campaign.report.columns import COSTS, MARGINS, MEASURES, Measure
 from coop_drake.campaign.report.distributions import Group
 from coop_drake.campaign.report.document import Report
-from coop_drake.campaign.report.figures import breaking_svg, distributions_svg
+from coop_drake.campaign.report.figures import breaking_svg, distributions_svg, growth_svg
 from coop_drake.campaign.report.influences import Influence
 from coop_drake.campaign.report.rates import percent
 from coop_drake.campaign.report.worst import WorstRun
@@ -65,6 +65,7 @@ def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
             "margins": distributions_svg(report.groups, MARGINS),
             "costs": distributions_svg(report.groups, COSTS),
             "breaking": breaking_svg(report.breaking),
+            "growth": growth_svg(report.questions),
         },
         colours=colours,
     )  # fmt: skip

@@ -1,71 +1,115 @@
-"""How the planner answered random questions: verdicts, wrong answers and times."""
+"""How the planner answered random questions: verdicts, wrong answers and times, and how times grow."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
+from math import inf
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coop_drake.campaign.report.distributions import Distribution, distribution
+
+ALL = "all"
+"""Name of the group of all questions."""
+
+CORNERS = (0, 13, 25, 49, 97)
+"""Least numbers of corners of the groups of floors [-]: about twice as many in each as in the one before."""
+
+JOINTS = (1, 3, 5, 8)
+"""Least numbers of joints of the groups of teams [-]."""
+
+WIDTHS = (0.0, 0.8, 1.0, 1.2, 1.5)
+"""Least widths of passages of the groups, over that of the narrowest corridor in which the team fits [-]."""
 
 
 @dataclass(frozen=True)
 class Questions:
-    """The questions of one kind, or all of them.
+    """The questions of one group, or all of them.
 
     Attributes:
-        kind: The kind, such as that of the floor; ``all`` for the last row.
+        axis: By what they are grouped: ``floor``, ``robots``, ``joints``, ``corners`` or ``width``; ``all``.
+        group: The value, or the values, of all questions in the group.
         count: Questions asked.
         plans: Answered with a plan.
         infeasible: Answered with a proof that there is none.
         undecided: Answered with neither.
-        refused: Answers that the exact checker refused.
+        refused: Answers that the exact checker refused, and errors of the planner.
+        contact: Plans with a sampled configuration at which something touches.
         contradicted: Proofs of infeasibility although another planner found a way.
         peer_found: Undecided questions for which another planner found a way.
         seconds: CPU time of the answers [s].
     """
 
-    kind: str
+    axis: str
+    group: str
     count: int
     plans: int
     infeasible: int
     undecided: int
     refused: int
+    contact: int
     contradicted: int
     peer_found: int
     seconds: Distribution
 
     @property
     def wrong(self) -> int:
-        """Answers that are wrong or not proved."""
-        return self.refused + self.contradicted
+        """Answers that are wrong or not proved; one may count twice."""
+        return self.refused + self.contact + self.contradicted
 
 
 def summarise_questions(table: Any) -> tuple[Questions, ...]:
-    """Return how the questions of every kind were answered, and all of them in the last row.
+    """Return how the questions of every group were answered, and all of them in the last row.
 
     Args:
         table: A pyarrow table with the columns of ``QuestionRecord``.
     """
-    columns = {
-        name: np.asarray(table[name].to_pylist())
-        for name in ("kind", "verdict", "verified", "peer_found", "cpu_seconds")
-    }
-    kinds = columns["kind"]
-    chosen = {str(kind): kinds == kind for kind in np.unique(kinds)}
-    rows = [*chosen.items(), ("all", np.ones(len(kinds), dtype=bool))]
-    return tuple(_count(kind, {name: column[own] for name, column in columns.items()}) for kind, own in rows)
+    columns = {name: np.asarray(table[name].to_pylist()) for name in table.schema.names}
+    return tuple(
+        _count(axis, group, {name: column[own] for name, column in columns.items()})
+        for axis, group, own in _groups(columns)
+        if own.any()
+    )
 
 
-def _count(kind: str, columns: dict[str, np.ndarray]) -> Questions:
+def _groups(columns: dict[str, NDArray[Any]]) -> Iterator[tuple[str, str, NDArray[np.bool_]]]:
+    """Yield what is grouped by, the group's name, and which questions belong to it."""
+    for axis in ("floor", "robots"):
+        for value in np.unique(columns[axis]):
+            yield axis, str(value), columns[axis] == value
+    for axis, least in (("joints", JOINTS), ("corners", CORNERS)):
+        for low, high in pairwise((*least, inf)):
+            name = f"{low} or more" if high == inf else f"{low} to {high - 1:g}"
+            yield axis, name, (columns[axis] >= low) & (columns[axis] < high)
+    for low, high in pairwise((*WIDTHS, inf)):
+        name = f"{low:g} or more" if high == inf else f"{low:g} to {high:g}"
+        yield "width", name, (columns["width_ratio"] >= low) & (columns["width_ratio"] < high)
+    yield ALL, ALL, np.ones(len(columns["floor"]), dtype=bool)
+
+
+def _count(axis: str, group: str, columns: dict[str, NDArray[Any]]) -> Questions:
     plans, infeasible, undecided = (
         columns["verdict"] == verdict for verdict in ("plan", "infeasible", "undecided")
     )
     found = columns["peer_found"].astype(bool)
     refused = ~columns["verified"].astype(bool) & ~undecided
+    contact = plans & (columns["sampled_margin"].astype(float) <= 0.0)
     seconds = distribution(columns["cpu_seconds"].astype(float))
     assert seconds is not None  # every question took some time
-    counts = (plans, infeasible, undecided, refused, infeasible & found, undecided & found)
-    a, b, c, d, e, f = (int(count.sum()) for count in counts)
-    return Questions(kind, len(plans), a, b, c, d, e, f, seconds)
+    return Questions(
+        axis,
+        group,
+        len(plans),
+        plans=int(plans.sum()),
+        infeasible=int(infeasible.sum()),
+        undecided=int(undecided.sum()),
+        refused=int(refused.sum()),
+        contact=int(contact.sum()),
+        contradicted=int((infeasible & found).sum()),
+        peer_found=int((undecided & found).sum()),
+        seconds=seconds,
+    )
