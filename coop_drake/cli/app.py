@@ -29,6 +29,7 @@ from coop_drake.cli.doctor import doctor_command
 from coop_drake.cli.examples import epilog
 from coop_drake.cli.floor_plan import floor_plan_command
 from coop_drake.cli.kernel_cache import keep_kernels_somewhere
+from coop_drake.cli.keys import keys_command
 from coop_drake.cli.maps import maps_command
 from coop_drake.cli.new import new_command
 from coop_drake.cli.object import object_command
@@ -62,6 +63,9 @@ _PANELS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "object": object_command,
         "show": show_command,
         "schema": schema_command,
+    },
+    "Processes of their own": {
+        "keys": keys_command,
     },
     "Understanding answers": {
         "why": why_command,

@@ -39,6 +39,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("schema --out scenario.schema.json", "for editors"),
         ("schema", "the same on standard output"),
     ),
+    "keys": (
+        ("keys --robots 2 --out keys", "for processes on this machine that prove who they are"),
+        ("keys --robots 3 --world 192.168.1.10 --supervisor 192.168.1.11", "for several machines"),
+    ),
     "compare": ((f"compare {_BASE}", "rigid grasps beside grasps as constraints"),),
     "campaign": (
         ("campaign many.campaign.yaml", "make all runs, or those that are missing, into out/campaigns/many/"),

@@ -25,6 +25,7 @@ from .schema import (
     Welcome,
 )
 from .server import MessageServer
+from .team_files import load_own_keys, make_team_files
 
 __all__ = [
     "SUPERVISOR",
@@ -58,8 +59,10 @@ __all__ = [
     "dump_address_book",
     "load_address_book",
     "load_keys",
+    "load_own_keys",
     "local_book",
     "make_keys",
+    "make_team_files",
     "name_of",
     "save_keys",
 ]

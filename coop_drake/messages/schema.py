@@ -54,8 +54,7 @@ class TurnedAway(NamedTuple):
 
     Attributes:
         nonce: That of the ``Hello``.
-        reason: 1: another process of this name is being heard; 2: the scenarios differ; 3: the plans differ;
-            4: another key belongs to the name.
+        reason: Why, see below.
     """
 
     nonce: Number

@@ -1,8 +1,9 @@
 """``python -m docs.generate out/docs`` builds the documentation as a site of HTML pages.
 
 With ``--notebooks DIR`` it has a page for each executed notebook in that folder, see ``make notebooks``.
-The pages of scenario and campaign files are kept in ``docs``, so that they can be read without the site, too.
-The galleries that ``python -m docs.gallery out/gallery`` has made beside the site are part of it.
+The pages of scenario and campaign files and of messages are kept in ``docs``, so that they can be read
+without the site, too. The galleries that ``python -m docs.gallery out/gallery`` has made beside the site are
+part of it.
 """
 
 from __future__ import annotations
@@ -18,12 +19,13 @@ import yaml
 
 from docs.generate.api_pages import api_pages
 from docs.generate.links import for_site
+from docs.generate.message_page import message_page
 from docs.generate.notebook_pages import write_notebook_pages
 from docs.generate.scenario_page import campaign_page, scenario_page
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
-PAGES = {"scenario.md": scenario_page, "campaign.md": campaign_page}
+PAGES = {"scenario.md": scenario_page, "campaign.md": campaign_page, "messages.md": message_page}
 """The pages of ``docs/reference`` that are made here, and how."""
 
 
