@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from coop_drake.diagram.knowledge import robot_knowledge
 from coop_drake.fields import HarmonicMap
 from coop_drake.nodes.robot_node import RobotNode
 from coop_drake.nodes.supervisor_node import SupervisorNode
-from coop_drake.nodes.team_messages import TeamMessage
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import Sample, run_loop
 from coop_drake.tree.pose import FloatArray
@@ -32,7 +32,7 @@ class DirectExchange:
     def __init__(self) -> None:
         self.robots: Sequence[RobotNode] = ()
         self.supervisor: SupervisorNode | None = None
-        self.messages: list[tuple[float, int | None, TeamMessage]] = []
+        self.messages: list[tuple[float, int | None, Any]] = []
 
     def step(self, time: float, measured: Sequence[FloatArray]) -> list[FloatArray]:
         """See ``Exchange``."""

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.diagram.hold import add_supervisor
+from coop_drake.messages import Hold, HoldRequest, Ready, Switch
 from coop_drake.nodes.sampled import SampledDiagram
-from coop_drake.nodes.team_messages import HoldBit, Report, Switch, TeamMessage
-from coop_drake.scenario import Hold
+from coop_drake.scenario import Hold as HoldSettings
 from coop_drake.systems import CellPlanner
 from coop_drake.tree.pose import FloatArray
 
@@ -28,8 +29,8 @@ class SupervisorNode:
         hold: When the team is held, None for never.
     """
 
-    def __init__(self, robots: int, cells: int, period: float, hold: Hold | None) -> None:
-        builder, self._period = DiagramBuilder(), period
+    def __init__(self, robots: int, cells: int, period: float, hold: HoldSettings | None) -> None:
+        builder = DiagramBuilder()
         planner = builder.AddNamedSystem("cell_planner", CellPlanner(robots, cells, period=period))
         for k in range(robots):
             builder.ExportInput(planner.GetInputPort(f"robot_{k}_ready"), f"robot_{k}_ready")
@@ -53,26 +54,26 @@ class SupervisorNode:
         self._sampled.at(time, self._heard)
         return np.concatenate([self._sampled.output(name) for name in self._logged])
 
-    def step(self, time: float) -> list[TeamMessage]:
+    def step(self, time: float) -> list[Switch | Hold]:
         """Compute a sample, and return what all robots are told."""
         self._sampled.at(time, self._heard)
         self._sampled.update()
-        said: list[TeamMessage] = []
+        said: list[Switch | Hold] = []
         cell, entry = self._sampled.output("current_cell")
         if int(cell) != self._cell:
             self._cell = int(cell)
-            said.append(Switch(self._cell, round(entry / self._period)))
+            said.append(Switch(self._cell, float(entry)))
         if self._held:
             held, number = self._sampled.output("hold_message")
-            said.append(HoldBit(bool(held), int(number)))
+            said.append(Hold(bool(held), int(number)))
         return said
 
-    def hear(self, robot: int, messages: Sequence[TeamMessage]) -> None:
+    def hear(self, robot: int, messages: Iterable[Any]) -> None:
         """Take in what a robot says; it counts from the next instant on."""
         for message in messages:
-            if isinstance(message, Report):
-                self._heard[f"robot_{robot}_ready"] = np.array([message.cell, 0.0 if message.ready else -1.0])
-            elif isinstance(message, HoldBit):
+            if isinstance(message, Ready):
+                self._heard[f"robot_{robot}_ready"] = np.array(message, dtype=float)
+            elif isinstance(message, HoldRequest):
                 self._heard[f"robot_{robot}_request"] = np.array(message, dtype=float)
 
     def release(self) -> None:

@@ -7,8 +7,8 @@ import pytest
 
 from coop_drake.diagram import control_period
 from coop_drake.errors import ScenarioError
+from coop_drake.messages import Ready, Switch
 from coop_drake.nodes.one_process import DirectExchange, simulate_apart
-from coop_drake.nodes.team_messages import Report, Switch
 from coop_drake.scenario import Control, Deployment, Hold, Measurements, Messages, RobotDepartures, Silence
 from coop_drake.scenario.deployment import ActuatorLimits, Deafness
 from coop_drake.simulation import communication, simulate
@@ -60,7 +60,7 @@ def test_as_many_messages_cross_as_the_summary_counts():
     scenario, plan = small_problem("base")
     scenario, exchange = replace(scenario, deployment=Deployment(control_rate=100.0)), DirectExchange()
     counted = communication(simulate_apart(scenario, plan, small_maps(), exchange=exchange))
-    senders = [sender for _, sender, message in exchange.messages if isinstance(message, Report)]
+    senders = [sender for _, sender, message in exchange.messages if isinstance(message, Ready)]
     assert [senders.count(k) for k in range(2)] == [*counted.reports]
     switches = [message for _, _, message in exchange.messages if isinstance(message, Switch)]
     assert [switch.cell for switch in switches] == [*range(1, len(plan.cells))]

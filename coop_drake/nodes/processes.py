@@ -1,0 +1,174 @@
+"""Processes of a team on this machine, which begin and end with a run."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Sequence
+from multiprocessing import get_context
+from multiprocessing.process import BaseProcess
+from types import TracebackType
+from typing import Any, NoReturn
+
+from coop_drake.answers.plan import Plan
+from coop_drake.answers.plan_file import plan_digest
+from coop_drake.diagram import control_period
+from coop_drake.diagram.knowledge import robot_knowledge
+from coop_drake.diagram.station import build_station
+from coop_drake.errors import CoopDrakeError, MessagingError
+from coop_drake.fields import HarmonicMap
+from coop_drake.interrupts import uninterrupted
+from coop_drake.messages import (
+    SUPERVISOR,
+    AddressBook,
+    KeyPair,
+    Question,
+    RobotEnd,
+    SupervisorEnd,
+    name_of,
+)
+from coop_drake.nodes.robot_node import RobotNode
+from coop_drake.nodes.robot_server import RobotServer
+from coop_drake.nodes.supervisor_node import SupervisorNode
+from coop_drake.nodes.supervisor_server import SupervisorServer
+from coop_drake.scenario import Scenario
+from coop_drake.scenario.digest import scenario_digest
+
+_CONTEXT = get_context("fork") if sys.platform == "linux" else get_context("spawn")
+"""A copy has imported already what this process has; libraries of macOS may not be used in one."""
+
+_OPENING = 30.0
+"""How long processes wait for each other at the start [s]: a slow machine imports Drake for some seconds."""
+
+
+def question_of(scenario: Scenario, plan: Plan) -> Question:
+    """Return what all processes of a team must agree on."""
+    return Question(int(scenario_digest(scenario)[:16], 16), int(plan_digest(plan)[:16], 16))
+
+
+def run_robot(
+    scenario: Scenario,
+    plan: Plan,
+    maps: Sequence[HarmonicMap],
+    robot: int,
+    book: AddressBook,
+    *,
+    keys: KeyPair | None = None,
+    wanted: Callable[[], bool] = lambda: True,
+) -> int:
+    """Be one robot until the world says goodbye; return the outcome that it names.
+
+    Raises:
+        MessagingError: The others cannot be reached, or fall silent.
+    """
+    control_period(scenario)
+    team = build_station(scenario).team
+    known = robot_knowledge(scenario, plan, maps, team)[robot]
+    node = RobotNode(known, scenario.deployment, robot, team.robots[robot].name)
+    end = RobotEnd(book, robot, question_of(scenario, plan), keys)
+    try:
+        end.open(_OPENING)
+        return RobotServer(node, end).run(wanted)
+    finally:
+        end.close()
+        node.release()
+
+
+def run_supervisor(
+    scenario: Scenario,
+    plan: Plan,
+    book: AddressBook,
+    *,
+    keys: KeyPair | None = None,
+    wanted: Callable[[], bool] = lambda: True,
+    tap: Callable[[str, int, bytes], object] | None = None,
+) -> int:
+    """Be the supervisor until the world says goodbye; return the outcome that it names.
+
+    Raises:
+        MessagingError: The others cannot be reached, or fall silent.
+    """
+    period, hold = control_period(scenario), scenario.control.hold
+    node = SupervisorNode(len(book.robots), len(plan.cells), period, hold)
+    end = SupervisorEnd(book, question_of(scenario, plan), keys, tap)
+    try:
+        end.open(_OPENING)
+        return SupervisorServer(node, end).run(wanted)
+    finally:
+        end.close()
+        node.release()
+
+
+class LocalTeam:
+    """The processes of all robots and of their supervisor, copies of this one; they end with the block.
+
+    They have sessions of their own, so that Ctrl-C reaches only the command, which ends them.
+
+    Args:
+        scenario: The scenario.
+        plan: The plan.
+        maps: The harmonic map of every transition.
+        book: Who listens where.
+    """
+
+    def __init__(
+        self, scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], book: AddressBook
+    ) -> None:
+        self._work: dict[int, Callable[..., int]] = {SUPERVISOR: run_supervisor}
+        self._arguments: dict[int, tuple[Any, ...]] = {SUPERVISOR: (scenario, plan, book)}
+        for k in range(len(book.robots)):
+            self._work[k], self._arguments[k] = run_robot, (scenario, plan, maps, k, book)
+        self.processes: dict[int, BaseProcess] = {}
+
+    def __enter__(self) -> LocalTeam:
+        for index in self._work:
+            self.start(index)
+        return self
+
+    def start(self, index: int) -> None:
+        """Start a process, or start it again."""
+        process = _CONTEXT.Process(
+            target=_served,
+            args=(name_of(index), self._work[index], self._arguments[index], os.getpid()),
+            daemon=True,
+        )
+        with uninterrupted():
+            process.start()
+        self.processes[index] = process
+
+    def check(self) -> None:
+        """Raise where a process has ended by itself.
+
+        Raises:
+            MessagingError: It says which, and how it ended.
+        """
+        for index, process in self.processes.items():
+            if process.exitcode is not None:
+                raise MessagingError(f"the process of {name_of(index)} ended ({_ending(process.exitcode)})")
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for process in self.processes.values():
+            process.join(1.0 if kind is None else 0.0)
+            if process.is_alive():
+                process.kill()
+                process.join()
+
+
+def _ending(code: int) -> str:
+    return f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
+
+
+def _served(name: str, work: Callable[..., int], arguments: tuple[Any, ...], parent: int) -> NoReturn:
+    """Do the work of a process until its parent is gone."""
+    os.setsid()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        work(*arguments, wanted=lambda: os.getppid() == parent)
+    except CoopDrakeError as error:
+        sys.stderr.write(f"{name}: {error}\n")
+        sys.stderr.flush()
+        os._exit(1)
+    os._exit(0)

@@ -1,0 +1,110 @@
+"""The world as a process: it simulates a team whose robots and supervisor are elsewhere."""
+
+from __future__ import annotations
+
+import time as clocks
+from collections.abc import Callable, Sequence
+
+from pydrake.systems.framework import DiagramBuilder
+
+from coop_drake.answers.log import SimulationLog
+from coop_drake.answers.plan import Plan
+from coop_drake.diagram import build_world, control_period
+from coop_drake.errors import MessagingError
+from coop_drake.fields import HarmonicMap
+from coop_drake.messages import AddressBook, Goodbye, KeyPair, WorldEnd, local_book
+from coop_drake.nodes.lock_step import LockStep
+from coop_drake.nodes.processes import LocalTeam, question_of
+from coop_drake.nodes.serving import TURN
+from coop_drake.plant import build_team_plant
+from coop_drake.progress import Progress
+from coop_drake.scenario import Scenario
+from coop_drake.simulation import Sample, run_loop
+
+ARRIVED, FAILED, INTERRUPTED = range(3)
+"""Outcomes, see ``messages.Goodbye``."""
+
+
+def run_world(
+    scenario: Scenario,
+    plan: Plan,
+    book: AddressBook,
+    *,
+    keys: KeyPair | None = None,
+    check: Callable[[], None] = lambda: None,
+    opening: float = 60.0,
+    progress: Progress | None = None,
+    observer: Callable[[Sample], None] | None = None,
+) -> SimulationLog:
+    """Wait for all robots and the supervisor, simulate the transport, and say goodbye to all.
+
+    Args:
+        scenario: The scenario.
+        plan: The plan that all have.
+        book: Who listens where.
+        keys: The world's keys, None where the book has none.
+        check: Called while the world waits; raises where a process is known to have ended.
+        opening: How long to wait for the others [s].
+        progress: Called with the stage and the fraction done, if given.
+        observer: Called with every accepted step.
+
+    Raises:
+        MessagingError: Somebody is missing.
+        ScenarioError: Robots do not compute at common samples.
+    """
+    end, outcome = WorldEnd(book, question_of(scenario, plan), keys), INTERRUPTED
+    exchange = LockStep(end, len(book.robots), check=check)
+    world = build_world(scenario, plan, exchange)
+    try:
+        _open(end, opening, check)
+        log = run_loop(world, scenario, progress=progress, observer=observer)
+        outcome = ARRIVED if log.reached and not log.violation else FAILED
+        return log
+    finally:
+        for index in end.present():
+            end.send(index, Goodbye(outcome))
+        end.close()
+        world.release()
+
+
+def _open(end: WorldEnd, limit: float, check: Callable[[], None]) -> None:
+    """Wait for everybody.
+
+    Raises:
+        MessagingError: Somebody does not come in time, or has ended.
+    """
+    deadline = clocks.monotonic() + limit
+    while True:
+        try:
+            return end.open(min(TURN, limit))
+        except MessagingError as error:
+            check()
+            if clocks.monotonic() > deadline:
+                raise MessagingError(f"{error}, {limit:g} s in all") from error
+
+
+def simulate_in_processes(
+    scenario: Scenario,
+    plan: Plan,
+    maps: Sequence[HarmonicMap],
+    *,
+    progress: Progress | None = None,
+    observer: Callable[[Sample], None] | None = None,
+) -> SimulationLog:
+    """Start all robots and the supervisor as processes on this machine, and be the world for them.
+
+    Args:
+        scenario: The scenario.
+        plan: A plan for it.
+        maps: The harmonic map of every transition.
+        progress: Called with the stage and the fraction done, if given.
+        observer: Called with every accepted step.
+
+    Raises:
+        MessagingError: A process ended.
+        ScenarioError: Robots do not compute at common samples.
+    """
+    control_period(scenario)
+    book = local_book(len(build_team_plant(scenario, DiagramBuilder()).robots))
+    with LocalTeam(scenario, plan, maps, book) as team:
+        return run_world(scenario, plan, book, check=team.check, progress=progress, observer=observer)
