@@ -110,6 +110,13 @@ Wait = Annotated[
     ),
 ]
 NoFigures = Annotated[bool, typer.Option("--no-figures", help="Write the recording, but no figures.")]
+Apart = Annotated[
+    bool,
+    typer.Option(
+        "--apart",
+        help="Run every robot and the supervisor as a process of its own; same results, bit for bit.",
+    ),
+]
 BlocksName = Annotated[
     Literal["named", "fused"],
     typer.Option(

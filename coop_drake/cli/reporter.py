@@ -22,6 +22,7 @@ from coop_drake.errors import (
     CoopDrakeError,
     FieldError,
     FloorPlanError,
+    MessagingError,
     ProcessError,
     ScenarioError,
     StallError,
@@ -235,7 +236,7 @@ def _explain(error: BaseException, reporter: Reporter) -> bool:
         details = {"file": error.file, "key": error.key, "value": error.shown, "allowed": error.allowed}
     elif isinstance(error, FloorPlanError):
         details = {"file": error.file, "place": error.place, "remedy": error.remedy, "finding": error.finding}
-    elif isinstance(error, FieldError | ProcessError | StallError):
+    elif isinstance(error, FieldError | MessagingError | ProcessError | StallError):
         code = ExitCode.FAILED_RUN
     elif isinstance(error, ModuleNotFoundError) and (advice := install_advice(error.name or "")):
         text = f"the package {error.name} is not installed; install what this needs: {advice}"

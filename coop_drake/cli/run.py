@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeAlias
 
+import typer
 from rich.markup import escape
 
 from coop_drake.cli.live import live_page
 from coop_drake.cli.maps import map_cells, write_certificates
 from coop_drake.cli.options import (
+    Apart,
     BlocksName,
     FreshMaps,
     GainsName,
@@ -36,6 +39,9 @@ if TYPE_CHECKING:
     from coop_drake.fields import HarmonicMap
     from coop_drake.viz import LivePage
 
+Simulation: TypeAlias = "Callable[..., SimulationLog]"
+"""Simulates a scenario, plan and maps, and is given ``progress`` and ``observer``."""
+
 
 def run_command(
     scenario: ScenarioPath,
@@ -46,6 +52,7 @@ def run_command(
     wait: Wait = False,
     no_figures: NoFigures = False,
     blocks: BlocksName = "named",
+    apart: Apart = False,
     machine: Machine = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -53,14 +60,38 @@ def run_command(
     """Plan, map, simulate and record a transport."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
+        simulation = simulation_of(task, blocks, apart=apart)
         folder = ResultFolder.of(task.name, out, "plan", "simulation")
         with DrawingProcesses(figures=not no_figures) as drawing:
             plan = plan_of(task, folder, reporter, simulated=True)
             if plan:
                 with live_page(task, plan, reporter, live=live, wait=wait) as page:
                     reporter.code = carry_out(
-                        task, plan, folder, reporter, drawing, page, fresh_maps=fresh_maps, blocks=blocks
+                        task, plan, folder, reporter, drawing, page, simulation, fresh_maps=fresh_maps
                     )
+
+
+def simulation_of(task: Task, blocks: Blocks, *, apart: bool) -> Simulation:
+    """Return what simulates: all in one process, or every robot in a process of its own.
+
+    Raises:
+        ScenarioError: Robots in processes of their own do not compute at common samples.
+    """
+    if not apart:
+        return partial(_in_one_process, blocks)
+    if blocks == "fused":
+        raise typer.BadParameter("--apart and --blocks fused do not go together: one block drives the team.")
+    from coop_drake.diagram import control_period
+    from coop_drake.nodes import simulate_in_processes
+
+    control_period(task.scenario)
+    return simulate_in_processes
+
+
+def _in_one_process(blocks: Blocks, *problem: Any, **options: Any) -> SimulationLog:
+    from coop_drake.simulation import simulate
+
+    return simulate(*problem, blocks=blocks, **options)
 
 
 def carry_out(
@@ -70,9 +101,9 @@ def carry_out(
     reporter: Reporter,
     drawing: DrawingProcesses,
     page: LivePage | None,
+    simulation: Simulation,
     *,
     fresh_maps: bool,
-    blocks: Blocks,
 ) -> ExitCode:
     """Simulate a plan and record it; a violated invariant or a goal not reached is a failed run.
 
@@ -81,7 +112,7 @@ def carry_out(
     """
     drawing.begin(task.scenario, task.problem, plan)
     maps = map_cells(task, plan, reporter, fresh=fresh_maps)
-    log = _simulate(task, plan, maps, reporter, blocks, page)
+    log = _simulate(task, plan, maps, reporter, simulation, page)
     if page:
         page.show_verdict(log)
     folder.begin("simulation", robots=log.robot_names)
@@ -119,14 +150,13 @@ def _simulate(
     plan: Plan,
     maps: tuple[HarmonicMap, ...],
     reporter: Reporter,
-    blocks: Blocks,
+    simulation: Simulation,
     observer: Callable[..., None] | None,
 ) -> SimulationLog:
     """Run the closed loop and note the facts."""
     from coop_drake.memory import peak_memory_mb
-    from coop_drake.simulation import simulate
 
     with reporter.stage("simulating", "simulation") as progress:
-        log = simulate(task.scenario, plan, maps, blocks=blocks, progress=progress, observer=observer)
+        log = simulation(task.scenario, plan, maps, progress=progress, observer=observer)
     reporter.facts.update(simulation_facts(plan, log, task.problem), peak_memory_mb=peak_memory_mb())
     return log

@@ -10,6 +10,7 @@ from rich.markup import escape
 
 from coop_drake.cli.live import live_page
 from coop_drake.cli.options import (
+    Apart,
     BlocksName,
     FreshMaps,
     Live,
@@ -23,7 +24,7 @@ from coop_drake.cli.options import (
 )
 from coop_drake.cli.reporter import Reporter, reporting
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.run import carry_out
+from coop_drake.cli.run import carry_out, simulation_of
 from coop_drake.cli.summary import plan_facts
 from coop_drake.cli.task import Task, read_task
 from coop_drake.viz.drawing_processes import DrawingProcesses
@@ -50,6 +51,7 @@ def simulate_command(
     wait: Wait = False,
     no_figures: NoFigures = False,
     blocks: BlocksName = "named",
+    apart: Apart = False,
     machine: Machine = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -57,6 +59,7 @@ def simulate_command(
     """Map, simulate and record a plan that was made before."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
+        simulation = simulation_of(task, blocks, apart=apart)
         folder = ResultFolder.of(task.name, out, "simulation")
         found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)
         with (
@@ -64,7 +67,7 @@ def simulate_command(
             live_page(task, found, reporter, live=live, wait=wait) as page,
         ):
             reporter.code = carry_out(
-                task, found, folder, reporter, drawing, page, fresh_maps=fresh_maps, blocks=blocks
+                task, found, folder, reporter, drawing, page, simulation, fresh_maps=fresh_maps
             )
 
 

@@ -1,10 +1,17 @@
 from .one_process import DirectExchange, simulate_apart
+from .processes import LocalTeam, run_robot, run_supervisor
 from .robot_node import RobotNode
 from .supervisor_node import SupervisorNode
+from .world_run import run_world, simulate_in_processes
 
 __all__ = [
     "DirectExchange",
+    "LocalTeam",
     "RobotNode",
     "SupervisorNode",
+    "run_robot",
+    "run_supervisor",
+    "run_world",
     "simulate_apart",
+    "simulate_in_processes",
 ]

@@ -65,10 +65,10 @@ class LockStep:
             pose, state = tuple(own[-3:]), tuple(own[:-3])
             self._end.send(k, Sample(self.sample, time, step, self._told[k], pose, state))
         self._end.send(SUPERVISOR, Tick(self.sample, time, step, tuple(self._sent)))
-        kinds: dict[int, type] = dict.fromkeys(range(self._robots), Effort if step else Telemetry)
+        kinds: dict[int, Any] = dict.fromkeys(range(self._robots), Effort if step else Telemetry)
         return self._answers(kinds | {SUPERVISOR: Status}, time)
 
-    def _answers(self, kinds: dict[int, type], time: float) -> dict[int, Any]:
+    def _answers(self, kinds: dict[int, Any], time: float) -> dict[int, Any]:
         """Wait for one answer of everybody about an instant."""
         found: dict[int, Any] = {}
         deadline = clocks.monotonic() + self._patience

@@ -115,14 +115,14 @@ class LocalTeam:
     def __init__(
         self, scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], book: AddressBook
     ) -> None:
-        self._work: dict[int, Callable[..., int]] = {SUPERVISOR: run_supervisor}
+        self.work: dict[int, Callable[..., int]] = {SUPERVISOR: run_supervisor}
         self._arguments: dict[int, tuple[Any, ...]] = {SUPERVISOR: (scenario, plan, book)}
         for k in range(len(book.robots)):
-            self._work[k], self._arguments[k] = run_robot, (scenario, plan, maps, k, book)
+            self.work[k], self._arguments[k] = run_robot, (scenario, plan, maps, k, book)
         self.processes: dict[int, BaseProcess] = {}
 
     def __enter__(self) -> LocalTeam:
-        for index in self._work:
+        for index in self.work:
             self.start(index)
         return self
 
@@ -130,7 +130,7 @@ class LocalTeam:
         """Start a process, or start it again."""
         process = _CONTEXT.Process(
             target=_served,
-            args=(name_of(index), self._work[index], self._arguments[index], os.getpid()),
+            args=(name_of(index), self.work[index], self._arguments[index], os.getpid()),
             daemon=True,
         )
         with uninterrupted():

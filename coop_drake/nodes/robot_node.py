@@ -15,7 +15,6 @@ from coop_drake.scenario import Deployment
 from coop_drake.systems import robot_record
 from coop_drake.tree.pose import FloatArray
 
-
 FOLLOWS, HOLDS, WAITS = range(3)
 """States of a robot, see ``messages.Effort``."""
 
@@ -34,12 +33,12 @@ class RobotNode:
         controller = build_robot_controller(knowledge)
         deployed = deploy(controller, deployment, robot, name, bodiless=True)
         self._controller, self._sampled = controller, SampledDiagram(deployed.diagram)
-        self._held = knowledge.hold is not None
+        self._period, self._held = knowledge.period or 0.0, knowledge.hold is not None
         joints = knowledge.joints.stop - knowledge.joints.start
         self._state_size = 2 * (3 + joints)
         self._logged = [name for name, size in robot_record(joints, holds=self._held).items() if size]
         self._cell, self._hold_message = np.zeros(2), np.zeros(2)
-        self._said = Ready(0, -1.0)
+        self._said = Ready(0, False)
         start = np.array(knowledge.plan.start[:3])
         self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self._state_size), start])))
         deployed.prepare(self._sampled.context)
@@ -74,7 +73,7 @@ class RobotNode:
         """Take in what the supervisor says; it counts from the next instant on."""
         for message in messages:
             if isinstance(message, Switch):
-                self._cell = np.array([message.cell, message.entry])
+                self._cell = np.array([message.cell, message.sample * self._period])
             elif isinstance(message, Hold):
                 self._hold_message = np.array(message, dtype=float)
 
@@ -84,8 +83,8 @@ class RobotNode:
         index, margin = self._sampled.output("ready")
         cell = int(self._cell[0])
         ready = index == cell and margin >= 0.0
-        if ready != (self._said.cell == cell and self._said.margin >= 0.0):
-            self._said = Ready(cell, float(margin) if ready else -1.0)
+        if ready != (self._said == (cell, True)):
+            self._said = Ready(cell, bool(ready))
             said.append(self._said)
         if self._held:
             asks, number = self._sampled.output("hold_request")

@@ -30,7 +30,7 @@ class SupervisorNode:
     """
 
     def __init__(self, robots: int, cells: int, period: float, hold: HoldSettings | None) -> None:
-        builder = DiagramBuilder()
+        builder, self._period = DiagramBuilder(), period
         planner = builder.AddNamedSystem("cell_planner", CellPlanner(robots, cells, period=period))
         for k in range(robots):
             builder.ExportInput(planner.GetInputPort(f"robot_{k}_ready"), f"robot_{k}_ready")
@@ -62,7 +62,7 @@ class SupervisorNode:
         cell, entry = self._sampled.output("current_cell")
         if int(cell) != self._cell:
             self._cell = int(cell)
-            said.append(Switch(self._cell, float(entry)))
+            said.append(Switch(self._cell, round(entry / self._period)))
         if self._held:
             held, number = self._sampled.output("hold_message")
             said.append(Hold(bool(held), int(number)))
@@ -72,7 +72,7 @@ class SupervisorNode:
         """Take in what a robot says; it counts from the next instant on."""
         for message in messages:
             if isinstance(message, Ready):
-                self._heard[f"robot_{robot}_ready"] = np.array(message, dtype=float)
+                self._heard[f"robot_{robot}_ready"] = np.array([message.cell, 0.0 if message.ready else -1.0])
             elif isinstance(message, HoldRequest):
                 self._heard[f"robot_{robot}_request"] = np.array(message, dtype=float)
 

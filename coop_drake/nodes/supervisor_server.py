@@ -37,6 +37,4 @@ class SupervisorServer(Server):
         sent = tuple(peer.sent for _, peer in sorted(self._end.team.peers.items()))
         cell, entry, arrived, *causes = self._node.look(time)
         codes = tuple(int(cause) for cause in causes)
-        self._end.efforts.send(
-            Status(number, time, sent, int(cell), float(entry), bool(arrived), codes)
-        )
+        self._end.efforts.send(Status(number, time, sent, int(cell), float(entry), bool(arrived), codes))

@@ -1,8 +1,7 @@
 """A team whose parts exchange plain values alone: the run is the one of the closed loop, bit for bit."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from coop_drake.diagram import control_period
@@ -12,6 +11,7 @@ from coop_drake.nodes.one_process import DirectExchange, simulate_apart
 from coop_drake.scenario import Control, Deployment, Hold, Measurements, Messages, RobotDepartures, Silence
 from coop_drake.scenario.deployment import ActuatorLimits, Deafness
 from coop_drake.simulation import communication, simulate
+from tests.support.same_runs import differences
 from tests.support.small_loop import small_maps, small_problem
 
 USUAL = Deployment(
@@ -39,12 +39,6 @@ CASES = {
 }
 
 
-def equal(first, second):
-    """Names of the fields in which two logs differ."""
-    pairs = [(field.name, getattr(first, field.name), getattr(second, field.name)) for field in fields(first)]
-    return [name for name, a, b in pairs if not (np.array_equal(a, b) if hasattr(a, "shape") else a == b)]
-
-
 @pytest.mark.parametrize("case", CASES)
 def test_the_log_is_that_of_the_closed_loop(case):
     team, deployment, control = CASES[case]
@@ -53,7 +47,7 @@ def test_the_log_is_that_of_the_closed_loop(case):
     together = simulate(scenario, plan, small_maps())
     apart = simulate_apart(scenario, plan, small_maps())
     assert together.reached
-    assert equal(together, apart) == []
+    assert differences(together, apart) == []
 
 
 def test_as_many_messages_cross_as_the_summary_counts():
