@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.run import carry_out
+from coop_drake.cli.run import carry_out, simulation_of
 from coop_drake.cli.task import Task
 from coop_drake.errors import ProcessError
 from coop_drake.viz.drawing_processes import DrawingProcesses
@@ -48,9 +48,9 @@ def replay(
     plan, maps = Plans(variation, folder.plans).with_maps(run)
     task = Task(scenario, planning_problem(scenario))
     results = ResultFolder.of(task.name, folder.path / "replays" / str(index), "simulation")
-    blocks = fastest_blocks(scenario, plan, maps)
+    simulation = simulation_of(task, fastest_blocks(scenario, plan, maps), apart=False)
     with DrawingProcesses(figures=figures) as drawing:
-        code = carry_out(task, plan, results, reporter, drawing, None, fresh_maps=False, blocks=blocks)
+        code = carry_out(task, plan, results, reporter, drawing, None, simulation, fresh_maps=False)
     log = SimulationLog.load(results.path / "log.npz")
     again = record_of_log(run, scenario.name, log, plan, run_digest(scenario, plan, "drake"))
     _compare(again, folder, batches, reporter)
