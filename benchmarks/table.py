@@ -8,6 +8,7 @@ from itertools import groupby
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.planner.guarantees import guarantee_table
 from benchmarks.rows import Row
 
 __all__ = ["show"]
@@ -16,7 +17,7 @@ _WIDTH = 130
 
 
 def show(rows: Sequence[Row], console: Console | None = None) -> None:
-    """Print one table per topic: a line for each item, a column for each figure.
+    """Print one table per topic, a line for each item, a column for each figure, then one of the planners.
 
     Behind a figure stands, in brackets, how many times its peer's it is; the peers are named below.
 
@@ -36,6 +37,10 @@ def show(rows: Sequence[Row], console: Console | None = None) -> None:
             if row.peer
         ):
             screen.print(line, style="dim", highlight=False)
+    planners = guarantee_table(rows)
+    if planners is not None:
+        screen.print()
+        screen.print(planners)
 
 
 def _place(rows: Sequence[Row], row: Row) -> int:

@@ -1,4 +1,4 @@
-"""Our planner, OMPL and a compiled RRT-Connect on the same scenario files, in one run."""
+"""Our planner, OMPL, Drake's GCS and a compiled RRT-Connect on the same scenario files, in one run."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from statistics import median
 from benchmarks.isolated import in_own_process
 from benchmarks.planner.cases import CASES, Case
 from benchmarks.planner.compiled_ompl import run_compiled_ompl
+from benchmarks.planner.gcs_peer import run_gcs
 from benchmarks.planner.ours import plan_repeatedly
 from benchmarks.rows import Row
 from benchmarks.tasks import Rows, Task
@@ -28,6 +29,12 @@ START_UP = 60.0
 
 MOST_PER_RUN = 20.0
 """CPU time of one run of the compiled trees [s]."""
+
+GCS_CASES = ("base", "elbow")
+"""Scenes on which Drake's own planner is measured: it takes minutes for each."""
+
+REGION_LIMIT = 300.0
+"""CPU time after which it begins no further region [s]."""
 
 PATIENCE = 5.0
 """An answer that took longer is not repeated [CPU s]."""
@@ -65,6 +72,8 @@ def head_to_head_tasks(effort: Effort) -> list[Task]:
         tasks.append(_trees_task(case, seeds))
         if has_ompl():
             tasks.append(_ompl_task(case, seeds, effort.budget))
+        if case.name in GCS_CASES:
+            tasks.append(_gcs_task(case))
         tasks.append(_our_task(case, effort))
     return tasks
 
@@ -91,6 +100,26 @@ def _ompl_task(case: Case, seeds: Sequence[int], budget: float) -> Task:
         shares = [run.check_seconds / run.cpu_seconds for run in runs if run.check_seconds is not None]
         share = [Row(f"{name}/check_share", median(shares), "of time")] if shares else []
         return [*judged(name, problem, runs, f"{budget:g} CPU s"), *share]
+
+    return Task(name, measure)
+
+
+def _gcs_task(case: Case) -> Task:
+    name = f"planner/gcs/{case.name}"
+
+    def measure(rows: Rows) -> Rows:
+        problem = case.problem()
+        run = in_own_process(run_gcs, problem, REGION_LIMIT, limit=START_UP + 2.0 * REGION_LIMIT).value
+        if run is None:
+            return [Row(f"{name}/found", 0.0, f"of 1 within {REGION_LIMIT:g} CPU s for regions")]
+        fault = fault_of(problem, run.path) if len(run.path) else "none"
+        return [
+            Row(f"{name}/found", float(not fault), f"of 1 within {REGION_LIMIT:g} CPU s for regions"),
+            Row(f"{name}/wrong", float(len(run.path) > 0 and bool(fault)), "paths"),
+            Row(f"{name}/cpu_seconds", run.region_seconds + run.solve_seconds, "s"),
+            Row(f"{name}/regions", run.regions, "regions"),
+            Row(f"{name}/region_seconds", run.region_seconds, "s"),
+        ]
 
     return Task(name, measure)
 

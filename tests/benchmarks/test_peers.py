@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from benchmarks.planner.family import corridor_problem, first_question
+from benchmarks.planner.gcs_peer import run_gcs
+from benchmarks.planner.guarantees import guarantee_table
 from benchmarks.planner.head_to_head import judged
+from benchmarks.rows import Row
 from coop_drake.campaign.questions.footprint import free_goals, prepared_check
 from coop_drake.campaign.questions.ompl_peer import run_ompl
 from coop_drake.campaign.questions.path_check import fault_of
@@ -76,3 +79,28 @@ def test_a_peer_is_judged_by_its_median_with_failures_counted():
     values = {row.figure: row.value for row in rows}
     assert (values["found"], values["wrong"], values["cpu_seconds"]) == (2, 0, 0.2)
     assert (values["fastest"], values["slowest"]) == (0.1, 0.2)
+
+
+def test_regions_of_drake_s_planner_hold_a_path_between_walls():
+    run = run_gcs(EASY, 60.0)
+    assert run.regions > 0
+    assert fault_of(EASY, run.path) == ""
+
+
+def test_drake_s_planner_without_time_finds_nothing():
+    run = run_gcs(EASY, -1.0)
+    assert (run.regions, len(run.path)) == (0, 0)
+
+
+def test_planners_are_shown_with_their_times_and_guarantees():
+    rows = [
+        Row("planner/base/first_plan_cpu_seconds", 0.1, "s"),
+        Row("planner/tight/first_plan_cpu_seconds", 0.3, "s"),
+        Row("planner/ompl/base/found", 10, "of 10 within 8 CPU s"),
+        Row("planner/ompl/base/cpu_seconds", 0.07, "s"),
+        Row("planner/gcs/base/found", 0, "of 1 within 300 CPU s for regions"),
+    ]
+    table = guarantee_table(rows)
+    assert [column.header for column in table.columns] == ["planner", "base", "guaranteed"]
+    assert list(table.columns[1].cells) == ["0.1", "0.07 (10 of 10)", "– (0 of 1)"]
+    assert guarantee_table(rows[:2]) is None
