@@ -61,6 +61,8 @@ def _leads_on(value: Any, where: str, entry: Point, boxes: list[plane.Box], regi
 def _check_free(question: Question, box: list[Interval], region: Region, where: str) -> None:
     """Check that no piece meets a wall, and no two pieces of a pair each other, anywhere in a cell.
 
+    Walls further from the cell than a piece reaches are left aside.
+
     An enclosure F of a piece meets a wall at positions in the Minkowski sum of the wall and -F. A piece that
     meets no wall lies inside the floor if one of its points does. As it moves without meeting a wall, that
     needs to be tested at one configuration for each ring of the cell: each part of it has a ring.
@@ -72,7 +74,10 @@ def _check_free(question: Question, box: list[Interval], region: Region, where: 
         return plane.boxes_apart(region.box, plane.box_of(near), gap) or region.side(hull(near), gap) < 0
 
     for body, chain, corners, radius in question.pieces:
-        apart = free(corners, radius, chain, box, question.floor.edges, clear)
+        moved, gap = swept(corners, radius, chain, box)
+        zone = [end + off for end, off in zip(region.box, plane.box_of(moved), strict=True)]
+        walls = [question.floor.edges[k] for k in question.floor.near(zone, gap)]
+        apart = free(corners, radius, chain, box, walls, clear)
         demand(apart, where, f"{body} may touch a wall")
         ((x, y),), error = swept(corners[:1], 0, chain, [(low, low) for low, _ in box])
         for (p, q), *_ in region.rings:

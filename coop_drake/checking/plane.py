@@ -5,8 +5,9 @@ cosines, and places on a segment are rounded, with stated bounds.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
+from math import isqrt
 from typing import Any
 
 Point = tuple[int, int]
@@ -21,6 +22,9 @@ ONE, FULL = 1 << BITS, 1 << 64
 FINE_TURN = 0x6_487ED511_0B4611A6_2633145C_06E0E689_48127044
 TURN = FINE_TURN >> BITS
 """2 pi, rounded down to a multiple of 2^-160, and of 2^-80."""
+
+MANY = 50
+"""The edges of regions with more than so many are put into rows [-]."""
 
 work_left = [0]  # Elementary steps that are still allowed.
 
@@ -131,22 +135,44 @@ class Region:
         self.boxes = [box_of(edge) for edge in self.edges]
         self.box = box_of([corner for ring in rings for corner in ring])
 
+    @cached_property
+    def rows(self) -> tuple[int, list[list[int]]]:
+        """Height of some rows along y, and the edges that reach into each: three times as many at most."""
+        low, high, count = self.box[1], self.box[3], len(self.edges)
+        height = 1 + max(sum(its[3] - its[1] for its in self.boxes) // count, (high - low) // isqrt(count))
+        rows = [list[int]() for _ in range(1 + (high - low) // height)]
+        for k, its in enumerate(self.boxes):
+            for row in rows[(its[1] - low) // height : 1 + (its[3] - low) // height]:
+                row.append(k)
+        return height, rows
+
+    def near(self, box: Sequence[int], gap: int) -> list[int]:
+        """Edges whose boxes are not further than a gap from a box, looked for in the rows near it."""
+        seen: Iterable[int] = range(len(self.edges))
+        if len(self.edges) > MANY:
+            (height, rows), low = self.rows, self.box[1]
+            first, last = max(0, (box[1] - gap - low) // height), (box[3] + gap - low) // height
+            seen = sorted({k for row in rows[first : max(first, last + 1)] for k in row})
+            spend(4 * len(seen))
+        spend(len(self.edges) if len(self.edges) <= MANY else 10)
+        return [k for k in seen if not boxes_apart(self.boxes[k], box, gap)]
+
     def has_inside(self, x: int, y: int, scale: int = 1) -> bool:
         """Whether the point (x, y) / scale, which is on no edge, lies in the region."""
-        spend(len(self.edges))
-        odd = False
-        for (px, py), (qx, qy) in self.edges:
+        odd, level = False, y // scale
+        for k in self.near((self.box[0], level, self.box[2], level), 0):
+            (px, py), (qx, qy) = self.edges[k]
             if (py * scale > y) != (qy * scale > y):
                 odd ^= ((qx - px) * (y - py * scale) > (qy - py) * (x - px * scale)) == (qy > py)
         return odd == self.odd
 
     def side(self, convex: Sequence[Point], gap: int) -> int:
         """1 if a convex set is inside, -1 if outside, by more than a gap [2^-80 m] each; 0 otherwise."""
-        spend(len(self.edges) + 10)
-        box, pairs = box_of(convex), zip(self.edges, self.boxes, strict=True)
+        spend(10)
+        box = box_of(convex)
         if self.odd and boxes_apart(self.box, box, gap):
             return -1
-        if any(not boxes_apart(its, box, gap) and not apart(edge, convex, gap) for edge, its in pairs):
+        if not all(apart(self.edges[k], convex, gap) for k in self.near(box, gap)):
             return 0
         return 1 if self.has_inside(*convex[0]) else -1
 
@@ -160,9 +186,8 @@ class Region:
         ((ax, ay), (bx, by)), box, cuts = segment, box_of(segment), [(FULL, FULL)]
         dx, dy = bx - ax, by - ay
         square, after = (dx * dx + dy * dy, 2) if dx or dy else (1, FULL + 1)
-        pairs = zip(self.edges, self.boxes, strict=True)
-        near = [edge for edge, its in pairs if not boxes_apart(its, box, 0)]
-        for (px, py), (qx, qy) in near:
+        for k in self.near(box, 0):
+            (px, py), (qx, qy) = self.edges[k]
             first, last = dx * (py - ay) - dy * (px - ax), dx * (qy - ay) - dy * (qx - ax)
             across = (px - ax) * (qy - py) - (py - ay) * (qx - px)
             if min(first, last) > 0 or max(first, last) < 0 or (first == last and across):
@@ -171,7 +196,6 @@ class Region:
             if first == last:  # On one line: all between the edge's ends is cut out.
                 places = [((x - ax) * dx + (y - ay) * dy) * FULL // square for x, y in ((px, py), (qx, qy))]
             cuts.append((min(places) - 1, max(places) + after))
-        spend(len(self.edges))
         found, low = [], 0
         for before, after in sorted(cuts):
             high = min(before, FULL)

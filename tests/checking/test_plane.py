@@ -142,3 +142,33 @@ def test_a_point_beside_a_slanted_edge_lies_inside_though_it_is_in_the_edges_box
     slanted = region([(0, 0), (9, 0), (9, 9)])
     assert slanted.stretches(((6, 2), (6, 2))) == [(0, FULL)]
     assert slanted.stretches(((2, 2), (2, 2))) == slanted.stretches(((2, 3), (2, 3))) == []
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 40), st.integers(-9, 9)), min_size=60, max_size=90),
+    st.tuples(st.integers(-50, 50), st.integers(-60, 60), st.integers(0, 30), st.integers(0, 30)),
+    st.integers(0, 12),
+)
+def test_edges_near_a_box_are_found_in_rows_as_among_all(offsets, place, gap):
+    around = [
+        (int(radius * cos(0.1 * k)), int(radius * sin(0.1 * k)) + jump)
+        for k, (radius, jump) in enumerate(offsets)
+    ]
+    many, (x, y, width, height) = region(around), place
+    box = x, y, x + width, y + height
+    assert len(many.edges) > plane.MANY
+    assert many.near(box, gap) == [
+        k for k, its in enumerate(many.boxes) if not plane.boxes_apart(its, box, gap)
+    ]
+    assert sum(map(len, many.rows[1])) <= 3 * len(many.edges)
+
+
+def test_a_point_is_inside_a_region_of_many_edges_as_in_shapely():
+    star = [(round((40 + 30 * (k % 2)) * cos(k / 16)), round(70 * sin(k / 16))) for k in range(100)]
+    many, shape = region(star), Polygon(star)
+    for x in range(-70, 71, 7):
+        for y in range(-73, 74, 7):
+            if not shape.boundary.intersects(Point(x + 0.5, y + 0.5)):
+                assert many.has_inside(2 * x + 1, 2 * y + 1, 2) == shape.buffer(0).contains(
+                    Point(x + 0.5, y + 0.5)
+                )

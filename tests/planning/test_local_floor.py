@@ -15,6 +15,7 @@ from coop_drake.laws import ScheduledGains
 from coop_drake.planning.planner import plan
 from coop_drake.planning.sampling.disc_route import disc_route
 from coop_drake.planning.sampling.local_floor import MANY_CORNERS, local_question
+from coop_drake.verification import verify_plan
 
 BEND = Polygon([(0, 0), (8, 0), (8, 1), (1, 1), (1, 7), (0, 7)])
 """Two aisles of 1 m that meet at a right angle."""
@@ -49,15 +50,17 @@ def test_a_route_prefers_the_wide_passage_and_few_turns() -> None:
 
 
 def test_a_plan_near_a_route_answers_the_question_on_the_whole_floor() -> None:
-    question = shelf_problem(MANY_CORNERS + 200)
+    far = shelf_problem(MANY_CORNERS + 200)
+    question = replace(far, goal_pose=far.start[:3] + np.array([9.0, 0.0, 0.0]))  # three aisles further
     local = local_question(question)
     assert local is not None
     assert question.workspace.buffer(1e-9).contains(local.workspace)
     assert shapely.get_num_coordinates(local.workspace) < MANY_CORNERS / 2
     assert all(local.workspace.contains(Point(p[:2])) for p in (question.start, question.goal_pose))
-    result = plan(question, ScheduledGains(), gain_set_name="scheduled")
+    gains = ScheduledGains()
+    result = plan(question, gains, gain_set_name="scheduled")
     assert isinstance(result, Found)
-    assert all(question.workspace.contains(cell.tidied) for cell in result.plan.cells)
+    verify_plan(result.plan, question, {"scheduled": gains})  # raises an error where it refuses
     assert result.plan.problem == problem_digest(question) != problem_digest(local)
 
 
