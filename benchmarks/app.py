@@ -20,6 +20,7 @@ from benchmarks.deployed import deployed_tasks
 from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.ledger import Ledger, LedgerError
 from benchmarks.mapping import mapping_tasks
+from benchmarks.messages import message_tasks
 from benchmarks.planner.ablation import ablation_tasks
 from benchmarks.planner.budgeted import budget_tasks
 from benchmarks.planner.contradiction import contradiction_tasks
@@ -110,6 +111,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *departure_tasks(),
         *deployed_tasks(),
         *adversary_tasks(),
+        *message_tasks(),
     ]
 
 
