@@ -1,46 +1,70 @@
-"""The batches of a campaign: consecutive runs that one process makes, and one file holds."""
+"""The batches of a campaign: consecutive runs or questions that one process makes, and one file holds."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 from coop_drake.answers.digest import content_digest
-from coop_drake.campaign.plans import Plans, scenario_content
+from coop_drake.campaign.plans import Plans, scenario_content, versions
+from coop_drake.campaign.questions.settings import QuestionSettings
+from coop_drake.campaign.records import QuestionRecord, Record, RunRecord
 from coop_drake.campaign.settings import Tier
 from coop_drake.campaign.variation import Variation
+from coop_drake.typed_data import to_plain
+
+PLANNER: Literal["planner"] = "planner"
+"""In place of a tier: the batch has planning questions in place of runs."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Consecutive runs of one scenario in one tier.
+    """Consecutive runs of one scenario in one tier, or consecutive planning questions.
 
     Attributes:
-        scenario: Index of the scenario in the campaign file.
-        tier: By which loop they are made.
+        scenario: Index of the scenario in the campaign file; 0 for questions.
+        tier: By which loop they are made; ``planner`` for questions.
         first: Index of the first run.
         stop: Index behind the last run.
         digest: SHA-256 of all that their results depend on; names their file.
     """
 
     scenario: int
-    tier: Tier
+    tier: Tier | Literal["planner"]
     first: int
     stop: int
     digest: str
 
     @property
+    def record(self) -> type[Record]:
+        """What each of its runs or questions leaves."""
+        return QuestionRecord if self.tier == PLANNER else RunRecord
+
+    @property
     def file(self) -> Path:
         """The file of its records, in the campaign's folder."""
-        return Path("runs") / f"{self.digest}.parquet"
+        return Path("questions" if self.tier == PLANNER else "runs") / f"{self.digest}.parquet"
 
     @property
     def costs(self) -> Path:
         """The file that says what it took; other than the records it is never the same twice."""
         return Path("costs") / f"{self.digest}.json"
+
+
+def question_batches(settings: QuestionSettings) -> Iterator[Batch]:
+    """Yield all batches of planning questions."""
+    for first in range(0, settings.count, settings.batch):
+        yield question_batch(settings, first, min(first + settings.batch, settings.count))
+
+
+def question_batch(settings: QuestionSettings, first: int, stop: int) -> Batch:
+    """Return one batch of planning questions; what it leaves does not depend on how many others there are."""
+    asked = to_plain(replace(settings, count=1, batch=1), QuestionSettings)
+    content = {"questions": asked, "versions": versions(), "first": first, "stop": stop}
+    return Batch(0, PLANNER, first, stop, content_digest(content))
 
 
 class Batching:

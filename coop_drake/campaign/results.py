@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coop_drake.campaign.batches import Batch
-from coop_drake.campaign.records import RunRecord, schema_of, table_of
+from coop_drake.campaign.batches import PLANNER, Batch
+from coop_drake.campaign.records import QuestionRecord, Record, RunRecord, schema_of, table_of
 from coop_drake.files import write_atomically
 
 if TYPE_CHECKING:
@@ -37,17 +37,22 @@ class CampaignFolder:
         return self.path / "plans"
 
     @property
+    def cases(self) -> Path:
+        """Questions that were answered wrongly or not at all."""
+        return self.path / "cases"
+
+    @property
     def lock(self) -> Path:
         """The file that a command which works in the folder holds a lock of."""
         return self.path / ".lock"
 
-    def write(self, batch: Batch, records: Iterable[RunRecord]) -> None:
+    def write(self, batch: Batch, records: Iterable[Record]) -> None:
         """Write the records of a batch, whole or not at all.
 
         Raises:
             OSError: The file cannot be written.
         """
-        write_table(self.path / batch.file, table_of(records, RunRecord))
+        write_table(self.path / batch.file, table_of(records, batch.record))
 
     def has(self, batch: Batch) -> bool:
         """Whether the records of a batch are there; a damaged file counts as missing."""
@@ -64,13 +69,21 @@ class CampaignFolder:
         return [batch for batch in batches if not self.has(batch)]
 
     def table(self, batches: Sequence[Batch]) -> pyarrow.Table:
-        """Return the records of those batches that are there, sorted by run and tier."""
+        """Return the records of those batches of runs that are there, sorted by run and tier."""
+        runs = self._records([one for one in batches if one.tier != PLANNER], RunRecord)
+        return runs.sort_by([("run", "ascending"), ("tier", "ascending")])
+
+    def questions(self, batches: Sequence[Batch]) -> pyarrow.Table:
+        """Return the records of those batches of questions that are there, sorted by number."""
+        asked = self._records([one for one in batches if one.tier == PLANNER], QuestionRecord)
+        return asked.sort_by("question")
+
+    def _records(self, batches: Sequence[Batch], kind: type[Record]) -> pyarrow.Table:
         import pyarrow
         import pyarrow.parquet
 
         there = [pyarrow.parquet.read_table(self.path / one.file) for one in batches if self.has(one)]
-        table = pyarrow.concat_tables(there) if there else schema_of(RunRecord).empty_table()
-        return table.sort_by([("run", "ascending"), ("tier", "ascending")])
+        return pyarrow.concat_tables(there) if there else schema_of(kind).empty_table()
 
     def costs(self, batches: Iterable[Batch]) -> list[dict[str, Any]]:
         """Return what the batches took whose costs are known, as `note` was told."""

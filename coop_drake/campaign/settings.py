@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from coop_drake.campaign.distributions import Count, Distribution
+from coop_drake.campaign.questions.settings import QuestionSettings
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.reading import read_file
 from coop_drake.typed_data import EXACT, Codec, DataError, Limits, Positive
@@ -73,10 +74,12 @@ class Campaign:
 
     Attributes:
         runs: Runs of transports; null for none.
+        questions: Random planning questions; null for none.
         path: The file it was read from.
     """
 
     runs: Runs | None = None
+    questions: QuestionSettings | None = None
     path: Path = field(default=Path("campaign.yaml"), metadata={"in_file": False})
 
     @property
@@ -98,5 +101,5 @@ def load_campaign(path: Path | str, original: Path | None = None) -> Campaign:
     file = Path(path)
     campaign = dataclasses.replace(read_file(Campaign, file), path=original or file)
     if campaign == Campaign(path=campaign.path):
-        raise ScenarioError(str(file), "the file", "no section", "at least one section, such as runs")
+        raise ScenarioError(str(file), "the file", "no section", "at least one section, runs or questions")
     return campaign

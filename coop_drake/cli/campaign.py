@@ -63,9 +63,9 @@ def run_command(
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make all runs of a campaign, or those that are missing after an interruption.
+    """Make all runs of a campaign and answer its questions, or those that an interruption left.
 
-    `campaign FILE` means the same. The exit code is 1 if a run was lost.
+    `campaign FILE` means the same. The exit code is 1 if a run was lost or an answer is wrong.
     """
     with reporting(machine=machine, quiet=quiet) as reporter:
         campaign, folder = _read(file, out)
@@ -99,7 +99,7 @@ def report_command(
         from coop_drake.campaign.report import make_report, write_report
 
         campaign, folder, batches = _with_batches(file, out)
-        report = make_report(campaign.name, folder.table(batches))
+        report = make_report(campaign.name, folder.table(batches), folder.questions(batches))
         at = "" if out is None else f" --out {out}"
         written = write_report(
             report,
@@ -127,6 +127,27 @@ def replay_command(
         reporter.code = replay(campaign, folder, batches, run, reporter, figures=not no_figures)
 
 
+@campaign_app.command("question")
+def question_command(
+    file: CampaignFile,
+    number: Annotated[int, typer.Argument(metavar="NUMBER", min=0, help="Number of the question.")],
+    out: CampaignOut = None,
+    machine: Machine = False,
+    quiet: Quiet = False,
+) -> None:
+    """Write a random question as a scenario with its models, to be planned or looked at like any other."""
+    with reporting(machine=machine, quiet=quiet) as reporter:
+        from coop_drake.campaign.questions import random_question
+        from coop_drake.errors import ScenarioError
+
+        campaign, folder = _read(file, out)
+        if campaign.questions is None:
+            raise ScenarioError(str(file), "questions", None, "a section of questions")
+        drawn = random_question(campaign.questions, number, folder.path / "drawn" / str(number))
+        reporter.facts["scenario"] = str(drawn.scenario.path)
+        reporter.say(f"Next: coop-drake plan {escape(str(drawn.scenario.path))}")
+
+
 def _read(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolder]:
     """Read a campaign file, and say where its results go."""
     from coop_drake.campaign import load_campaign
@@ -144,12 +165,23 @@ def _with_batches(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolde
 
 
 def _show(campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter) -> None:
+    """Show what a campaign has come to so far; a lost run or a wrong answer makes the command fail."""
+    reporter.facts["folder"] = str(folder.path)
+    if campaign.questions is not None:
+        _show_questions(campaign, folder, batches, reporter)
+    if campaign.runs is not None:
+        _show_runs(campaign, folder, batches, reporter)
+    reporter.say(f"All results are in {escape(str(folder.path))}")
+
+
+def _show_runs(
+    campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter
+) -> None:
     """Show the state of every scenario in every tier; a lost run makes the command fail."""
     from coop_drake.campaign.state import state_of
 
     rows = state_of(campaign, folder, batches)
     reporter.facts.update(
-        folder=str(folder.path),
         runs=sum(row.runs for row in rows),
         done=sum(row.done for row in rows),
         lost=sum(row.lost for row in rows),
@@ -157,6 +189,23 @@ def _show(campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...]
     )
     headings = ("runs", "done", "lost", "least funnel margin", "least clearance", "CPU time of a run")
     reporter.table(campaign.name, [row.cells() for row in rows], headings, "scenario, tier")
-    reporter.say(f"All results are in {escape(str(folder.path))}")
     if reporter.facts["lost"]:
+        reporter.code = ExitCode.FAILED_RUN
+
+
+def _show_questions(
+    campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter
+) -> None:
+    """Show how questions were answered, by what makes them hard; a wrong answer makes the command fail."""
+    from dataclasses import asdict
+
+    from coop_drake.campaign.report.questions import summarise_questions
+
+    table = folder.questions(batches)
+    rows = summarise_questions(table) if table.num_rows else ()
+    reporter.facts["questions"] = [{**asdict(row), "wrong": row.wrong} for row in rows]
+    headings = ("asked", "plans", "no way", "undecided", "wrong", "CPU time", "95 %", "largest")
+    if rows:
+        reporter.table(campaign.name, [row.cells() for row in rows], headings, "questions by")
+    if rows and rows[-1].wrong:
         reporter.code = ExitCode.FAILED_RUN

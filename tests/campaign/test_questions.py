@@ -29,7 +29,7 @@ from coop_drake.scenario import load_scenario
 from coop_drake.tree.component_tree import Body, Component, ComponentTree
 from tests.support.cases import rectangle
 
-SMALL = QuestionSettings(seed=3, robots=(2,), most_joints=1, floors=("room",), peer_time=0.0)
+SMALL = QuestionSettings(seeds=(3,), robots=(2,), most_joints=1, floors=("room",), peer_time=0.0)
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +59,7 @@ def test_a_question_is_an_ordinary_scenario_that_begins_and_ends_without_collisi
 
 
 def test_some_joints_have_goals_at_which_the_team_is_free(tmp_path):
-    asked = QuestionSettings(seed=3, robots=(2,), most_joints=2, floors=("door",))
+    asked = QuestionSettings(seeds=(3,), robots=(2,), most_joints=2, floors=("door",))
     for number in range(30):
         problem = random_question(asked, number, tmp_path / str(number)).problem
         if any(goal is not None for goal in problem.goal_joints):

@@ -1,4 +1,4 @@
-from .answering import answer, ask, is_wrong
+from .answering import answer, ask, begun_question, is_wrong
 from .peers import Searched, search_by_peers
 from .question import Question, random_question
 from .settings import QuestionSettings
@@ -9,6 +9,7 @@ __all__ = [
     "Searched",
     "answer",
     "ask",
+    "begun_question",
     "is_wrong",
     "random_question",
     "search_by_peers",

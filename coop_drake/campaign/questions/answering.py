@@ -35,15 +35,20 @@ def ask(number: int, settings: QuestionSettings, cases: Path | None = None) -> Q
     Args:
         number: Number of the question.
         settings: What is drawn, and how it is judged.
-        cases: Folder that receives the scenario, its models and what was found, if the answer is wrong, or is
-            undecided although another planner finds a way; None to keep nothing.
+        cases: Folder that receives the scenario, its models and what was found, if the answer is wrong or
+            undecided; None to keep nothing.
     """
     with TemporaryDirectory() as folder:
         question = random_question(settings, number, Path(folder))
         record, found = answer(question, settings)
-        if cases is not None and (is_wrong(record) or record.peer_found or record.verdict == "undecided"):
-            _keep(question, record, found, cases / f"{settings.seed}_{number}")
+        if cases is not None and (is_wrong(record) or record.verdict == "undecided"):
+            _keep(question, record, found, cases / f"{question.seed}_{number}")
     return record
+
+
+def begun_question(settings: QuestionSettings, number: int) -> QuestionRecord:
+    """Return the record of a question while it is answered; it stays so if its process is lost."""
+    return QuestionRecord(number, settings.seed(number), "", 0, 0, "", "failed")
 
 
 def answer(question: Question, settings: QuestionSettings) -> tuple[QuestionRecord, Searched]:

@@ -60,7 +60,7 @@ class Question:
 
     Attributes:
         number: Its number in the campaign; seed and number determine it.
-        seed: Seed of the campaign.
+        seed: Its seed.
         scenario: The scenario; ``scenario.path`` is its file, beside which its models are.
         problem: What the planner is asked.
         floor: Kind of the floor.
@@ -86,14 +86,15 @@ def random_question(settings: QuestionSettings, number: int, folder: Path) -> Qu
     Start and goal are free of collisions; whether there is a way between them is the question.
 
     Args:
-        settings: The seed, and what may be drawn.
+        settings: The seeds, and what may be drawn.
         number: Number of the question.
         folder: Where the scenario and its models are written.
 
     Raises:
         QuestionError: The settings allow no question.
     """
-    random, seed = np.random.default_rng([settings.seed, number]), settings.seed
+    seed = settings.seed(number)
+    random = np.random.default_rng([seed, number])
     kind = settings.floors[int(random.integers(len(settings.floors)))]
     robots = random_count(random, settings.robots)
     folder.mkdir(parents=True, exist_ok=True)

@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from coop_drake.typed_data import EXACT, Limits, NotNegative, Positive
+from coop_drake.typed_data import EXACT, DataError, Limits, NotNegative, Positive
 
 FloorKind = Literal["room", "corridor", "door", "warehouse", "rooms"]
 
 Count = Annotated[int, Limits(above=0)]
+
+Seed = Annotated[int, Limits(at_least=0), EXACT]
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,8 @@ class QuestionSettings:
 
     Attributes:
         count: How many are asked.
-        seed: Seed of all that is drawn; the seed and its number determine a question.
+        seeds: Seeds of all that is drawn, which questions take by turns; the seed and its number determine a
+            question.
         floors: Kinds of floors; each is as frequent as the others.
         robots: Numbers of robots; each is a third as frequent as the one before.
         most_joints: Largest number of joints of a robot; each number is a third as frequent as the one
@@ -32,7 +35,7 @@ class QuestionSettings:
     """
 
     count: Count = 100
-    seed: Annotated[int, Limits(at_least=0), EXACT] = 0
+    seeds: tuple[Seed, ...] = (0,)
     floors: tuple[FloorKind, ...] = ("room", "corridor", "door", "warehouse", "rooms")
     robots: tuple[Annotated[int, Limits(at_least=2, at_most=5)], ...] = (2, 3, 4, 5)
     most_joints: Annotated[int, Limits(at_least=1, at_most=3)] = 3
@@ -41,3 +44,22 @@ class QuestionSettings:
     peer_time: NotNegative = 1.0
     patient_peer_time: NotNegative = 60.0
     batch: Count = 20
+
+    def __post_init__(self) -> None:
+        """Refuse lists without an entry."""
+        for key in ("seeds", "floors", "robots"):
+            if not getattr(self, key):
+                raise DataError(key, [], "at least one entry")
+
+    def seed(self, number: int) -> int:
+        """Return the seed of a question."""
+        return self.seeds[number % len(self.seeds)]
+
+    @property
+    def longest(self) -> float:
+        """Time after which a process that answers one question counts as hanging [s].
+
+        Processor time is limited by the other entries. A process on a busy machine gets a part of a
+        processor, and checking an answer takes about as long as finding it.
+        """
+        return 10.0 * (2.0 * self.time_limit + 2.0 * max(self.peer_time, self.patient_peer_time)) + 600.0

@@ -67,7 +67,7 @@ def growth_svg(questions: Sequence[Questions]) -> str:
     groups = [one for one in questions if one.axis != ALL]
     if not groups:
         return ""
-    names = [f"{one.axis}: {one.group}" for one in groups]
+    names = [f"{one.axis} {one.group}" for one in groups]
     figure, (ax,) = _panels(1, len(groups), names, width=5.0)
     places = np.arange(len(groups))[::-1] + 0.35
     for place, one in zip(places, groups, strict=True):

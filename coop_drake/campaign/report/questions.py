@@ -61,6 +61,13 @@ class Questions:
         """Answers that are wrong or not proved; one may count twice."""
         return self.refused + self.contact + self.contradicted
 
+    def cells(self) -> tuple[str, ...]:
+        """Return a row of a table."""
+        counts = (self.count, self.plans, self.infeasible, self.undecided, self.wrong)
+        times = (self.seconds.median, self.seconds.high, self.seconds.largest)
+        name = ALL if self.axis == ALL else f"{self.axis} {self.group}"
+        return name, *map(str, counts), *(f"{time:.2g} s" for time in times)
+
 
 def summarise_questions(table: Any) -> tuple[Questions, ...]:
     """Return how the questions of every group were answered, and all of them in the last row.

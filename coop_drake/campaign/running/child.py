@@ -1,8 +1,8 @@
-"""A process that makes the runs of one batch, writes a line for each, and ends.
+"""A process that makes the runs or answers the questions of one batch, writes a line for each, and ends.
 
 ``python -m coop_drake.campaign.running.child ORDER`` with the order as JSON. Drake keeps some memory of every
 plant, which ends with the process. Lines on standard output are JSON: ``["begun", record]`` and ``["ended",
-record]`` for each run, ``["costs", mapping]`` at the end, ``["error", message]`` where nothing can be run.
+record]`` for each of them, ``["costs", mapping]`` at the end, ``["error", message]`` where none can be made.
 """
 
 from __future__ import annotations
@@ -11,12 +11,21 @@ import json
 import os
 import sys
 import threading
+from collections.abc import Callable, Iterator
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from time import process_time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from coop_drake.errors import CoopDrakeError
+
+if TYPE_CHECKING:
+    from coop_drake.campaign.records import Record
+    from coop_drake.campaign.results import CampaignFolder
+    from coop_drake.campaign.settings import Campaign
+
+    Task = tuple[Record, Callable[[], Record]]  # The record while it is made, and what makes it.
 
 
 def main(order: dict[str, Any]) -> int:
@@ -31,16 +40,28 @@ def main(order: dict[str, Any]) -> int:
 
 
 def _make(order: dict[str, Any]) -> None:
-    from coop_drake.campaign.batches import Batching
-    from coop_drake.campaign.plans import Plans
+    from coop_drake.campaign.batches import PLANNER
     from coop_drake.campaign.results import CampaignFolder
-    from coop_drake.campaign.running.making import RunMaker
     from coop_drake.campaign.settings import load_campaign
-    from coop_drake.campaign.variation import Variation
     from coop_drake.memory import peak_memory_mb
 
-    folder, batch = CampaignFolder(Path(order["folder"])), order["batch"]
-    variation = Variation(load_campaign(folder.campaign, Path(order["campaign"])))
+    folder = CampaignFolder(Path(order["folder"]))
+    campaign = load_campaign(folder.campaign, Path(order["campaign"]))
+    made = _questions if order["batch"]["tier"] == PLANNER else _runs
+    for begun, record in made(campaign, folder, order):
+        _say("begun", asdict(begun))
+        _say("ended", asdict(record()))
+    _say("costs", {"cpu_seconds": process_time(), "peak_memory_mb": peak_memory_mb()})
+
+
+def _runs(campaign: Campaign, folder: CampaignFolder, order: dict[str, Any]) -> Iterator[Task]:
+    """Yield the runs of a batch that are to be made."""
+    from coop_drake.campaign.batches import Batching
+    from coop_drake.campaign.plans import Plans
+    from coop_drake.campaign.running.making import RunMaker
+    from coop_drake.campaign.variation import Variation
+
+    batch, variation = order["batch"], Variation(campaign)
     plans = Plans(variation, folder.plans)
     place = batch["scenario"], batch["tier"], batch["first"], batch["stop"]
     if Batching(variation, plans).batch(*place).digest != batch["digest"]:
@@ -48,9 +69,19 @@ def _make(order: dict[str, Any]) -> None:
     maker = RunMaker(variation, plans, batch["tier"], folder.path / "logs")
     for index in range(order["begin"], batch["stop"]):
         run = variation.run(index)
-        _say("begun", asdict(maker.begun(run)))
-        _say("ended", asdict(maker.record(run)))
-    _say("costs", {"cpu_seconds": process_time(), "peak_memory_mb": peak_memory_mb()})
+        yield maker.begun(run), partial(maker.record, run)
+
+
+def _questions(campaign: Campaign, folder: CampaignFolder, order: dict[str, Any]) -> Iterator[Task]:
+    """Yield the questions of a batch that are to be answered; kernels are loaded before their time counts."""
+    from coop_drake.campaign.questions import ask, begun_question
+    from coop_drake.planning import warm_up
+
+    settings = campaign.questions
+    assert settings is not None  # or there would be no batches
+    warm_up.main()
+    for number in range(order["begin"], order["batch"]["stop"]):
+        yield begun_question(settings, number), partial(ask, number, settings, folder.cases)
 
 
 def _say(kind: str, content: object) -> None:

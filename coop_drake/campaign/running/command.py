@@ -9,8 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from coop_drake.campaign.batches import Batch, Batching
+from coop_drake.campaign.batches import PLANNER, Batch, Batching, question_batches
 from coop_drake.campaign.plans import Plans
+from coop_drake.campaign.questions.settings import QuestionSettings
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.campaign.running.placing import place
 from coop_drake.campaign.running.supervising import Order
@@ -42,11 +43,12 @@ def batches_of(campaign: Campaign, folder: CampaignFolder) -> tuple[Batch, ...]:
     Raises:
         ScenarioError: The campaign file or a scenario is wrong.
     """
+    asked = () if campaign.questions is None else tuple(question_batches(campaign.questions))
     if campaign.runs is None:
-        return ()
+        return asked
     variation = Variation(campaign)
     variation.check()
-    return tuple(Batching(variation, Plans(variation, folder.plans)).batches())
+    return *Batching(variation, Plans(variation, folder.plans)).batches(), *asked
 
 
 def run_campaign(
@@ -57,7 +59,7 @@ def run_campaign(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
-    """Make all runs of a campaign whose records are not there yet.
+    """Make all runs and answer all questions of a campaign whose records are not there yet.
 
     Args:
         campaign: The campaign.
@@ -77,13 +79,12 @@ def run_campaign(
     batches = batches_of(campaign, folder)
     with _locked(folder):
         write_atomically(folder.campaign, campaign.path.read_bytes())
-        if campaign.runs is None:
-            return Outcome(folder, batches, 0)
         missing = folder.missing(batches)
-        variation = Variation(campaign)
-        plans = Plans(variation, folder.plans)
-        for scenario in sorted({batch.scenario for batch in missing}):
-            plans.with_maps(variation.run(scenario * variation.runs_of_scenario), progress)
+        if runs := [batch for batch in missing if batch.tier != PLANNER]:
+            variation = Variation(campaign)
+            plans = Plans(variation, folder.plans)
+            for scenario in sorted({batch.scenario for batch in runs}):
+                plans.with_maps(variation.run(scenario * variation.runs_of_scenario), progress)
         there = len(batches) - len(missing)
         done: set[str] = set()
 
@@ -92,10 +93,18 @@ def run_campaign(
             count = there + len(done)
             advance(f"{count} of {len(batches)} batches", count / len(batches))
 
-        file, limit = str(campaign.path.absolute()), campaign.runs.time_limit
-        if missing:
-            place([Order(file, str(folder.path), one, limit) for one in missing], workers, scheduler, note)
+        file = str(campaign.path.absolute())
+        orders = [Order(file, str(folder.path), one, _time_limit(campaign, one)) for one in missing]
+        if orders:
+            place(orders, workers, scheduler, note)
         return Outcome(folder, batches, len(done))
+
+
+def _time_limit(campaign: Campaign, batch: Batch) -> float:
+    """Longest that a process may take for a run or a question of a batch [s]."""
+    limits = campaign.questions if batch.tier == PLANNER else campaign.runs
+    assert limits is not None  # or there would be no such batch
+    return limits.longest if isinstance(limits, QuestionSettings) else limits.time_limit
 
 
 @contextmanager

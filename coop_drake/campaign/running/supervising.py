@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from coop_drake.campaign.batches import Batch
-from coop_drake.campaign.records import RunRecord
+from coop_drake.campaign.records import Record
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.errors import ProcessError
 
@@ -46,7 +46,7 @@ class Order:
 class _LostError(Exception):
     """A process ended, or was ended, before it was done; with the record of the run it was at, if any."""
 
-    def __init__(self, reason: str, begun: RunRecord | None) -> None:
+    def __init__(self, reason: str, begun: Record | None) -> None:
         super().__init__(reason)
         self.begun = begun
 
@@ -63,14 +63,14 @@ def make_batch(order: Order) -> bool:
     folder, batch = CampaignFolder(Path(order.folder)), order.batch
     if folder.has(batch):
         return False
-    records: list[RunRecord] = []
+    records: list[Record] = []
     costs = {"runs": batch.stop - batch.first, "cpu_seconds": 0.0, "peak_memory_mb": 0.0, "lost_processes": 0}
     failures = 0
     while len(records) < batch.stop - batch.first:
         try:
             for kind, content in _lines(order, batch.first + len(records)):
                 if kind == "ended":
-                    records.append(RunRecord(**content))
+                    records.append(batch.record(**content))
                     failures = 0
                 else:
                     costs["cpu_seconds"] += content["cpu_seconds"]
@@ -98,7 +98,7 @@ def _lines(order: Order, begin: int) -> Iterator[tuple[str, Any]]:
     """
     told = json.dumps({**asdict(order), "begin": begin})
     command = [sys.executable, "-m", "coop_drake.campaign.running.child", told]
-    begun: RunRecord | None = None
+    begun: Record | None = None
     pipe = subprocess.PIPE
     with (
         tempfile.TemporaryFile() as errors,
@@ -111,7 +111,7 @@ def _lines(order: Order, begin: int) -> Iterator[tuple[str, Any]]:
                 if kind == "error":
                     raise ProcessError(content)
                 if kind == "begun":
-                    begun = RunRecord(**content)
+                    begun = order.batch.record(**content)
                     continue
                 begun = None
                 yield kind, content

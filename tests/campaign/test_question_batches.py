@@ -1,0 +1,94 @@
+"""Questions of a campaign: in batches that do not depend on each other, answered by a process of its own."""
+
+import json
+from dataclasses import asdict, replace
+
+import pytest
+from typer.testing import CliRunner
+
+from coop_drake.campaign import Campaign, QuestionRecord, load_campaign
+from coop_drake.campaign.batches import PLANNER, question_batches
+from coop_drake.campaign.questions import QuestionSettings, ask
+from coop_drake.campaign.records import MEASURED
+from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.running.command import batches_of
+from coop_drake.campaign.running.supervising import Order, make_batch
+from coop_drake.cli.app import app
+from coop_drake.errors import ScenarioError
+
+FILE = """
+questions: {count: 5, seeds: [3], robots: [2], most_joints: 1, floors: [room], batch: 2, peer_time: 0.0}
+"""
+LAST = 4
+"""The only question of the last batch."""
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory) -> Campaign:
+    path = tmp_path_factory.mktemp("campaign") / "asked.campaign.yaml"
+    path.write_text(FILE)
+    return load_campaign(path)
+
+
+def test_more_questions_and_other_floors_change_only_the_batches_that_they_concern():
+    asked = QuestionSettings(count=5, batch=2)
+    few, many = list(question_batches(asked)), list(question_batches(replace(asked, count=8)))
+    assert [(one.first, one.stop) for one in few] == [(0, 2), (2, 4), (4, 5)]
+    assert [one.digest for one in few[:2]] == [one.digest for one in many[:2]]
+    assert few[2].digest != many[2].digest
+    others = {one.digest for one in question_batches(replace(asked, floors=("door",)))}
+    assert others.isdisjoint(one.digest for one in few)
+
+
+def test_a_process_answers_as_this_one_does(campaign, tmp_path):
+    folder = CampaignFolder(tmp_path)
+    folder.campaign.write_text(FILE)
+    batches = batches_of(campaign, folder)
+    assert {one.tier for one in batches} == {PLANNER}
+    last = batches[LAST // 2]
+    assert make_batch(Order(str(campaign.path), str(tmp_path), last, 600.0))
+    assert folder.missing(batches) == list(batches[:-1])
+    (row,) = folder.questions(batches).to_pylist()
+    here = asdict(ask(LAST, campaign.questions))
+    differing = {name for name in row if str(row[name]) != str(here[name])}
+    assert all(name.endswith(MEASURED) for name in differing)
+    assert row["verdict"] == "plan"
+    assert row["verified"]
+    assert folder.table(batches).num_rows == 0
+    assert not folder.cases.exists()
+
+
+def test_a_wrong_answer_is_counted_and_fails_the_command(campaign, tmp_path):
+    folder, command = CampaignFolder(tmp_path), [str(campaign.path), "--out", str(tmp_path), "--json"]
+    right = QuestionRecord(0, 3, "room", 2, 2, "bar", "plan", 1.0, verified=True, sampled_margin=1e-6)
+    for batch in batches_of(campaign, folder):
+        folder.write(batch, [replace(right, question=number) for number in range(batch.first, batch.stop)])
+    assert CliRunner().invoke(app, ["campaign", "run", *command]).exit_code == 0
+    folder.write(batch, [replace(right, question=LAST, verified=False)])
+    failed = CliRunner().invoke(app, ["campaign", "run", *command])
+    assert failed.exit_code == 1
+    every = json.loads(failed.stdout)["questions"][-1]
+    assert (every["count"], every["plans"], every["wrong"]) == (5, 5, 1)
+
+
+def test_a_question_is_written_as_a_scenario(campaign, tmp_path):
+    done = CliRunner().invoke(
+        app, ["campaign", "question", str(campaign.path), str(LAST), "--out", str(tmp_path), "--quiet"]
+    )
+    assert done.exit_code == 0
+    assert (tmp_path / "drawn" / "4" / "question_3_4.scenario.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        ("questions: {floors: [cave]}", "questions.floors"),
+        ("questions: {robots: [1]}", "questions.robots"),
+        ("questions: {seeds: []}", "questions.seeds"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(tmp_path, text, key):
+    path = tmp_path / "wrong.campaign.yaml"
+    path.write_text(text)
+    with pytest.raises(ScenarioError, match=key):
+        load_campaign(path)
