@@ -14,6 +14,7 @@ from coop_drake.campaign.plans import Maps, Plans, versions
 from coop_drake.campaign.records import RunRecord
 from coop_drake.campaign.settings import Tier
 from coop_drake.campaign.variation import Run, Variation
+from coop_drake.errors import ScenarioError
 from coop_drake.scenario.digest import scenario_digest
 from coop_drake.scenario.model import Scenario
 
@@ -62,9 +63,11 @@ class RunMaker:
 def simulated(scenario: Scenario, plan: Plan, maps: Maps) -> SimulationLog:
     """Simulate a run by Drake's loop, with fused blocks where they know all that the scenario asks for."""
     from coop_drake.simulation import simulate
-    from coop_drake.tuning.trial import fastest_blocks
 
-    return simulate(scenario, plan, maps, blocks=fastest_blocks(scenario, plan, maps))
+    try:
+        return simulate(scenario, plan, maps, blocks="fused")
+    except ScenarioError:  # They have refused it before the run began.
+        return simulate(scenario, plan, maps)
 
 
 def run_digest(scenario: Scenario, plan: Plan, tier: Tier) -> str:

@@ -22,7 +22,6 @@ _WAITING = 1000
 _SETTINGS = {
     "distributed.scheduler.allowed-failures": 100,
     "distributed.scheduler.worker-ttl": "60s",
-    "distributed.worker.daemon": True,
 }
 """A batch is tried again when its worker was lost, and given to another worker when its own has been silent
 for a minute; settings of the user's own in Dask's configuration stand above these."""

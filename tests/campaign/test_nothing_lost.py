@@ -1,0 +1,212 @@
+"""Whatever is killed, hangs or is full: a campaign goes on, or the same command does, to the same bytes."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from coop_drake.campaign.batches import Batching
+from coop_drake.campaign.plans import Plans
+from coop_drake.campaign.results import CampaignFolder, write_table
+from coop_drake.campaign.running import Order, make_batch, supervising
+from coop_drake.campaign.running.making import RunMaker
+from coop_drake.campaign.settings import load_campaign
+from coop_drake.campaign.variation import Variation
+from coop_drake.errors import ProcessError
+from tests.support.processes import kill, processes, waited_for
+from tests.support.scenarios import write_scenario
+
+RUNS, BATCH = 16, 2
+FILE = f"""
+runs:
+  scenarios: [room.scenario.yaml]
+  count: {RUNS}
+  batch: {BATCH}
+  vary:
+    deployment.mass_error: !Uniform {{min: -0.1, max: 0.1}}
+"""
+CHILD = "coop_drake.campaign.running.child"
+PROGRAM = "from coop_drake.entry_point import main; main()"
+
+
+class Undisturbed:
+    """A campaign whose runs were made one after another in this process, and where it may be made again."""
+
+    def __init__(self, folder: Path) -> None:
+        write_scenario(folder / "room.scenario.yaml")
+        self.file = folder / "room.campaign.yaml"
+        self.file.write_text(FILE)
+        self.variation = Variation(load_campaign(self.file))
+        self.folder = CampaignFolder(folder / "undisturbed")
+        self.plans = Plans(self.variation, self.folder.plans)
+        self.batches = tuple(Batching(self.variation, self.plans).batches())
+        maker = RunMaker(self.variation, self.plans, "drake", folder / "logs")
+        for batch in self.batches:
+            runs = map(self.variation.run, range(batch.first, batch.stop))
+            self.folder.write(batch, map(maker.record, runs))
+
+    def files(self, folder: CampaignFolder) -> dict[str, bytes]:
+        return {path.name: path.read_bytes() for path in (folder.path / "runs").glob("*")}
+
+    def order(self, folder: Path, index: int = 0, time_limit: float = 60.0) -> Order:
+        """An order for one of the batches, in a folder of its own."""
+        made = CampaignFolder(folder)
+        folder.mkdir(exist_ok=True)
+        made.campaign.write_bytes(self.file.read_bytes())
+        Plans(self.variation, made.plans).with_maps(self.variation.run(0))
+        return Order(str(self.file), str(folder), self.batches[index], time_limit)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    return Undisturbed(tmp_path_factory.mktemp("undisturbed"))
+
+
+def begun(campaign, folder, *arguments, **options):
+    """The command, in a process of its own that Ctrl-C and limits can be sent to."""
+    words = [sys.executable, "-c", PROGRAM, "campaign", campaign.file, "--out", folder, *arguments]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(list(map(str, words)), stdout=pipe, stderr=pipe, text=True, **options)
+
+
+def sorted_bytes(folder, campaign):
+    """The sorted table of a campaign as one file."""
+    path = folder.path / "sorted.parquet"
+    write_table(path, folder.table(campaign.batches))
+    return path.read_bytes()
+
+
+def child_of(folder, *, but=()):
+    """A process that makes runs for a folder, when there is one."""
+    return waited_for(lambda: [p for p in processes(CHILD, str(folder)) if p.pid not in but])[0]
+
+
+def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undisturbed, tmp_path):
+    folder = CampaignFolder(tmp_path / "disturbed")
+
+    small = {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (5000, resource.RLIM_INFINITY))}
+    undisturbed.order(folder.path)  # The plan is there: it would not fit either.
+    full = begun(undisturbed, folder.path, "--workers", 1, **small)
+    _, said = full.communicate(timeout=120)
+    assert full.returncode == 2, said
+    assert "file too large" in said
+    assert undisturbed.files(folder) == {}
+
+    first = begun(undisturbed, folder.path, "--workers", 2)
+    child = child_of(folder.path)
+    kill(child.pid)
+    child = child_of(folder.path, but=[child.pid])
+    kill(child.parent)  # the worker, with which its process ends
+    waited_for(lambda: child.pid not in {p.pid for p in processes(CHILD)})
+    child_of(folder.path, but=[child.pid])
+    first.send_signal(signal.SIGINT)
+    began = time.monotonic()
+    _, said = first.communicate(timeout=60)
+    assert first.returncode == 130, said
+    assert time.monotonic() - began < 30.0
+    waited_for(lambda: not processes(CHILD, str(folder.path)))
+    assert len(undisturbed.files(folder)) < len(undisturbed.batches)
+
+    second = begun(undisturbed, folder.path, "--workers", 1)
+    child_of(folder.path)
+    beside = begun(undisturbed, folder.path)
+    _, said = beside.communicate(timeout=60)
+    assert beside.returncode == 2
+    assert "a folder in which no other command works" in said
+    kill(second.pid)
+    second.communicate()
+    waited_for(lambda: not processes(CHILD, str(folder.path)))
+    assert len(undisturbed.files(folder)) < len(undisturbed.batches)
+
+    last = begun(undisturbed, folder.path, "--json", "--workers", 2)
+    said, _ = last.communicate(timeout=300)
+    facts = json.loads(said)
+    assert (last.returncode, facts["done"], facts["lost"]) == (0, RUNS, 0)
+    assert undisturbed.files(folder) == undisturbed.files(undisturbed.folder)
+    assert sorted_bytes(folder, undisturbed) == sorted_bytes(undisturbed.folder, undisturbed)
+
+
+def test_a_scheduler_of_the_users_own_may_be_killed(undisturbed, tmp_path):
+    folder = CampaignFolder(tmp_path / "elsewhere")
+    place = tmp_path / "scheduler.json"
+    own = {"stderr": subprocess.DEVNULL, "env": {**os.environ, "DASK_TEMPORARY_DIRECTORY": str(tmp_path)}}
+    dask = [sys.executable, "-m", "distributed.cli.dask_"]
+    options = ["--host", "127.0.0.1", "--no-dashboard"]
+    start = [*dask[:-1], f"{dask[-1]}scheduler", *options, "--port", "0", "--scheduler-file", str(place)]
+    scheduler = subprocess.Popen(start, **own)
+    address = waited_for(lambda: place.exists() and json.loads(place.read_text() or "{}").get("address"))
+    work = [*dask[:-1], f"{dask[-1]}worker", address, *options, "--no-nanny", "--nthreads", "1"]
+    worker = subprocess.Popen(work, **own)
+    try:
+        command = begun(undisturbed, folder.path, "--scheduler", address)
+        child_of(folder.path)
+        kill(scheduler.pid)
+        _, said = command.communicate(timeout=120)
+        assert command.returncode == 1, said
+        assert "the same command goes on from here" in said
+    finally:
+        for process in (scheduler, worker):
+            kill(process.pid)
+            process.wait()
+    waited_for(lambda: not processes(CHILD, str(folder.path)))
+    there = undisturbed.files(folder)
+    assert there.items() <= undisturbed.files(undisturbed.folder).items()
+    assert len(there) < len(undisturbed.batches)
+
+
+def test_a_process_that_hangs_is_ended_and_another_goes_on(undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(supervising, "_START", 20.0)
+    order = undisturbed.order(tmp_path / "hanging")
+    stopping = threading.Thread(target=lambda: kill(child_of(order.folder).pid, signal.SIGSTOP))
+    stopping.start()
+    assert make_batch(order)
+    stopping.join()
+    folder = CampaignFolder(Path(order.folder))
+    assert folder.costs([order.batch])[0]["lost_processes"] >= 1
+    assert (folder.path / order.batch.file).read_bytes() == (
+        undisturbed.folder.path / order.batch.file
+    ).read_bytes()
+
+
+def test_a_run_that_ends_every_process_is_recorded_as_lost_and_the_others_are_made(
+    undisturbed, tmp_path, monkeypatch
+):
+    order = undisturbed.order(tmp_path / "fatal")
+    fatal, original = order.batch.first, supervising._lines
+
+    def lines(order, begin):
+        """As before, but that processes for the first run are killed when it has begun."""
+        for kind, content in original(order, begin):
+            if begin == fatal:
+                raise supervising._LostError("the process ended by signal SIGSEGV", begun_record)
+            yield kind, content
+
+    maker = RunMaker(undisturbed.variation, undisturbed.plans, "drake", tmp_path)
+    begun_record = maker.begun(undisturbed.variation.run(fatal))
+    monkeypatch.setattr(supervising, "_lines", lines)
+    assert make_batch(order)
+    assert not make_batch(order)  # Its file is there.
+    rows = CampaignFolder(Path(order.folder)).table([order.batch]).to_pylist()
+    assert [row["arrived"] for row in rows] == [False, True]
+    assert rows[0]["reason"] == "the process ended by signal SIGSEGV"
+    expected = undisturbed.folder.table([order.batch]).to_pylist()
+    assert {key: rows[1][key] for key in ("time", "steps", "funnel_margin")} == {
+        key: expected[1][key] for key in ("time", "steps", "funnel_margin")
+    }
+
+
+def test_a_scenario_that_was_changed_meanwhile_is_not_run(undisturbed, tmp_path):
+    order = undisturbed.order(tmp_path / "changed")
+    changed = CampaignFolder(tmp_path / "changed").campaign
+    changed.write_text(changed.read_text().replace("max: 0.1", "max: 0.2"))
+    with pytest.raises(ProcessError, match="was changed while the campaign ran"):
+        make_batch(order)
