@@ -1,10 +1,8 @@
 """Motion and dynamics of one planar robot: J z' of (27) and the actuator forces of (22)-(34).
 
-A chain is a table with one row for each link and a last row for a frame that is fixed on one of the links.
-A row says how the link is attached to its parent, in the plane of the root's frame with all joints at zero;
-the reference point of a link is its joint. Poses are computed from the root outwards, forces from the tips
-inwards (recursive Newton-Euler). The base is holonomic: it can take any acceleration, and no matrix needs
-to be inverted.
+A robot is a chain of ``laws/chain_motion.py``. Poses are computed from the root outwards, forces from the
+tips inwards (recursive Newton-Euler). The base is holonomic: it can take any acceleration, and no matrix
+needs to be inverted.
 """
 
 from math import atan2
@@ -12,64 +10,44 @@ from math import atan2
 import numpy as np
 
 from coop_drake.compiled import compiled
+from coop_drake.laws.chain_motion import (
+    ALPHA,
+    AX,
+    AY,
+    COM_X,
+    COM_Y,
+    COS,
+    DAMPING,
+    INERTIA,
+    MASS,
+    PARENT,
+    POSITION,
+    PX,
+    PY,
+    RATE,
+    ROTOR,
+    SIN,
+    TURN,
+    UX,
+    UY,
+    VX,
+    VY,
+    W,
+    X,
+    Y,
+    accelerate_chain,
+    move_chain,
+)
 from coop_drake.laws.load_sharing import object_twist, rotated
 from coop_drake.tree.pose import FloatArray, IntArray
-
-PARENT, X, Y, TURN, SLIDE_X, SLIDE_Y, POSITION, RATE, MASS, COM_X, COM_Y, INERTIA, DAMPING, ROTOR = range(14)
-COLUMNS = 14
-"""Columns of a chain: index of the parent's row [-]; reference point [m]; rotation for each unit of the
-joint's coordinate (+1 or -1, or 0 where it slides or is fixed) and direction of sliding [-]; where the
-joint's coordinate and its rate stand in the state [-] (for the root, the first of three each); mass [kg],
-centre of mass [m], inertia about it [kg m^2]; damping [N s/m or N m s] and inertia [kg or kg m^2] that the
-joint itself adds."""
-
-_MOTION_COLUMNS = 12
-_COS, _SIN, _X, _Y, _VX, _VY, _W, _AX, _AY, _ALPHA, _UX, _UY = range(_MOTION_COLUMNS)
-
-
-@compiled
-def _move(chain: FloatArray, state: FloatArray) -> FloatArray:
-    """Return the motion of every row's reference point relative to the root's origin, in W.
-
-    Args:
-        chain: The chain, shape (links + 1, ``COLUMNS``).
-        state: Holds the positions and the rates of the root, (x, y, yaw), and of the joints.
-
-    Returns:
-        (cos, sin, x, y, x', y', w) of every row, room for (x'', y'', w'), and the direction in which the
-        row's joint slides, shape (links + 1, 12) [m, m/s, rad/s].
-    """
-    motion = np.empty((chain.shape[0], _MOTION_COLUMNS))
-    yaw = state[int(chain[0, POSITION]) + 2]
-    motion[0, _COS], motion[0, _SIN] = np.cos(yaw), np.sin(yaw)
-    motion[0, _X], motion[0, _Y], motion[0, _VX], motion[0, _VY] = 0.0, 0.0, 0.0, 0.0
-    motion[0, _W] = state[int(chain[0, RATE]) + 2]
-    for i in range(1, chain.shape[0]):
-        p = int(chain[i, PARENT])
-        q, rate, turn = state[int(chain[i, POSITION])], state[int(chain[i, RATE])], chain[i, TURN]
-        c, s, w = motion[p, _COS], motion[p, _SIN], motion[p, _W]
-        dx = chain[i, X] - chain[p, X] + chain[i, SLIDE_X] * q
-        dy = chain[i, Y] - chain[p, Y] + chain[i, SLIDE_Y] * q
-        rx, ry = rotated(c, s, dx, dy)
-        ux, uy = rotated(c, s, chain[i, SLIDE_X], chain[i, SLIDE_Y])
-        motion[i, _UX], motion[i, _UY] = ux, uy
-        motion[i, _X], motion[i, _Y] = motion[p, _X] + rx, motion[p, _Y] + ry
-        motion[i, _VX] = motion[p, _VX] - w * ry + ux * rate
-        motion[i, _VY] = motion[p, _VY] + w * rx + uy * rate
-        if turn == 0.0:
-            motion[i, _COS], motion[i, _SIN], motion[i, _W] = c, s, w
-        else:
-            motion[i, _COS], motion[i, _SIN] = rotated(c, s, np.cos(turn * q), np.sin(turn * q))
-            motion[i, _W] = w + turn * rate
-    return motion
 
 
 @compiled
 def frame_twist(chain: FloatArray, state: FloatArray) -> tuple[float, float, float]:
     """Return J z' of the chain's frame: velocity of its origin and its angular rate in W [m/s, rad/s]."""
-    motion = _move(chain, state)
+    motion = move_chain(chain, state)
     first, last = int(chain[0, RATE]), chain.shape[0] - 1
-    return state[first] + motion[last, _VX], state[first + 1] + motion[last, _VY], motion[last, _W]
+    return state[first] + motion[last, VX], state[first + 1] + motion[last, VY], motion[last, W]
 
 
 @compiled
@@ -102,17 +80,17 @@ def read_robot(chain: FloatArray, yaw: float, joints: IntArray, state: FloatArra
         state: State of the team.
         robot: Receives (x, y, yaw, q, and their rates), yaw in (-pi, pi], shape (2 (3 + n),).
     """
-    motion = _move(chain, state)
+    motion = move_chain(chain, state)
     position, rate, last = int(chain[0, POSITION]), int(chain[0, RATE]), chain.shape[0] - 1
     n = joints.shape[1]
-    c, s = rotated(motion[last, _COS], motion[last, _SIN], np.cos(yaw), np.sin(yaw))
+    c, s = rotated(motion[last, COS], motion[last, SIN], np.cos(yaw), np.sin(yaw))
     robot[0], robot[1], robot[2] = (
-        state[position] + motion[last, _X],
-        state[position + 1] + motion[last, _Y],
+        state[position] + motion[last, PX],
+        state[position + 1] + motion[last, PY],
         atan2(s, c),
     )
-    robot[3 + n], robot[4 + n] = state[rate] + motion[last, _VX], state[rate + 1] + motion[last, _VY]
-    robot[5 + n] = motion[last, _W]
+    robot[3 + n], robot[4 + n] = state[rate] + motion[last, VX], state[rate + 1] + motion[last, VY]
+    robot[5 + n] = motion[last, W]
     for i in range(n):
         robot[3 + i], robot[6 + n + i] = state[joints[0, i]], state[joints[1, i]]
 
@@ -134,8 +112,8 @@ def robot_effort(
         effort: Receives the base wrench at Bk in W and the joint torques, shape (3 + n,) [N, N m].
     """
     last = chain.shape[0] - 1
-    motion = _move(chain, robot)
-    _accelerate(chain, robot, axes, motion)
+    motion = move_chain(chain, robot)
+    accelerate_chain(chain, robot, axes, motion)
     ax, ay, alpha = _of_root(motion[last], command)
     forces = np.zeros((last + 1, 3))  # on each link from its parent, about its reference point
     forces[last, 0], forces[last, 1], forces[last, 2] = command[3], command[4], command[5]
@@ -143,13 +121,13 @@ def robot_effort(
         _add_inertia(chain[i], motion[i], ax, ay, alpha, forces[i])
         if i > 0:
             p = int(chain[i, PARENT])
-            rx, ry = motion[i, _X] - motion[p, _X], motion[i, _Y] - motion[p, _Y]
+            rx, ry = motion[i, PX] - motion[p, PX], motion[i, PY] - motion[p, PY]
             forces[p, 0] += forces[i, 0]
             forces[p, 1] += forces[i, 1]
             forces[p, 2] += forces[i, 2] + rx * forces[i, 1] - ry * forces[i, 0]
     effort[0], effort[1], effort[2] = forces[0, 0], forces[0, 1], forces[0, 2]
     for i in range(1, last):
-        along = motion[i, _UX] * forces[i, 0] + motion[i, _UY] * forces[i, 1]
+        along = motion[i, UX] * forces[i, 0] + motion[i, UY] * forces[i, 1]
         of_joint = chain[i, DAMPING] * robot[int(chain[i, RATE])] + chain[i, ROTOR] * axes[i]
         effort[2 + i] = chain[i, TURN] * forces[i, 2] + along + of_joint
 
@@ -169,36 +147,20 @@ def base_acceleration(
     Returns:
         Acceleration of Bk in W and angular acceleration [m/s^2, rad/s^2].
     """
-    motion = _move(chain, robot)
-    _accelerate(chain, robot, axes, motion)
+    motion = move_chain(chain, robot)
+    accelerate_chain(chain, robot, axes, motion)
     return _of_root(motion[chain.shape[0] - 1], command)
 
 
 @compiled
 def _of_root(frame: FloatArray, command: FloatArray) -> tuple[float, float, float]:
     """Return the root's acceleration that gives the last frame of a chain the acceleration commanded."""
-    alpha = command[2] - frame[_ALPHA]
+    alpha = command[2] - frame[ALPHA]
     return (
-        command[0] - frame[_AX] + alpha * frame[_Y],
-        command[1] - frame[_AY] - alpha * frame[_X],
+        command[0] - frame[AX] + alpha * frame[PY],
+        command[1] - frame[AY] - alpha * frame[PX],
         alpha,
     )
-
-
-@compiled
-def _accelerate(chain: FloatArray, robot: FloatArray, axes: FloatArray, motion: FloatArray) -> None:
-    """Write (x'', y'', w') of every row as if the root had no acceleration."""
-    motion[0, _AX], motion[0, _AY], motion[0, _ALPHA] = 0.0, 0.0, 0.0
-    links = chain.shape[0] - 1
-    for i in range(1, chain.shape[0]):
-        p = int(chain[i, PARENT])
-        rate, acceleration = robot[int(chain[i, RATE])], axes[i] if i < links else 0.0
-        w, alpha, ux, uy = motion[p, _W], motion[p, _ALPHA], motion[i, _UX], motion[i, _UY]
-        rx, ry = motion[i, _X] - motion[p, _X], motion[i, _Y] - motion[p, _Y]
-        coriolis = 2.0 * w * rate
-        motion[i, _AX] = motion[p, _AX] - alpha * ry - w * w * rx - coriolis * uy + ux * acceleration
-        motion[i, _AY] = motion[p, _AY] + alpha * rx - w * w * ry + coriolis * ux + uy * acceleration
-        motion[i, _ALPHA] = alpha + chain[i, TURN] * acceleration
 
 
 @compiled
@@ -206,11 +168,11 @@ def _add_inertia(
     row: FloatArray, motion: FloatArray, ax: float, ay: float, alpha: float, force: FloatArray
 ) -> None:
     """Add the force that accelerates a link as it moves, the root's acceleration (ax, ay, alpha) included."""
-    w, mass = motion[_W], row[MASS]
-    ex, ey = rotated(motion[_COS], motion[_SIN], row[COM_X] - row[X], row[COM_Y] - row[Y])
-    turning = alpha + motion[_ALPHA]
-    fx = mass * (motion[_AX] + ax - alpha * motion[_Y] - turning * ey - w * w * ex)
-    fy = mass * (motion[_AY] + ay + alpha * motion[_X] + turning * ex - w * w * ey)
+    w, mass = motion[W], row[MASS]
+    ex, ey = rotated(motion[COS], motion[SIN], row[COM_X] - row[X], row[COM_Y] - row[Y])
+    turning = alpha + motion[ALPHA]
+    fx = mass * (motion[AX] + ax - alpha * motion[PY] - turning * ey - w * w * ex)
+    fy = mass * (motion[AY] + ay + alpha * motion[PX] + turning * ex - w * w * ey)
     force[0] += fx
     force[1] += fy
     force[2] += row[INERTIA] * turning + ex * fy - ey * fx

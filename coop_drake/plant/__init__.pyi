@@ -6,6 +6,7 @@ from .robot import RobotPlant, build_robot_plant
 from .run_masses import run_setup
 from .separate_team import SeparateTeam, build_separate_team
 from .team import ObjectInertia, RobotModel, TeamPlant, build_team_plant
+from .team_tree import TeamTree, team_tree
 from .turning import turning_coupling
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "RobotPlant",
     "SeparateTeam",
     "TeamPlant",
+    "TeamTree",
     "base_chain",
     "base_poses",
     "build_robot_plant",
@@ -25,5 +27,6 @@ __all__ = [
     "robot_chain",
     "run_setup",
     "set_configuration",
+    "team_tree",
     "turning_coupling",
 ]

@@ -9,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Frame, Joint, RigidBody
 from pydrake.systems.framework import Context
 
-from coop_drake.laws.robot_dynamics import (
+from coop_drake.laws.chain_motion import (
     COLUMNS,
     COM_X,
     COM_Y,

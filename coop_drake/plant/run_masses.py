@@ -13,6 +13,7 @@ from coop_drake.plant.team import TeamPlant, build_team_plant
 from coop_drake.scenario import Floor, Messages, Scenario
 from coop_drake.scenario.digest import scenario_digest
 from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.runs import BodyMass, RunSetup
 
 
@@ -63,10 +64,14 @@ def moved_masses(scenario: Scenario) -> tuple[float, ...]:
     )
 
 
-def _masses(team: TeamPlant, context: Context, tree: ComponentTree) -> list[BodyMass]:
-    """Masses of every robot's and the object's bodies in every component; the team stands at zero."""
-    plant, origins = team.plant, [np.zeros(2)]
-    groups = [_welded(team, team.object_body)]
+def component_bodies(team: TeamPlant, tree: ComponentTree) -> tuple[list[set[int]], list[FloatArray]]:
+    """Return the indices of the bodies of every component, and its origin where all joints are at zero [m].
+
+    Args:
+        team: The team.
+        tree: Its component tree.
+    """
+    origins, groups = [np.zeros(2)], [_welded(team, team.object_body)]
     for component in tree.components[1:]:
         assert component.joint is not None
         assert component.parent is not None
@@ -75,6 +80,12 @@ def _masses(team: TeamPlant, context: Context, tree: ComponentTree) -> list[Body
         outer = sides[1] if int(sides[0].index()) in groups[component.parent] else sides[0]
         groups.append(_welded(team, outer))
         origins.append(origins[component.parent] + (component.joint.X_PJ.x, component.joint.X_PJ.y))
+    return groups, origins
+
+
+def _masses(team: TeamPlant, context: Context, tree: ComponentTree) -> list[BodyMass]:
+    """Masses of every robot's and the object's bodies in every component; the team stands at zero."""
+    plant, (groups, origins) = team.plant, component_bodies(team, tree)
     robots = [{int(body.index()) for body in bodies_of(plant, r.models)} for r in team.assembly.robots]
     masses = []
     for index, (group, origin) in enumerate(zip(groups, origins, strict=True)):

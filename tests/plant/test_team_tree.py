@@ -1,0 +1,63 @@
+"""The team as a planar tree against Drake's own plant."""
+
+import numpy as np
+import pytest
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import ExternallyAppliedSpatialForce
+from pydrake.systems.framework import DiagramBuilder
+
+from coop_drake.laws.chain_motion import DAMPING
+from coop_drake.laws.team_dynamics import solve_symmetric, team_accelerations
+from coop_drake.plant import build_team_plant, read_component_tree, team_tree
+from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
+
+ARMS = [[REVOLUTE, PRISMATIC, REVOLUTE], [PRISMATIC], [REVOLUTE, REVOLUTE], []]
+GRAVITY = 0.3
+
+
+def applied(team, wrenches):
+    """Wrenches on the bases and on the object as Drake takes them."""
+    forces = []
+    origins = [(robot.base_body, np.zeros(3)) for robot in team.robots]
+    origins.append((team.object_body, team.object_frame.GetFixedPoseInBodyFrame().translation()))
+    for (body, place), (fx, fy, torque) in zip(origins, wrenches, strict=True):
+        force = ExternallyAppliedSpatialForce()
+        force.body_index, force.p_BoBq_B = body.index(), place
+        force.F_Bq_W = SpatialForce(tau=[0.0, 0.0, torque], f=[fx, fy, 0.0])
+        forces.append(force)
+    return forces
+
+
+def test_the_team_accelerates_as_in_drake(tmp_path):
+    builder, generator = DiagramBuilder(), np.random.default_rng(1)
+    team = build_team_plant(ring_team(tmp_path, ARMS), builder)
+    plant, diagram = team.plant, builder.Build()
+    plant.mutable_gravity_field().set_gravity_vector([GRAVITY, 0.0, 0.0])
+    tree = team_tree(team, read_component_tree(team))
+    context = plant.GetMyMutableContextFromRoot(diagram.CreateDefaultContext())
+    tree.tree[1:, DAMPING] = 0.7
+    for joint in team.joints:
+        joint.SetDampingVector(context, [0.7])
+    size = plant.num_velocities()
+    for _ in range(20):
+        state, wrenches = generator.normal(size=2 * size), generator.normal(size=(len(ARMS) + 1, 3))
+        state[team.position_index[3:]] *= 0.1  # nothing touches, and no joint is at its limit
+        torques, efforts = generator.normal(size=len(team.joints)), np.zeros(size)
+        efforts[team.velocity_index[3:]] = torques
+        plant.SetPositionsAndVelocities(context, state)
+        plant.get_actuation_input_port().FixValue(context, torques)
+        plant.get_applied_spatial_force_input_port().FixValue(context, applied(team, wrenches))
+        expected = plant.get_generalized_acceleration_output_port().Eval(context)
+        found = np.empty(size)
+        team_accelerations(tree.tree, tree.bases, tree.places, wrenches, efforts, GRAVITY, state, found)
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("size", [1, 2, 7])
+def test_positive_definite_systems_are_solved(size):
+    generator = np.random.default_rng(size)
+    root, right = generator.normal(size=(size, size)), generator.normal(size=size)
+    matrix = root @ root.T + 0.1 * np.eye(size)
+    solution, lower = right.copy(), np.tril(matrix)
+    solve_symmetric(lower, solution)
+    np.testing.assert_allclose(matrix @ solution, right, atol=1e-9)
