@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 
+from coop_drake.laws.channels import NOTHING, carry_measurements
 from coop_drake.laws.random_draws import uniform_pair
 from coop_drake.laws.sampling import period_of, whole_periods
 from coop_drake.systems.block import Block
@@ -65,7 +66,7 @@ class LossyMeasurement(Block):
 
     def state_at_rest(self, value: FloatArray) -> FloatArray:
         """Return the state when measurements have always been ``value``, shape (n,)."""
-        return np.tile([-1.0, *value], self._rows)
+        return np.tile([NOTHING, *value], self._rows)
 
     def _thrown(self, context: Context) -> tuple[int, bool, bool]:
         """Return the number of the present measurement, whether it is lost, and whether it is late if not."""
@@ -76,13 +77,8 @@ class LossyMeasurement(Block):
     def _receive(self, context: Context, discrete_state: DiscreteValues) -> None:
         kept = context.get_discrete_state_vector().value().reshape(self._rows, -1)
         number, lost, late = self._thrown(context)
-        now = np.array([number, *self._measured.Eval(context)])
         following = np.empty_like(kept)
-        following[:-1], following[-1] = kept[1:], -1.0
-        if late and not lost:
-            following[-1] = now
-        newest = [kept[0], following[0], *([] if lost or late else [now])]
-        following[0] = max(newest, key=lambda row: row[0])
+        carry_measurements(kept, number, self._measured.Eval(context), lost, late, following)
         discrete_state.get_mutable_vector().SetFromVector(following.ravel())
 
     def _write_received(self, context: Context, output: BasicVector) -> None:

@@ -6,12 +6,11 @@ import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 from pydrake.systems.primitives import LinearSystem
 
+from coop_drake.laws.channels import NOTHING, carry_reports, channel_rows
 from coop_drake.laws.random_draws import uniform_pair
 from coop_drake.laws.sampling import period_of, whole_periods
 from coop_drake.systems.block import Block
 from coop_drake.systems.current_cell import READY_SIZE
-
-_NOTHING = (-1.0, -1.0)
 
 
 class MessageChannel(Block):
@@ -50,23 +49,15 @@ class MessageChannel(Block):
             raise ValueError(f"MessageChannel's probabilities must lie in [0, 1], not {loss} and {repeat}")
         self._period, self._loss, self._repeat, self._seed = period, loss, repeat, seed
         self._delay = whole_periods(delay, period)
-        self._again = self._delay + max(self._delay, 1)
         self._sent = self.DeclareVectorInputPort("sent", READY_SIZE)
-        self.DeclareDiscreteState(np.tile(_NOTHING, 1 + self._again))
+        self.DeclareDiscreteState(np.full(READY_SIZE * channel_rows(self._delay), NOTHING))
         self.DeclareVectorOutputPort("heard", READY_SIZE, self._write_heard, {self.xd_ticket()})
         self.DeclarePeriodicDiscreteUpdateEvent(period_sec=period, offset_sec=0.0, update=self._transmit)
 
     def _transmit(self, context: Context, discrete_state: DiscreteValues) -> None:
         kept = context.get_discrete_state_vector().value().reshape(-1, READY_SIZE)
         arrivals = np.empty_like(kept)
-        arrivals[:-1], arrivals[-1] = kept[1:], _NOTHING
-        arrives, again = self._thrown(context)
-        if arrives:
-            arrivals[self._delay] = self._sent.Eval(context)
-            if again:
-                arrivals[self._again] = arrivals[self._delay]
-        if arrivals[0, 0] < 0.0:
-            arrivals[0] = kept[0]
+        carry_reports(kept, self._sent.Eval(context), *self._thrown(context), self._delay, arrivals)
         discrete_state.get_mutable_vector().SetFromVector(arrivals.ravel())
 
     def _thrown(self, context: Context) -> tuple[bool, bool]:
@@ -90,5 +81,5 @@ def clear_channel(period: float) -> LinearSystem:
     """
     passed, no = np.eye(READY_SIZE), np.zeros((READY_SIZE, READY_SIZE))
     hold = LinearSystem(A=no, B=passed, C=passed, D=no, time_period=period)
-    hold.configure_default_state(_NOTHING)
+    hold.configure_default_state(np.full(READY_SIZE, NOTHING))
     return hold
