@@ -21,7 +21,12 @@ _GRAVITY = 9.80665
 def tilt_floor(team: TeamPlant, floor: Floor) -> None:
     """Let gravity pull all bodies of a plant down the slope of the floor, along x of W."""
     if floor.slope:
-        team.plant.mutable_gravity_field().set_gravity_vector([_GRAVITY * sin(floor.slope), 0.0, 0.0])
+        team.plant.mutable_gravity_field().set_gravity_vector([downhill(floor.slope), 0.0, 0.0])
+
+
+def downhill(slope: float) -> float:
+    """Return the acceleration of gravity along a floor [m/s^2], which falls by an angle [rad]."""
+    return _GRAVITY * sin(slope)
 
 
 def add_disturbances(

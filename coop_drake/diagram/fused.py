@@ -156,7 +156,7 @@ def build_team_controller(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) 
         cells.append(FusedCell(cell.row, cell.clearance.edges, *cell.field.kernel_arguments, law.table))
     return TeamController(
         cells,
-        _stacked(team, knowledge),
+        fused_team(team, knowledge),
         [transition.inradius for transition in known.plan.transitions],
         known.plan.goal_pose[:2],
         known.position_tolerance,
@@ -167,7 +167,13 @@ def build_team_controller(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) 
     )
 
 
-def _stacked(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> FusedTeam:
+def fused_team(team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> FusedTeam:
+    """Return the models of all robots as arrays.
+
+    Args:
+        team: The simulated team, one tree rooted at the object.
+        knowledge: What every robot knows before the run.
+    """
     chains = [robot_chain(known.robot) for known in knowledge]
     bases, motion = [base_chain(team, robot) for robot in team.robots], knowledge[0].motion
     counts = [

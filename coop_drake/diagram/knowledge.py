@@ -67,7 +67,7 @@ def robot_knowledge(
             sample_offset=deployment.of_robot(robot.name).sample_offset,
             predicted_periods=delay if control.predictor else 0,
             hold=control.hold,
-            rest_samples=_rest_samples(deployment),
+            rest_samples=rest_samples(deployment),
             observer_gains=observer_gains(scenario.command_age) if control.observer else None,
             motion=_motion(scenario, plan, robot.name, 0 if control.predictor else delay),
             axis_motion=_axis_motion(scenario, plan, team, robot, 0 if control.predictor else delay),
@@ -76,10 +76,20 @@ def robot_knowledge(
     ]
 
 
-def _rest_samples(deployment: Deployment) -> int:
+def rest_samples(deployment: Deployment) -> int:
     """Return over how many samples rates are averaged, 0 where they have no noise."""
     noisy = deployment.period is not None and deployment.measurements.rate_noise > 0.0
     return whole_periods(REST_WINDOW, deployment.period) if noisy and deployment.period else 0
+
+
+def report_periods(age: float, period: float) -> int:
+    """Return for how many periods a report is used.
+
+    Args:
+        age: How long a report may be used after it was made [s].
+        period: The control period [s].
+    """
+    return whole_periods(age, period) + REPORT_PERIODS
 
 
 def _robot(scenario: Scenario, index: int, factor: float) -> RobotPlant:
@@ -104,7 +114,7 @@ def _motion(scenario: Scenario, plan: Plan, robot: str, age: int) -> NominalMoti
         start=plan.start[:2],
         targets=np.array([transition.target for transition in plan.transitions]),
         period=deployment.period,
-        report_periods=whole_periods(budget.report_age, deployment.period) + REPORT_PERIODS,
+        report_periods=report_periods(budget.report_age, deployment.period),
         measurement_periods=age,
         offset=deployment.of_robot(robot).sample_offset,
     )

@@ -95,7 +95,7 @@ class Wrapping:
     def actuate(self, effort: OutputPort) -> OutputPort:
         """Return the effort of the actuators: after limits and lag."""
         size = effort.size()
-        limits = _limits(self._deployment, size - 3)
+        limits = effort_limits(self._deployment, size - 3)
         blocks: list[tuple[str, LeafSystem]] = [("actuator_limits", Saturation(-limits, limits))]
         if lag := self._deployment.actuators.lag:
             blocks.append(("effort_in_kilonewtons", Gain(1.0 / _KILO, size)))
@@ -221,7 +221,7 @@ def _affine(factors: FloatArray, offsets: FloatArray) -> AffineSystem:
     )
 
 
-def _limits(deployment: Deployment, joints: int) -> FloatArray:
+def effort_limits(deployment: Deployment, joints: int) -> FloatArray:
     """Return the largest base wrench and joint torques, shape (3 + n,)."""
     limits = deployment.actuators
     force, torque, effort = (

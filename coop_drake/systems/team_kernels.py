@@ -15,7 +15,16 @@ from coop_drake.systems.nominal_kernels import accelerate_along
 from coop_drake.systems.ready_kernels import robot_ready, robot_ready_along
 from coop_drake.tree.pose import FloatArray, IntArray
 
-__all__ = ["FusedCell", "FusedTeam", "drive_team", "report_readiness", "telemetry_parts", "telemetry_size"]
+__all__ = [
+    "FusedCell",
+    "FusedTeam",
+    "drive_team",
+    "read_own",
+    "report_readiness",
+    "state_of_object",
+    "telemetry_parts",
+    "telemetry_size",
+]
 
 
 class FusedCell(NamedTuple):
@@ -126,7 +135,7 @@ def drive_team(
     """
     robots, n = yaws.size, places.shape[1] - 3
     acceleration, commands, bases, efforts, bounds, margin = telemetry_parts(telemetry, robots)
-    object_state, robot, governed = _object_state(places, state), np.empty(6 + 2 * n), np.empty(4)
+    object_state, robot, governed = state_of_object(places, state), np.empty(6 + 2 * n), np.empty(4)
     if tracking.size:
         margin[0], governed[0], governed[1] = nominal[4], 0.0, 0.0
         accelerate_along(tracking, object_state, governor_position, nominal, nominal, governed[2:])
@@ -138,7 +147,7 @@ def drive_team(
         start, stop = first[2, k], first[2, k + 1]
         m = 1 + stop - start
         rows, chain = table[start + k : stop + k + 1], chains[first[0, k] : first[0, k + 1]]
-        _read_robot(k, places, first, base_chains, yaws, state, robot)
+        read_own(k, places, first, base_chains, yaws, state, robot)
         track_axes(rows, time, clock, jumps[start + k : stop + k + 1], object_state, robot, axes)
         end_effector_command(loads[k], object_state, governed[2:], axes, commands[k])
         robot_effort(chain, robot, commands[k], axes, effort)
@@ -186,10 +195,10 @@ def report_readiness(
         nominal: What ``NominalGovernor`` shows, of shape (0,) where p_G follows the measured position.
         reports: Receives the reports.
     """
-    object_state, robot = _object_state(places, state), np.empty(2 * places.shape[1])
+    object_state, robot = state_of_object(places, state), np.empty(2 * places.shape[1])
     for k in range(yaws.size):
         start, stop = first[2, k] + k, first[2, k + 1] + k + 1
-        _read_robot(k, places, first, base_chains, yaws, state, robot)
+        read_own(k, places, first, base_chains, yaws, state, robot)
         reports[2 * k] = index
         own, following = table[start:stop], next_table[start:stop]
         if nominal.size:
@@ -225,18 +234,18 @@ def remember_jumps(
         reports: What ``report_readiness`` gives.
         jumps: Receives the jumps of the robots that are ready, shape (N + n,).
     """
-    object_state, robot = _object_state(places, state), np.empty(2 * places.shape[1])
+    object_state, robot = state_of_object(places, state), np.empty(2 * places.shape[1])
     for k in range(yaws.size):
         if reports[2 * k + 1] >= 0.0:
             start, stop = first[2, k] + k, first[2, k + 1] + k + 1
-            _read_robot(k, places, first, base_chains, yaws, state, robot)
+            read_own(k, places, first, base_chains, yaws, state, robot)
             write_jumps(
                 table[start:stop], next_table[start:stop], time, clock, object_state, robot, jumps[start:stop]
             )
 
 
 @compiled
-def _read_robot(
+def read_own(
     k: int,
     places: IntArray,
     first: IntArray,
@@ -251,7 +260,7 @@ def _read_robot(
 
 
 @compiled
-def _object_state(places: IntArray, state: FloatArray) -> FloatArray:
+def state_of_object(places: IntArray, state: FloatArray) -> FloatArray:
     """Return pose and twist of the object, shape (6,)."""
     object_state = np.empty(6)
     for i in range(3):

@@ -1,0 +1,163 @@
+"""What the compiled loop computes with, as arrays: transport, departures of a run, what it remembers.
+
+Numbers of all robots are stacked. With n_k joints of robot k, and f_k joints of the robots before it, its own
+axes (theta, q_k) are the rows from k + f_k on of M = N + n; its effort begins at 3 k + f_k, and its state
+(z_k, z_k') at twice that.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from coop_drake.systems.team_kernels import FusedTeam
+from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.team_arrays import TeamArrays
+
+
+class LoopCells(NamedTuple):
+    """All C cells of a plan; rows from ``first[i]`` to ``first[i + 1]`` of a stack are those of cell i.
+
+    Attributes:
+        first: First entries in ``governed``, ``regions``, ``flats`` and ``fields``, shape (4, C + 1).
+        rows: Governor's rows, see ``governed_gains``, shape (C, 9).
+        governed: Edges of the governed sets, shape (., 4) [m].
+        regions: Edges of the regions Q_i, shape (., 4) [m].
+        flats: Maps, see ``VelocityField.kernel_arguments``.
+        fields: What the velocity fields add to them.
+        tables: The axes of all robots, shape (C, M, ``LAW_COLUMNS``).
+        slices: Lower, then upper ends of the slices of (theta, q), shape (2, C, 1 + n) [rad or m].
+        numbers: Inradius R [m], K with which the cell is entered [1/s^2], longest time in it [s] and the
+            target [m], shape (C, 5).
+        goal: Goal position, shape (2,) [m].
+        tolerances: Largest distance to it that counts as arrived, for robots and for the run, shape (2,) [m].
+    """
+
+    first: IntArray
+    rows: FloatArray
+    governed: FloatArray
+    regions: FloatArray
+    flats: FloatArray
+    fields: FloatArray
+    tables: FloatArray
+    slices: FloatArray
+    numbers: FloatArray
+    goal: FloatArray
+    tolerances: FloatArray
+
+
+class LoopPlant(NamedTuple):
+    """The simulated team.
+
+    Attributes:
+        tree: See ``TeamTree``.
+        bases: Rows of the bases, then that of the object.
+        places: Where wrenches act on them.
+        shapes: Its bodies.
+        walls: Edges of the floor, shape (E, 4) [m].
+        reach: How far a body moves at most for a unit of theta, then of every joint, shape (1 + n,) [m or -].
+        axis_rows: Row among the M axes of (theta, q), then the robot that it is taken from, shape (2, 1 + n).
+        strongest: Largest effort of every joint that its model allows, shape (n,) [N m or N].
+    """
+
+    tree: FloatArray
+    bases: IntArray
+    places: FloatArray
+    shapes: TeamArrays
+    walls: FloatArray
+    reach: FloatArray
+    axis_rows: IntArray
+    strongest: FloatArray
+
+
+class LoopNominal(NamedTuple):
+    """The nominal motions of a plan with a budget; arrays of shape (0,) where it has none for the axes.
+
+    Attributes:
+        flow: What ``nominal_flow`` gives, of shape (0, 0) where p_G follows the measured position.
+        position: Largest speed of p_G [m/s], for how many periods a report is used [-] and the tube's radius
+            [m], shape (3,).
+        axis_gains: K_a [1/s^2], zeta_a [1/s] and the lag of the nominal axes [s], shape (3,) or (0,).
+        mountings: Those of all robots, see ``place_on_axes``, shape (M,).
+        departures: Largest departures of (theta, q) from their nominal motions in every cell, shape
+            (C, 1 + n) or (0, 0) [rad or m].
+    """
+
+    flow: FloatArray
+    position: FloatArray
+    axis_gains: FloatArray
+    mountings: FloatArray
+    departures: FloatArray
+
+
+class LoopDepartures(NamedTuple):
+    """What departs from the ideal team in one run.
+
+    Attributes:
+        times: Control period, longest time of the run, lag of the actuators [s], shape (3,).
+        periods: Age of measurements, rows of a line of measurements, periods that a report travels, samples
+            over which rates are averaged, shape (4,).
+        seeds: Of every robot and use, see ``seed_of``, shape (N, 7).
+        probabilities: Of lost and of late measurements, of lost and of repeated reports, shape (4,) [-].
+        errors: Standard deviation of the noise, and size, length in periods and phase of the wave of every
+            component of a measured pose, then of all measured states, shape (3 + 2 (3 N + n), 4).
+        biases: Constant errors of the measured pose, shape (N, 3) [m, rad].
+        odometry: Factors of the measured rates of bases, shape (N,) [-].
+        limits: Largest efforts, shape (3 N + n,) [N, N m].
+        floor: Coulomb friction [N], viscous friction [N s/m], acceleration of gravity along x [m/s^2], (3,).
+        pushes: Place in ``LoopPlant.bases``, force [N], torque [N m], begin and end [s], shape (., 6).
+        hearing: Errors of the clocks [s], and how late switches are heard [periods], shape (2, N).
+        silences: Begin and end [s], and 0 for motors that work, 1 for held ones, 2 for limp ones, (3, N).
+    """
+
+    times: FloatArray
+    periods: IntArray
+    seeds: IntArray
+    probabilities: FloatArray
+    errors: FloatArray
+    biases: FloatArray
+    odometry: FloatArray
+    limits: FloatArray
+    floor: FloatArray
+    pushes: FloatArray
+    hearing: FloatArray
+    silences: FloatArray
+
+
+class LoopMemory(NamedTuple):
+    """What changes in a run; a ring keeps its newest entry at the number of the sample modulo its length.
+
+    Attributes:
+        state: The team's, in the order of the plant, shape (2 (3 + n),).
+        current: Index of the cell [-] and time of its entry [s] as the planner has them, ring (R, 2).
+        poses: Measured poses, ring (D, N, 3).
+        states: Measured states of all robots, ring (D, 2 (3 N + n)).
+        lines: Lines of measured poses, then of states, of every robot, shape (N, 2, rows, 1 + size).
+        governors: p_G of every robot, shape (N, 2) [m].
+        nominal: p^, p^' and p_G, ring (D, 6).
+        axes: x^, x^' and a^ of all axes, ring (D, 3, M).
+        jumps: What fades, shape (M,).
+        jumped: To which cell every robot's jumps belong, shape (N,).
+        rates: Rates of the last samples, ring (samples, 3 N + n).
+        efforts: Commands that actuators follow, shape (2, 3 N + n): what is held, and what acts [N, N m].
+        channels: What the channels of reports hold, shape (N, ``channel_rows``, 2).
+        reports: What robots report, and what they said last before a silence, shape (2, N, 2).
+    """
+
+    state: FloatArray
+    current: FloatArray
+    poses: FloatArray
+    states: FloatArray
+    lines: FloatArray
+    governors: FloatArray
+    nominal: FloatArray
+    axes: FloatArray
+    jumps: FloatArray
+    jumped: IntArray
+    rates: FloatArray
+    efforts: FloatArray
+    channels: FloatArray
+    reports: FloatArray
+
+
+Loop = tuple[LoopCells, FusedTeam, LoopPlant, LoopNominal, LoopDepartures, LoopMemory]
+"""All of them, in the order in which compiled functions take them."""

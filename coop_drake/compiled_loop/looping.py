@@ -1,0 +1,171 @@
+"""The compiled loop: a whole run from the start until the team has arrived, or something is violated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coop_drake.compiled import compiled
+from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal, LoopPlant
+from coop_drake.compiled_loop.motion import advance
+from coop_drake.compiled_loop.robots import follow_axes, heard_cell, lead, remember_switch, report
+from coop_drake.compiled_loop.sensing import measure, receive
+from coop_drake.compiled_loop.watching import ENDED, RUNS, begin_figures, left_by_all, watch
+from coop_drake.laws.channels import carry_reports
+from coop_drake.laws.nominal_axes import carry_axes
+from coop_drake.laws.random_draws import uniform_pair
+from coop_drake.laws.robot_dynamics import estimate_object
+from coop_drake.systems.nominal_kernels import step_nominal
+from coop_drake.systems.team_kernels import FusedTeam
+from coop_drake.tree.pose import FloatArray
+
+EARLY = 1e-6
+"""Share of a period by which an interval that begins at a sample may seem to begin later [-], by rounding."""
+
+
+@compiled
+def run_loop(
+    cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal, departures: LoopDepartures,
+    memory: LoopMemory,
+) -> FloatArray:  # fmt: skip
+    """Run a transport and return its figures, see ``watching``.
+
+    Args:
+        cells: The plan's cells.
+        team: The robots' models of themselves.
+        plant: The simulated team.
+        nominal: The nominal motions.
+        departures: What departs from the ideal team.
+        memory: The state at the start; it is changed.
+    """
+    figures, measured = begin_figures(), np.full(memory.state.size // 2 + 2, np.nan)
+    sample = 0
+    watch(sample, cells, team, plant, nominal, departures, memory, measured, figures)
+    while figures[ENDED] == RUNS:
+        _update(sample, cells, team, nominal, departures, memory)
+        advance(sample, team, plant, departures, memory)
+        sample += 1
+        watch(sample, cells, team, plant, nominal, departures, memory, measured, figures)
+    return figures
+
+
+@compiled
+def _update(
+    sample: int, cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures,
+    memory: LoopMemory,
+) -> None:  # fmt: skip
+    """Do what happens at a sample: all read what was before, as in Drake."""
+    robots, law = team.yaws.size, np.empty(memory.jumps.size)
+    measure(sample, team, departures, memory)
+    held = memory.efforts[0].copy()
+    for k in range(robots):
+        begin = k + team.first[2, k]
+        end = begin + 1 + team.first[2, k + 1] - team.first[2, k]
+        _compute(k, sample, begin, cells, team, nominal, departures, memory, law[begin:end])
+        _fail(k, sample, held, team, departures, memory)
+    for i in range(held.size):
+        limit = departures.limits[i]
+        memory.efforts[0, i] = min(max(memory.efforts[0, i], -limit), limit)
+    now = sample % memory.current.shape[0]
+    cell = int(memory.current[now, 0])
+    _lead_on(sample, cell, law, cells, nominal, departures, memory)
+    following = memory.current[(sample + 1) % memory.current.shape[0]]
+    following[0], following[1] = memory.current[now, 0], memory.current[now, 1]
+    if cell + 1 < cells.rows.shape[0] and left_by_all(cell, memory):
+        following[0], following[1] = cell + 1, sample * departures.times[0]
+    _send(sample, departures, memory)
+
+
+@compiled
+def _compute(
+    k: int, sample: int, begin: int, cells: LoopCells, team: FusedTeam, nominal: LoopNominal,
+    departures: LoopDepartures, memory: LoopMemory, law: FloatArray,
+) -> None:  # fmt: skip
+    """Do what robot k computes at a sample: its effort, its report, its own p_G, and the law of its axes."""
+    seen = np.empty(6)
+    pose, robot = receive(k, sample, team, departures, memory)
+    chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
+    estimate_object(chain, team.loads[k, :2], robot, pose, seen)
+    cell, time = heard_cell(k, sample, departures, memory)
+    governed = lead(k, sample, cell, time, cells, team, nominal, departures, memory, seen)
+    led, led_robot = follow_axes(
+        k, sample, cell, time, governed[2:], seen, robot, cells, team, nominal, departures, memory, law
+    )
+    judged, judged_robot = led, led_robot
+    if departures.periods[3] > 0 and cell + 1 == cells.rows.shape[0]:
+        judged, judged_robot = _averaged(sample, 3 * begin - 2 * team.first[2, k], led, led_robot, memory)
+    margin = report(k, sample, cell, time, judged, judged_robot, cells, nominal, departures, memory, begin)
+    memory.reports[0, k, 0], memory.reports[0, k, 1] = cell, margin
+    if margin >= 0.0:
+        remember_switch(k, cell, time, led, led_robot, cells, memory, begin)
+    memory.governors[k, 0] += departures.times[0] * governed[0]
+    memory.governors[k, 1] += departures.times[0] * governed[1]
+
+
+@compiled
+def _averaged(
+    sample: int, at: int, led: FloatArray, robot: FloatArray, memory: LoopMemory
+) -> tuple[FloatArray, FloatArray]:
+    """Return both states with the means of the last rates, and remember those of now."""
+    judged, judged_robot, n = led.copy(), robot.copy(), robot.size // 2
+    for i in range(n):
+        mean = memory.rates[:, at + i].mean()
+        if i < 3:
+            judged[3 + i] = mean
+        else:
+            judged_robot[n + i] = mean
+        memory.rates[sample % memory.rates.shape[0], at + i] = led[3 + i] if i < 3 else robot[n + i]
+    return judged, judged_robot
+
+
+@compiled
+def _fail(
+    k: int, sample: int, held: FloatArray, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory
+) -> None:
+    """Let robot k fall silent, and its motors fail, while it is said to."""
+    period, begin = departures.times[0], departures.silences[0, k]
+    early = EARLY * period
+    if not begin - early <= sample * period < departures.silences[1, k] - early:
+        memory.reports[1, k] = memory.reports[0, k]
+        return
+    memory.reports[0, k] = memory.reports[1, k]
+    own, motors = 3 * k + team.first[2, k], departures.silences[2, k]
+    for i in range(own, own + 3 + team.first[2, k + 1] - team.first[2, k]):
+        if motors > 0.0:
+            memory.efforts[0, i] = held[i] if motors == 1.0 else 0.0
+
+
+@compiled
+def _lead_on(
+    sample: int, cell: int, law: FloatArray, cells: LoopCells, nominal: LoopNominal,
+    departures: LoopDepartures, memory: LoopMemory,
+) -> None:  # fmt: skip
+    """Carry the nominal motions over a period."""
+    period = departures.times[0]
+    if nominal.flow.size:
+        ring, first = memory.nominal.shape[0], cells.first
+        edges = cells.governed[first[0, cell] : first[0, cell + 1]]
+        flat = cells.flats[first[2, cell] : first[2, cell + 1]]
+        field = cells.fields[first[3, cell] : first[3, cell + 1]]
+        now, later = memory.nominal[sample % ring], memory.nominal[(sample + 1) % ring]
+        step_nominal(
+            cells.rows[cell], edges, flat, field, nominal.flow, period, nominal.position[0], 1.0, now, later
+        )
+    if nominal.axis_gains.size:
+        ring = memory.axes.shape[0]
+        now_axes, later_axes = memory.axes[sample % ring], memory.axes[(sample + 1) % ring]
+        carry_axes(now_axes, law, period, nominal.axis_gains[2], later_axes)
+
+
+@compiled
+def _send(sample: int, departures: LoopDepartures, memory: LoopMemory) -> None:
+    """Carry every robot's channel of reports over a period."""
+    loss, repeat = departures.probabilities[2], departures.probabilities[3]
+    arrivals = np.empty(memory.channels[0].shape)
+    for k in range(memory.channels.shape[0]):
+        arrives, repeated = True, False
+        if loss > 0.0 or repeat > 0.0:
+            chances = uniform_pair(departures.seeds[k, 0], sample)
+            arrives, repeated = chances[0] >= loss, chances[1] < repeat
+        kept = memory.channels[k]
+        carry_reports(kept, memory.reports[0, k], arrives, repeated, departures.periods[2], arrivals)
+        kept[:] = arrivals

@@ -1,0 +1,195 @@
+"""Makes the arrays of a transport for the compiled loop, once for all its runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydrake.systems.framework import DiagramBuilder
+
+from coop_drake.answers.plan import Plan
+from coop_drake.compiled_loop.arrays import LoopCells, LoopNominal, LoopPlant
+from coop_drake.diagram.fused import fused_team
+from coop_drake.diagram.knowledge import robot_knowledge
+from coop_drake.diagram.robot_controller import RobotKnowledge
+from coop_drake.errors import ScenarioError
+from coop_drake.fields import HarmonicMap, VelocityField
+from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.laws.hand_over import governed_gains
+from coop_drake.plant import TeamPlant, base_chain, build_team_plant, read_component_tree, team_tree
+from coop_drake.scenario import Scenario
+from coop_drake.simulation.clearance import TeamClearance
+from coop_drake.simulation.stall import patience
+from coop_drake.systems import axis_laws
+from coop_drake.systems.team_kernels import FusedTeam
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class CompiledTransport:
+    """A scenario, a plan and its maps as the compiled loop needs them; departures are given run by run.
+
+    Attributes:
+        scenario: The scenario, with the departures with which it was prepared.
+        plan: The plan.
+        robot_names: Names of the robots.
+        cells: The plan's cells.
+        team: The robots' models of themselves, with their true masses.
+        plant: The simulated team.
+        nominal: The nominal motions, their flow for the scenario's control rate.
+        start: State of the team at the start, in the order of the plant.
+        first_axes: Where the M axes of all robots rest at the start.
+    """
+
+    scenario: Scenario
+    plan: Plan
+    robot_names: tuple[str, ...]
+    cells: LoopCells
+    team: FusedTeam
+    plant: LoopPlant
+    nominal: LoopNominal
+    start: FloatArray
+    first_axes: FloatArray
+
+
+def prepare(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> CompiledTransport:
+    """Make the arrays of a transport.
+
+    Args:
+        scenario: The scenario; its team must be sampled.
+        plan: A plan for it.
+        maps: The harmonic map of every transition.
+
+    Raises:
+        PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
+        ScenarioError: The models do not make a team, or the compiled loop does not know what the scenario
+            wants.
+    """
+    _check(scenario)
+    exact = replace(scenario, deployment=replace(scenario.deployment, mass_error=0.0))
+    team = build_team_plant(scenario, DiagramBuilder())
+    knowledge = robot_knowledge(exact, plan, maps, team)
+    if any(known.robot.has_springs for known in knowledge):
+        raise _refusal(scenario, "directives", "a robot with springs", "models without springs")
+    tree, fused = read_component_tree(team), fused_team(team, knowledge)
+    axes = np.array([i for r in team.robots for i in (0, *range(1 + r.q_slice.start, 1 + r.q_slice.stop))])
+    return CompiledTransport(
+        scenario,
+        plan,
+        tuple(robot.name for robot in team.robots),
+        _cells(scenario, plan, knowledge, axes),
+        fused,
+        _plant(scenario, team, tree, fused),
+        _nominal(plan, team, knowledge),
+        team.plant_state(plan.start, np.zeros(len(plan.start))),
+        plan.start[2:][axes],
+    )
+
+
+def _check(scenario: Scenario) -> None:
+    """Refuse what does not change from run to run and the loop does not know."""
+    control = scenario.control
+    for key, found, allowed in (
+        ("plant.grasps", scenario.plant.grasps if not scenario.plant.ideal else None, "rigid"),
+        ("control.predictor", control.predictor or None, "false"),
+        ("control.observer", control.observer or None, "false"),
+        ("control.hold", control.hold, "null"),
+    ):
+        if found is not None:
+            raise _refusal(scenario, key, found, allowed)
+
+
+def _refusal(scenario: Scenario, key: str, found: object, allowed: str) -> ScenarioError:
+    return ScenarioError(
+        str(scenario.path), key, found, f"{allowed}, because the compiled loop knows no other"
+    )
+
+
+def _cells(scenario: Scenario, plan: Plan, knowledge: Sequence[RobotKnowledge], axes: IntArray) -> LoopCells:
+    cells, stacks = knowledge[0].cells, tuple[list[FloatArray], ...](([], [], [], []))
+    for cell, region in zip(cells, plan.cells, strict=True):
+        assert isinstance(cell.field, VelocityField)  # robot_knowledge makes no other
+        found = cell.clearance.edges, BoundaryDistance(region.tidied).edges, *cell.field.kernel_arguments
+        for stack, entry in zip(stacks, found, strict=True):
+            stack.append(entry)
+    first = [np.cumsum([0, *(len(entry) for entry in stack)]) for stack in stacks]
+    governed, regions, flats, fields = (np.ascontiguousarray(np.concatenate(stack)) for stack in stacks)
+    numbers = [
+        [each.inradius, governed_gains(cell.row, 0.0)[0], patience(plan, i), *each.target]
+        for i, (each, cell) in enumerate(zip(plan.transitions, cells, strict=True))
+    ]
+    return LoopCells(
+        np.array(first, dtype=np.int64),
+        np.array([cell.row for cell in cells]),
+        governed,
+        regions,
+        flats,
+        fields,
+        np.array([law.table for law in axis_laws(plan, list(axes))]),
+        np.array([[cell.lower for cell in plan.cells], [cell.upper for cell in plan.cells]]),
+        np.array(numbers),
+        np.array(plan.goal_pose[:2], dtype=float),
+        np.array([knowledge[0].position_tolerance, scenario.goal.tolerances.position]),
+    )
+
+
+def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, fused: FusedTeam) -> LoopPlant:
+    whole = team_tree(team, tree)
+    shapes, walls = TeamClearance(scenario.workspace.polygon, tree).kernel_arguments
+    rows = [(0, 0)]
+    for k, robot in enumerate(team.robots):
+        begin = k + int(fused.first[2, k])
+        rows.extend((begin + 1 + i, k) for i in range(robot.q_slice.stop - robot.q_slice.start))
+    drives = [team.plant.get_joint_actuator(index) for index in team.plant.GetJointActuatorIndices()]
+    limit_of = {int(drive.joint().index()): drive.effort_limit() for drive in drives}
+    strongest = [limit_of.get(int(joint.index()), np.inf) for joint in team.joints]
+    return LoopPlant(
+        whole.tree,
+        whole.bases,
+        whole.places,
+        shapes,
+        walls,
+        _reach(tree),
+        np.array(rows, dtype=np.int64).T.copy(),
+        np.array(strongest, dtype=float),
+    )
+
+
+def _reach(tree: ComponentTree) -> FloatArray:
+    """Return how far any point of a body moves at most for a unit of theta, then of every joint [m or -]."""
+    outside = [
+        max((float(np.hypot(*shape.vertices.T).max()) + shape.radius for body in component.bodies
+             for shape in body.shapes), default=0.0)
+        for component in tree.components
+    ]  # fmt: skip
+    reach = np.zeros(1 + len(tree.joints))
+    for i in range(len(tree.components) - 1, -1, -1):
+        component, joint = tree.components[i], tree.components[i].joint
+        if joint is None or component.parent is None:
+            reach[0] = max(reach[0], outside[i])
+            continue
+        slides = joint.kind == "prismatic"
+        reach[1 + joint.index] = 1.0 if slides else outside[i]
+        way = float(np.hypot(joint.X_PJ.x, joint.X_PJ.y))
+        way += max(abs(joint.lower), abs(joint.upper)) if slides else 0.0
+        outside[component.parent] = max(outside[component.parent], way + outside[i])
+    return reach
+
+
+def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> LoopNominal:
+    """Return the nominal motions; their flow and the age of reports follow from the control rate of a run."""
+    none, tube, motion = np.empty(0), plan.tube, knowledge[0].axis_motion
+    departures = [one.tolerance.departure for one in plan.transitions if one.tolerance is not None]
+    mountings = np.concatenate([base_chain(team, robot).mounting for robot in team.robots])
+    gains = none
+    if motion is not None:
+        gains = np.array([motion.tracking.stiffness, motion.tracking.damping, motion.lag])
+    return LoopNominal(
+        np.empty((0, 0)),
+        none if tube is None else np.array([tube.speed, 0.0, tube.radius]),
+        gains,
+        mountings,
+        np.array(departures) if motion is not None else np.empty((0, 0)),
+    )

@@ -1,0 +1,203 @@
+"""What one robot of the compiled loop computes at a sample, by the laws that Drake's blocks call."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coop_drake.compiled import compiled
+from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal
+from coop_drake.laws.axis_table import track_axes, write_jumps
+from coop_drake.laws.load_sharing import end_effector_command
+from coop_drake.laws.nominal_axes import carry_axes, place_on_axes, pull_axes
+from coop_drake.laws.robot_dynamics import robot_effort
+from coop_drake.systems.governor_kernels import govern
+from coop_drake.systems.nominal_kernels import accelerate_along, show_nominal
+from coop_drake.systems.ready_kernels import axes_ready, robot_ready, robot_ready_along
+from coop_drake.systems.team_kernels import FusedTeam
+from coop_drake.tree.pose import FloatArray
+
+ON_TIME = np.array([0.0, 1.0, 0.0])
+"""A clock that never stood still: lag [s], pace [-] and the derivative of the pace [1/s]."""
+
+
+@compiled
+def heard_cell(k: int, sample: int, departures: LoopDepartures, memory: LoopMemory) -> tuple[int, float]:
+    """Return the cell that robot k knows at a sample, and the time since its entry by its own clock [s]."""
+    heard = sample - int(departures.hearing[1, k])
+    if heard < 0:  # it has heard nothing yet, and begins in the first cell
+        return 0, sample * departures.times[0]
+    current = memory.current[heard % memory.current.shape[0]]
+    return int(current[0]), sample * departures.times[0] - (current[1] - departures.hearing[0, k])
+
+
+@compiled
+def lead(
+    k: int, sample: int, cell: int, time: float, cells: LoopCells, team: FusedTeam, nominal: LoopNominal,
+    departures: LoopDepartures, memory: LoopMemory, seen: FloatArray,
+) -> FloatArray:  # fmt: skip
+    """Return p_G' as robot k moves its own p_G, and the desired acceleration of the object's origin.
+
+    Args:
+        k: The robot.
+        sample: Number of the sample.
+        cell: The cell that it knows.
+        time: Time since its entry [s].
+        cells: The plan's cells.
+        team: The robots' models.
+        nominal: The nominal motions.
+        departures: What departs.
+        memory: What changes.
+        seen: The object's state as the robot knows it, shape (6,).
+
+    Returns:
+        Both, shape (4,) [m/s, m/s^2]; p_G' is zero where a nominal motion leads.
+    """
+    governed = np.zeros(4)
+    if nominal.flow.size:
+        ring = memory.nominal.shape[0]
+        now, then = memory.nominal[sample % ring], max(sample - departures.periods[0], 0) % ring
+        accelerate_along(team.tracking, seen, now[4:6], now, memory.nominal[then], governed[2:])
+    else:
+        first, p_G = cells.first, memory.governors[k]
+        edges = cells.governed[first[0, cell] : first[0, cell + 1]]
+        flat = cells.flats[first[2, cell] : first[2, cell + 1]]
+        field = cells.fields[first[3, cell] : first[3, cell + 1]]
+        govern(cells.rows[cell], edges, flat, field, time, seen, p_G, governed)
+    return governed
+
+
+@compiled
+def command(
+    k: int, linear: FloatArray, axes: FloatArray, seen: FloatArray, robot: FloatArray, team: FusedTeam,
+    memory: LoopMemory,
+) -> None:  # fmt: skip
+    """Write the effort that gives end effector and joints of robot k the desired accelerations.
+
+    Args:
+        k: The robot.
+        linear: Desired acceleration of the object's origin, shape (2,) [m/s^2].
+        axes: Desired accelerations of its angle and of the joints, shape (1 + n_k,).
+        seen: The object's state with which they become efforts, shape (6,).
+        robot: The robot's own, shape (2 (3 + n_k),).
+        team: The robots' models.
+        memory: Receives the effort.
+    """
+    wanted, own = np.empty(6), 3 * k + team.first[2, k]
+    chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
+    end_effector_command(team.loads[k], seen, linear, axes, wanted)
+    robot_effort(chain, robot, wanted, axes, memory.efforts[0, own : own + 2 + axes.size])
+
+
+@compiled
+def follow_axes(
+    k: int, sample: int, cell: int, time: float, linear: FloatArray, seen: FloatArray, robot: FloatArray,
+    cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory,
+    law: FloatArray,
+) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    """Write the effort of robot k and what the law of its axes asks for.
+
+    Args:
+        k: This and the next three arguments are those of ``lead``.
+        sample: Number of the sample.
+        cell: The cell.
+        time: Time since its entry [s].
+        linear: Desired acceleration of the object's origin, shape (2,) [m/s^2].
+        seen: The object's state as the robot knows it, shape (6,).
+        robot: Its own state as measured, shape (2 (3 + n_k),).
+        cells: This and the next four arguments are those of ``lead``.
+        team: The robots' models.
+        nominal: The nominal motions.
+        departures: What departs.
+        memory: What changes.
+        law: Receives the accelerations of the law, shape (1 + n_k,).
+
+    Returns:
+        The states of object and robot on which the law acts, and by which the robot is ready.
+    """
+    begin = k + team.first[2, k]
+    rows = cells.tables[cell, begin : begin + law.size]
+    jumps = memory.jumps[begin : begin + law.size] if memory.jumped[k] == cell else np.zeros(law.size)
+    if not nominal.axis_gains.size:
+        track_axes(rows, time, ON_TIME, jumps, seen, robot, law)
+        command(k, linear, law, seen, robot, team, memory)
+        return seen, robot
+    ring, mounting = memory.axes.shape[0], nominal.mountings[begin : begin + law.size]
+    now = memory.axes[sample % ring, :, begin : begin + law.size]
+    then = memory.axes[max(sample - departures.periods[0], 0) % ring, :2, begin : begin + law.size]
+    led, led_robot = _placed(now, mounting, seen, robot)
+    track_axes(rows, time, ON_TIME, jumps, led, led_robot, law)
+    pulled, later = np.empty(law.size), np.empty((3, law.size))
+    gains, lag = nominal.axis_gains, nominal.axis_gains[2]
+    pull_axes(law, seen, robot, then, (gains[0], gains[1]), pulled)
+    carry_axes(now, law, 0.5 * departures.times[0] + lag, lag, later)
+    ahead, robot_ahead = _placed(later, mounting, seen, robot)
+    command(k, linear, pulled, ahead, robot_ahead, team, memory)
+    return led, led_robot
+
+
+@compiled
+def _placed(
+    axes: FloatArray, mounting: FloatArray, seen: FloatArray, robot: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the states of object and robot with the angles and rates of their nominal axes."""
+    led, led_robot = seen.copy(), robot.copy()
+    led[2], led[5] = axes[0, 0], axes[1, 0]
+    place_on_axes(axes, mounting, led_robot)
+    return led, led_robot
+
+
+@compiled
+def report(
+    k: int, sample: int, cell: int, time: float, seen: FloatArray, robot: FloatArray, cells: LoopCells,
+    nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory, begin: int,
+) -> float:  # fmt: skip
+    """Return the margin with which robot k is ready; of a margin below zero only the sign counts.
+
+    Args:
+        k: This and the next three arguments are those of ``lead``.
+        sample: Number of the sample.
+        cell: The cell.
+        time: Time since its entry [s].
+        seen: The object's state by which it judges, shape (6,).
+        robot: Its own, shape (2 (3 + n_k),).
+        cells: This and the next three arguments are those of ``lead``.
+        nominal: The nominal motions.
+        departures: What departs.
+        memory: What changes.
+        begin: Its first row among all axes.
+    """
+    end, last = begin + robot.size // 2 - 2, cell + 1 == cells.rows.shape[0]
+    following = cell if last else cell + 1
+    own, after = cells.tables[cell, begin:end], cells.tables[following, begin:end]
+    margin = axes_ready(own, after, last, time, seen, robot)
+    if margin < 0.0:  # the position is not judged in vain
+        return margin
+    edges = cells.governed[cells.first[0, following] : cells.first[0, following + 1]]
+    stiffness, inradius, tolerance = cells.numbers[following, 1], cells.numbers[cell, 0], cells.tolerances[0]
+    if not nominal.flow.size:
+        return robot_ready(
+            own, after, edges, stiffness, inradius, cells.goal, tolerance, last, time, seen, robot,
+            memory.governors[k],
+        )  # fmt: skip
+    shown, state = np.empty(6), memory.nominal[sample % memory.nominal.shape[0]]
+    here = cells.governed[cells.first[0, cell] : cells.first[0, cell + 1]]
+    speed, periods = nominal.position[0], nominal.position[1]
+    period, target = departures.times[0], cells.numbers[cell, 3:]
+    show_nominal(here, cells.numbers[cell, 1], target, period, periods, speed, state, shown)
+    return robot_ready_along(
+        own, after, edges, stiffness, inradius, cells.goal, tolerance, last, time, seen, robot, state[4:6],
+        shown,
+    )  # fmt: skip
+
+
+@compiled
+def remember_switch(
+    k: int, cell: int, time: float, seen: FloatArray, robot: FloatArray, cells: LoopCells,
+    memory: LoopMemory, begin: int,
+) -> None:  # fmt: skip
+    """Write the jumps of the accelerations of robot k at a switch now; arguments as in ``report``."""
+    if cell + 1 < cells.rows.shape[0]:
+        end = begin + robot.size // 2 - 2
+        own, after = cells.tables[cell, begin:end], cells.tables[cell + 1, begin:end]
+        write_jumps(own, after, time, ON_TIME, seen, robot, memory.jumps[begin:end])
+        memory.jumped[k] = cell + 1

@@ -1,0 +1,141 @@
+"""Runs of the compiled loop: one, or many of one transport."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+
+from coop_drake.compiled_loop.departing import believed, departures_of, memory_of, nominal_of
+from coop_drake.compiled_loop.looping import run_loop
+from coop_drake.compiled_loop.preparing import CompiledTransport
+from coop_drake.compiled_loop.watching import (
+    ARRIVED,
+    AT_BODY,
+    AT_WALL,
+    BODY,
+    CELL,
+    EFFORT,
+    ENDED,
+    FORCE,
+    FUNNEL,
+    FUNNEL_AXIS,
+    FUNNEL_CELL,
+    LATE,
+    OUT_OF_FUNNEL,
+    OUT_OF_REGION,
+    OUT_OF_SLICE,
+    PLACE,
+    REGION,
+    SAMPLES,
+    SHARE,
+    STALLED,
+    VALUE,
+    WALL,
+)
+from coop_drake.scenario import Deployment
+from coop_drake.tree.pose import FloatArray
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """What a run of the compiled loop leaves. Margins are the smallest ones at all samples.
+
+    Attributes:
+        arrived: Whether the object came to rest at the goal and nothing was violated.
+        reason: Why it did not arrive; empty if it did.
+        time: Duration of the transport [s].
+        steps: Number of samples.
+        funnel_margin: Distance of an axis to a bound of its funnel [rad or m].
+        funnel_axis: The axis: ``angle`` or a joint's name.
+        funnel_cell: The cell.
+        cell_margin: Distance of the object's position to the boundary of its cell's region [m].
+        wall_clearance: Distance of any body to any wall [m].
+        body_clearance: Distance between bodies that must not touch [m].
+        budget_share: Largest share used of what the plan's budget states: of the tube's radius, or of the
+            departure of an axis; NaN for a plan without a budget [-].
+        peak_force: Largest force of a base [N].
+        peak_torque: Largest effort of a joint [N m or N]; zero for a team without joints.
+    """
+
+    arrived: bool
+    reason: str
+    time: float
+    steps: int
+    funnel_margin: float
+    funnel_axis: str
+    funnel_cell: int
+    cell_margin: float
+    wall_clearance: float
+    body_clearance: float
+    budget_share: float
+    peak_force: float
+    peak_torque: float
+
+
+def run(
+    transport: CompiledTransport, deployment: Deployment | None = None, *, seed: int | None = None
+) -> RunOutcome:
+    """Run a transport once.
+
+    Args:
+        transport: What ``prepare`` returned.
+        deployment: The departures; None for those of the scenario that was prepared.
+        seed: Seed of noise and losses; None for that of the deployment.
+
+    Raises:
+        ScenarioError: The compiled loop does not know what departs.
+    """
+    deployment = transport.scenario.deployment if deployment is None else deployment
+    deployment = deployment if seed is None else replace(deployment, seed=seed)
+    departures = departures_of(transport, deployment)
+    period = float(departures.times[0])
+    figures = run_loop(
+        transport.cells,
+        believed(transport.team, deployment.mass_error),
+        transport.plant,
+        nominal_of(transport, period),
+        departures,
+        memory_of(transport, departures),
+    )
+    return _outcome(transport, figures, period)
+
+
+def run_many(transport: CompiledTransport, deployments: Iterable[Deployment]) -> Iterator[RunOutcome]:
+    """Run a transport once for each deployment, in their order; arguments and errors as for ``run``."""
+    return (run(transport, deployment) for deployment in deployments)
+
+
+def _outcome(transport: CompiledTransport, figures: FloatArray, period: float) -> RunOutcome:
+    axes = ("angle", *transport.plan.joint_names)
+    arrived = figures[ENDED] == ARRIVED
+    return RunOutcome(
+        arrived=bool(arrived),
+        reason="" if arrived else _reason(figures, axes, period),
+        time=float(figures[SAMPLES] * period),
+        steps=int(figures[SAMPLES]),
+        funnel_margin=float(figures[FUNNEL]),
+        funnel_axis=axes[int(figures[FUNNEL_AXIS])],
+        funnel_cell=int(figures[FUNNEL_CELL]),
+        cell_margin=float(figures[REGION]),
+        wall_clearance=float(figures[WALL]),
+        body_clearance=float(figures[BODY]),
+        budget_share=float(figures[SHARE]),
+        peak_force=float(figures[FORCE]),
+        peak_torque=float(figures[EFFORT]),
+    )
+
+
+def _reason(figures: FloatArray, axes: tuple[str, ...], period: float) -> str:
+    """Return why a run ended, as the log of Drake's loop says it."""
+    time, cell, value = figures[SAMPLES] * period, int(figures[CELL]), figures[VALUE]
+    axis = axes[int(figures[PLACE])]
+    text = {
+        STALLED: f"stalled, {value:.6g} s after its entry",
+        LATE: "no arrival within max_time",
+        OUT_OF_FUNNEL: f"distance of {axis} to its funnel is {value:.3g} rad or m",
+        OUT_OF_SLICE: f"distance of {axis} to its slice is {value:.3g} rad or m",
+        OUT_OF_REGION: f"distance of the object to the boundary of cell {cell} is {value:.3g} m",
+        AT_WALL: f"clearance between a body and the walls is {value:.3g} m",
+        AT_BODY: f"clearance between two bodies is {value:.3g} m",
+    }
+    return f"at t = {time:.6g} s in cell {cell}: {text[int(figures[ENDED])]}"

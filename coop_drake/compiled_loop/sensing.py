@@ -1,0 +1,76 @@
+"""What the robots of the compiled loop measure: with constant errors, noise, delay and losses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coop_drake.compiled import compiled
+from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory
+from coop_drake.laws.channels import NOTHING, carry_measurements
+from coop_drake.laws.measurement_errors import write_errors
+from coop_drake.laws.random_draws import uniform_pair
+from coop_drake.systems.team_kernels import FusedTeam, read_own
+from coop_drake.tree.pose import FloatArray
+
+LOST_POSE, POSE_NOISE, STATE_NOISE = 1, 5, 6
+"""Uses of seeds: losses of measured poses, those of measured states being the next one, and noise of both."""
+
+
+@compiled
+def measure(sample: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory) -> None:
+    """Write what every robot's sensors measure at a sample, before delay and losses."""
+    now = sample % memory.poses.shape[0]
+    for k in range(team.yaws.size):
+        own = 3 * k + team.first[2, k]
+        size = 3 + team.first[2, k + 1] - team.first[2, k]
+        pose, robot = memory.poses[now, k], memory.states[now, 2 * own : 2 * (own + size)]
+        for i in range(3):
+            pose[i] = memory.state[team.places[0, i]] + departures.biases[k, i]
+        read_own(k, team.places, team.first, team.base_chains, team.yaws, memory.state, robot)
+        for i in range(size, size + 3):
+            robot[i] *= departures.odometry[k]
+        _err(departures.seeds[k, POSE_NOISE], sample, departures.errors[:3], pose)
+        begin = 3 + 2 * own
+        _err(departures.seeds[k, STATE_NOISE], sample, departures.errors[begin : begin + robot.size], robot)
+
+
+@compiled
+def _err(seed: int, sample: int, sizes: FloatArray, values: FloatArray) -> None:
+    """Add the errors of a measurement, unless there are none."""
+    if sizes[:, :2].max() > 0.0:
+        errors = np.empty(values.size)
+        write_errors(seed, sizes[:, 0], sizes[:, 1:], sample, errors)
+        for i in range(values.size):
+            values[i] += errors[i]
+
+
+@compiled
+def receive(
+    k: int, sample: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory
+) -> tuple[FloatArray, FloatArray]:
+    """Return the pose and the state that robot k has at a sample, and carry its lines over a period."""
+    own = 2 * (3 * k + team.first[2, k])
+    end = own + 2 * (3 + team.first[2, k + 1] - team.first[2, k])
+    seen = max(sample - departures.periods[0], 0) % memory.poses.shape[0]
+    pose, robot = memory.poses[seen, k], memory.states[seen, own:end]
+    if departures.probabilities[0] > 0.0 or departures.probabilities[1] > 0.0:
+        pose, robot = pose.copy(), robot.copy()
+        for kind, values in ((0, pose), (1, robot)):
+            _pass(departures.seeds[k, LOST_POSE + kind], sample, departures, memory.lines[k, kind], values)
+    return pose, robot
+
+
+@compiled
+def _pass(seed: int, sample: int, departures: LoopDepartures, line: FloatArray, values: FloatArray) -> None:
+    """Replace measured values by those that have arrived, and carry the line over a period."""
+    measured, following = np.zeros(line.shape[1] - 1), np.empty(line.shape)
+    measured[: values.size] = values
+    if sample == 0:
+        for row in line:
+            row[0], row[1:] = NOTHING, measured
+    chances = uniform_pair(seed, sample)
+    lost, late = chances[0] < departures.probabilities[0], chances[1] < departures.probabilities[1]
+    if lost or late:
+        values[:] = line[0, 1 : 1 + values.size]
+    carry_measurements(line, sample, measured, lost, late, following)
+    line[:] = following

@@ -1,0 +1,165 @@
+"""The compiled loop and Drake's loop run the same transports with the same departures and seeds."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from coop_drake.compiled_loop import prepare, run, run_many
+from coop_drake.errors import ScenarioError
+from coop_drake.scenario import (
+    ActuatorLimits,
+    Control,
+    Deployment,
+    Floor,
+    Hold,
+    Measurements,
+    Messages,
+    PlantSettings,
+    PoseBias,
+    Push,
+    RobotDepartures,
+    Silence,
+    Wave,
+    Waves,
+)
+from coop_drake.simulation import build_maps, simulate
+from tests.support.small_loop import small_maps, small_problem
+from tests.support.tubes import WITH_AXES, tubed_problem
+
+PRESET = Deployment(
+    control_rate=200.0,
+    mass_error=0.2,
+    measurements=Measurements(0.001, 0.0005, 0.01, 0.01),
+    actuators=ActuatorLimits(base_force=300.0, lag=0.005),
+    messages=Messages(loss=0.2),
+)
+
+
+def at_200_hz(**departures):
+    return Deployment(control_rate=200.0, **departures)
+
+
+def of_one(**departures):
+    return at_200_hz(robots={"robot_0": RobotDepartures(**departures)})
+
+
+CASES = {
+    "rate": Deployment(control_rate=100.0),
+    "model error": at_200_hz(mass_error=-0.3),
+    "noise": at_200_hz(measurements=Measurements(1e-3, 5e-4, 1e-2), seed=3),
+    "waves": at_200_hz(measurements=Measurements(waves=Waves(x=Wave(2e-3, 0.3), joints=Wave(1e-3, 0.5)))),
+    "delay": at_200_hz(measurements=Measurements(delay=0.008)),
+    "lost and late": at_200_hz(measurements=Measurements(loss=0.1, late=0.2, late_by=0.012), seed=2),
+    "limits": at_200_hz(actuators=ActuatorLimits(base_force=100.0, base_torque=50.0, joint_effort=20.0)),
+    "lag": at_200_hz(actuators=ActuatorLimits(lag=0.005)),
+    "reports": at_200_hz(messages=Messages(loss=0.5, repeat=0.3, delay=0.02), seed=4),
+    "pose and odometry": of_one(pose_bias=PoseBias(0.004, -0.002, 0.001), odometry_scale=0.05),
+    "clock": of_one(clock_error=0.03, switch_delay=0.02),
+    "silence": of_one(silence=Silence(0.5, 0.02, motors="limp")),
+    "held motors": of_one(silence=Silence(0.5, 0.02, motors="held")),
+    "floor": at_200_hz(floor=Floor(coulomb_friction=5.0, viscous_friction=5.0, slope=0.01)),
+    "push": at_200_hz(pushes=(Push("robot_1", (15.0, 5.0), 0.5, 0.5, torque=1.0),)),
+}
+
+
+@cache
+def prepared(team="base"):
+    scenario, plan = small_problem(team)
+    return prepare(replace(scenario, deployment=at_200_hz()), plan, small_maps())
+
+
+def both(transport, deployment, maps):
+    """The outcome of the compiled loop, and the log of Drake's."""
+    scenario = replace(transport.scenario, deployment=deployment)
+    return run(transport, deployment), simulate(scenario, transport.plan, maps)
+
+
+def assert_agree(outcome, log, *, close=1e-5):
+    """Drake's log also has rows between samples where efforts lag, and integrates within an accuracy."""
+    assert outcome.arrived == log.reached
+    assert outcome.arrived, (outcome.reason, log.violation)
+    assert outcome.time == pytest.approx(log.times[-1], abs=0.0051)
+    assert outcome.funnel_margin == pytest.approx(log.funnel_margin.min(), abs=close)
+    assert outcome.wall_clearance == pytest.approx(log.workspace_clearance.min(), abs=close)
+    assert outcome.body_clearance == pytest.approx(log.body_clearance.min(), abs=close)
+    forces = np.hypot(log.base_wrenches[..., 0], log.base_wrenches[..., 1])
+    assert outcome.peak_force == pytest.approx(forces.max(), rel=2e-3)
+    assert outcome.peak_torque == pytest.approx(np.abs(log.joint_torques).max(), rel=2e-3)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_each_departure_has_the_same_effect(name):
+    outcome, log = both(prepared(), CASES[name], small_maps())
+    assert_agree(outcome, log)
+    assert repr(outcome) != repr(run(prepared()))
+
+
+def test_cells_are_measured_at_the_same_samples():
+    outcome, log = both(prepared(), at_200_hz(), small_maps())
+    assert outcome.cell_margin == pytest.approx(log.cell_clearance.min(), abs=1e-6)
+    assert outcome.steps == round(log.times[-1] * 200.0)
+    axes = np.c_[log.object_pose[:, 2], log.joints]
+    margins = np.minimum(axes - log.funnel_lower, log.funnel_upper - axes)
+    row, axis = np.unravel_index(np.argmin(margins), margins.shape)
+    assert outcome.funnel_axis == ("angle", *log.joint_names)[axis]
+    assert outcome.funnel_cell == log.cell_index[row]
+
+
+@pytest.mark.parametrize("team", ["base", "elbow"])
+def test_a_plan_with_a_budget_is_followed_as_in_drake(team):
+    scenario, plan = tubed_problem(WITH_AXES, team)
+    maps = build_maps(plan)
+    transport = prepare(replace(scenario, deployment=PRESET), plan, maps)
+    outcome, log = both(transport, PRESET, maps)
+    assert_agree(outcome, log, close=5e-5)
+    assert outcome.budget_share > 0.0
+    assert np.isnan(run(prepared()).budget_share)
+
+
+def test_a_lost_run_ends_where_and_why_it_does_in_drake():
+    harsh = Deployment(control_rate=100.0, measurements=Measurements(delay=0.1))
+    outcome, log = both(prepared(), harsh, small_maps())
+    assert not outcome.arrived
+    assert outcome.time == pytest.approx(log.times[-1])
+    place = "distance of {} to its funnel is -0.0146 rad or m"
+    assert outcome.reason.endswith(place.format("angle"))
+    assert place.format("object angle") in log.violation
+
+
+def test_the_same_seed_gives_the_same_run_and_another_seed_another_one():
+    runs = run_many(prepared(), [replace(PRESET, seed=seed) for seed in (1, 1, 2)])
+    first, again, other = map(repr, runs)
+    assert first == again
+    assert first != other
+    assert repr(run(prepared(), PRESET, seed=2)) == other
+
+
+@pytest.mark.parametrize(
+    ("key", "change"),
+    [
+        ("plant.grasps", {"plant": PlantSettings(grasps="constraints")}),
+        ("control.predictor", {"control": Control(predictor=True)}),
+        ("control.observer", {"control": Control(observer=True)}),
+        ("control.hold", {"control": Control(hold=Hold())}),
+    ],
+)
+def test_scenarios_that_the_loop_does_not_know_are_refused(key, change):
+    scenario, plan = small_problem()
+    with pytest.raises(ScenarioError) as refusal:
+        prepare(replace(scenario, deployment=at_200_hz(), **change), plan, small_maps())
+    assert key in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "deployment"),
+    [
+        ("deployment.control_rate", Deployment()),
+        ("deployment.robots.robot_0.sample_offset", of_one(sample_offset=0.001)),
+    ],
+)
+def test_departures_that_the_loop_does_not_know_are_refused(key, deployment):
+    with pytest.raises(ScenarioError) as refusal:
+        run(prepared(), deployment)
+    assert key in str(refusal.value)
