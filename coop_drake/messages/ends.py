@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, Literal
 
 from coop_drake.errors import MessagingError
@@ -149,28 +149,6 @@ class WorldEnd(_End):
     def send(self, peer: int, message: Any) -> bool:
         """Send a message to a robot or the supervisor; False where it has no session or takes no more."""
         return self.sensors.send(peer, message)
-
-    def receive_all(self, kinds: Mapping[int, type[Any]], number: int, limit: float) -> dict[int, Any]:
-        """Return one message of every sender about a sample, for lock-step; others are dropped meanwhile.
-
-        Args:
-            kinds: Which class is expected of which sender.
-            number: Number of the sample.
-            limit: Longest time to wait [s].
-
-        Raises:
-            MessagingError: Some sent none in time; it says who.
-        """
-        found: dict[int, Any] = {}
-        deadline = time.monotonic() + limit
-        while len(found) < len(kinds):
-            taken = self.receive(deadline - time.monotonic())
-            if taken is None:
-                raise MessagingError(f"{_missing(set(kinds) - set(found))} (waited for {limit:g} s)")
-            sender, message = taken
-            if type(message) is kinds.get(sender) and message.number == number:
-                found[sender] = message
-        return found
 
 
 class RobotEnd(_End):

@@ -1,11 +1,13 @@
 """Strangers, replayed, reordered, malformed messages and floods are refused and counted."""
 
 import random
+from contextlib import ExitStack
+from socket import create_connection
 
 import pytest
 
 from coop_drake.messages import Effort, Hello, Ready, Switch, make_keys
-from coop_drake.messages.codec import encode
+from coop_drake.messages.codec import LONGEST, encode
 from coop_drake.messages.incoming import BURST, Incoming
 from coop_drake.messages.refusals import RefusedError
 from coop_drake.messages.schema import SUPERVISOR
@@ -136,6 +138,27 @@ def test_a_client_refuses_what_is_not_its_servers(pairs):
     pairs.settle(lambda: honest.refusals.total == 5, honest)
     reasons = {reason.name for reason in honest.refusals.counts}
     assert reasons == {"LENGTH", "SENDER", "SESSION", "KIND", "SEQUENCE"}
+
+
+def test_connections_that_do_not_speak_zeromq_do_no_harm(pairs):
+    honest, dice = pairs.connect(0), random.Random(1)
+    place = ("127.0.0.1", int(pairs.server.address.rpartition(":")[2]))
+    with ExitStack() as opened:
+        for number in range(60):
+            connection = opened.enter_context(create_connection(place))
+            if number % 3 == 0:  # The others stay silent.
+                connection.sendall(b"GET / HTTP/1.1\r\n\r\n" + dice.randbytes(200))
+        exchange(pairs, honest)
+    exchange(pairs, honest, 2)
+    assert (pairs.server.peers[0].sessions, pairs.server.peers[0].incoming.lost) == (1, 0)
+
+
+def test_a_message_that_is_too_long_closes_its_connection(pairs):
+    honest, stranger = pairs.connect(0), pairs.stranger()
+    stranger.send(bytes(LONGEST + 1))
+    stranger.send(b"short")
+    assert pairs.refused(1) == {"LENGTH": 1}  # The connection was opened again.
+    exchange(pairs, honest)
 
 
 @pytest.fixture(scope="module")
