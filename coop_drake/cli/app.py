@@ -37,15 +37,18 @@ from coop_drake.cli.plan import plan_command
 from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.reproduce import reproduce_command
 from coop_drake.cli.robot import robot_command
+from coop_drake.cli.robot_node import robot_node_command
 from coop_drake.cli.run import run_command
 from coop_drake.cli.schema import schema_command
 from coop_drake.cli.show import show_command
 from coop_drake.cli.simulate import simulate_command
+from coop_drake.cli.supervisor import supervisor_command
 from coop_drake.cli.tune import tune_command
 from coop_drake.cli.verify import verify_command
 from coop_drake.cli.warm import warm_command
 from coop_drake.cli.watch import watch_command
 from coop_drake.cli.why import why_command
+from coop_drake.cli.world import world_command
 
 _PANELS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
     "Carrying objects": {
@@ -65,6 +68,9 @@ _PANELS: dict[str, dict[str, Callable[..., None] | typer.Typer]] = {
         "schema": schema_command,
     },
     "Processes of their own": {
+        "world": world_command,
+        "robot-node": robot_node_command,
+        "supervisor": supervisor_command,
         "keys": keys_command,
     },
     "Understanding answers": {

@@ -11,6 +11,8 @@ from multiprocessing.process import BaseProcess
 from types import TracebackType
 from typing import Any, NoReturn
 
+from pydrake.systems.framework import DiagramBuilder
+
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_digest
 from coop_drake.diagram import control_period
@@ -32,6 +34,7 @@ from coop_drake.nodes.robot_node import RobotNode
 from coop_drake.nodes.robot_server import RobotServer
 from coop_drake.nodes.supervisor_node import SupervisorNode
 from coop_drake.nodes.supervisor_server import SupervisorServer
+from coop_drake.plant import build_team_plant
 from coop_drake.scenario import Scenario
 from coop_drake.scenario.digest import scenario_digest
 
@@ -45,6 +48,11 @@ _OPENING = 30.0
 def question_of(scenario: Scenario, plan: Plan) -> Question:
     """Return what all processes of a team must agree on."""
     return Question(int(scenario_digest(scenario)[:16], 16), int(plan_digest(plan)[:16], 16))
+
+
+def robots_of(scenario: Scenario) -> int:
+    """Return the number of robots of a scenario."""
+    return len(build_team_plant(scenario, DiagramBuilder()).robots)
 
 
 def run_robot(

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import time as clocks
 from collections.abc import Callable, Sequence
-
-from pydrake.systems.framework import DiagramBuilder
+from typing import Any
 
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
@@ -14,9 +13,8 @@ from coop_drake.errors import MessagingError
 from coop_drake.fields import HarmonicMap
 from coop_drake.messages import AddressBook, Goodbye, KeyPair, WorldEnd, local_book
 from coop_drake.nodes.lock_step import LockStep
-from coop_drake.nodes.processes import LocalTeam, question_of
+from coop_drake.nodes.processes import LocalTeam, question_of, robots_of
 from coop_drake.nodes.serving import TURN
-from coop_drake.plant import build_team_plant
 from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import Sample, run_loop
@@ -83,6 +81,13 @@ def _open(end: WorldEnd, limit: float, check: Callable[[], None]) -> None:
                 raise MessagingError(f"{error}, {limit:g} s in all") from error
 
 
+def simulate_world(
+    scenario: Scenario, plan: Plan, _maps: Sequence[HarmonicMap], **options: Any
+) -> SimulationLog:
+    """Run the world as :func:`run_world` does, which needs no maps; called as other simulations are."""
+    return run_world(scenario, plan, **options)
+
+
 def simulate_in_processes(
     scenario: Scenario,
     plan: Plan,
@@ -105,6 +110,6 @@ def simulate_in_processes(
         ScenarioError: Robots do not compute at common samples.
     """
     control_period(scenario)
-    book = local_book(len(build_team_plant(scenario, DiagramBuilder()).robots))
+    book = local_book(robots_of(scenario))
     with LocalTeam(scenario, plan, maps, book) as team:
         return run_world(scenario, plan, book, check=team.check, progress=progress, observer=observer)
