@@ -5,21 +5,18 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from coop_drake.campaign.distributions import Count, Distribution
+from coop_drake.campaign.keys import Plain, Seed
 from coop_drake.campaign.questions.settings import QuestionSettings
+from coop_drake.campaign.search.settings import Breaking, Searches
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.reading import read_file
-from coop_drake.typed_data import EXACT, Codec, DataError, Limits, Positive
+from coop_drake.typed_data import DataError, Limits, Positive
 
 Tier = Literal["drake", "compiled"]
 """Which loop a run is made by."""
-
-Plain = Annotated[Any, Codec(lambda value, key: value, lambda value: value)]
-"""A value as it would stand in a scenario file; the scenario's own key says what is allowed."""
-
-Seed = Annotated[int, Limits(at_least=0), EXACT]
 
 
 @dataclass(frozen=True)
@@ -75,11 +72,15 @@ class Campaign:
     Attributes:
         runs: Runs of transports; null for none.
         questions: Random planning questions; null for none.
+        searches: Searches for runs with small margins; null for none.
+        breaking: Multiples of a budget at which runs are first lost; null for none.
         path: The file it was read from.
     """
 
     runs: Runs | None = None
     questions: QuestionSettings | None = None
+    searches: Searches | None = None
+    breaking: Breaking | None = None
     path: Path = field(default=Path("campaign.yaml"), metadata={"in_file": False})
 
     @property

@@ -75,7 +75,7 @@ def run_command(
             outcome = run_campaign(
                 campaign, folder.path, workers=workers, scheduler=scheduler, progress=progress
             )
-        reporter.facts["batches_made"] = outcome.made
+        reporter.facts.update(batches_made=outcome.made, searches_made=outcome.searched)
         _show(campaign, folder, outcome.batches, reporter)
 
 
@@ -97,9 +97,18 @@ def report_command(
     """Write report.html and report.json: rates with bounds, distributions, the worst runs."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         from coop_drake.campaign.report import make_report, write_report
+        from coop_drake.campaign.search.jobs import findings_of
 
         campaign, folder, batches = _with_batches(file, out)
-        report = make_report(campaign.name, folder.table(batches), folder.questions(batches))
+        findings, breaking = findings_of(campaign, folder.path)
+        report = make_report(
+            campaign.name,
+            folder.table(batches),
+            folder.questions(batches),
+            facts=_facts(campaign),
+            findings=findings,
+            breaking=breaking,
+        )
         at = "" if out is None else f" --out {out}"
         written = write_report(
             report,
@@ -157,6 +166,17 @@ def _read(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolder]:
     return campaign, CampaignFolder((out or Path("out") / "campaigns" / campaign.name).absolute())
 
 
+def _facts(campaign: Campaign) -> list[tuple[str, str]]:
+    """Return what a report says of what was asked for."""
+    from importlib.metadata import version
+
+    facts = [("file", campaign.path.name), ("coop_drake", version("coop-drake")), ("Drake", version("drake"))]
+    if campaign.runs is not None:
+        facts += [("seed", str(campaign.runs.seed)), ("varied keys", str(len(campaign.runs.vary)))]
+        facts += [("budget", campaign.runs.budget)] if campaign.runs.budget else []
+    return facts
+
+
 def _with_batches(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolder, tuple[Batch, ...]]:
     from coop_drake.campaign.running.command import batches_of
 
@@ -171,6 +191,8 @@ def _show(campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...]
         _show_questions(campaign, folder, batches, reporter)
     if campaign.runs is not None:
         _show_runs(campaign, folder, batches, reporter)
+    if campaign.searches is not None or campaign.breaking is not None:
+        _show_searches(campaign, folder, reporter)
     reporter.say(f"All results are in {escape(str(folder.path))}")
 
 
@@ -208,4 +230,35 @@ def _show_questions(
     if rows:
         reporter.table(campaign.name, [row.cells() for row in rows], headings, "questions by")
     if rows and rows[-1].wrong:
+        reporter.code = ExitCode.FAILED_RUN
+
+
+def _show_searches(campaign: Campaign, folder: CampaignFolder, reporter: Reporter) -> None:
+    """Show what searches and bisections have found; a run lost inside the budget makes the command fail."""
+    from dataclasses import asdict
+
+    from coop_drake.campaign.search.jobs import findings_of
+
+    findings, points = findings_of(campaign, folder.path)
+    reporter.facts["searches"] = [asdict(one) for one in findings]
+    reporter.facts["breaking"] = [{**asdict(one), "lost": one.beyond} for one in points]
+    if findings:
+        rows = [
+            (f"{one.scenario}, {one.seed}", str(one.evaluations), f"{one.before:.4f}", f"{one.least:.4f}")
+            for one in findings
+        ]
+        reporter.table("searches", rows, ("runs", "margin at first", "least found"), "scenario, seed")
+    if points:
+        rows = [
+            (
+                f"{one.scenario}, {one.departure}",
+                f"{one.certified:g}",
+                f"{one.kept:.3g}",
+                one.reason or "none",
+            )
+            for one in points
+        ]
+        headings = ("certified", "largest multiple without a loss", "the loss")
+        reporter.table("breaking points", rows, headings, "departure")
+    if any(not one.arrived for one in findings):
         reporter.code = ExitCode.FAILED_RUN

@@ -15,6 +15,7 @@ from coop_drake.campaign.questions.settings import QuestionSettings
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.campaign.running.placing import place
 from coop_drake.campaign.running.supervising import Order
+from coop_drake.campaign.search.jobs import run_jobs
 from coop_drake.campaign.settings import Campaign
 from coop_drake.campaign.variation import Variation
 from coop_drake.errors import ScenarioError
@@ -30,11 +31,13 @@ class Outcome:
         folder: Where its results are.
         batches: All of its batches.
         made: How many of them this call has made; the others were there.
+        searched: How many searches and bisections it has made.
     """
 
     folder: CampaignFolder
     batches: tuple[Batch, ...]
     made: int
+    searched: int = 0
 
 
 def batches_of(campaign: Campaign, folder: CampaignFolder) -> tuple[Batch, ...]:
@@ -59,7 +62,9 @@ def run_campaign(
     scheduler: str | None = None,
     progress: Progress | None = None,
 ) -> Outcome:
-    """Make all runs and answer all questions of a campaign whose records are not there yet.
+    """Make all runs and searches and answer all questions of a campaign whose results are not there yet.
+
+    Searches are made on this machine.
 
     Args:
         campaign: The campaign.
@@ -97,7 +102,8 @@ def run_campaign(
         orders = [Order(file, str(folder.path), one, _time_limit(campaign, one)) for one in missing]
         if orders:
             place(orders, workers, scheduler, note)
-        return Outcome(folder, batches, len(done))
+        searched = run_jobs(campaign, folder.path, workers or os.cpu_count() or 1, progress)
+        return Outcome(folder, batches, len(done), searched)
 
 
 def _time_limit(campaign: Campaign, batch: Batch) -> float:

@@ -29,7 +29,10 @@ _SHARES = ("velocity", "turn_rate", "joint_rates")
 """Errors that together reach the budget's bounds of rates and of the velocity."""
 
 _DELAYS = ("delay", "lag", "report_age")
-"""Departures from 0 to the budget's bound."""
+"""Departures up to the budget's bound."""
+
+_LEAST_LAG = 0.2
+"""Smallest lag over the budget's bound [-]: far shorter ones change nothing and take long to simulate."""
 
 
 class BoundedDepartures:
@@ -76,7 +79,7 @@ class BoundedDepartures:
         values |= dict.fromkeys((*noise, "deployment.messages.loss"), 0.0)
         values["deployment.mass_error"] = budget.model_error * (2.0 * given["model_error"] - 1.0)
         values["deployment.measurements.delay"] = budget.delay * given["delay"]
-        values["deployment.actuators.lag"] = budget.lag * given["lag"]
+        values["deployment.actuators.lag"] = budget.lag * (_LEAST_LAG + (1.0 - _LEAST_LAG) * given["lag"])
         values["deployment.messages.delay"] = budget.report_age * given["report_age"]
         return values
 

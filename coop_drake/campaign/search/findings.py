@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 
 @dataclass(frozen=True)
@@ -57,3 +58,8 @@ class BreakingPoint:
     lost: float
     runs: int
     reason: str
+
+    @property
+    def beyond(self) -> float | None:
+        """The smallest multiple at which a run was lost; None where none was."""
+        return self.lost if isfinite(self.lost) else None

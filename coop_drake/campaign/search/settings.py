@@ -1,0 +1,92 @@
+"""The sections ``searches`` and ``breaking`` of a campaign file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from coop_drake.campaign.distributions import Count
+from coop_drake.campaign.keys import Plain, Seed
+from coop_drake.typed_data import DataError, Limits, Positive
+
+Margin = Literal["funnel_margin", "cell_margin", "wall_clearance", "body_clearance"]
+"""A column of the runs that a search drives down."""
+
+DepartureName = Literal["delay", "lag", "angles", "rates", "position", "model", "reports", "all"]
+"""A departure that is multiplied."""
+
+
+@dataclass(frozen=True)
+class Searches:
+    """Searches for departures inside the budget of a plan with which a margin becomes as small as possible.
+
+    Normal noise and losses are off, because no number bounds them; errors of measurements are square waves
+    within the budget's bounds, which together with the model's error, delay, lag and the age of reports an
+    optimiser chooses (CMA-ES).
+
+    Attributes:
+        scenarios: Scenario files, relative to the campaign file, or names of shipped scenarios.
+        count: Searches for every scenario, each with a seed of its own.
+        evaluations: Largest number of runs of a search; a lost run ends it.
+        set: Values of keys of the scenario in every run and in the plan, by their dotted keys.
+        budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it; null for what
+            every scenario requires.
+        factor: How many times the budget departures may be; 1 for departures inside it [-].
+        margin: The margin that is driven down.
+        seed: Seed of all searches.
+        tier: Which loop simulates the runs.
+    """
+
+    scenarios: tuple[str, ...]
+    count: Count = 1
+    evaluations: Count = 200
+    set: dict[str, Plain] = field(default_factory=dict)
+    budget: str | None = None
+    factor: Positive = 1.0
+    margin: Margin = "funnel_margin"
+    seed: Seed = 0
+    tier: Literal["drake", "compiled"] = "drake"
+
+    def __post_init__(self) -> None:
+        if not self.scenarios:
+            raise DataError("scenarios", [], "at least one scenario")
+
+
+@dataclass(frozen=True)
+class Breaking:
+    """How many times the budget of a plan each departure may be until a run is lost, by bisection.
+
+    Errors of measurements are square waves with periods and signs drawn for every run. Those of one kind act
+    alone, with the delay and the lag of the budget; longer delays and lags come with all errors of it.
+
+    Attributes:
+        scenarios: Scenario files, relative to the campaign file, or names of shipped scenarios.
+        departures: What is multiplied, one after the other: ``angles``, ``rates`` and ``position`` for errors
+            of measurements, ``model`` for the model's error, ``reports`` for the age of reports, ``all`` for
+            all errors.
+        runs: Runs at every multiple.
+        halvings: How often the interval between a multiple that loses runs and one that does not is halved.
+        largest: Multiples beyond this are not tried [-].
+        set: Values of keys of the scenario in every run and in the plan, by their dotted keys.
+        budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it; null for what
+            every scenario requires.
+        seed: Seed of periods and signs.
+        tier: Which loop simulates the runs.
+    """
+
+    scenarios: tuple[str, ...]
+    departures: tuple[DepartureName, ...] = (
+        "delay", "lag", "angles", "rates", "position", "model", "reports", "all",
+    )  # fmt: skip
+    runs: Count = 10
+    halvings: Count = 5
+    largest: Annotated[float, Limits(at_least=1.0)] = 64.0
+    set: dict[str, Plain] = field(default_factory=dict)
+    budget: str | None = None
+    seed: Seed = 0
+    tier: Literal["drake", "compiled"] = "drake"
+
+    def __post_init__(self) -> None:
+        for name, values in (("scenarios", self.scenarios), ("departures", self.departures)):
+            if not values:
+                raise DataError(name, [], f"at least one of the {name}")

@@ -1,0 +1,99 @@
+"""Runs of one scenario along its plan, with departures that a search chooses."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import yaml
+
+from coop_drake.answers.budget import Budget
+from coop_drake.campaign.records import RunRecord
+from coop_drake.errors import ScenarioError
+from coop_drake.files import write_atomically
+from coop_drake.tree import ComponentTree
+
+if TYPE_CHECKING:
+    from coop_drake.campaign.results import CampaignFolder
+    from coop_drake.campaign.search.settings import Breaking, Searches
+    from coop_drake.campaign.settings import Campaign
+
+
+class Trials:
+    """Makes runs of one scenario, all along the plan that its budget asks for.
+
+    Args:
+        campaign: The campaign file, against which the name of the scenario is resolved.
+        asked: The section that asks for the runs.
+        scenario: Name of the scenario, one of the section's.
+        folder: The folder of the results, with the plans.
+    """
+
+    def __init__(
+        self, campaign: Campaign, asked: Searches | Breaking, scenario: str, folder: CampaignFolder
+    ) -> None:
+        from coop_drake.campaign.plans import Plans
+        from coop_drake.campaign.running.making import RunMaker
+        from coop_drake.campaign.settings import Campaign as File
+        from coop_drake.campaign.settings import Runs
+        from coop_drake.campaign.variation import Variation
+
+        self._section = Runs((scenario,), 1, set=asked.set, budget=asked.budget, tier=asked.tier)
+        self._campaign, self._name = campaign, scenario
+        self.variation = Variation(File(runs=self._section, path=campaign.path))
+        self._plans = Plans(self.variation, folder.plans)
+        self._maker = RunMaker(self.variation, self._plans, asked.tier, folder.path / "logs")
+
+    @property
+    def name(self) -> str:
+        """Name of the scenario."""
+        return self.variation.scenarios[0].name
+
+    @cached_property
+    def budget(self) -> Budget:
+        """The budget that the plan states.
+
+        Raises:
+            PlanError: There is no plan.
+            ScenarioError: The plan has no budget.
+        """
+        plan, _ = self._plans.with_maps(self.variation.run(0))
+        if plan.budget is None:
+            allowed = "position, all or a file with a budget: searches need to know what is certified"
+            raise ScenarioError(str(self._campaign.path), "budget", None, allowed)
+        return plan.budget
+
+    @cached_property
+    def tree(self) -> ComponentTree:
+        """The team."""
+        from coop_drake.plant import planning_problem
+
+        return planning_problem(self.variation.scenarios[0]).tree
+
+    @property
+    def digest(self) -> str:
+        """Digest of what the plan is made from."""
+        return self._plans.digest_of(self.variation.run(0))
+
+    def run_all(self, chosen: Sequence[Mapping[str, Any]], seed: int = 0) -> list[RunRecord]:
+        """Make one run for each choice of departures, with a seed for what is still drawn."""
+        from coop_drake.campaign.variation import Run
+
+        return [self._maker.record(Run(0, 0, seed, dict(values))) for values in chosen]
+
+    def write_found(self, values: Mapping[str, Any], file: Path, seed: int = 0) -> Path:
+        """Write a campaign file whose run 0 is the run with these departures, for ``campaign replay``."""
+        beside = self._campaign.path.parent / self._name
+        name = os.path.relpath(beside, file.parent) if beside.exists() else self._name
+        section: dict[str, Any] = {
+            "scenarios": [name],
+            "count": 1,
+            "set": dict(self._section.set),
+            "budget": self._section.budget,
+            "grid": {key: [value] for key, value in {**values, "deployment.seed": seed}.items()},
+        }
+        text = yaml.safe_dump({"runs": section}, sort_keys=False, allow_unicode=True)
+        return write_atomically(file, text.encode())

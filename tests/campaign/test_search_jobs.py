@@ -1,0 +1,136 @@
+"""Searches and bisections of a campaign file, and that what they find can be made again."""
+
+import json
+from dataclasses import replace
+from math import inf, isfinite
+
+import numpy as np
+import pytest
+import yaml
+
+from coop_drake.campaign import load_campaign
+from coop_drake.campaign.plans import Plans
+from coop_drake.campaign.running.making import RunMaker
+from coop_drake.campaign.search import BreakingPoint
+from coop_drake.campaign.search.jobs import carry_out, findings_of, jobs_of, run_jobs
+from coop_drake.campaign.search.multiples import departures_at, largest_multiple, multiplied
+from coop_drake.campaign.variation import Variation
+from coop_drake.errors import ScenarioError
+from tests.support.scenarios import write_scenario
+
+ASKED = {"set": {"deployment.preset": "mobile_base"}, "budget": "all", "scenarios": ["room.scenario.yaml"]}
+BROKEN = {**ASKED, "departures": ["angles", "model"], "runs": 2, "halvings": 6, "seed": 5}
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("searches")
+    write_scenario(folder / "room.scenario.yaml")
+    sections = {"searches": {**ASKED, "evaluations": 2, "seed": 4}, "breaking": BROKEN}
+    file = folder / "room.campaign.yaml"
+    file.write_text(yaml.safe_dump(sections))
+    return load_campaign(file)
+
+
+@pytest.fixture(scope="module")
+def searched(campaign):
+    """The one search of the campaign, made in a process of its own."""
+    alone = replace(campaign, breaking=None)
+    folder = campaign.path.parent / "results"
+    return alone, folder, run_jobs(alone, folder, workers=1)
+
+
+def test_a_search_is_made_once_and_kept(searched):
+    campaign, folder, made = searched
+    assert made == 1
+    assert run_jobs(campaign, folder, workers=1) == 0
+    (finding,), points = findings_of(campaign, folder)
+    assert points == []
+    assert (finding.scenario, finding.tier, finding.seed, finding.evaluations) == ("room", "drake", 4, 2)
+    assert finding.arrived
+    assert 0.0 < finding.least <= finding.before
+
+
+def test_the_worst_run_is_found_again_to_the_last_bit(searched):
+    campaign, folder, _ = searched
+    (finding,), _ = findings_of(campaign, folder)
+    again = Variation(load_campaign(folder / finding.file))
+    assert again.count == 1
+    maker = RunMaker(again, Plans(again, folder / "plans"), "drake", folder)
+    record = maker.record(again.run(0))
+    assert record.funnel_margin == finding.least
+    assert record.arrived
+    assert len(list((folder / "plans").iterdir())) == 1  # it follows the plan of the search
+
+
+def test_a_breaking_point_is_where_the_first_run_is_lost(campaign, searched, monkeypatch):
+    def record(maker, run):
+        size = run.values["deployment.measurements.waves.angle.size"]
+        return replace(maker.begun(run), arrived=size < 0.006, reason="" if size < 0.006 else "left")
+
+    monkeypatch.setattr(RunMaker, "record", record)
+    folder = searched[1]
+    first, second = (job for job in jobs_of(campaign, folder) if job.departure)
+    carry_out(first)
+    _, (angles,) = findings_of(campaign, folder)
+    assert angles.certified == 0.0015
+    assert (angles.kept < 4.0 <= angles.lost, angles.lost - angles.kept <= 0.1) == (True, True)
+    assert (angles.reason, angles.runs, angles.beyond) == ("left", 2, angles.lost)
+    carry_out(second)
+    _, (_, model) = findings_of(campaign, folder)
+    assert (model.departure, model.kept, model.lost, model.beyond) == ("model", 4.0, inf, None)
+    assert isinstance(model, BreakingPoint)
+    files = {job.departure: job.file() for job in jobs_of(campaign, folder)}
+    assert json.loads(files["model"].read_text())["lost"] is None
+
+
+def test_further_searches_leave_the_results_of_earlier_ones_valid(campaign, tmp_path):
+    more = replace(campaign, searches=replace(campaign.searches, count=3), breaking=None)
+    before, after = (jobs_of(one, tmp_path) for one in (campaign, more))
+    assert [job.seed for job in after] == [4, 5, 6]
+    assert after[0].file() == before[0].file()
+    other = replace(more, searches=replace(more.searches, evaluations=3))
+    assert jobs_of(other, tmp_path)[0].file() != before[0].file()
+
+
+def test_one_departure_acts_alone_at_its_multiple_and_all_errors_together(campaign, searched):
+    trials = jobs_of(campaign, searched[1])[0].trials()
+    budget, tree = trials.budget, trials.tree
+    waves = "deployment.measurements.waves"
+    angles = departures_at(budget, tree, "angles", 3.0, 1)
+    assert angles[f"{waves}.angle.size"] == angles[f"{waves}.joints.size"] == pytest.approx(3.0 * 0.0015)
+    assert angles[f"{waves}.turn_rate.size"] == angles["deployment.mass_error"] == 0.0
+    assert angles["deployment.measurements.delay"] == budget.delay
+    delay = departures_at(budget, tree, "delay", 2.0, 1)
+    assert delay["deployment.measurements.delay"] == 2.0 * budget.delay
+    assert delay[f"{waves}.angle.size"] == budget.angle_noise
+    errors = {departures_at(budget, tree, "model", 2.0, seed)["deployment.mass_error"] for seed in range(9)}
+    assert errors == {-0.4, 0.4}
+    assert largest_multiple(budget, "model", 64.0) == pytest.approx(4.5)
+    assert multiplied(budget, "all", 64.0).model_error == 0.9
+    rates = [departures_at(budget, tree, "rates", 1.0, seed) for seed in range(5)]
+    assert all(np.isfinite(value) for values in rates for value in values.values())
+    assert isfinite(largest_multiple(budget, "all", 8.0))
+
+
+@pytest.mark.parametrize(
+    ("section", "key"),
+    [
+        ({"searches": {**ASKED, "scenarios": []}}, "searches.scenarios"),
+        ({"searches": {**ASKED, "margin": "time"}}, "searches.margin"),
+        ({"breaking": {**BROKEN, "departures": ["wind"]}}, "breaking.departures[0]"),
+        ({"breaking": {**BROKEN, "largest": 0.5}}, "breaking.largest"),
+    ],
+)
+def test_wrong_sections_are_refused_with_file_and_key(section, key, tmp_path):
+    file = tmp_path / "wrong.campaign.yaml"
+    file.write_text(yaml.safe_dump(section))
+    with pytest.raises(ScenarioError) as refused:
+        load_campaign(file)
+    assert refused.value.key == key
+
+
+def test_a_search_needs_a_budget(campaign, searched):
+    asked = replace(campaign, searches=replace(campaign.searches, budget=None))
+    with pytest.raises(ScenarioError, match="what is certified"):
+        _ = jobs_of(asked, searched[1])[0].trials().budget
