@@ -68,7 +68,7 @@ def growth_svg(questions: Sequence[Questions]) -> str:
     if not groups:
         return ""
     names = [f"{one.axis} {one.group}" for one in groups]
-    figure, (ax,) = _panels(1, len(groups), names, width=5.0)
+    figure, (ax,) = _panels(1, len(groups), names, width=5.0, row=0.24)
     places = np.arange(len(groups))[::-1] + 0.35
     for place, one in zip(places, groups, strict=True):
         times = one.seconds
@@ -76,15 +76,16 @@ def growth_svg(questions: Sequence[Questions]) -> str:
         ax.plot(times.median, place, "o", color=BLUE, markersize=4.5)
         ax.plot(times.largest, place, "D", color=ORANGE, markersize=5.0)
     ax.set_xscale("log")
+    ax.xaxis.set_major_formatter("{x:g}")
     ax.set_xlabel("CPU time of an answer [s]")
     return _svg(figure)
 
 
 def _panels(
-    count: int, rows: int, names: Sequence[str], *, width: float = _PANEL
+    count: int, rows: int, names: Sequence[str], *, width: float = _PANEL, row: float = _ROW
 ) -> tuple[Figure, list[Axes]]:
     with house_style():
-        size = (_LABELS + count * width, rows * _ROW + 1.0)
+        size = (_LABELS + count * width, rows * row + 1.0)
         figure = Figure(figsize=size)
         FigureCanvasAgg(figure)
         axes = list(figure.subplots(1, count, sharey=True, squeeze=False)[0])

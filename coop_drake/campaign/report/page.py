@@ -77,7 +77,8 @@ def headline(report: Report) -> str:
         return report.rate.sentence
     if report.questions:
         every = report.questions[-1]
-        return f"{every.count:,} questions: {every.wrong:,} wrong answers, {every.undecided:,} undecided."
+        wrong = "1 wrong answer" if every.wrong == 1 else f"{every.wrong:,} wrong answers"
+        return f"{every.count:,} questions: {wrong}, {every.undecided:,} undecided."
     return "There are no results yet."
 
 
