@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from benchmarks.adversaries.measured import adversary_tasks
 from benchmarks.breaking import breaking_tasks
 from benchmarks.commands import bench_commands
+from benchmarks.compiled_runs import compiled_tasks
 from benchmarks.contents import TOPICS, WHOLE, show_contents
 from benchmarks.departures import departure_tasks
 from benchmarks.deployed import deployed_tasks
@@ -110,6 +111,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *simulating_tasks(),
         *departure_tasks(),
         *deployed_tasks(),
+        *compiled_tasks(),
         *adversary_tasks(),
         *message_tasks(),
     ]

@@ -19,6 +19,7 @@ TOPICS = {
     "simulating": "the closed loop beside the bare plant; memory of repeated runs",
     "departures": "transports of teams that are not ideal, mild and harsh; with predictor and observer",
     "deployed": "shipped transports under the preset mobile_base, at 10 and 20 ms, beside the ideal ones",
+    "compiled": "runs of the compiled loop beside those of Drake's: how many a second, and their differences",
     "breaking": "departures that an axis bears, by a search for the worst, beside those that are certified",
     "apart": "processes of their own: messages between them beside a pipe",
     "adversaries": "altered plans and proofs beside the exact checker; how long it checks random answers",

@@ -9,7 +9,7 @@ from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemor
 from coop_drake.compiled_loop.motion import advance
 from coop_drake.compiled_loop.robots import follow_axes, heard_cell, lead, remember_switch, report
 from coop_drake.compiled_loop.sensing import measure, receive
-from coop_drake.compiled_loop.watching import ENDED, RUNS, begin_figures, left_by_all, watch
+from coop_drake.compiled_loop.watching import ENDED, RUNS, begin_figures, left_by_all, watch, watch_switch
 from coop_drake.laws.channels import carry_reports
 from coop_drake.laws.nominal_axes import carry_axes
 from coop_drake.laws.random_draws import uniform_pair
@@ -42,6 +42,7 @@ def run_loop(
     watch(sample, cells, team, plant, nominal, departures, memory, measured, figures)
     while figures[ENDED] == RUNS:
         _update(sample, cells, team, nominal, departures, memory)
+        watch_switch(sample, cells, team, plant, departures, memory, figures)
         advance(sample, team, plant, departures, memory)
         sample += 1
         watch(sample, cells, team, plant, nominal, departures, memory, measured, figures)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from math import nan
 
 from coop_drake.compiled_loop.departing import believed, departures_of, memory_of, nominal_of
 from coop_drake.compiled_loop.looping import run_loop
@@ -54,7 +55,7 @@ class RunOutcome:
         budget_share: Largest share used of what the plan's budget states: of the tube's radius, or of the
             departure of an axis; NaN for a plan without a budget [-].
         peak_force: Largest force of a base [N].
-        peak_torque: Largest effort of a joint [N m or N]; zero for a team without joints.
+        peak_torque: Largest effort of a joint [N m or N]; NaN for a team without joints.
     """
 
     arrived: bool
@@ -121,7 +122,7 @@ def _outcome(transport: CompiledTransport, figures: FloatArray, period: float) -
         body_clearance=float(figures[BODY]),
         budget_share=float(figures[SHARE]),
         peak_force=float(figures[FORCE]),
-        peak_torque=float(figures[EFFORT]),
+        peak_torque=float(figures[EFFORT]) if transport.plan.joint_names else nan,
     )
 
 

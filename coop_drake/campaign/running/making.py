@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from coop_drake.answers.digest import content_digest
 from coop_drake.answers.log import SimulationLog
@@ -18,6 +19,9 @@ from coop_drake.errors import ScenarioError
 from coop_drake.scenario.digest import scenario_digest
 from coop_drake.scenario.model import Scenario
 
+if TYPE_CHECKING:
+    from coop_drake.compiled_loop import CompiledTransport, RunOutcome
+
 
 class RunMaker:
     """Makes the runs of a campaign in one process.
@@ -31,6 +35,7 @@ class RunMaker:
 
     def __init__(self, variation: Variation, plans: Plans, tier: Tier, logs: Path) -> None:
         self._variation, self._plans, self._tier, self._logs = variation, plans, tier, logs
+        self._transport: CompiledTransport | None = None
 
     def begun(self, run: Run) -> RunRecord:
         """Return the record of a run that has not ended."""
@@ -48,8 +53,11 @@ class RunMaker:
         try:
             plan, maps = self._plans.with_maps(run)
             scenario = self._variation.scenario_of(run)
+            digest = run_digest(scenario, plan, self._tier)
+            if self._tier == "compiled":
+                return replace(begun, digest=digest, **vars(self._compiled(scenario, plan, maps)))
             log = simulated(scenario, plan, maps)
-            record = record_of_log(run, begun.scenario, log, plan, run_digest(scenario, plan, self._tier))
+            record = record_of_log(run, begun.scenario, log, plan, digest)
         except (OSError, MemoryError):
             raise
         except Exception as error:
@@ -58,6 +66,19 @@ class RunMaker:
         if keep == "all" or (keep == "lost" and not record.arrived):
             log.save(self._logs / f"{run.index}.npz")
         return record
+
+    def _compiled(self, scenario: Scenario, plan: Plan, maps: Maps) -> RunOutcome:
+        """Make a run by the compiled loop; runs that differ in their deployments alone share their arrays."""
+        from coop_drake.compiled_loop import prepare, run
+
+        known = self._transport
+        if (
+            known is None
+            or known.plan is not plan
+            or replace(known.scenario, deployment=scenario.deployment) != scenario
+        ):
+            known = self._transport = prepare(scenario, plan, maps)
+        return run(known, scenario.deployment)
 
 
 def simulated(scenario: Scenario, plan: Plan, maps: Maps) -> SimulationLog:

@@ -1,0 +1,43 @@
+"""A campaign whose runs are made by both loops."""
+
+from dataclasses import asdict
+
+import pytest
+
+from coop_drake.campaign.plans import Plans
+from coop_drake.campaign.running.making import RunMaker
+from coop_drake.campaign.settings import load_campaign
+from coop_drake.campaign.variation import Variation
+from coop_drake.compiled_loop import preparing
+
+FILE = """
+runs:
+  scenarios: [warehouse]
+  count: 2
+  seed: 5
+  tier: both
+  set: {deployment.preset: mobile_base, deployment.messages.loss: 0.0}
+  vary:
+    deployment.mass_error: !Uniform {min: -0.2, max: 0.2}
+"""
+
+
+def test_both_tiers_leave_the_same_record(tmp_path, monkeypatch):
+    path, prepared = tmp_path / "both.campaign.yaml", []
+    path.write_text(FILE)
+    variation = Variation(load_campaign(path))
+    plans = Plans(variation, tmp_path)
+    monkeypatch.setattr(preparing, "_check", prepared.append)
+    compiled, drake = (RunMaker(variation, plans, tier, tmp_path) for tier in ("compiled", "drake"))
+    records = [compiled.record(variation.run(index)) for index in range(2)]
+    assert len(prepared) == 1
+    assert records[0].funnel_margin != records[1].funnel_margin
+    found, expected = asdict(records[1]), asdict(drake.record(variation.run(1)))
+    assert (found.pop("tier"), expected.pop("tier")) == ("compiled", "drake")
+    assert found.pop("digest") != expected.pop("digest")
+    for name in ("run", "scenario", "seed", "values", "arrived", "reason", "funnel_axis", "held"):
+        assert found[name] == expected[name]
+    assert found["time"] == pytest.approx(expected["time"], abs=0.0051)
+    for name in ("funnel_margin", "wall_clearance", "body_clearance"):
+        assert found[name] == pytest.approx(expected[name], abs=5e-4)
+    assert found["peak_force"] == pytest.approx(expected["peak_force"], rel=2e-3)
