@@ -46,6 +46,10 @@ class DirectExchange:
         self.messages += ((time, None, message) for message in told)
         return [effort for effort, _ in done]
 
+    def trouble(self) -> str:
+        """See ``Exchange``; nobody can be missing."""
+        return ""
+
     def look(self, time: float, measured: Sequence[FloatArray]) -> FloatArray:
         """See ``Exchange``."""
         assert self.supervisor is not None

@@ -18,7 +18,7 @@ from coop_drake.answers.plan_file import plan_digest
 from coop_drake.diagram import control_period
 from coop_drake.diagram.knowledge import robot_knowledge
 from coop_drake.diagram.station import build_station
-from coop_drake.errors import CoopDrakeError, MessagingError
+from coop_drake.errors import CoopDrakeError
 from coop_drake.fields import HarmonicMap
 from coop_drake.interrupts import uninterrupted
 from coop_drake.messages import (
@@ -145,15 +145,9 @@ class LocalTeam:
             process.start()
         self.processes[index] = process
 
-    def check(self) -> None:
-        """Raise where a process has ended by itself.
-
-        Raises:
-            MessagingError: It says which, and how it ended.
-        """
-        for index, process in self.processes.items():
-            if process.exitcode is not None:
-                raise MessagingError(f"the process of {name_of(index)} ended ({_ending(process.exitcode)})")
+    def gone(self) -> set[int]:
+        """Return the indices of the processes that have ended."""
+        return {index for index, process in self.processes.items() if process.exitcode is not None}
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -163,10 +157,6 @@ class LocalTeam:
             if process.is_alive():
                 process.kill()
                 process.join()
-
-
-def _ending(code: int) -> str:
-    return f"killed by {signal.Signals(-code).name}" if code < 0 else f"exit code {code}"
 
 
 def _served(name: str, work: Callable[..., int], arguments: tuple[Any, ...], parent: int) -> NoReturn:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time as clocks
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 from coop_drake.answers.log import SimulationLog
@@ -11,9 +11,10 @@ from coop_drake.answers.plan import Plan
 from coop_drake.diagram import build_world, control_period
 from coop_drake.errors import MessagingError
 from coop_drake.fields import HarmonicMap
-from coop_drake.messages import AddressBook, Goodbye, KeyPair, WorldEnd, local_book
-from coop_drake.nodes.lock_step import LockStep
+from coop_drake.messages import AddressBook, Goodbye, KeyPair, WorldEnd, local_book, name_of
+from coop_drake.nodes.pacing import Pacing
 from coop_drake.nodes.processes import LocalTeam, question_of, robots_of
+from coop_drake.nodes.sample_exchange import PATIENCE, SampleExchange
 from coop_drake.nodes.serving import TURN
 from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
@@ -29,8 +30,11 @@ def run_world(
     book: AddressBook,
     *,
     keys: KeyPair | None = None,
-    check: Callable[[], None] = lambda: None,
+    gone: Callable[[], Collection[int]] = tuple,
     opening: float = 60.0,
+    pacing: Pacing | None = None,
+    patience: float = PATIENCE,
+    before: Callable[[int], None] = lambda sample: None,
     progress: Progress | None = None,
     observer: Callable[[Sample], None] | None = None,
 ) -> SimulationLog:
@@ -41,8 +45,11 @@ def run_world(
         plan: The plan that all have.
         book: Who listens where.
         keys: The world's keys, None where the book has none.
-        check: Called while the world waits; raises where a process is known to have ended.
+        gone: Returns the processes that are known to have ended.
         opening: How long to wait for the others [s].
+        pacing: Keeps the pace of the wall clock, see ``SampleExchange``; as ``patience`` and ``before``.
+        patience: How long a process may take for an answer in lock-step [s].
+        before: Called before every sample with its number.
         progress: Called with the stage and the fraction done, if given.
         observer: Called with every accepted step.
 
@@ -51,10 +58,12 @@ def run_world(
         ScenarioError: Robots do not compute at common samples.
     """
     end, outcome = WorldEnd(book, question_of(scenario, plan), keys), INTERRUPTED
-    exchange = LockStep(end, len(book.robots), check=check)
+    exchange = SampleExchange(
+        end, len(book.robots), pacing=pacing, gone=gone, patience=patience, before=before
+    )
     world = build_world(scenario, plan, exchange)
     try:
-        _open(end, opening, check)
+        _open(end, opening, gone)
         log = run_loop(world, scenario, progress=progress, observer=observer)
         outcome = ARRIVED if log.reached and not log.violation else FAILED
         return log
@@ -65,7 +74,7 @@ def run_world(
         world.release()
 
 
-def _open(end: WorldEnd, limit: float, check: Callable[[], None]) -> None:
+def _open(end: WorldEnd, limit: float, gone: Callable[[], Collection[int]]) -> None:
     """Wait for everybody.
 
     Raises:
@@ -76,7 +85,9 @@ def _open(end: WorldEnd, limit: float, check: Callable[[], None]) -> None:
         try:
             return end.open(min(TURN, limit))
         except MessagingError as error:
-            check()
+            if ended := gone():
+                names = ", ".join(name_of(index) for index in sorted(ended))
+                raise MessagingError(f"the process of {names} ended before the start") from error
             if clocks.monotonic() > deadline:
                 raise MessagingError(f"{error}, {limit:g} s in all") from error
 
@@ -93,6 +104,7 @@ def simulate_in_processes(
     plan: Plan,
     maps: Sequence[HarmonicMap],
     *,
+    pacing: Pacing | None = None,
     progress: Progress | None = None,
     observer: Callable[[Sample], None] | None = None,
 ) -> SimulationLog:
@@ -102,6 +114,7 @@ def simulate_in_processes(
         scenario: The scenario.
         plan: A plan for it.
         maps: The harmonic map of every transition.
+        pacing: Keeps the pace of the wall clock, None for lock-step.
         progress: Called with the stage and the fraction done, if given.
         observer: Called with every accepted step.
 
@@ -112,4 +125,6 @@ def simulate_in_processes(
     control_period(scenario)
     book = local_book(robots_of(scenario))
     with LocalTeam(scenario, plan, maps, book) as team:
-        return run_world(scenario, plan, book, check=team.check, progress=progress, observer=observer)
+        return run_world(
+            scenario, plan, book, gone=team.gone, pacing=pacing, progress=progress, observer=observer
+        )

@@ -45,6 +45,10 @@ class Exchange(Protocol):
         """
         ...
 
+    def trouble(self) -> str:
+        """Return who is missing since when; empty where everybody is there."""
+        ...
+
     def look(self, time: float, measured: Sequence[FloatArray]) -> FloatArray:
         """Return what everybody would log at an instant: all robots' records, then the supervisor's."""
         ...
@@ -86,6 +90,11 @@ class TeamLink(Block):
             self._declare_effort(f"robot_{k}_effort_command", slice(int(end) - size, int(end)))
         self.DeclareVectorOutputPort("records", record_size, self._write_records)
         self.DeclarePeriodicDiscreteUpdateEvent(period_sec=period, offset_sec=0.0, update=self._sample)
+
+    @property
+    def trouble(self) -> str:
+        """Who is missing since when; empty where everybody is there."""
+        return self._exchange.trouble()
 
     def _declare_effort(self, name: str, part: slice) -> None:
         def write(context: Context, output: BasicVector) -> None:

@@ -11,21 +11,13 @@ from coop_drake.messages import SUPERVISOR, Present, Ready, Switch, local_book
 from coop_drake.messages.codec import decode, header_of
 from coop_drake.messages.wire import MESSAGES
 from coop_drake.nodes import LocalTeam, run_supervisor, run_world, simulate_in_processes
-from coop_drake.scenario import Control, Deployment, Hold, Measurements, Messages
+from coop_drake.scenario import Control, Hold, Measurements, Messages
 from coop_drake.simulation import communication, simulate
 from tests.support.same_runs import differences
-from tests.support.small_loop import small_maps, small_problem
+from tests.support.sampled_team import sampled
+from tests.support.small_loop import small_maps
 
 pytestmark = pytest.mark.no_cover
-
-
-IDEAL = Control()
-
-
-def sampled(team, control=IDEAL, **departures):
-    scenario, plan = small_problem(team)
-    deployment = Deployment(control_rate=100.0, **departures)
-    return replace(scenario, deployment=deployment, control=control), plan
 
 
 def test_a_held_team_of_three_with_noise_delay_and_losses_runs_as_in_one_process():
@@ -50,7 +42,7 @@ def test_a_transport_needs_a_few_hundred_bytes_between_robots(tmp_path):
         run_supervisor, tap=lambda way, peer, data: os.write(log, bytes((way == "sent", len(data))) + data)
     )
     with team:
-        counted = communication(run_world(scenario, plan, book, check=team.check))
+        counted = communication(run_world(scenario, plan, book, gone=team.gone))
     os.close(log)
     data, said = recorded.read_bytes(), []
     while data:
@@ -66,17 +58,6 @@ def test_a_transport_needs_a_few_hundred_bytes_between_robots(tmp_path):
     assert len(ready) + len(switches) + len(opening) == len(said)
     assert sum(isinstance(message, Present) for message in opening) == 2
     assert sum(size for _, _, size in said) < 600
-
-
-def test_a_process_that_ends_is_named():
-    scenario, plan = sampled("base")
-    book = local_book(2)
-    with LocalTeam(scenario, plan, small_maps(), book) as team:
-        team.processes[1].kill()
-        team.processes[1].join()
-        with pytest.raises(MessagingError, match="robot 1 ended"):
-            run_world(scenario, plan, book, check=team.check)
-    assert not any(process.is_alive() for process in team.processes.values())
 
 
 def test_processes_with_another_plan_are_turned_away(capfd):
