@@ -237,6 +237,7 @@ def _show_searches(campaign: Campaign, folder: CampaignFolder, reporter: Reporte
     """Show what searches and bisections have found; a run lost inside the budget makes the command fail."""
     from dataclasses import asdict
 
+    from coop_drake.campaign.report.searches import summarise_searches
     from coop_drake.campaign.search.jobs import findings_of
 
     findings, points = findings_of(campaign, folder.path)
@@ -244,10 +245,15 @@ def _show_searches(campaign: Campaign, folder: CampaignFolder, reporter: Reporte
     reporter.facts["breaking"] = [{**asdict(one), "lost": one.beyond} for one in points]
     if findings:
         rows = [
-            (f"{one.scenario}, {one.seed}", str(one.evaluations), f"{one.before:.4f}", f"{one.least:.4f}")
-            for one in findings
+            (
+                f"{row.scenario}, {row.margin.replace('_', ' ')}",
+                *map(str, (row.searches, row.runs, row.lost)),
+                *(f"{number:.4f}" for number in (row.before, row.typical, row.worst.worst)),
+            )
+            for row in summarise_searches(findings)
         ]
-        reporter.table("searches", rows, ("runs", "margin at first", "least found"), "scenario, seed")
+        heads = ("searches", "runs", "found a loss", "random", "usual find", "worst find")
+        reporter.table("searches", rows, heads, "scenario, driven")
     if points:
         rows = [
             (

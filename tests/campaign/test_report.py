@@ -12,6 +12,7 @@ from coop_drake.campaign.records import QuestionRecord, table_of
 from coop_drake.campaign.report import make_report, write_report
 from coop_drake.campaign.report.page import headline, render_page
 from coop_drake.campaign.report.rates import loss_rate
+from coop_drake.campaign.report.searches import summarise_searches
 from coop_drake.campaign.search import BreakingPoint, Finding
 from tests.support.campaign_table import run_table
 
@@ -137,6 +138,19 @@ def test_questions_are_grouped_by_what_makes_them_hard():
     }  # fmt: skip
     page = render_page(report, replay)
     assert "width 1 to 1.2" in page
+
+
+def test_searches_of_a_scenario_are_told_together():
+    def find(seed, worst, arrived=True, margin="funnel_margin"):
+        return Finding("base", "compiled", seed, 10, margin, 9e-3, worst, arrived, "", f"found/{seed}")
+
+    shares = [find(4, 0.5, margin="budget_share"), find(5, 0.9, margin="budget_share")]
+    margins, share = summarise_searches([find(1, 5e-3), find(2, 3e-3), find(3, 7e-3), *shares])
+    assert (margins.searches, margins.runs, margins.lost, margins.typical) == (3, 30, 0, 5e-3)
+    assert margins.worst.file == "found/2"
+    assert share.worst.file == "found/5"
+    (lost,) = summarise_searches([find(1, 5e-3), find(2, 6e-3, arrived=False)])
+    assert (lost.lost, lost.worst.seed) == (1, 2)
 
 
 class Links(HTMLParser):

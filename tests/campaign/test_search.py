@@ -109,6 +109,8 @@ def test_a_lost_run_counts_as_less_than_any_other():
     assert margin_of(record(2e-3, arrived=False), "funnel_margin") == LOST
     assert margin_of(record(-2e-3, arrived=False), "funnel_margin") == -2e-3
     assert margin_of(record(nan), "funnel_margin") == inf
+    assert margin_of(record(2e-3, budget_share=0.7), "budget_share") == pytest.approx(0.3)
+    assert margin_of(record(2e-3, arrived=False, budget_share=1.2), "budget_share") == pytest.approx(-0.2)
     assert margin_of(replace(record(nan), arrived=False), "funnel_margin") == LOST
 
 

@@ -48,7 +48,7 @@ def test_a_search_is_made_once_and_kept(searched):
     assert points == []
     assert (finding.scenario, finding.tier, finding.seed, finding.evaluations) == ("room", "drake", 4, 2)
     assert finding.arrived
-    assert 0.0 < finding.least <= finding.before
+    assert 0.0 < finding.worst <= finding.before
 
 
 def test_the_worst_run_is_found_again_to_the_last_bit(searched):
@@ -58,7 +58,7 @@ def test_the_worst_run_is_found_again_to_the_last_bit(searched):
     assert again.count == 1
     maker = RunMaker(again, Plans(again, folder / "plans"), "drake", folder)
     record = maker.record(again.run(0))
-    assert record.funnel_margin == finding.least
+    assert record.funnel_margin == finding.worst
     assert record.arrived
     assert len(list((folder / "plans").iterdir())) == 1  # it follows the plan of the search
 

@@ -13,6 +13,7 @@ from coop_drake.campaign.report.document import Report
 from coop_drake.campaign.report.figures import breaking_svg, distributions_svg, growth_svg
 from coop_drake.campaign.report.influences import Influence
 from coop_drake.campaign.report.rates import percent
+from coop_drake.campaign.report.searches import summarise_searches
 from coop_drake.campaign.report.worst import WorstRun
 from coop_drake.drawing import colours
 from coop_drake.files import write_atomically
@@ -48,7 +49,8 @@ def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
         "report.html",
         report=report,
         headline=headline(report),
-        good=not (report.rate and report.rate.lost) and not any(row.wrong for row in report.questions),
+        good=not (report.rate and report.rate.lost)
+        and all(one.arrived for one in report.findings) and not any(row.wrong for row in report.questions),
         rows=[_row(group) for group in report.groups],
         margins=MARGINS,
         table=_influence_table(report.influences),
@@ -59,6 +61,7 @@ def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
             (one, [_shown(measure.name, one.largest.get(measure.name, nan)) for measure in agreed])
             for one in report.agreements
         ],
+        searched=summarise_searches(report.findings),
         shown=_shown,
         percent=percent,
         figures={

@@ -15,9 +15,9 @@ class Finding:
         tier: Which loop simulated the runs.
         seed: Seed of the search.
         evaluations: Runs simulated.
-        margin: Name of the column that was driven down.
-        before: Its value in the first run, without errors [unit of the column].
-        least: Its smallest value [unit of the column].
+        margin: Name of the column that was driven down, or up if it is ``budget_share``.
+        before: Its value in the first run, whose departures were drawn at random [unit of the column].
+        worst: Its worst value [unit of the column].
         arrived: Whether the worst run arrived.
         reason: Why not; empty if it arrived.
         file: Scenario file of the worst run; empty where none was written.
@@ -29,7 +29,7 @@ class Finding:
     evaluations: int
     margin: str
     before: float
-    least: float
+    worst: float
     arrived: bool
     reason: str
     file: str = ""

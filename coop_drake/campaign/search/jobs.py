@@ -22,7 +22,7 @@ from coop_drake.campaign.search.findings import BreakingPoint, Finding
 from coop_drake.campaign.search.multiples import SCALED, departures_at, largest_multiple
 from coop_drake.campaign.search.settings import Breaking, Searches
 from coop_drake.campaign.search.trials import Trials
-from coop_drake.campaign.search.worst import search_worst
+from coop_drake.campaign.search.worst import in_column, search_worst
 from coop_drake.campaign.settings import Campaign
 from coop_drake.files import write_atomically
 from coop_drake.interrupts import uninterrupted
@@ -30,6 +30,10 @@ from coop_drake.progress import Progress
 
 _FOLDER = "searches"
 """Where results of searches and bisections are, below the campaign's folder."""
+
+
+_TRIALS: dict[tuple[str, str, str, str], Trials] = {}
+"""What makes runs in this process: jobs of one scenario share its plan and maps."""
 
 
 @dataclass(frozen=True)
@@ -58,8 +62,11 @@ class Job:
         return found
 
     def trials(self) -> Trials:
-        """Return what makes the job's runs."""
-        return Trials(self.campaign, self.asked, self.scenario, CampaignFolder(self.folder))
+        """Return what makes the job's runs; the same for jobs that ask for the same ones."""
+        key = str(self.campaign.path), str(self.folder), self.scenario, repr(self.asked)
+        if key not in _TRIALS:
+            _TRIALS[key] = Trials(self.campaign, self.asked, self.scenario, CampaignFolder(self.folder))
+        return _TRIALS[key]
 
     def file(self) -> Path:
         """Return the file of the result, named by the digest of all that it depends on."""
@@ -87,7 +94,7 @@ def jobs_of(campaign: Campaign, folder: Path) -> list[Job]:
 
 
 def run_jobs(campaign: Campaign, folder: Path, workers: int, progress: Progress | None = None) -> int:
-    """Make the searches and bisections whose results are not there, each in a process of its own.
+    """Make the searches and bisections whose results are not there, by processes.
 
     Args:
         campaign: The campaign.
@@ -105,10 +112,10 @@ def run_jobs(campaign: Campaign, folder: Path, workers: int, progress: Progress 
         _ = first.trials().budget  # Processes find the plan in the folder.
     if not missing:
         return 0
+    context, drake = multiprocessing.get_context("spawn"), any(job.asked.tier == "drake" for job in missing)
     with uninterrupted():
-        pool = ProcessPoolExecutor(
-            workers, mp_context=multiprocessing.get_context("spawn"), max_tasks_per_child=1
-        )
+        # Drake keeps some memory of every plant, which ends with the process.
+        pool = ProcessPoolExecutor(workers, mp_context=context, max_tasks_per_child=1 if drake else None)
         futures = [pool.submit(carry_out, job) for job in missing]
     try:
         for count, future in enumerate(as_completed(futures), start=1 + len(jobs) - len(missing)):
@@ -169,8 +176,8 @@ def _searched(job: Job) -> Finding:
         job.seed,
         len(found.margins),
         asked.margin,
-        found.margins[0],
-        min(found.margins),
+        in_column(found.margins[0], asked.margin),
+        in_column(min(found.margins), asked.margin),
         found.record.arrived,
         found.record.reason,
         str(file.relative_to(job.folder)),

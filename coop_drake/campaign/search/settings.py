@@ -9,8 +9,8 @@ from coop_drake.campaign.distributions import Count
 from coop_drake.campaign.keys import Plain, Seed
 from coop_drake.typed_data import DataError, Limits, Positive
 
-Margin = Literal["funnel_margin", "cell_margin", "wall_clearance", "body_clearance"]
-"""A column of the runs that a search drives down."""
+Margin = Literal["funnel_margin", "cell_margin", "wall_clearance", "body_clearance", "budget_share"]
+"""A column of the runs that a search drives down; the share of what the budget states it drives up."""
 
 DepartureName = Literal["delay", "lag", "angles", "rates", "position", "model", "reports", "all"]
 """A departure that is multiplied."""
@@ -32,7 +32,7 @@ class Searches:
         budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it; null for what
             every scenario requires.
         factor: How many times the budget departures may be; 1 for departures inside it [-].
-        margin: The margin that is driven down.
+        margin: The margin that is driven down; ``budget_share`` is driven up.
         seed: Seed of all searches.
         tier: Which loop simulates the runs.
     """

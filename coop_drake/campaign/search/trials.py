@@ -73,7 +73,7 @@ class Trials:
 
         return planning_problem(self.variation.scenarios[0]).tree
 
-    @property
+    @cached_property
     def digest(self) -> str:
         """Digest of what the plan is made from."""
         return self._plans.digest_of(self.variation.run(0))

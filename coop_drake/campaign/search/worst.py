@@ -40,11 +40,19 @@ class Worst:
 
 
 def margin_of(record: RunRecord, name: str) -> float:
-    """Return a margin of a run, and below zero if the run was lost."""
-    margin = float(getattr(record, name))
+    """Return a margin of a run, and below zero if the run was lost.
+
+    ``budget_share`` counts as what is left of the budget's stated distance.
+    """
+    margin = in_column(float(getattr(record, name)), name)
     if record.arrived:
         return margin if isfinite(margin) else np.inf
     return margin if margin < 0.0 else LOST
+
+
+def in_column(margin: float, name: str) -> float:
+    """Return what the column has that a margin stands for, or the other way round."""
+    return 1.0 - margin if name == "budget_share" else margin
 
 
 def search_worst(

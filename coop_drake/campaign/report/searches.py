@@ -1,0 +1,58 @@
+"""What the searches of a scenario found together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from coop_drake.campaign.search.findings import Finding
+
+
+@dataclass(frozen=True)
+class Searched:
+    """The searches of one scenario for one margin in one tier.
+
+    Attributes:
+        scenario: Name of the scenario.
+        tier: Which loop simulated the runs.
+        margin: Name of the column that was driven down, or up if it is ``budget_share``.
+        searches: Number of searches.
+        runs: Runs of all of them.
+        lost: Searches that found a lost run.
+        before: Median of the first runs' values [unit of the column].
+        typical: Median of the worst values [unit of the column].
+        worst: The finding with the worst value of all; a lost run if there is one.
+    """
+
+    scenario: str
+    tier: str
+    margin: str
+    searches: int
+    runs: int
+    lost: int
+    before: float
+    typical: float
+    worst: Finding
+
+
+def summarise_searches(findings: Sequence[Finding]) -> tuple[Searched, ...]:
+    """Return what searches found by scenario, tier and margin, in the order in which these come first."""
+    groups: dict[tuple[str, str, str], list[Finding]] = {}
+    for one in findings:
+        groups.setdefault((one.scenario, one.tier, one.margin), []).append(one)
+    return tuple(_summary(key, group) for key, group in groups.items())
+
+
+def _summary(key: tuple[str, str, str], group: Sequence[Finding]) -> Searched:
+    sign = -1.0 if key[2] == "budget_share" else 1.0
+    return Searched(
+        *key,
+        searches=len(group),
+        runs=sum(one.evaluations for one in group),
+        lost=sum(not one.arrived for one in group),
+        before=float(np.median([one.before for one in group])),
+        typical=float(np.median([one.worst for one in group])),
+        worst=min(group, key=lambda one: (one.arrived, sign * one.worst)),
+    )
