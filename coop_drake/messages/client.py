@@ -73,7 +73,7 @@ class MessageClient:
         self._sender, self._question, self._tap = sender, question, tap
         role: Role = "world" if server == WORLD else "supervisor"
         self._allowed = allowed_kinds(channel, ("server", "both", role))
-        self._nonce, self._asked = 0, -math.inf
+        self._nonce, self._asked = secrets.randbits(32), -math.inf
         self._own_context = None if context else zmq.Context()
         used = context or self._own_context
         assert used is not None
@@ -113,17 +113,19 @@ class MessageClient:
             if event in FAILURES:
                 self.trouble = "the connection was refused: a key is missing or wrong"
             elif event == zmq.Event.DISCONNECTED:
-                self.session = 0  # The next server may be another process, which does not know the session.
+                # The next server may be another process, which does not know the session.
+                self.session, self._nonce = 0, secrets.randbits(32)
             elif not self.session:
                 self._asked = -math.inf
-        if not self.session and monotonic() - self._asked >= _AGAIN:
-            self._ask()
         for _ in range(_READ_AT_ONCE):
             parts = next_parts(self._socket)
             if parts is None:
-                return None
+                break
             if (message := self._take(parts)) is not None:
                 return message
+        if not self.session and monotonic() - self._asked >= _AGAIN:
+            self._asked = monotonic()
+            self._put(encode(Hello(self._nonce, *self._question), self._sender, 0, 0))
         return None
 
     def send(self, message: Any) -> bool:
@@ -142,10 +144,6 @@ class MessageClient:
         self._socket.close()
         if self._own_context is not None:
             self._own_context.term()
-
-    def _ask(self) -> None:
-        self._nonce, self._asked = secrets.randbits(32), monotonic()
-        self._put(encode(Hello(self._nonce, *self._question), self._sender, 0, 0))
 
     def _take(self, parts: list[zmq.Frame]) -> Any | None:
         """Return a message, None where it is about a session or is refused."""
@@ -173,8 +171,10 @@ class MessageClient:
 
     def _answered(self, answer: Any) -> None:
         """Begin the session that is offered, or remember why there is none."""
-        if self.session or answer.nonce != self._nonce:
+        if answer.nonce != self._nonce:
             raise RefusedError(Reason.SESSION)
+        if self.session:
+            return  # The answer to a question that was asked again meanwhile.
         if isinstance(answer, TurnedAway):
             self.trouble = REASONS.get(answer.reason, "it does not know this process")
             return

@@ -50,7 +50,11 @@ class Peer:
         return self.route is not None and self.route != route and now - self.heard < SILENCE
 
     def offer(self, route: bytes) -> int:
-        """Draw a session for a connection; it begins with the first message that carries it."""
+        """Return the session of a connection, drawn when it first asks; its first message begins it."""
+        if route == self.route:
+            return self.session
+        if route in self.offers:
+            return self.offers[route]
         while len(self.offers) >= _MOST_OFFERS:
             del self.offers[next(iter(self.offers))]
         self.offers[route] = 1 + secrets.randbelow(2**32 - 1)

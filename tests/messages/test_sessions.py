@@ -4,8 +4,9 @@ import pytest
 import zmq
 
 from coop_drake.errors import MessagingError
-from coop_drake.messages import Effort, Present, Question, Ready, Switch
-from tests.support.message_pairs import LIMIT, Pairs
+from coop_drake.messages import Effort, Hello, Present, Question, Ready, Switch
+from coop_drake.messages.codec import encode
+from tests.support.message_pairs import LIMIT, QUESTION, Pairs
 
 
 @pytest.fixture
@@ -98,3 +99,17 @@ def test_nothing_is_sent_without_a_session(pairs):
 def test_an_address_that_is_taken_is_named(pairs):
     with pytest.raises(MessagingError, match=f"{pairs.server.address}: cannot listen there: address already"):
         Pairs(address=pairs.server.address)
+
+
+def test_a_process_that_asks_again_before_it_reads_the_answer_gets_one_session(pairs):
+    client = pairs.client(0)
+    hello = encode(Hello(client._nonce, *QUESTION), 0, 0, 0)
+    for _ in range(3):
+        pairs.settle(lambda: client._put(hello))
+    peer = pairs.server.peers[0]
+    pairs.settle(lambda: peer.incoming.received and peer.session == client.session, client)
+    client._put(hello)
+    assert client.send(Ready(1, True))
+    assert pairs.settle(lambda: peer.incoming.received == 2, client) == [(0, Ready(1, True))]
+    assert peer.sessions == client.sessions == 1
+    assert (pairs.server.refusals.total, client.refusals.total) == (0, 0)
