@@ -48,7 +48,7 @@ def replay(
     plan, maps = Plans(variation, folder.plans).with_maps(run)
     task = Task(scenario, planning_problem(scenario))
     results = ResultFolder.of(task.name, folder.path / "replays" / str(index), "simulation")
-    simulation = simulation_of(task, fastest_blocks(scenario, plan, maps), apart=False)
+    simulation = simulation_of(task, fastest_blocks(scenario, plan, maps), reporter)
     with DrawingProcesses(figures=figures) as drawing:
         code = carry_out(task, plan, results, reporter, drawing, None, simulation, fresh_maps=False)
     log = SimulationLog.load(results.path / "log.npz")

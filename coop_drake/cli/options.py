@@ -117,6 +117,13 @@ Apart = Annotated[
         help="Run every robot and the supervisor as a process of its own; same results, bit for bit.",
     ),
 ]
+FreeRunning = Annotated[
+    bool,
+    typer.Option(
+        "--free-running",
+        help="Pace the processes by the wall clock: what comes too late is not waited for; measures ages.",
+    ),
+]
 BlocksName = Annotated[
     Literal["named", "fused"],
     typer.Option(

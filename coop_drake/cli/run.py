@@ -14,6 +14,7 @@ from coop_drake.cli.maps import map_cells, write_certificates
 from coop_drake.cli.options import (
     Apart,
     BlocksName,
+    FreeRunning,
     FreshMaps,
     GainsName,
     Live,
@@ -28,7 +29,7 @@ from coop_drake.cli.options import (
 from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
-from coop_drake.cli.summary import simulation_facts, summary_rows
+from coop_drake.cli.summary import process_lines, simulation_facts, summary_rows
 from coop_drake.cli.task import Task, read_task
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
@@ -53,6 +54,7 @@ def run_command(
     no_figures: NoFigures = False,
     blocks: BlocksName = "named",
     apart: Apart = False,
+    free_running: FreeRunning = False,
     machine: Machine = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -60,7 +62,7 @@ def run_command(
     """Plan, map, simulate and record a transport."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
-        simulation = simulation_of(task, blocks, apart=apart)
+        simulation = simulation_of(task, blocks, reporter, apart=apart, free_running=free_running)
         folder = ResultFolder.of(task.name, out, "plan", "simulation")
         with DrawingProcesses(figures=not no_figures) as drawing:
             plan = plan_of(task, folder, reporter, simulated=True)
@@ -71,21 +73,26 @@ def run_command(
                     )
 
 
-def simulation_of(task: Task, blocks: Blocks, *, apart: bool) -> Simulation:
+def simulation_of(
+    task: Task, blocks: Blocks, reporter: Reporter, *, apart: bool = False, free_running: bool = False
+) -> Simulation:
     """Return what simulates: all in one process, or every robot in a process of its own.
 
     Raises:
         ScenarioError: Robots in processes of their own do not compute at common samples.
     """
+    if free_running and not apart:
+        raise typer.BadParameter("--free-running needs --apart: it paces processes of their own.")
     if not apart:
         return partial(_in_one_process, blocks)
     if blocks == "fused":
         raise typer.BadParameter("--apart and --blocks fused do not go together: one block drives the team.")
     from coop_drake.diagram import control_period
-    from coop_drake.nodes import simulate_in_processes
+    from coop_drake.nodes import simulate_in_processes, wall_clock
 
     control_period(task.scenario)
-    return simulate_in_processes
+    pacing = wall_clock(task.scenario) if free_running else None
+    return partial(simulate_in_processes, pacing=pacing, report=reporter.facts.update)
 
 
 def _in_one_process(blocks: Blocks, *problem: Any, **options: Any) -> SimulationLog:
@@ -123,6 +130,8 @@ def carry_out(
         drawing.wait("recording")
     reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
     _warn_of_unknown_limits(reporter)
+    for line in process_lines(reporter.facts):
+        reporter.say(line)
     reporter.say(f"The recording is {escape(str(folder.recording))}; open it in a browser")
     if page:
         page.hand_over(folder.recording)

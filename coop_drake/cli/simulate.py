@@ -12,6 +12,7 @@ from coop_drake.cli.live import live_page
 from coop_drake.cli.options import (
     Apart,
     BlocksName,
+    FreeRunning,
     FreshMaps,
     Live,
     Machine,
@@ -52,6 +53,7 @@ def simulate_command(
     no_figures: NoFigures = False,
     blocks: BlocksName = "named",
     apart: Apart = False,
+    free_running: FreeRunning = False,
     machine: Machine = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -59,7 +61,7 @@ def simulate_command(
     """Map, simulate and record a plan that was made before."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
-        simulation = simulation_of(task, blocks, apart=apart)
+        simulation = simulation_of(task, blocks, reporter, apart=apart, free_running=free_running)
         folder = ResultFolder.of(task.name, out, "simulation")
         found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)
         with (

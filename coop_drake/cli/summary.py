@@ -88,6 +88,24 @@ def _beside_limit(speed: Mapping[str, Any]) -> str:
     return f"{speed['peak']:.2f} {speed['unit']}, {limit}"
 
 
+def process_lines(facts: Mapping[str, Any]) -> list[str]:
+    """Return a line for each process of a run apart, and one for the ages of its commands."""
+    lines = [
+        f"{process['name']}: {process['state']}, {process['team_messages']} messages sent to the team"
+        for process in facts.get("processes", ())
+    ]
+    if refused := sum(facts.get("refused", {}).values()):
+        lines.append(f"{refused} messages were refused")
+    if ages := facts.get("command_ages"):
+        times = [1e3 * ages[key] for key in ("median", "high", "largest", "allowed")]
+        lines.append(
+            "Ages of commands: median {:.1f} ms, 99.9 % below {:.1f} ms, largest {:.1f} ms; "
+            "allowed {:.1f} ms, exceeded by {} of {}".format(*times, ages["late"], ages["count"])
+        )
+        lines.append(f"The wall clock was {ages['slipped']:.2f} s ahead of the simulated time at the end")
+    return lines
+
+
 def answer_of(result: PlanningResult) -> str:
     """Return ``found``, ``infeasible`` or ``undecided``."""
     return type(result).__name__.lower()

@@ -7,6 +7,7 @@ from functools import partial
 from coop_drake.cli.live import live_page
 from coop_drake.cli.node_options import ADDRESSES, Addresses, OwnKey, PlanFile, place_of, problem_of
 from coop_drake.cli.options import (
+    FreeRunning,
     FreshMaps,
     GainsName,
     Live,
@@ -31,6 +32,7 @@ def world_command(
     plan: PlanFile = None,
     out: ResultsFolder = None,
     gains: GainsName = None,
+    free_running: FreeRunning = False,
     fresh_maps: FreshMaps = False,
     live: Live = False,
     wait: Wait = False,
@@ -42,7 +44,7 @@ def world_command(
     """Simulate and record a team whose robots and supervisor are processes of their own."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         from coop_drake.messages import WORLD
-        from coop_drake.nodes import simulate_world
+        from coop_drake.nodes import simulate_world, wall_clock
 
         task, found = problem_of(scenario, gains, plan, reporter)
         folder = ResultFolder.of(task.name, out, "simulation")
@@ -52,7 +54,13 @@ def world_command(
             DrawingProcesses(figures=not no_figures) as drawing,
             live_page(task, found, reporter, live=live, wait=wait) as page,
         ):
-            world = partial(simulate_world, book=book, keys=keys)
+            world = partial(
+                simulate_world,
+                book=book,
+                keys=keys,
+                pacing=wall_clock(task.scenario) if free_running else None,
+                report=reporter.facts.update,
+            )
             reporter.code = carry_out(
                 task, found, folder, reporter, drawing, page, world, fresh_maps=fresh_maps
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time as clocks
 from collections.abc import Callable, Collection, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,10 @@ PATIENCE = 5.0
 TOLERATED = 0.02
 """How long drives hold the last effort of a robot that gives no other [s]: shipped transports lose nothing
 by it."""
+
+
+STATES = ("follows the plan", "holds", "waits", "ends")
+"""States of a robot in words, see ``messages.Effort``."""
 
 
 class SampleExchange:
@@ -79,6 +84,26 @@ class SampleExchange:
         """Return who is missing since when; empty where everybody is there."""
         said = (f"{name_of(k)} has not answered since t = {t:.6g} s" for k, t in sorted(self.missing.items()))
         return "; ".join(said)
+
+    def facts(self) -> dict[str, Any]:
+        """Return what a run reports about its processes: answers, messages of the team, ages of commands."""
+        processes = []
+        for index in self._everyone:
+            effort = self._last.get((index, Effort))
+            said = self._last.get((index, Status if index == SUPERVISOR else Effort))
+            counts = () if said is None else np.atleast_1d(said.team_messages)
+            state = "missing" if index in self.missing else "" if effort is None else STATES[effort.state]
+            processes.append(
+                {
+                    "name": name_of(index),
+                    "state": state or "there",
+                    "missing_since": self.missing.get(index),
+                    "team_messages": int(sum(counts)),
+                }
+            )
+        ages = {} if self._pacing is None else {"command_ages": asdict(self._pacing.ages())}
+        refused = self._end.refusals.counts
+        return {"processes": processes, "refused": {why.name: n for why, n in refused.items()}, **ages}
 
     def step(self, time: float, measured: Sequence[FloatArray]) -> list[FloatArray]:
         """See ``Exchange``."""

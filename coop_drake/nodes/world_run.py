@@ -35,6 +35,7 @@ def run_world(
     pacing: Pacing | None = None,
     patience: float = PATIENCE,
     before: Callable[[int], None] = lambda sample: None,
+    report: Callable[[dict[str, Any]], None] = lambda facts: None,
     progress: Progress | None = None,
     observer: Callable[[Sample], None] | None = None,
 ) -> SimulationLog:
@@ -50,6 +51,7 @@ def run_world(
         pacing: Keeps the pace of the wall clock, see ``SampleExchange``; as ``patience`` and ``before``.
         patience: How long a process may take for an answer in lock-step [s].
         before: Called before every sample with its number.
+        report: Called at the end with facts about the processes.
         progress: Called with the stage and the fraction done, if given.
         observer: Called with every accepted step.
 
@@ -65,6 +67,7 @@ def run_world(
     try:
         _open(end, opening, gone)
         log = run_loop(world, scenario, progress=progress, observer=observer)
+        report(exchange.facts())
         outcome = ARRIVED if log.reached and not log.violation else FAILED
         return log
     finally:
@@ -103,10 +106,7 @@ def simulate_in_processes(
     scenario: Scenario,
     plan: Plan,
     maps: Sequence[HarmonicMap],
-    *,
-    pacing: Pacing | None = None,
-    progress: Progress | None = None,
-    observer: Callable[[Sample], None] | None = None,
+    **options: Any,
 ) -> SimulationLog:
     """Start all robots and the supervisor as processes on this machine, and be the world for them.
 
@@ -114,17 +114,22 @@ def simulate_in_processes(
         scenario: The scenario.
         plan: A plan for it.
         maps: The harmonic map of every transition.
-        pacing: Keeps the pace of the wall clock, None for lock-step.
-        progress: Called with the stage and the fraction done, if given.
-        observer: Called with every accepted step.
+        options: As for :func:`run_world`.
 
     Raises:
-        MessagingError: A process ended.
+        MessagingError: A process ended before the start.
         ScenarioError: Robots do not compute at common samples.
     """
     control_period(scenario)
     book = local_book(robots_of(scenario))
     with LocalTeam(scenario, plan, maps, book) as team:
-        return run_world(
-            scenario, plan, book, gone=team.gone, pacing=pacing, progress=progress, observer=observer
-        )
+        return run_world(scenario, plan, book, gone=team.gone, **options)
+
+
+def wall_clock(scenario: Scenario) -> Pacing:
+    """Return the pace of the wall clock for a scenario.
+
+    Commands may be as old as measurements are when robots use them, for which the plan's budget holds; where
+    these have no delay, one control period old.
+    """
+    return Pacing(max(scenario.deployment.whole_delay, control_period(scenario)))

@@ -9,16 +9,21 @@ import pytest
 from coop_drake.errors import MessagingError
 from coop_drake.messages import SUPERVISOR, local_book
 from coop_drake.nodes import LocalTeam, run_world
+from coop_drake.nodes.pacing import Pacing
+from coop_drake.simulation import simulate
+from tests.support.same_runs import differences
 from tests.support.sampled_team import sampled
 from tests.support.small_loop import small_maps
 
 pytestmark = pytest.mark.no_cover
 
+PATIENT = {"patience": 1.0}
+
 FAULT = 40
 """Sample of the fault; the team is on its way."""
 
 
-def run_with(team_name, act, patience=1.0):
+def run_with(team_name, act, **options):
     """The log of a run in which something is done to the processes at a sample."""
     scenario, plan = sampled(team_name)
     book = local_book(3 if team_name == "three" else 2)
@@ -28,7 +33,7 @@ def run_with(team_name, act, patience=1.0):
             if sample == FAULT:
                 act(team)
 
-        return run_world(scenario, plan, book, gone=team.gone, before=before, patience=patience)
+        return run_world(scenario, plan, book, gone=team.gone, before=before, **PATIENT | options)
 
 
 def kill(index):
@@ -84,3 +89,25 @@ def test_a_process_that_is_missing_at_the_start_is_named():
         with pytest.raises(MessagingError, match="robot 1 ended before the start"):
             run_world(scenario, plan, book, gone=team.gone)
     assert not any(process.is_alive() for process in team.processes.values())
+
+
+def test_the_pace_of_the_wall_clock_changes_nothing_where_nobody_is_late():
+    facts = {}
+    log = run_with("base", lambda team: None, pacing=Pacing(allowed=30.0), report=facts.update)
+    scenario, plan = sampled("base")
+    assert differences(log, simulate(scenario, plan, small_maps())) == []
+    ages = facts["command_ages"]
+    assert ages["count"] == 2 * round(log.times[-1] / 0.01)
+    assert 0.0 < ages["median"] <= ages["high"] <= ages["largest"] < 30.0
+    assert ages["late"] == 0
+    assert [process["state"] for process in facts["processes"]] == ["follows the plan"] * 2 + ["there"]
+    assert facts["processes"][0]["team_messages"] > 0
+    assert facts["refused"] == {}
+
+
+def test_a_robot_that_is_late_for_too_long_stops_a_paced_team():
+    facts = {}
+    log = run_with("base", stop(1), pacing=Pacing(allowed=1.0), report=facts.update)
+    assert log.violation.startswith("robot 1 has not answered since t = 0.4 s; the team rests")
+    assert facts["processes"][1]["state"] == "missing"
+    assert facts["processes"][1]["missing_since"] == pytest.approx(0.4)
