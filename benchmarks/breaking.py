@@ -105,7 +105,9 @@ def certified(plan: Plan, budget: Budget) -> bool:
     assert plan.axis_tracking is not None  # the plan has a budget for the axes
     loop = None if budget.model_error >= 1.0 else axis_loop(plan.axis_tracking, budget)
     tables = [axis_table(plan.funnel(k), one.gains) for k, one in enumerate(plan.transitions)]
-    proved = loop is not None and follow_transitions(tables, plan.start[2:], loop)
+    axes = len(plan.start) - 2
+    nothing = np.zeros((len(tables), axes, axes, axes))
+    proved = loop is not None and follow_transitions(lambda _, k: tables[k], 1, nothing, plan.start[2:], loop)
     return bool(proved) and not isinstance(proved, UnprovedTransition)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Annotated
 
+from coop_drake.tree.rate_terms import BODY, Bodies
 from coop_drake.typed_data import EXACT, DataError, Limits, NotNegative, Positive, Vector, check_fields
 
 _Exact = Annotated[NotNegative, EXACT]
@@ -14,6 +15,10 @@ SCALED = (
     "acceleration_error", "report_age",
 )  # fmt: skip
 """Departures that a budget of the same control rate has more or less of."""
+
+
+UNSAID = ("axes", "bodies", "rotors")
+"""Fields that a budget in a line says in other words, or not at all: what the models give."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,10 @@ class Budget:
         moved_mass: Largest mass that one robot moves, its own and its share of the object's; needed where
             ``base_force`` is given [kg].
         axes: Whether angles and joints are part of the budget; false for the position alone.
+        bodies: The team's bodies, from which follows how much the rates of the axes accelerate them, each as
+            [component in the tree, mass [kg], centre of mass x, y [m], inertia [kg m^2]]; empty where
+            ``acceleration_error`` counts what the model's error leaves of this.
+        rotors: Inertia that its rotor adds to every joint, empty or of shape (n,) [kg m^2 or kg].
     """
 
     control_rate: Annotated[float, Limits(at_least=1.0, at_most=1e4)] = 200.0
@@ -54,11 +63,17 @@ class Budget:
     base_force: Positive | None = None
     moved_mass: Positive | None = None
     axes: bool = True
+    bodies: Bodies = ()
+    rotors: tuple[_Exact, ...] = ()
 
     def __post_init__(self) -> None:
         check_fields(self)
         if self.base_force is not None and self.moved_mass is None:
             raise DataError("moved_mass", None, "a positive number, because base_force is given")
+        for i, body in enumerate(self.bodies):
+            if len(body) != len(BODY) or body[0] < 0.0 or body[0] % 1.0 or min(body[1], body[4]) < 0.0:
+                allowed = f"{', '.join(BODY)}, of which only x and y may be negative"
+                raise DataError(f"bodies[{i}]", body, allowed)
 
     @property
     def period(self) -> float:
@@ -71,7 +86,7 @@ class Budget:
 
     def describe(self) -> str:
         """All bounds in a line."""
-        stated = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "axes"}
+        stated = {field.name: getattr(self, field.name) for field in fields(self) if field.name not in UNSAID}
         text = ", ".join(f"{name} {value:.4g}" for name, value in stated.items() if value is not None)
         return text if self.axes else f"{text}, axes false"
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from pydrake.systems.framework import DiagramBuilder
+
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import ScenarioError
 from coop_drake.laws import ScheduledGains
-from coop_drake.plant.run_masses import moved_masses
+from coop_drake.plant.component_tree import read_component_tree
+from coop_drake.plant.run_masses import bodies_of_team, joint_inertias, moved_masses
+from coop_drake.plant.team import build_team_plant
 from coop_drake.scenario import Scenario
-from coop_drake.scenario.budget_file import read_budget
+from coop_drake.scenario.budget_file import TeamMasses, read_budget
 
 
 def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) -> Budget | None:
@@ -29,4 +33,10 @@ def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) 
     if not isinstance(scenario.gain_sets[name], ScheduledGains):
         allowed = "a gain set of scheduled gains: the funnels of others never close, so that no budget holds"
         raise ScenarioError(str(scenario.path), "gains.selected", name, allowed)
-    return read_budget(choice or required, scenario, problem.tree, lambda: moved_masses(scenario))
+    return read_budget(choice or required, scenario, problem.tree, lambda: _of_models(scenario))
+
+
+def _of_models(scenario: Scenario) -> TeamMasses:
+    team = build_team_plant(scenario, DiagramBuilder())
+    bodies = bodies_of_team(team, read_component_tree(team))
+    return TeamMasses(moved_masses(scenario, team), bodies, tuple(joint_inertias(team).tolist()))

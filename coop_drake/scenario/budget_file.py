@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import hypot
 from pathlib import Path
+from typing import NamedTuple
 
 from coop_drake.answers.budget import Budget
 from coop_drake.errors import ScenarioError
@@ -13,6 +14,7 @@ from coop_drake.scenario.measured_bounds import rate_levers, wave_bounds
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.reading import read_file
 from coop_drake.tree import ComponentTree
+from coop_drake.tree.rate_terms import Bodies
 
 ALL = "all"
 """The choice that stands for the departures of the scenario's section ``deployment``."""
@@ -31,13 +33,27 @@ REPORTS_LOST = 5
 """Reports lost in a row for which a budget provides [-]: one in 3000 times where a fifth of them is lost."""
 
 DISAGREEMENT = 0.2
-"""Error of accelerations that a budget from a deployment provides for beside that of the model, for the
-coupling of axes and for robots that measure differently [rad/s^2 or m/s^2]. It is an assumption, which the
-log of a run can be compared with."""
+"""Error of accelerations that a budget from a deployment provides for beside that of the model: for robots
+that measure differently, and efforts for another configuration than the team's [rad/s^2 or m/s^2]. It is an
+assumption, which the log of a run can be compared with."""
+
+
+class TeamMasses(NamedTuple):
+    """What a budget takes from the models of a team.
+
+    Attributes:
+        moved: The mass that each robot moves, itself and its share of the object [kg].
+        bodies: As the field of ``Budget``.
+        rotors: As the field of ``Budget``.
+    """
+
+    moved: Sequence[float]
+    bodies: Bodies
+    rotors: tuple[float, ...]
 
 
 def read_budget(
-    choice: str, scenario: Scenario, tree: ComponentTree, masses: Callable[[], Sequence[float]]
+    choice: str, scenario: Scenario, tree: ComponentTree, masses: Callable[[], TeamMasses]
 ) -> Budget:
     """Return the budget that ``plan --budget`` names.
 
@@ -46,7 +62,7 @@ def read_budget(
             ``position`` for the same without the axes, or a file with the keys of ``Budget``.
         scenario: The scenario.
         tree: The team.
-        masses: Returns what each robot moves, itself and its share of the object [kg].
+        masses: Returns what follows from the masses of the models.
 
     Raises:
         ScenarioError: There is no such file, it is wrong, or the scenario has no control rate or has
@@ -61,14 +77,14 @@ def read_budget(
     return budget
 
 
-def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: Sequence[float], *, axes: bool) -> Budget:
+def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: TeamMasses, *, axes: bool) -> Budget:
     deployment = scenario.deployment
     if deployment.control_rate is None or deployment.period is None:
         allowed = "a number, for a budget of the scenario's own departures"
         raise ScenarioError(str(scenario.path), "deployment.control_rate", None, allowed)
     _refuse_uncounted(scenario)
     measured, messages = deployment.measurements, deployment.messages
-    share = hypot(*masses) / sum(masses)  # errors of several robots rarely add up
+    share = hypot(*masses.moved) / sum(masses.moved)  # errors of several robots rarely add up
     mean = PLANE_DEVIATIONS * share
     lost = REPORTS_LOST * deployment.period if messages.loss > 0.0 else 0.0
     waves = wave_bounds(measured.waves, tree)
@@ -85,8 +101,10 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: Sequence[flo
         acceleration_error=DISAGREEMENT,
         report_age=messages.delay + lost,
         base_force=deployment.actuators.base_force,
-        moved_mass=max(masses),
+        moved_mass=max(masses.moved),
         axes=axes,
+        bodies=masses.bodies if axes else (),
+        rotors=masses.rotors if axes else (),
     )
 
 

@@ -44,7 +44,11 @@ def verify_plan(
     checks = [same, *exact, check_gains(plan, gain_sets)]
     checks += [
         further
-        for further in (check_speeds(plan, problem), check_accelerations(plan, problem), check_budget(plan))
+        for further in (
+            check_speeds(plan, problem),
+            check_accelerations(plan, problem),
+            check_budget(plan, problem.tree),
+        )
         if further is not None
     ]
     checks += check_position(plan, problem.position_tolerance)

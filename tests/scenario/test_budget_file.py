@@ -4,13 +4,14 @@ from dataclasses import replace
 from math import sqrt
 
 import pytest
+from pydrake.systems.framework import DiagramBuilder
 from typer.testing import CliRunner
 
 import coop_drake
 from coop_drake.answers import Found, Undecided, load_plan
 from coop_drake.cli import app
 from coop_drake.errors import ScenarioError
-from coop_drake.plant import planning_problem
+from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.plant.budgets import budget_of
 from coop_drake.plant.run_masses import moved_masses
 from coop_drake.scenario import Deployment, Measurements
@@ -33,8 +34,9 @@ def test_the_budget_of_a_preset(tmp_path):
     problem = planning_problem(found)
     budget = budget_of("all", found, problem)
     assert budget_of(None, found, problem) is None
-    assert budget_of("position", found, problem) == replace(budget, axes=False)
-    assert moved_masses(found) == pytest.approx((8.5, 8.5))
+    assert budget_of("position", found, problem) == replace(budget, axes=False, bodies=(), rotors=())
+    assert sum(body[1] for body in budget.bodies) == pytest.approx(17.0)
+    assert moved_masses(found, build_team_plant(found, DiagramBuilder())) == pytest.approx((8.5, 8.5))
     assert (budget.base_force, budget.moved_mass) == (300.0, pytest.approx(8.5))
     assert (budget.delay, budget.lag, budget.model_error) == (0.01, 0.005, 0.2)
     assert budget.position_noise == pytest.approx(3.44 * 0.001 / sqrt(2.0))  # two robots of the same mass

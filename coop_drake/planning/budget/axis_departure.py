@@ -19,7 +19,6 @@ longer ago than ``MEMORY`` is counted with its largest size in the whole plan.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 
@@ -79,51 +78,55 @@ class AxisLoop:
         tracking: Its gains.
         budget: The departures to be tolerated.
         sums: Of every part of the model's range the sums of responses, shape (parts, 3, 3).
+        kicks: Responses to a unit of acceleration in one period within ``MEMORY``, the oldest first, shape
+            (parts, 3, memory).
     """
 
     tracking: AxisTracking
     budget: Budget
     sums: FloatArray
+    kicks: FloatArray
 
     @property
-    def typical_rate(self) -> float:
-        """Largest departure of a typical axis's rate from the nominal one [rad/s or m/s]."""
-        typical = np.array([TYPICAL_ACCELERATION])
-        return float(self.departures(typical, typical)[1][0])
+    def rest(self) -> float:
+        """By how much the model's factor may differ from f within a part [-]."""
+        return _rest(self.budget)
 
-    def departures(self, near: FloatArray, largest: FloatArray) -> FloatArray:
-        """Return the largest |e|, |e'| and |e''| of some axes, shape (3, m), with ``SLACK``.
+    @property
+    def errors(self) -> FloatArray:
+        """Largest error of the model in every part, shape (parts,) [-]."""
+        return np.abs(np.array(_factors(self.budget)) - 1.0) + self.rest
 
-        Args:
-            near: Largest |a^| within ``MEMORY``, shape (m,) [rad/s^2 or m/s^2].
-            largest: Largest |a^| in the whole plan, of the same shape.
-        """
-        budget, T = self.budget, self.budget.period
-        noise = self.tracking.stiffness * budget.angle_noise + self.tracking.damping * budget.rate_noise
-        rest, (noises, pushes, lates) = _rest(budget), self.sums.transpose(2, 1, 0)[..., None]
-        error = np.abs(np.array(_factors(budget)) - 1.0)[:, None] + rest
-        pull = noise * (1.0 + noises[Q]) + (budget.acceleration_error + error * largest) * pushes[Q]
-        pull = pull / (1.0 - rest * pushes[Q])
-        steady = budget.acceleration_error + rest * pull
-        between = (1.0 + budget.model_error) * pull + error * near + budget.acceleration_error
-        found = noise * noises[:Q] + (steady + error * near) * (pushes[:Q] - lates[:Q])
-        found += (steady + error * largest) * lates[:Q]
-        found += np.array([T * T / 8.0, T / 2.0])[:, None, None] * between
-        furthest: FloatArray = (1.0 + SLACK) * np.vstack([found, between[None]]).max(axis=1)
-        return furthest
+    @property
+    def noises(self) -> FloatArray:
+        """What noise causes of x [rad or m], x' [rad/s or m/s] and the pull, shape (parts, 3)."""
+        noise = (
+            self.tracking.stiffness * self.budget.angle_noise + self.tracking.damping * self.budget.rate_noise
+        )
+        caused: FloatArray = noise * (self.sums[:, :, COMMAND] + [0.0, 0.0, 1.0])
+        return caused
+
+    def typical(self) -> tuple[float, float]:
+        """Return the largest departures of a typical axis [rad or m] and of its rate [rad/s or m/s]."""
+        pushes, error = self.sums[:, :, ACCELERATION], self.budget.acceleration_error
+        steady = error + self.errors * TYPICAL_ACCELERATION
+        pull = (self.noises[:, Q] + steady * pushes[:, Q]) / (1.0 - self.rest * pushes[:, Q])
+        found = self.noises[:, :Q] + (steady + self.rest * pull)[:, None] * pushes[:, :Q]
+        away, fast = found.max(axis=0).tolist()
+        return away, fast
 
 
 def best_loop(budget: Budget) -> AxisLoop | None:
     """Return the loop with the gains for which a typical axis departs least; None where none is stable."""
-    typical, best, least = np.array([TYPICAL_ACCELERATION]), None, inf
+    best, least = None, inf
     for stiffness in STIFFNESSES:
         for damping in DAMPINGS:
             tracking = AxisTracking(stiffness, damping * stiffness**0.5)
             loop = axis_loop(tracking, budget)
             if loop is None:
                 continue
-            departures = loop.departures(typical, typical)[:, 0].tolist()
-            found = departures[X] + RATE_WEIGHT * departures[V]
+            away, fast = loop.typical()
+            found = away + RATE_WEIGHT * fast
             if found < least:
                 best, least = loop, found
     return best
@@ -132,28 +135,13 @@ def best_loop(budget: Budget) -> AxisLoop | None:
 def axis_loop(tracking: AxisTracking, budget: Budget) -> AxisLoop | None:
     """Return the loop with some gains, None where it is not stable for every error of the model."""
     T = budget.period
-    periods = whole_periods(budget.delay, T), whole_periods(MEMORY, T), whole_periods(HORIZON, T)
-    gains = tracking.stiffness, tracking.damping
-    sums = np.array([_sums(gains, T, budget.lag, factor, periods) for factor in _factors(budget)])
+    periods = whole_periods(budget.delay, T), whole_periods(HORIZON, T)
+    gains, factors = (tracking.stiffness, tracking.damping), _factors(budget)
+    kicks = np.zeros((len(factors), 3, whole_periods(MEMORY, T)))
+    pairs = zip(factors, kicks, strict=True)
+    sums = np.array([_sums(gains, T, budget.lag, factor, periods, own) for factor, own in pairs])
     good = np.isfinite(sums).all() and (_rest(budget) * sums[:, Q, ACCELERATION] < 1.0).all()
-    return AxisLoop(tracking, budget, sums) if good else None
-
-
-def near_accelerations(largest: Sequence[FloatArray], stays: Sequence[float], k: int) -> FloatArray:
-    """Return the largest |a^| of transition k and of those that ended less than ``MEMORY`` before it, (m,).
-
-    Args:
-        largest: Largest |a^| of every transition, each of shape (m,) [rad/s^2 or m/s^2].
-        stays: For how long every cell is kept at least [s].
-        k: The transition.
-    """
-    near, ago = largest[k], 0.0
-    for before in range(k - 1, -1, -1):
-        near = np.maximum(near, largest[before])
-        ago += stays[before]
-        if ago >= MEMORY:
-            break
-    return near
+    return AxisLoop(tracking, budget, sums, kicks) if good else None
 
 
 def _factors(budget: Budget) -> list[float]:
@@ -169,7 +157,12 @@ def _rest(budget: Budget) -> float:
 
 @compiled
 def _sums(
-    gains: tuple[float, float], period: float, lag: float, factor: float, periods: tuple[int, int, int]
+    gains: tuple[float, float],
+    period: float,
+    lag: float,
+    factor: float,
+    periods: tuple[int, int],
+    kicks: FloatArray,
 ) -> FloatArray:
     """Return the sums of the magnitudes of responses, shape (3, 3), infinite where one does not end.
 
@@ -181,9 +174,11 @@ def _sums(
         period: T [s].
         lag: Time constant of the actuators [s].
         factor: f [-].
-        periods: Delay, ``MEMORY`` and ``HORIZON`` in periods.
+        periods: Delay and ``HORIZON`` in periods.
+        kicks: Receives the responses to a unit of acceleration within ``MEMORY``, the oldest first, shape (3,
+            memory).
     """
-    T, (delay, memory, n) = period, periods
+    T, (delay, n), memory = period, periods, kicks.shape[1]
     left, in_v, in_x = lag_factors(T, lag)
     e, v, pull = np.zeros((3, n + 1)), np.zeros((3, n + 1)), np.zeros((3, n + 1))
     e[1, 0], v[2, 0] = 1.0, 1.0  # the runs: a unit command, a unit of e and one of e'
@@ -205,6 +200,8 @@ def _sums(
             sums[i, 1] += kick
             if k >= memory:
                 sums[i, 2] += kick
+            else:
+                kicks[i, memory - 1 - k] = kick
         quiet = quiet + 1 if largest < LEFT else 0
         if quiet > delay + 1:  # nothing that is measured later differs from this
             return sums

@@ -66,21 +66,45 @@ class AxisSets:
         distance: Least distance to the funnel's bounds at all times [rad or m]; not positive if none is
             shown.
         acceleration: Largest magnitude of the acceleration [rad/s^2 or m/s^2].
-        rate: Largest magnitude of the rate, between samples, too [rad/s or m/s].
         last: Largest magnitude of the acceleration once the funnel is closed [rad/s^2 or m/s^2].
         settled: Largest departure from the goal interval's middle once the funnel is closed [rad or m].
         settled_rate: Largest rate once the funnel is closed [rad/s or m/s].
         parts: Into how many parts the positions at the entry were cut.
+        settled_distance: As ``distance``, once the funnel is closed.
     """
 
     tubes: tuple[FloatArray, ...]
     distance: float
     acceleration: float = np.inf
-    rate: float = np.inf
     last: float = np.inf
     settled: float = np.inf
     settled_rate: float = np.inf
     parts: int = 1
+    settled_distance: float = 0.0
+
+    def spare(self, departures: FloatArray) -> float:
+        """Return the least distance to the funnel's bounds of an axis that departs [rad or m].
+
+        Args:
+            departures: Its largest departures in all periods, the last one for ever, shape (periods + 1,).
+        """
+        distances = [tube[:, DISTANCE] - departures[: len(tube)] for tube in self.tubes]
+        least = min(float(some.min()) for some in distances)
+        ended = min(len(tube) for tube in self.tubes)
+        return min(least, self.settled_distance - float(departures[ended:].max()))
+
+    def moving(self, samples: int, period: float) -> FloatArray:
+        """Return the largest |x''| and |x'| in all periods, the last one for ever, shape (2, samples + 1)."""
+        moving = np.repeat([[self.last], [self.settled_rate]], samples + 1, axis=1)
+        for tube in self.tubes:
+            now = np.array([tube[:, ACCELERATION], np.abs(tube[:, V]) + tube[:, V_REACH]])
+            moving[:, : len(tube)] = np.maximum(moving[:, : len(tube)], now)
+        moving[1] += period * moving[0]
+        return moving
+
+    def fastest(self, departures: FloatArray, period: float) -> float:
+        """Return the largest rate of an axis whose rate departs by these, as for ``spare`` [rad/s or m/s]."""
+        return float((self.moving(len(departures) - 1, period)[1] + departures).max())
 
 
 def axis_sets(row: FloatArray, conditions: AxisConditions, entry: Entry, parts: int) -> AxisSets:
@@ -101,16 +125,15 @@ def axis_sets(row: FloatArray, conditions: AxisConditions, entry: Entry, parts: 
     ends = np.array([_closed_part(tube[begin:], middle) for tube in tubes]).max(axis=0).tolist()
     kept = settle(row, conditions, begin * T, (ends[0], ends[1], ends[2]), (ends[3], ends[4]), tail)
     most = max(kept.acceleration, *(float(tube[:, ACCELERATION].max()) for tube in tubes))
-    rate = max(kept.rate, *(float((np.abs(tube[:, V]) + tube[:, V_REACH]).max()) for tube in tubes))
     return AxisSets(
         tuple(tubes),
         min(kept.distance, *(float(tube[:, DISTANCE].min()) for tube in tubes)),
         most,
-        rate + 0.5 * T * most,
         kept.acceleration,
         kept.x,
         kept.rate,
         parts,
+        kept.distance,
     )
 
 

@@ -13,17 +13,18 @@ from coop_drake.laws import ScheduledGains
 from coop_drake.laws.axis_table import LEAVING_TIME, REST_RATE, REST_REACH, axis_table
 from coop_drake.laws.gains import IDEAL_AGE, RestCondition
 from coop_drake.planning.budget.axis_departure import SLACK, best_loop
+from coop_drake.planning.budget.coupling import cell_couplings
 from coop_drake.planning.budget.transitions import (
     ProvedTransition,
     UnprovedTransition,
     follow_transitions,
 )
 from coop_drake.planning.execution.transitions import share_speeds, with_gains
+from coop_drake.tree.pose import FloatArray
 
-AGE_FACTORS = (1.0, 1.5, 2.0)
+AGE_FACTORS = (1.0, 1.25, 1.6, 2.0)
 """Gains are tried for so many times the age of what a nominal motion's commands rest on [-]: slow motions
-take smaller accelerations, in which the error of the model has its share. All transitions have the same
-factor, so that K falls slowly."""
+take smaller accelerations and rates, in which the error of the model has its share."""
 
 _UNSTABLE = UnprovedTransition(0, 0, "is not stable under the delay, the lag and the model's error")
 
@@ -45,22 +46,28 @@ def fit_budget(
         The plan with these gains, the budget and what follows from it, with the times estimated before; or
         where it does not hold.
     """
-    first, loop = None, best_loop(budget)
+    loop = best_loop(budget)
     if loop is None:
         return _UNSTABLE
-    for factor in _factors(gain_set, budget):
-        rules = gain_set.slowed(factor)
-        again = with_gains(plan, rules, plan.gain_set)
-        if problem.limits.any:
-            again = share_speeds(problem, again, rules, loop.typical_rate)
-        tables = [axis_table(again.funnel(k), one.gains) for k, one in enumerate(again.transitions)]
-        found = follow_transitions(tables, plan.start[2:], loop)
-        if not isinstance(found, UnprovedTransition):
-            fitted = tuple(_stated(*pair, factor) for pair in zip(again.transitions, found, strict=True))
-            return replace(again, transitions=fitted, budget=budget, axis_tracking=loop.tracking)
-        first = first or found
-    assert first is not None  # there is a factor
-    return first
+    factors = _factors(gain_set, budget)
+    plans = [with_gains(plan, gain_set.slowed(factors[0]), plan.gain_set)]
+    if problem.limits.any:
+        plans = [share_speeds(problem, plans[0], gain_set.slowed(factors[0]), loop.typical()[1])]
+
+    def table_of(choice: int, k: int) -> FloatArray:
+        while len(plans) <= choice:
+            plans.append(with_gains(plans[0], gain_set.slowed(factors[len(plans)]), plan.gain_set))
+        return axis_table(plans[choice].funnel(k), plans[choice].transitions[k].gains)
+
+    couplings = cell_couplings(budget, problem.tree, plan.cells)
+    found = follow_transitions(table_of, len(factors), couplings, plan.start[2:], loop)
+    if isinstance(found, UnprovedTransition):
+        return found
+    fitted = tuple(
+        _stated(plans[passed.choice].transitions[k], passed, factors[passed.choice])
+        for k, passed in enumerate(found)
+    )
+    return replace(plans[0], transitions=fitted, budget=budget, axis_tracking=loop.tracking)
 
 
 def _factors(gain_set: ScheduledGains, budget: Budget) -> list[float]:
@@ -88,7 +95,7 @@ def _tolerance(factor: float, passed: ProvedTransition) -> Tolerance:
         entry_rate_lower=np.array([entry.rate_lower for entry in entries]),
         entry_rate_upper=np.array([entry.rate_upper for entry in entries]),
         entry_acceleration=np.array([entry.acceleration for entry in entries]),
-        distance=np.array([(1.0 - SLACK) * sets.distance for sets in every]) - passed.departure,
+        distance=passed.spare,
         acceleration=np.array([(1.0 + SLACK) * sets.acceleration for sets in every]),
         settled=np.array([(1.0 + SLACK) * sets.settled for sets in every]),
         settled_rate=np.array([(1.0 + SLACK) * sets.settled_rate for sets in every]),

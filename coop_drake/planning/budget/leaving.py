@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import ceil
 
 import numpy as np
@@ -17,6 +18,10 @@ from coop_drake.laws.axis_table import (
 from coop_drake.planning.budget.axis_sets import AxisSets, Entry
 from coop_drake.planning.budget.axis_tube import ACCELERATION, V_REACH, X_REACH, AxisConditions, V, X
 from coop_drake.tree.pose import FloatArray
+
+EARLIER = 4
+"""By how many samples earlier a cell may be left than the tubes say: another approximation of the law gives
+tubes that come to rest up to 2 samples earlier."""
 
 LOWEST, HIGHEST = [0, 2], [1, 3, 4, 5]
 """Which of the numbers of an entry set are lower bounds, and which upper ones."""
@@ -53,6 +58,41 @@ def next_entry(row: FloatArray, sets: AxisSets, conditions: AxisConditions, repo
     return Entry(low, high, slow, quick, pushed, middle)
 
 
+def first_leaving(table: FloatArray, every: Sequence[AxisSets], period: float) -> int:
+    """Return the first sample at which all axes of a transition can have come to rest and its cell be left.
+
+    Args:
+        table: The axes, with the condition of rest under which the cell is left.
+        every: Their sets.
+        period: T [s].
+    """
+    stay: int = ceil(table[0, LEAVING_TIME] / period - 1e-6)
+    first = stay
+    for row, sets in zip(table, every, strict=True):
+        middle, rest = (
+            0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER]),
+            (float(row[REST_REACH]), float(row[REST_RATE])),
+        )
+        first = max(first, min(_first_rest(tube, middle, rest, stay) for tube in sets.tubes))
+    return max(stay, first - EARLIER)
+
+
+@compiled
+def _rests(sample: FloatArray, middle: float, rest: tuple[float, float]) -> bool:
+    """Return whether a motion can be at rest at a sample of a tube."""
+    near = abs(sample[X] - middle) <= rest[0] + sample[X_REACH]
+    return bool(near and abs(sample[V]) <= rest[1] + sample[V_REACH])
+
+
+@compiled
+def _first_rest(tube: FloatArray, middle: float, rest: tuple[float, float], first: int) -> int:
+    """Return the first sample of a tube from another one on at which a motion can be at rest, or its end."""
+    for k in range(first, len(tube)):
+        if _rests(tube[k], middle, rest):
+            return k
+    return max(first, len(tube))
+
+
 @compiled
 def _limit(bounds: FloatArray, middle: float, rest: tuple[float, float], time: float) -> None:
     """Cut bounds of states to where a motion can be that was at rest some time ago."""
@@ -84,7 +124,7 @@ def _switching(
     reported = -since - 1
     for k in range(leaving, len(tube)):
         x, x_reach, v, v_reach = tube[k, X] - middle, tube[k, X_REACH], tube[k, V], tube[k, V_REACH]
-        if abs(x) <= rest[0] + x_reach and abs(v) <= rest[1] + v_reach:
+        if _rests(tube[k], middle, rest):
             reported = k
         if k - reported > since:
             continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,17 +11,17 @@ from coop_drake.laws.axis_table import (
     ACCELERATION_LIMIT,
     GOAL_LOWER,
     GOAL_UPPER,
-    LEAVING_TIME,
     RATE_LIMIT,
     REST_RATE,
     REST_REACH,
 )
 from coop_drake.laws.readiness import EROSION
 from coop_drake.laws.sampling import whole_periods
-from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop, near_accelerations
+from coop_drake.planning.budget.axis_departure import SLACK, AxisLoop
 from coop_drake.planning.budget.axis_sets import AxisSets, Entry, axis_sets
 from coop_drake.planning.budget.axis_tube import AxisConditions
-from coop_drake.planning.budget.leaving import next_entry
+from coop_drake.planning.budget.departing import Departures, Inflow, at_rest, departing
+from coop_drake.planning.budget.leaving import first_leaving, next_entry
 from coop_drake.planning.budget.rate_room import comes_near_limit
 from coop_drake.tree.pose import FloatArray
 
@@ -34,6 +34,13 @@ REST_SPEED = 0.03
 
 REST_FACTOR = 1.5
 """Least distance and rate with which a cell may be left, over the largest ones of a settled motion [-]."""
+
+ATTEMPTS = 12
+"""Largest number of attempts to get beyond a transition, with other gains of it or of those before it [-]."""
+
+OTHERWISE = 0.01
+"""Fraction by which departures are enlarged [-]: another approximation of the law gives other tubes, and up
+to 0.3 % larger departures."""
 
 ENTRY_PARTS = (1, 3)
 """Parts into which the positions at an entry are cut, tried in this order [-]."""
@@ -62,74 +69,96 @@ class ProvedTransition:
         table: Its axes, an ``axis_table`` with the condition of rest under which the cell is left.
         entries: The sets in which their nominal motions enter.
         sets: What follows for these.
+        spare: Least distances of the axes to their funnels' bounds, shape (axes,) [rad or m].
         departure: Largest departures from them, shape (axes,) [rad or m].
         rate_departure: Largest departures of the rates, shape (axes,) [rad/s or m/s].
+        inflow: What has entered the loops of its axes when the next one begins.
+        choice: Number of the gains that it has.
     """
 
     table: FloatArray
     entries: Sequence[Entry]
     sets: Sequence[AxisSets]
+    spare: FloatArray
     departure: FloatArray
     rate_departure: FloatArray
+    inflow: Inflow
+    choice: int = 0
 
 
 def follow_transitions(
-    tables: Sequence[FloatArray], start: FloatArray, loop: AxisLoop
+    table_of: Callable[[int, int], FloatArray],
+    choices: int,
+    couplings: FloatArray,
+    start: FloatArray,
+    loop: AxisLoop,
 ) -> list[ProvedTransition] | UnprovedTransition:
     """Follow all axes through transitions: their nominal motions, and how far they depart from these.
 
+    Every transition has the first gains with which it holds, and with which the next one does.
+
     Args:
-        tables: The axes in every transition, each an ``axis_table`` with quintic funnels.
+        table_of: Returns the axes in transition k with a choice of gains, an ``axis_table`` with quintic
+            funnels.
+        choices: How many choices of gains there are, the quickest first.
+        couplings: How much rates accelerate the axes in every cell, see ``cell_couplings``.
         start: Where they rest at the beginning, shape (axes,) [rad or m].
         loop: The loop that pulls the axes to their nominal motions, with the budget.
     """
-    budget, proved = loop.budget, list[ProvedTransition]()
-    conditions, periods = (
-        AxisConditions(budget.period, budget.lag),
-        whole_periods(budget.report_age, budget.period),
-    )
-    for k, table in enumerate(tables):
-        found = _proved(k, table.copy(), _entries(proved, start, conditions, periods), conditions)
-        if isinstance(found, UnprovedTransition):
-            return found
-        proved.append(found)
-    return _departing(proved, loop)
+    proved, choice, furthest, failed = list[ProvedTransition](), 0, -1, 0
+    limit = UnprovedTransition(0, 0, "")
+    while (k := len(proved)) < len(couplings):
+        found = _attempt(k, table_of(choice, k).copy(), couplings[k], proved[-1] if proved else start, loop)
+        if not isinstance(found, UnprovedTransition):
+            proved.append(replace(found, choice=choice))
+            choice = 0
+            continue
+        if k > furthest:
+            furthest, failed, limit = k, 0, found
+        choice, failed = choice + 1, failed + 1
+        while choice == choices or failed == ATTEMPTS:
+            if failed == ATTEMPTS or not proved:
+                return limit
+            choice = proved.pop().choice + 1
+    return proved
 
 
-def _departing(
-    proved: Sequence[ProvedTransition], loop: AxisLoop
-) -> list[ProvedTransition] | UnprovedTransition:
-    """Return the transitions with the departures of their axes; or where these leave a funnel or a limit."""
-    accelerations = [(1.0 + SLACK) * np.array([sets.acceleration for sets in each.sets]) for each in proved]
-    stays = [float(each.table[0, LEAVING_TIME]) for each in proved]
-    largest, result = np.max(accelerations, axis=0), []
-    for k, each in enumerate(proved):
-        near = near_accelerations(accelerations, stays, k)
-        departure, rate_departure, push = loop.departures(near, largest)
-        for axis, sets in enumerate(each.sets):
-            if not (1.0 - SLACK) * sets.distance > departure[axis]:
-                return UnprovedTransition(k, axis, "may leave its funnel")
-            if not (1.0 + SLACK) * sets.rate + rate_departure[axis] < each.table[axis, RATE_LIMIT]:
-                return UnprovedTransition(k, axis, "may exceed the limit of its rate")
-            if not accelerations[k][axis] + push[axis] <= each.table[axis, ACCELERATION_LIMIT]:
-                return UnprovedTransition(k, axis, "may exceed the limit of its acceleration")
-        result.append(replace(each, departure=departure, rate_departure=rate_departure))
-    return result
+def _attempt(
+    k: int, table: FloatArray, coupling: FloatArray, before: ProvedTransition | FloatArray, loop: AxisLoop
+) -> ProvedTransition | UnprovedTransition:
+    """Return what holds for transition k, entered from the one before or from rest; or what does not hold."""
+    budget, T = loop.budget, loop.budget.period
+    conditions = AxisConditions(T, budget.lag)
+    if isinstance(before, ProvedTransition):
+        entries, inflow = _entries(before, conditions, whole_periods(budget.report_age, T)), before.inflow
+    else:
+        entries, inflow = [Entry(float(x), float(x)) for x in before], at_rest(loop, len(before))
+    every = _sets(k, table, entries, conditions)
+    if isinstance(every, UnprovedTransition):
+        return every
+    found, inflow = departing(loop, every, coupling, inflow, first_leaving(table, every, T))
+    found = Departures(*((1.0 + OTHERWISE) * one for one in found))
+    departure, rate_departure, push = (one.max(axis=0) for one in found)
+    spare = np.array([(1.0 - SLACK) * sets.spare(found.position[:, i]) for i, sets in enumerate(every)])
+    for axis, sets in enumerate(every):
+        if not spare[axis] > 0.0:
+            return UnprovedTransition(k, axis, "may leave its funnel")
+        if not (1.0 + SLACK) * sets.fastest(found.rate[:, axis], T) < table[axis, RATE_LIMIT]:
+            return UnprovedTransition(k, axis, "may exceed the limit of its rate")
+        if not (1.0 + SLACK) * sets.acceleration + push[axis] <= table[axis, ACCELERATION_LIMIT]:
+            return UnprovedTransition(k, axis, "may exceed the limit of its acceleration")
+    return ProvedTransition(table, entries, every, spare, departure, rate_departure, inflow)
 
 
-def _entries(
-    proved: Sequence[ProvedTransition], start: FloatArray, conditions: AxisConditions, periods: int
-) -> list[Entry]:
+def _entries(before: ProvedTransition, conditions: AxisConditions, periods: int) -> list[Entry]:
     """Return the sets in which the axes enter the next transition, reports being used for some periods."""
-    if not proved:
-        return [Entry(float(x), float(x)) for x in start]
-    pairs = zip(proved[-1].table, proved[-1].sets, strict=True)
+    pairs = zip(before.table, before.sets, strict=True)
     return [_widened(next_entry(row, sets, conditions, periods)) for row, sets in pairs]
 
 
-def _proved(
+def _sets(
     k: int, table: FloatArray, entries: Sequence[Entry], conditions: AxisConditions
-) -> ProvedTransition | UnprovedTransition:
+) -> list[AxisSets] | UnprovedTransition:
     """Return the sets of all axes of a transition, and write the condition of rest into its table."""
     every = []
     for axis, (row, entry) in enumerate(zip(table, entries, strict=True)):
@@ -149,8 +178,7 @@ def _proved(
         row[REST_REACH] = min(half, max(REST_FACTOR * reach, share))
         row[REST_RATE] = max(REST_FACTOR * rate, REST_SPEED)
         every.append(sets)
-    nothing = np.zeros(len(table))
-    return ProvedTransition(table, entries, every, nothing, nothing)
+    return every
 
 
 def _widened(entry: Entry) -> Entry:

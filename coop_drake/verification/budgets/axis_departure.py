@@ -1,14 +1,16 @@
 """How far axes may depart from their nominal motions under a budget, for the gains that a plan states.
 
-The departure e of an axis obeys e'' = (1 + epsilon) q + epsilon a + w, a being the acceleration of its
-nominal motion and q the pull -K e - zeta e' of a delayed, noisy, sampled and lagging loop. Where the factor
-1 + epsilon is f + d, with |d| at most a part of the model's error, the loop e'' = f q is linear and known.
+The departure e of an axis obeys e'' = (1 + epsilon) q + epsilon (a + c) + w, a being the acceleration of its
+nominal motion, c that which the nominal rates of all axes cause by themselves, and q the pull -K e - zeta e'
+of a delayed, noisy, sampled and lagging loop. Where the factor 1 + epsilon is f + d, with |d| at most a part
+of the model's error, the loop e'' = f q is linear and known: e is the sum of its responses to every period.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from math import ceil
+from math import ceil, exp
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,74 +32,161 @@ LEFT = 1e-7
 RECENT = 0.3
 """What entered longer ago counts with its largest size in the whole plan [s]."""
 
+ROUNDS = 60
+"""Largest number of enlarged bounds that are tried for what stays for ever [-]."""
 
-def departures(
-    tracking: AxisTracking, budget: Budget, accelerations: FloatArray, stays: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the largest departures of all axes, their rates and accelerations, (transitions, axes) each.
 
-    Args:
-        tracking: Gains of the pull.
+class Loop(NamedTuple):
+    """The loop that pulls axes to their nominal motions; p parts of the model's range.
+
+    Attributes:
         budget: The budget.
-        accelerations: Largest nominal accelerations, shape (transitions, axes) [rad/s^2 or m/s^2].
-        stays: For how long every cell is kept at least, shape (transitions,) [s].
+        recent: Sizes of the responses of e, e' and q to a unit of acceleration in one period, the oldest
+            first, shape (p, memory, 3).
+        old: Sums of those that are older, shape (p, 3).
+        noise: What noise causes of e, e' and the pull, shape (p, 3).
+        errors: Largest |epsilon| of every part, shape (p, 1).
+        spread: Largest |d| [-].
+    """
+
+    budget: Budget
+    recent: FloatArray
+    old: FloatArray
+    noise: FloatArray
+    errors: FloatArray
+    spread: float
+
+
+class Entered(NamedTuple):
+    """What entered the loops before a cell is entered.
+
+    Attributes:
+        recent: Of the periods before, the latest last: the largest acceleration, and the part of it that
+            counts for the rates of other axes' terms, shape (2, p, axes, memory).
+        largest: The largest one at all earlier times, shape (p, axes).
+        lagging: The largest lagging pull, shape (p, axes).
+    """
+
+    recent: FloatArray
+    largest: FloatArray
+    lagging: FloatArray
+
+
+def loop_of(tracking: AxisTracking, budget: Budget) -> Loop:
+    """Return the loop of a plan's gains.
 
     Raises:
         RefusalError: The loop does not come to rest.
     """
-    parts = PARTS if budget.model_error > 0.0 else 1
+    T, delay = budget.period, ceil(budget.delay / budget.period - 1e-9)
+    parts, memory = PARTS if budget.model_error > 0.0 else 1, ceil(RECENT / budget.period - 1e-9)
     spread = budget.model_error / parts
     errors = budget.model_error * (np.arange(1, 2 * parts, 2) / parts - 1.0)
-    command, push, old = _sums(tracking, budget, errors)
-    if not (spread * push[2] < 1.0).all():
-        raise RefusalError("axis_tracking", "the error of the model may exceed what the loop makes up for")
-    noise = tracking.stiffness * budget.angle_noise + tracking.damping * budget.rate_noise
-    share = (np.abs(errors) + spread)[:, None, None]
-    near, largest = _recent(accelerations, stays), accelerations.max(axis=0)
-    other, own = budget.acceleration_error + share * largest, budget.acceleration_error + share * near
-    columns = (..., None, None)
-    pull = noise * (1.0 + command[2][columns]) + push[2][columns] * other
-    pull = pull / (1.0 - spread * push[2][columns])
-    between = (1.0 + budget.model_error) * pull + own
-    found = []
-    for i, reach in enumerate((budget.period**2 / 8.0, budget.period / 2.0)):
-        recent, before = (push[i] - old[i])[columns], old[i][columns]
-        away = noise * command[i][columns] + recent * (own + spread * pull) + before * (other + spread * pull)
-        found.append((away + reach * between).max(axis=0))
-    return found[0], found[1], between.max(axis=0)
-
-
-def _recent(accelerations: FloatArray, stays: FloatArray) -> FloatArray:
-    """Return the largest accelerations of every transition and of those that ended within ``RECENT``."""
-    begins = np.concatenate(([0.0], np.cumsum(stays)))[:-1]
-    ends, last = begins + stays, accelerations.copy()
-    for k, begin in enumerate(begins):
-        last[k] = accelerations[: k + 1][(begin - ends[: k + 1] < RECENT)].max(axis=0)
-    return last
-
-
-def _sums(tracking: AxisTracking, budget: Budget, errors: FloatArray) -> tuple[FloatArray, ...]:
-    """Return sums of absolute responses of e, e' and the pull, three arrays of shape (3, parts).
-
-    They are those to a unit of command in each period, to a unit of acceleration at all times, and what the
-    latter causes later than ``RECENT``.
-    """
-    T, delay = budget.period, ceil(budget.delay / budget.period - 1e-9)
-    e, v, a = np.zeros((3, 3, len(errors)))  # runs: a command, a rate, a place
+    e, v, a = np.zeros((3, 3, parts))  # runs: a command, a rate, a place
     v[1], e[2] = 1.0, 1.0
     past = deque([(0.0 * e, 0.0 * v)] * delay, maxlen=delay + 1)
-    command, push, old = np.zeros((3, 3, len(errors)))
+    command, sizes = np.zeros((3, parts)), []
     for k in range(ceil(HORIZON / T)):
         past.append((e, v))
         pull = -tracking.stiffness * past[0][0] - tracking.damping * past[0][1]
         found = np.array([e, v, pull])
         command += np.abs(found[:, 0])
-        size = T * mean_size(found[:, 1], found[:, 1] + T * found[:, 2])
-        push += size
-        old += size if k >= ceil(RECENT / T - 1e-9) else 0.0
+        sizes.append(T * mean_size(found[:, 1], found[:, 1] + T * found[:, 2]))
         if k == 0:
             pull[0] += 1.0
         e, v, a = carried(e, v, a, pull, 1.0 + errors, budget.lag, T)
     if not max(np.abs(e).max(), np.abs(v).max()) < LEFT:
         raise RefusalError("axis_tracking", f"the axes have not come to rest after {HORIZON} s")
-    return command, push, old
+    kicks = np.array(sizes).transpose(2, 0, 1)
+    if not (spread * kicks[:, :, 2].sum(axis=1) < 1.0).all():
+        raise RefusalError("axis_tracking", "the error of the model may exceed what the loop makes up for")
+    size = tracking.stiffness * budget.angle_noise + tracking.damping * budget.rate_noise
+    noise = size * (command.T + np.array([0.0, 0.0, 1.0]))
+    recent = np.ascontiguousarray(kicks[:, :memory][:, ::-1])
+    return Loop(
+        budget, recent, kicks[:, memory:].sum(axis=1), noise, np.abs(errors)[:, None] + spread, spread
+    )
+
+
+def resting(loop: Loop, axes: int) -> Entered:
+    """Return what entered the loops of axes that rest at the plan's start."""
+    parts, memory, _ = loop.recent.shape
+    error = np.full((2, parts, axes, memory), loop.budget.acceleration_error)
+    return Entered(error, error[0, :, :, 0], 0.0 * error[0, :, :, 0])
+
+
+def departures(
+    loop: Loop, coupling: FloatArray, moving: FloatArray, before: Entered, leaving: int
+) -> tuple[FloatArray, Entered]:
+    """Return how far axes depart in every period of a transition, and what enters before the next one.
+
+    Args:
+        loop: The loop of all axes.
+        coupling: Largest coefficients c_ijk of c, shape (axes, axes, axes).
+        moving: Largest |a| and rate in every period of the nominal motion, the last one for ever, shape
+            (periods + 1, 2, axes).
+        before: What entered before.
+        leaving: The first sample at which the cell can be left.
+
+    Returns:
+        Largest |e|, |e'| and |e''|, shape (periods + 1, 3, axes), the last one for ever; and what enters.
+    """
+    T, memory, ever = loop.budget.period, loop.recent.shape[1], len(moving) - 1
+    entered = np.concatenate([before.recent, np.empty((*before.recent.shape[:3], ever + 1))], axis=3)
+    largest, lagging, kept = before.largest.copy(), before.lagging.copy(), before.lagging.copy()
+    gone = exp(-T / loop.budget.lag) if loop.budget.lag > 0.0 else 0.0
+    found = np.empty((ever + 1, 3, moving.shape[2]))
+    for k in range(ever):
+        answers = entered[..., k : memory + k] @ loop.recent
+        largest = np.maximum(largest, entered[0, :, :, memory + k - 1])
+        state, pulled = _state(loop, answers, largest, lagging)
+        found[k], entered[..., memory + k] = _period(loop, coupling, moving[k], state)
+        if k > 0:
+            found[k - 1, 0] = np.maximum(found[k - 1, 0], state[0].max(axis=0))
+        lagging = pulled + gone * np.maximum(lagging - pulled, 0.0)
+        kept = np.maximum(kept, state[2]) if k >= leaving else kept
+    most, total = entered[..., ever : memory + ever].max(axis=3), loop.recent.sum(axis=1)[:, None]
+    for _ in range(ROUNDS):
+        largest = np.maximum(largest, most[0])
+        state, _ = _state(loop, most[..., None] * total, largest, lagging)
+        found[ever], flows = _period(loop, coupling, moving[ever], state)
+        if (flows <= most).all():
+            break
+        most = np.maximum(most, 1.005 * flows)
+    else:
+        found[ever] = np.inf
+    found[ever - 1, 0] = np.maximum(found[ever - 1, 0], found[ever, 0])
+    entered[..., memory + ever] = most
+    ends = np.flip(np.maximum.accumulate(np.flip(entered, 3), axis=3), 3)
+    first = min(leaving, ever + 1)
+    return found, Entered(ends[..., first : first + memory], largest, np.maximum(kept, state[2]))
+
+
+def _state(
+    loop: Loop, answers: FloatArray, largest: FloatArray, lagging: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return |e|, |e'|, the lagging pull and the rate that others' terms see, (4, p, axes), and the pull."""
+    old = largest[..., None] * loop.old[:, None]
+    whole = loop.noise[:, None] + answers[0] + old
+    seen = answers[1, :, :, 1] + old[..., 1]
+    pulled = whole[..., 2]
+    return np.stack([whole[..., 0], whole[..., 1], np.maximum(pulled, lagging), seen]), pulled
+
+
+def _period(
+    loop: Loop, coupling: FloatArray, moving: FloatArray, state: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return |e|, |e'| and |e''| in one period, (3, axes), and what enters in it, (2, p, axes)."""
+    T, (fastest, rates) = loop.budget.period, moving
+    terms = _terms(coupling, rates)
+    own = loop.errors * (fastest + terms) + loop.budget.acceleration_error
+    more = _terms(coupling, rates + (state[3] + T * own).max(axis=0)) - terms
+    push = (1.0 + loop.budget.model_error) * state[2] + own + more
+    found = np.stack([state[0] + T * T / 8.0 * push, state[1] + T * push, push]).max(axis=1)
+    return found, np.stack([own + more + loop.spread * state[2], own])
+
+
+def _terms(coupling: FloatArray, rates: FloatArray) -> FloatArray:
+    """Return the largest accelerations that rates cause by themselves, shape (axes,)."""
+    terms: FloatArray = coupling @ rates @ rates
+    return terms

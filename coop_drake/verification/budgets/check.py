@@ -9,17 +9,20 @@ nominal motion than stated, and so no nearer to its funnel's bounds.
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from coop_drake.answers.budget import Tolerance
-from coop_drake.answers.plan import Plan
+from coop_drake.answers.plan import Plan, Transition
 from coop_drake.errors import RefusalError
+from coop_drake.tree import ComponentTree
 from coop_drake.tree.pose import FloatArray, IntArray
-from coop_drake.verification.budgets.axis_departure import departures
+from coop_drake.verification.budgets.axis_departure import Loop, departures, loop_of, resting
 from coop_drake.verification.budgets.axis_law import Axes
-from coop_drake.verification.budgets.entering import entering
+from coop_drake.verification.budgets.entering import entering, first_rest
 from coop_drake.verification.budgets.rate_room import check_rate_room
+from coop_drake.verification.budgets.rate_terms import couplings
 from coop_drake.verification.budgets.staying import Closed, staying, tails
 from coop_drake.verification.budgets.tubes import Nominal, tubes
 from coop_drake.verification.checks import Check
@@ -34,8 +37,12 @@ RAMPED = 6.0
 """mu t after which a gain counts as ramped in [-]; what is missing then counts as a disturbance."""
 
 
-def check_budget(plan: Plan) -> Check | None:
+def check_budget(plan: Plan, tree: ComponentTree | None = None) -> Check | None:
     """Check what a plan states about its budget; None for a plan without one.
+
+    Args:
+        plan: The plan.
+        tree: Its team, needed for a budget that has the team's bodies.
 
     Raises:
         RefusalError: Names the transition, the entry and the axis.
@@ -46,44 +53,78 @@ def check_budget(plan: Plan) -> Check | None:
             if stated is not None:
                 raise RefusalError(where, "is stated, but the plan has no budget for the axes")
         return None if plan.budget is None else Check("angles and joints are not part of the budget", 0)
-    _check_departures(plan)
-    smallest, count, entry = np.inf, 0, None
+    loop, terms = _loop(plan), _coupling(plan, tree)
+    entered = resting(loop, plan.start.size - 2)
+    smallest, count, entry = np.inf, 0, _start(plan)
     for k, transition in enumerate(plan.transitions):
         stated, where = transition.tolerance, f"transitions[{k}]"
-        assert stated is not None  # _check_departures has seen that
+        if stated is None:
+            raise RefusalError(f"{where}.tolerance", "is missing, but the plan has a budget")
         if transition.gains.funnel != "quintic":
             raise RefusalError(
                 f"{where}.gains.funnel", f"{transition.gains.funnel}: such a funnel never closes"
             )
-        found = entry if entry is not None else _start(plan)
-        _check_entry(stated, found, f"{where}.tolerance")
-        entry = _check_transition(plan, k, stated, f"{where}.tolerance")  # of the next one
+        _check_entry(stated, entry, f"{where}.tolerance")
+        motion, entry = _check_motion(plan, k, stated, f"{where}.tolerance")
+        away, entered = departures(loop, terms[k], motion.moving, entered, motion.leaving)
+        _check_departures(transition, motion, away, f"{where}.tolerance")
         smallest, count = min(smallest, float(stated.distance.min())), count + stated.distance.size
     return Check(
         "axes stay in their funnels under the budget", count, smallest, "rad or m to a funnel's bound"
     )
 
 
-def _check_departures(plan: Plan) -> None:
-    """Check how far axes and their rates may depart from their nominal motions."""
-    stated = []
-    for k, transition in enumerate(plan.transitions):
-        if transition.tolerance is None:
-            raise RefusalError(f"transitions[{k}].tolerance", "is missing, but the plan has a budget")
-        stated.append(transition.tolerance)
+def _loop(plan: Plan) -> Loop:
     if plan.axis_tracking is None:
         raise RefusalError("axis_tracking", "is missing, but the plan has a budget")
     assert plan.budget is not None  # checked by the caller
-    accelerations = np.array([one.acceleration for one in stated])
-    stays = [max(one.gains.hand_over_time, one.gains.rest.after if one.gains.rest else 0.0)
-             for one in plan.transitions]  # fmt: skip
-    found = departures(plan.axis_tracking, plan.budget, accelerations, np.array(stays))
-    for k, one in enumerate(stated):
-        for name, values in zip(("departure", "rate_departure"), found[:2], strict=True):
-            _require(getattr(one, name), values[k], False, f"transitions[{k}].tolerance.{name}")
-        most = plan.transitions[k].gains.acceleration_limit
-        if most is not None and not (one.acceleration + found[2][k] <= most).all():
-            raise RefusalError(f"transitions[{k}].tolerance", "an axis may exceed its limit of acceleration")
+    return loop_of(plan.axis_tracking, plan.budget)
+
+
+def _coupling(plan: Plan, tree: ComponentTree | None) -> FloatArray:
+    """Return the coefficients of the rate terms in every cell, none where the budget has no bodies."""
+    assert plan.budget is not None  # checked by the caller
+    axes = plan.start.size - 2
+    if not plan.budget.bodies:
+        return np.zeros((len(plan.cells), axes, axes, axes))
+    if tree is None:
+        raise ValueError("tree: expected the team, because the plan's budget has its bodies")
+    if max(body[0] for body in plan.budget.bodies) >= len(tree.components):
+        raise RefusalError("budget.bodies", f"expected components below {len(tree.components)}")
+    if len(plan.budget.rotors) not in (0, axes - 1):
+        raise RefusalError("budget.rotors", f"has {len(plan.budget.rotors)} numbers, not {axes - 1}")
+    return couplings(plan.budget, tree, plan.cells)
+
+
+class _Motion(NamedTuple):
+    """What follows for the nominal motions of a transition.
+
+    Attributes:
+        moving: Largest |acceleration| and rate in every period, the last one for ever, shape (periods + 1, 2,
+            axes).
+        spare: Least distance to the funnels' bounds in every period, likewise, shape (periods + 1, axes).
+        leaving: The first sample at which the cell can be left.
+    """
+
+    moving: FloatArray
+    spare: FloatArray
+    leaving: int
+
+
+def _check_departures(transition: Transition, motion: _Motion, away: FloatArray, where: str) -> None:
+    """Check how far axes and their rates may depart from their nominal motions, and what this leaves."""
+    stated, gains = transition.tolerance, transition.gains
+    assert stated is not None  # checked by the caller
+    for i, name in enumerate(("departure", "rate_departure")):
+        _require(getattr(stated, name), away[:, i].max(axis=0), False, f"{where}.{name}")
+    _require(stated.distance, (motion.spare - away[:, 0]).min(axis=0), True, f"{where}.distance")
+    if not (stated.distance > 0.0).all():
+        raise RefusalError(where, "an axis may leave its funnel")
+    most, limits = gains.acceleration_limit, gains.rate_limit
+    if most is not None and not (stated.acceleration + away[:, 2].max(axis=0) <= most).all():
+        raise RefusalError(where, "an axis may exceed its limit of acceleration")
+    if limits is not None and not ((motion.moving[:, 1] + away[:, 1]).max(axis=0) <= limits).all():
+        raise RefusalError(where, "an axis may be faster than its limit")
 
 
 def _start(plan: Plan) -> FloatArray:
@@ -124,8 +165,8 @@ def _axes(plan: Plan, k: int) -> Axes:
     return Axes(np.array([cell.lower, cell.upper]), goal, gains.decay_rate, gains.log_gain, *singles)
 
 
-def _check_transition(plan: Plan, k: int, stated: Tolerance, where: str) -> FloatArray:
-    """Check one transition of the nominal motions; return in which states the next one can begin."""
+def _check_motion(plan: Plan, k: int, stated: Tolerance, where: str) -> tuple[_Motion, FloatArray]:
+    """Check one transition of the nominal motions; return in which states the next one can begin, too."""
     assert plan.budget is not None  # checked by the caller
     budget, axes, rest = plan.budget, _axes(plan, k), plan.transitions[k].gains.rest
     members, middle, reach = _parts(stated)
@@ -141,27 +182,50 @@ def _check_transition(plan: Plan, k: int, stated: Tolerance, where: str) -> Floa
     box, most = _ends(made, begins, samples, motions.axes)
     x, v = stated.settled[members], stated.settled_rate[members]
     needed, last = staying(motions, Closed(begins * T, follows, box, x, v))
-    check_rate_room(plan.transitions[k], T, made, last, members, where)
+    check_rate_room(plan.transitions[k], made, last, members, where)
     half = 0.5 * (axes.goal[1] - axes.goal[0])
-    distance, fastest = half[members] - x - 0.125 * T * T * last, last.copy()
+    needed, fastest = np.maximum(needed, most), last.copy()
     for i, n in enumerate(samples):
-        distance[i] = min(distance[i], made[:n, 5, i].min())
         fastest[i] = max(fastest[i], made[:n, 4, i].max())
-    needed = np.maximum(needed, most)
     for name, found in (
-        ("distance", -_largest(-distance, members) - stated.departure),
         ("acceleration", _largest(fastest, members)),
         ("settled", _largest(needed[0], members)),
         ("settled_rate", _largest(needed[1], members)),
     ):
-        _require(getattr(stated, name), found, name == "distance", f"{where}.{name}")
+        _require(getattr(stated, name), found, False, f"{where}.{name}")
     if rest is None:
         raise RefusalError(f"transitions[{k}].gains.rest", "is missing, but the plan has a budget")
     within = np.minimum(rest.reach, 2.0 * (0.5 - EROSION) * half)
-    resting = (stated.settled <= within).all() and (stated.settled_rate <= rest.rate).all()
-    if not (stated.distance > 0.0).all() or not resting:
-        raise RefusalError(where, "an axis may leave its funnel, or never count as arrived")
-    return entering(plan.transitions[k], budget, made, samples, members, last, rest, stated)
+    if not ((stated.settled <= within).all() and (stated.settled_rate <= rest.rate).all()):
+        raise RefusalError(where, "an axis may never count as arrived")
+    ends = half[members] - x - 0.125 * T * T * last
+    leaving = first_rest(plan.transitions[k], T, made, samples, members, rest)
+    motion = _motion(made, samples, members, np.array([last, v, ends]), T, leaving)
+    entered = entering(plan.transitions[k], budget, made, samples, members, last, rest, stated)
+    return motion, entered
+
+
+def _motion(
+    made: FloatArray, samples: FloatArray, members: IntArray, ever: FloatArray, period: float, leaving: int
+) -> _Motion:
+    """Return what follows for all axes from the tubes of their parts.
+
+    Args:
+        made: The tubes, as ``tubes`` returns them.
+        samples: How many samples of each tube there are, shape (b,).
+        members: Axis of each tube, shape (b,).
+        ever: Largest acceleration, rate, and least distance after each tube's end, shape (3, b).
+        period: Control period [s].
+        leaving: The first sample at which the cell can be left.
+    """
+    rows = np.repeat(ever[None], int(samples.max()) + 1, axis=0)
+    for i, n in enumerate(samples):
+        tube = made[:n, :, i]
+        rows[:n, :, i] = np.column_stack([tube[:, 4], np.abs(tube[:, 2]) + tube[:, 3], tube[:, 5]])
+    axes = [rows[:, :, members == axis] for axis in range(int(members.max()) + 1)]
+    moving = np.stack([own[:, :2].max(axis=2) for own in axes], axis=2)
+    moving[:, 1] += period * moving[:, 0]
+    return _Motion(moving, np.stack([own[:, 2].min(axis=1) for own in axes], axis=1), leaving)
 
 
 def _middles(plan: Plan, k: int) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import ceil
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coop_drake.answers.budget import Budget, Tolerance
 from coop_drake.answers.plan import Transition
@@ -60,13 +61,42 @@ def entering(
     return result
 
 
+def first_rest(
+    transition: Transition,
+    period: float,
+    made: FloatArray,
+    samples: FloatArray,
+    members: IntArray,
+    rest: RestCondition,
+) -> int:
+    """Return the first sample at which all axes can be at rest and the cell be left; arguments as above."""
+    middle = 0.5 * (transition.goal_lower + transition.goal_upper)
+    first = ceil(max(transition.gains.hand_over_time, rest.after) / period - 1e-6)
+    latest = first
+    for axis in range(middle.size):
+        limits, ends = (rest.reach[axis], rest.rate[axis]), []
+        for i in np.flatnonzero(members == axis):
+            tube = made[: samples[i], :, i].copy()
+            tube[:, 0] -= middle[axis]
+            times = np.flatnonzero(_resting(tube, limits))
+            ends.append(next(iter(times[times >= first]), max(first, len(tube))))
+        latest = max(latest, min(ends))
+    return int(latest)
+
+
+def _resting(tube: FloatArray, limits: tuple[float, float]) -> NDArray[np.bool_]:
+    """Return at which samples a tube about the middle holds a motion at rest."""
+    low, high = tube[:, [0, 2]] - tube[:, [1, 3]], tube[:, [0, 2]] + tube[:, [1, 3]]
+    there: NDArray[np.bool_] = np.all((low <= limits) & (high >= -np.array(limits)), axis=1)
+    return there
+
+
 def _switched(
     tube: FloatArray, limits: tuple[float, float], since: int, stay: int, period: float
 ) -> list[tuple[float, ...]]:
     """Return in which states a tube about the middle can be when the cell is switched before its end."""
     low, high = tube[:, [0, 2]] - tube[:, [1, 3]], tube[:, [0, 2]] + tube[:, [1, 3]]
-    resting = ((low <= limits) & (high >= -np.array(limits))).all(axis=1)
-    times = np.flatnonzero(resting)
+    times = np.flatnonzero(_resting(tube, limits))
     times = times[times >= stay]
     possible = [k for k in range(stay, len(tube)) if ((times <= k) & (times >= k - since)).any()]
     if not possible:

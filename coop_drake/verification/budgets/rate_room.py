@@ -11,7 +11,6 @@ from coop_drake.tree.pose import FloatArray, IntArray
 
 def check_rate_room(
     transition: Transition,
-    period: float,
     made: FloatArray,
     last: FloatArray,
     members: IntArray,
@@ -24,7 +23,6 @@ def check_rate_room(
 
     Args:
         transition: The transition, with its stated sets.
-        period: Control period [s].
         made: Tubes of all parts, shape (samples, 6, b), see ``tubes``.
         last: Largest |acceleration| of each part after its tube's end, shape (b,).
         members: Axis of each part, shape (b,).
@@ -50,6 +48,3 @@ def check_rate_room(
         asked = commanded[:, of].ravel()
         if not (rates * asked <= 0.5 * gain * (limit**2 - rates**2)).all():
             raise RefusalError(f"{where}[{axis}]", f"an axis may be damped by its limit of {limit:.6g}")
-        fastest = rates.max() + 0.5 * period * stated.acceleration[axis] + stated.rate_departure[axis]
-        if not fastest <= limit:
-            raise RefusalError(f"{where}[{axis}]", f"an axis may be faster than its limit of {limit:.6g}")

@@ -1,0 +1,96 @@
+"""A quick turn of bent arms under a budget: rates alone accelerate joints, and wrong masses leave a part."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from coop_drake.errors import RefusalError
+from coop_drake.laws import ScheduledGains
+from coop_drake.planning.planner import plan as make
+from coop_drake.plant import planning_problem
+from coop_drake.plant.budgets import budget_of
+from coop_drake.scenario import Deployment, Goal, ObjectPose, Start
+from coop_drake.simulation import build_maps, simulate
+from coop_drake.typed_data import convert_class
+from coop_drake.verification.budgets import check_budget
+from coop_drake.verification.runs.rows import Rows
+from coop_drake.verification.runs.tube import check_budget_used
+from tests.support.small_scenario import small_scenario
+
+ARMS = (-0.05, 0.22), (0.45, -0.95)
+"""The second robot's arm is bent as in the cell of `elbow` in which the object turns quickest."""
+
+TURN = 1.3
+"""How far the object turns [rad]."""
+
+
+@cache
+def planned(counted=True):
+    scenario = small_scenario("elbow")
+    names, pose = tuple(scenario.start.joints), scenario.start.object
+    joints = dict(zip(names, ARMS, strict=True))
+    goal = ObjectPose(pose.x + 0.2, pose.y, pose.theta + TURN)
+    deployment = convert_class(Deployment.completed({"preset": "mobile_base"}, "deployment"), Deployment)
+    scenario = replace(
+        scenario, deployment=deployment, start=Start(pose, joints), limits={},
+        goal=Goal(goal, joints, scenario.goal.tolerances),
+    )  # fmt: skip
+    gains = ScheduledGains().for_age(deployment.command_age)
+    scenario = replace(scenario, gains=replace(scenario.gains, sets={"scheduled": gains}))
+    problem = planning_problem(scenario)
+    budget = budget_of("all", scenario, problem)
+    if not counted:
+        budget = replace(budget, bodies=(), rotors=())
+    plan = make(problem, gains, gain_set_name="scheduled", budget=budget).plan
+    return scenario, plan, build_maps(plan)
+
+
+def turned(mass_error, counted=True):
+    scenario, plan, maps = planned(counted)
+    deployment = replace(scenario.deployment, mass_error=mass_error)
+    return plan, simulate(replace(scenario, deployment=deployment), plan, maps)
+
+
+def spared(plan, log):
+    """By how much every axis kept more than the stated distance from its bounds, least, shape (axes,)."""
+    axes = np.column_stack([log.object_pose[:, 2], log.joints])
+    stated = np.array([one.tolerance.distance for one in plan.transitions])[log.cell_index]
+    kept = np.minimum(axes - log.funnel_lower, log.funnel_upper - axes)
+    return (kept - stated).min(axis=0)
+
+
+@pytest.mark.parametrize("mass_error", [-0.2, 0.2])
+def test_axes_keep_the_stated_distances_in_a_quick_turn(mass_error):
+    plan, log = turned(mass_error)
+    assert (log.reached, log.violation) == (True, "")
+    assert np.abs(log.object_twist[:, 2]).max() > 1.2
+    spare = check_budget_used(Rows(log, plan))[1].tightest
+    assert spare == pytest.approx(spared(plan, log).min())
+    assert spare > 0.0
+
+
+def test_without_rate_terms_axes_come_nearer_to_their_bounds_than_stated():
+    plan, log = turned(-0.2, counted=False)
+    assert spared(plan, log).min() < -0.01
+    with pytest.raises(RefusalError, match="nearer to a bound than stated"):
+        check_budget_used(Rows(log, plan))
+
+
+def test_the_plan_is_checked_with_the_bodies_of_its_team():
+    scenario, plan, _ = planned()
+    tree = planning_problem(scenario).tree
+    assert check_budget(plan, tree).tightest > 0.0
+    easily_turned = tuple((*body[:4], 0.1 * body[4]) for body in plan.budget.bodies)
+    for changes, where in (
+        ({"bodies": easily_turned}, "tolerance"),
+        ({"bodies": ((9, 1.0, 0.0, 0.0, 0.1),)}, "budget.bodies"),
+        ({"rotors": (0.0,)}, "budget.rotors"),
+    ):
+        altered = replace(plan, budget=replace(plan.budget, **changes))
+        with pytest.raises(RefusalError) as refusal:
+            check_budget(altered, tree)
+        assert where in refusal.value.where
+    with pytest.raises(ValueError, match="expected the team"):
+        check_budget(plan)
