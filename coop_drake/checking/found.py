@@ -69,9 +69,7 @@ def _check_free(question: Question, box: list[Interval], region: Region, where: 
     """
 
     def clear(wall: tuple[Point, Point], moved: list[Point], gap: int) -> bool:
-        plane.spend(5 * len(moved))
-        near = [(wx - x, wy - y) for wx, wy in wall for x, y in moved]
-        return plane.boxes_apart(region.box, plane.box_of(near), gap) or region.side(hull(near), gap) < 0
+        return region.side(plane.difference(wall, moved), gap) < 0
 
     for body, chain, corners, radius in question.pieces:
         moved, gap = swept(corners, radius, chain, box)

@@ -19,6 +19,7 @@ from coop_drake.checking.plane import (
     Region,
     apart,
     cosine_and_sine,
+    difference,
     hull,
     numbers,
 )
@@ -67,6 +68,20 @@ def test_sets_are_apart_exactly_if_their_distance_is_larger(first, second, gap):
     if abs(distance - gap) > 1e-9 or gap == 0:
         expected = distance > gap
         assert apart(hull(first), hull(second), gap) == expected == apart(hull(second), hull(first), gap)
+
+
+@given(PLACES, PLACES)
+def test_edges_in_order_of_their_directions_bound_all_differences(first, second):
+    first, second = hull(first), hull(second)
+    found = difference(first, second)
+    assert hull(found) == hull((p - x, q - y) for p, q in first for x, y in second)
+    assert len(found) <= len(first) + len(second)
+    assert area(found) == area(hull(found))
+
+
+def area(ring):
+    """Twice the area that a ring runs around counter-clockwise."""
+    return sum(x * q - y * p for (x, y), (p, q) in pairwise([ring[-1], *ring]))
 
 
 @given(PLACES, PLACES, st.integers(-3, 2))
