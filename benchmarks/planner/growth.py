@@ -20,7 +20,7 @@ ROBOTS = (2, 3, 4, 5, 6)
 JOINTS = (1, 2, 3)
 """Joints of each of two arms."""
 
-VERTICES = (50, 500, 5_000)
+VERTICES = (50, 500, 5_000, 50_000)
 """Corners of a floor with shelves, about."""
 
 

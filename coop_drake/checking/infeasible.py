@@ -18,6 +18,7 @@ def check_proof(question: Question, answer: Any, progress: plane.Progress) -> li
     A proof is about the positions in W of a point of a component, and about that component's angle in W.
     """
     slices, (point,), edges = answer["slices"], points([answer["point"]]), 0
+    outside = Region(question.floor.rings, odd=False)
     chain = question.chains[index(answer["component"], len(question.chains))]
     boxes = [intervals(value["lower"], value["upper"], question.axes) for value in slices]
     neighbours = _facets(boxes, question.limits) + [(k, k) for k in range(len(boxes))]
@@ -37,7 +38,11 @@ def check_proof(question: Question, answer: Any, progress: plane.Progress) -> li
             clear = free([point], 0, steps, box, wrong, lambda cell, *at: cell.side(*at) < 0)
             demand(clear, where, f"cells may hold the {name} and have reached: {label}")
         forbidden = _forbidden(question, [Step(0, -1, offset=point), *chain], wide, value["witnesses"], where)
-        edges += 0 if forbidden is None else _check_cover([cell for _, cell in cells[k]], forbidden, where)
+        edges += (
+            0
+            if forbidden is None
+            else _check_cover([cell for _, cell in cells[k]], forbidden, outside, where)
+        )
         progress("checking slices", (k + 1) / len(slices))
     return [
         ("slices tile a turn and the limits of the joints", len(slices)),
@@ -56,14 +61,14 @@ def _meets(wide: list[Interval], box: list[Interval], carrier: list[Step]) -> bo
 
 
 def _forbidden(question: Question, frame: list[Step], box: list[Interval], witnesses: Any, where: str) -> Any:
-    """Check that pieces hold witnesses; returns open sets of forbidden positions, None if all are.
+    """Check that pieces hold witnesses; returns their polygons, None if all positions are forbidden.
 
     A witness is a convex polygon K inside one piece, relative to the position p that the proof is about and
     in directions of W, or inside both pieces of a pair, in a component's frame. A position p is forbidden if
     the mean of K's corners, a point of the piece, is off the floor, and if p + K meets a wall e: p is in the
     interior of the Minkowski sum of e and -K.
     """
-    forbidden, floor = list[Region](), question.floor
+    polygons = list[list[Point]]()
     for witness in witnesses:
         pieces = [question.pieces[index(k, len(question.pieces))] for k in witness["pieces"]]
         polygon, paired = hull(points(witness["polygon"])), tuple(witness["pieces"]) in question.pairs
@@ -73,12 +78,9 @@ def _forbidden(question: Question, frame: list[Step], box: list[Interval], witne
             motion = team.relative(seen, piece.chain)
             inside = free(polygon, 2 - piece.radius, motion, box, [piece.corners], _inside)
             demand(inside, f"{where}.witnesses", f"may leave the inside of {piece.body}")
-        spend(100 * len(floor.edges) + len(question.pairs))
-        x0, y0 = (sum(values) // len(polygon) for values in zip(*polygon, strict=True))
-        off_floor = Region([[(x - x0, y - y0) for x, y in ring] for ring in floor.rings], odd=False)
-        sums = [hull((wx - x, wy - y) for wx, wy in wall for x, y in polygon) for wall in floor.edges]
-        forbidden += [off_floor, *[Region([corners]) for corners in sums]]
-    return None if any(len(witness["pieces"]) == 2 for witness in witnesses) else forbidden
+        spend(100 + len(question.pairs))
+        polygons.append(polygon)
+    return None if any(len(witness["pieces"]) == 2 for witness in witnesses) else polygons
 
 
 def _inside(piece: list[Point], corners: list[Point], depth: int) -> bool:
@@ -87,31 +89,82 @@ def _inside(piece: list[Point], corners: list[Point], depth: int) -> bool:
     return all(Region([piece]).side([corner], gap) >= least for corner in corners)
 
 
-def _check_cover(cells: list[Region], forbidden: list[Region], where: str) -> int:
+class _Sets:
+    """Open sets of positions: cells, and what polygons K forbid, made as far as it is looked for.
+
+    Attributes:
+        known: A region by its number, and how far its points are moved to be positions.
+    """
+
+    def __init__(self, cells: list[Region], polygons: list[list[Point]], outside: Region) -> None:
+        self.known, self.polygons, self.walls = dict[int, tuple[Region, Point]](), polygons, outside.edges
+        for cell in cells:
+            self.known[len(self.known)] = cell, (0, 0)
+        for polygon in polygons:
+            x, y = (sum(values) // len(polygon) for values in zip(*polygon, strict=True))
+            self.known[len(self.known)] = outside, (-x, -y)
+        self.always, self.outside = list(self.known), outside
+
+    def near(self, edge: tuple[Point, Point]) -> list[int]:
+        """The sets that may meet an edge."""
+        box, regions = plane.box_of(edge), [self.known[k][0] for k in self.always]
+        spend(len(regions))
+        found = [k for k, one in enumerate(regions) if not (one.odd and plane.boxes_apart(one.box, box, 0))]
+        for number, polygon in enumerate(self.polygons):
+            zone = [end + off for end, off in zip(box, plane.box_of(polygon), strict=True)]
+            for wall in self.outside.near(zone, 0):
+                k = len(self.always) + number * len(self.walls) + wall
+                if k not in self.known:
+                    corners = hull((wx - x, wy - y) for wx, wy in self.walls[wall] for x, y in polygon)
+                    self.known[k] = Region([corners]), (0, 0)
+                found.append(k)
+        return found
+
+    def edges(self, k: int) -> list[tuple[Point, Point]]:
+        """The edges of a set."""
+        region, (x, y) = self.known[k]
+        return [((ax + x, ay + y), (bx + x, by + y)) for (ax, ay), (bx, by) in region.edges]
+
+    def stretches(self, k: int, edge: tuple[Point, Point]) -> list[Interval]:
+        """Stretches of an edge in a set."""
+        region, (x, y) = self.known[k]
+        return region.stretches([(px - x, py - y) for px, py in edge])
+
+
+def _check_cover(cells: list[Region], polygons: list[list[Point]], outside: Region, where: str) -> int:
     """Check that the interiors of cells and forbidden sets cover the plane; counts their edges.
 
     The union of some open sets is open. If each point of each of their boundaries lies in one of them, it is
     closed as well, thus the whole plane. All cells belong to these sets; a forbidden one does as soon as it
-    covers a part of a boundary.
+    covers a part of a boundary. Of many edges it is tested first whether a box about them lies in a cell.
     """
-    sets, count, taken = [*cells, *forbidden], 0, set(range(max(len(cells), 1)))
-    demand(len(sets) > 0, where, "has neither cells nor witnesses")
-    left = [edge for k in taken for edge in sets[k].edges]
+    demand(len(cells) + len(polygons) > 0, where, "has neither cells nor witnesses")
+    sets, count, taken = _Sets(cells, polygons, outside), 0, set(range(max(len(cells), 1)))
+    left = [sets.edges(k) for k in taken]
     while left:
-        edge, count = left.pop(), count + 1
-        spend(len(sets))
-        box, (x, y) = plane.box_of(edge), edge[0]
-        near = [k for k, one in enumerate(sets) if not (one.odd and plane.boxes_apart(one.box, box, 0))]
-        chosen = _chosen(sets, [k for k in near if k in taken], edge) or _chosen(sets, near, edge)
-        demand(len(chosen) > 0, where, f"no cell covers ({x / ONE:.6f}, {y / ONE:.6f}), which may be free")
-        left += [edge for k in chosen - taken for edge in sets[k].edges]
-        taken |= chosen
+        edges = left.pop()
+        if len(edges) > plane.MANY:
+            low_x, low_y, high_x, high_y = plane.box_of([corner for edge in edges for corner in edge])
+            around = [(low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y)]
+            if any(cell.side(around, 0) > 0 for cell in cells):
+                count += len(edges)
+                continue
+            left += [edges[: len(edges) // 2], edges[len(edges) // 2 :]]
+            continue
+        for edge in edges:
+            count, near, (x, y) = count + 1, sets.near(edge), edge[0]
+            chosen = _chosen(sets, [k for k in near if k in taken], edge) or _chosen(sets, near, edge)
+            demand(
+                len(chosen) > 0, where, f"no cell covers ({x / ONE:.6f}, {y / ONE:.6f}), which may be free"
+            )
+            left += [sets.edges(k) for k in sorted(chosen - taken)]
+            taken |= chosen
     return count
 
 
-def _chosen(sets: list[Region], among: list[int], edge: tuple[Point, Point]) -> set[int]:
+def _chosen(sets: _Sets, among: list[int], edge: tuple[Point, Point]) -> set[int]:
     """Some sets whose stretches together cover an edge, the far-reaching first; none if they do not."""
-    stretches = [(low, high, k) for k in among for low, high in sets[k].stretches(edge)]
+    stretches = [(low, high, k) for k in among for low, high in sets.stretches(k, edge)]
     chosen, covered = set[int](), -1
     while covered < FULL:
         high, k = max([(high, -k) for low, high, k in stretches if low <= max(covered, 0)], default=(-1, 0))

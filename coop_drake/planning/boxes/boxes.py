@@ -12,21 +12,18 @@ from shapely import MultiPolygon, Polygon
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
-from coop_drake.geometry.parts import parts_of
 from coop_drake.geometry.swept_tree import Interval, Intervals, SweptTree
 from coop_drake.planning.boxes.certify import PathBox
 from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.cells.cells import CellMaker, Region, regions_of
 from coop_drake.planning.cells.slices import nearest_turn
+from coop_drake.planning.questions.floor_near import nearby
 from coop_drake.planning.questions.margins import disc_polygon, is_patched, marginal_workspace
 from coop_drake.tree.pose import FloatArray
 
 MANY_COORDINATES = 150
 """On a floor with more corners only the part near a box is looked at, because Minkowski differences of the
 whole floor would take most of the time."""
-
-EXTRA_FLOOR = 1.0
-"""The part of a floor near a path reaches this much further than the team [m]: wide cells are faster."""
 
 
 @dataclass(frozen=True)
@@ -90,18 +87,6 @@ class Regions:
 
     def _maker(self, floor: Polygon | MultiPolygon) -> CellMaker:
         return CellMaker(self._swept, self._pairs, floor)
-
-
-def nearby(floor: Polygon | MultiPolygon, positions: FloatArray, reach: float) -> MultiPolygon:
-    """The part of a floor that a team at some positions can touch, and ``EXTRA_FLOOR`` around it.
-
-    Args:
-        floor: Polygons with holes [m].
-        positions: Positions p_WL, shape (k, 2) [m].
-        reach: Distance of the team's furthest point from p_WL [m].
-    """
-    lower, upper = positions.min(axis=0) - reach - EXTRA_FLOOR, positions.max(axis=0) + reach + EXTRA_FLOOR
-    return MultiPolygon(parts_of(floor.intersection(shapely.box(*lower, *upper))))
 
 
 def _joined(regions: Sequence[Region], box: PathBox) -> Region | None:

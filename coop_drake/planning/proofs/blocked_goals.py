@@ -12,6 +12,7 @@ from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.planning.cells.slices import halves
 from coop_drake.planning.proofs.blocked_goal_proof import blocked_goal_proof
 from coop_drake.planning.proofs.witnesses import Witnesses
+from coop_drake.planning.questions.floor_near import nearby
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.questions.question_checks import goal_beyond_limits
 from coop_drake.planning.questions.relaxation import relaxed
@@ -41,7 +42,10 @@ def blocked_goal(problem: PlanningProblem) -> tuple[InfeasibilityProof | None, i
         question = relaxed(problem, chosen)[0]
         swept = SweptTree(question.tree)
         pairs = BodyPairs(swept)
-        boxes, made = _blocked(question, CellMaker(swept, pairs, shrunk(question.workspace, 0.0)))
+        # At the goal pose the team meets no other part of the floor.
+        floor = nearby(question.workspace, question.goal_pose[None, :2], question.tree.reach)
+        whole = shrunk(question.workspace, 0.0)
+        boxes, made = _blocked(question, CellMaker(swept, pairs, whole if floor.is_empty else floor))
         slices += made
         beyond = goal_beyond_limits(question) is not None
         if boxes or beyond:

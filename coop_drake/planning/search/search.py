@@ -25,6 +25,7 @@ from coop_drake.planning.cells.events import Watch
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.proofs.blocked_goals import blocked_goal, touch_at_goal
 from coop_drake.planning.proofs.clearance_bound import clearance_bound
+from coop_drake.planning.proofs.enclosed_ends import refuted_at_an_end
 from coop_drake.planning.proofs.proof_search import Proofs
 from coop_drake.planning.questions.question_checks import check_question, goal_beyond_limits
 from coop_drake.planning.search.cell_search import search_by_cells
@@ -144,7 +145,7 @@ class _Search:
     ) -> None:
         self._began, self._unit, self._routed = thread_time(), unit, routed
         self._first_plan: float | None = None
-        self._problem, self._progress = problem, progress
+        self._problem, self._progress, self._watch = problem, progress, watch
         self._samples = SampledSearch(problem, routed=routed)
         self._proofs = Proofs(problem, watch)
         self._other_slices = 0
@@ -170,6 +171,10 @@ class _Search:
             return NoChannel(
                 True, "at the goal pose the team is in collision for all values of its free joints", blocked
             )
+        refutation, slices = refuted_at_an_end(self._problem, self._watch)
+        self._other_slices += slices
+        if refutation is not None:
+            return NoChannel(True, refutation.reason, refutation.proof)
         budget = self._problem.settings.max_slices
         each, short = min(FIRST_EXPLORATION, budget), min(SHORT_EXPLORATION, budget)
         object_blocked = self._samples.object_blocked > 0
