@@ -9,7 +9,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory, LoopPlant
 from coop_drake.laws.friction import base_friction
-from coop_drake.laws.team_dynamics import team_accelerations
+from coop_drake.laws.team_dynamics import team_accelerations, team_work
 from coop_drake.systems.team_kernels import FusedTeam, read_own
 from coop_drake.tree.pose import FloatArray
 
@@ -26,14 +26,16 @@ def advance(
     Efforts follow what is held as exponentials, exactly. A step of 5 ms errs by 1e-8 of the distances moved.
     """
     period, n = departures.times[0], memory.state.size // 2
-    acting = memory.efforts[1].copy()
-    state, start = memory.state.copy(), memory.state.copy()
-    change = np.zeros(2 * n)
-    slopes = np.empty(n)
+    acting, state, start = memory.efforts[1].copy(), memory.state.copy(), memory.state.copy()
+    change, slopes, work = np.zeros(2 * n), np.empty(n), team_work(plant.tree.shape[0])
+    wrenches, efforts = np.empty((team.yaws.size + 1, 3)), np.zeros(n)
     for stage in range(4):
         ahead = 0.0 if stage == 0 else period if stage == 3 else 0.5 * period
         _follow(ahead, acting, departures, memory)
-        _accelerate(sample * period + ahead, state, team, plant, departures, memory, slopes)
+        _drive(sample * period + ahead, state, team, plant, departures, memory, wrenches, efforts)
+        team_accelerations(
+            plant.tree, plant.bases, plant.places, wrenches, efforts, departures.floor[2], state, work, slopes
+        )
         weight = period / 6.0 if stage in (0, 3) else period / 3.0
         further = 0.0 if stage == 3 else period if stage == 2 else 0.5 * period
         for i in range(n):
@@ -57,11 +59,11 @@ def _follow(ahead: float, acting: FloatArray, departures: LoopDepartures, memory
 
 
 @compiled
-def _accelerate(
+def _drive(
     time: float, state: FloatArray, team: FusedTeam, plant: LoopPlant, departures: LoopDepartures,
-    memory: LoopMemory, slopes: FloatArray,
+    memory: LoopMemory, wrenches: FloatArray, efforts: FloatArray,
 ) -> None:  # fmt: skip
-    """Write the accelerations of the object and of all joints under the efforts that act.
+    """Write the wrenches on bases and object, and the efforts of all joints.
 
     Args:
         time: Now [s].
@@ -70,10 +72,11 @@ def _accelerate(
         plant: The simulated team.
         departures: What departs.
         memory: Holds the efforts.
-        slopes: Receives the accelerations, shape (3 + n,).
+        wrenches: Receives forces in W and torques, shape (N + 1, 3) [N, N m].
+        efforts: Receives the efforts at the places of the rates, shape (3 + n,) [N m or N].
     """
     robots, n = team.yaws.size, state.size // 2
-    wrenches, efforts = np.zeros((robots + 1, 3)), np.zeros(n)
+    wrenches[robots] = 0.0
     for k in range(robots):
         first, own = team.first[2, k], 3 * k + team.first[2, k]
         for i in range(3):
@@ -87,9 +90,6 @@ def _accelerate(
         if push[BEGIN] <= time < push[END]:
             for i in range(3):
                 wrenches[int(push[0]), i] += push[1 + i]
-    team_accelerations(
-        plant.tree, plant.bases, plant.places, wrenches, efforts, departures.floor[2], state, slopes
-    )
 
 
 @compiled

@@ -9,6 +9,7 @@ computes it.
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -41,6 +42,33 @@ from coop_drake.laws.load_sharing import rotated
 from coop_drake.tree.pose import FloatArray, IntArray
 
 
+class TeamWork(NamedTuple):
+    """Room for what ``team_accelerations`` computes on the way, given so that it need not be made each time.
+
+    Attributes:
+        inertias: Mass, first moments and inertia of every link and what it carries, shape (1 + n, 4).
+        forces: What these need while no coordinate accelerates, shape (1 + n, 3).
+        matrix: The mass matrix, shape (3 + n, 3 + n).
+        wanted: Forces without an acceleration, then accelerations, shape (3 + n,).
+        still: Accelerations of joints that are zero, shape (1 + n,).
+    """
+
+    inertias: FloatArray
+    forces: FloatArray
+    matrix: FloatArray
+    wanted: FloatArray
+    still: FloatArray
+
+
+@compiled
+def team_work(links: int) -> TeamWork:
+    """Return room for a tree of so many links, the object included."""
+    size = links + 2
+    return TeamWork(
+        np.empty((links, 4)), np.empty((links, 3)), np.empty((size, size)), np.empty(size), np.zeros(links)
+    )
+
+
 @compiled
 def team_accelerations(
     tree: FloatArray,
@@ -50,6 +78,7 @@ def team_accelerations(
     efforts: FloatArray,
     gravity: float,
     state: FloatArray,
+    work: TeamWork,
     accelerations: FloatArray,
 ) -> None:
     """Write the accelerations of the object and of all joints under given forces.
@@ -64,13 +93,20 @@ def team_accelerations(
             read [N m or N].
         gravity: Acceleration along x of W of all masses [m/s^2].
         state: State of the team: 3 + n positions, then their rates in the same order.
+        work: What ``team_work`` returns; it is overwritten.
         accelerations: Receives x'', y'', theta'' and those of the joints, each at the place of its rate,
             shape (3 + n,) [m/s^2 or rad/s^2].
     """
-    size, wanted = tree.shape[0] + 2, np.empty(tree.shape[0] + 2)
+    size, wanted, inertias, forces, matrix = (
+        tree.shape[0] + 2,
+        work.wanted,
+        work.inertias,
+        work.forces,
+        work.matrix,
+    )
     motion = move_chain(tree, state)
-    accelerate_chain(tree, state, np.zeros(tree.shape[0]), motion)
-    inertias, forces, matrix = np.empty((size, 4)), np.empty((size, 3)), np.zeros((size, size))
+    accelerate_chain(tree, state, work.still, motion)
+    matrix[:] = 0.0
     for i in range(tree.shape[0]):
         _write_inertia(tree[i], motion[i], gravity, inertias[i], forces[i])
     for k in range(pushed.size):

@@ -7,7 +7,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.laws.chain_motion import DAMPING
-from coop_drake.laws.team_dynamics import solve_symmetric, team_accelerations
+from coop_drake.laws.team_dynamics import solve_symmetric, team_accelerations, team_work
 from coop_drake.plant import build_team_plant, read_component_tree, team_tree
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 
@@ -38,7 +38,7 @@ def test_the_team_accelerates_as_in_drake(tmp_path):
     tree.tree[1:, DAMPING] = 0.7
     for joint in team.joints:
         joint.SetDampingVector(context, [0.7])
-    size = plant.num_velocities()
+    size, work = plant.num_velocities(), team_work(len(tree.tree))
     for _ in range(20):
         state, wrenches = generator.normal(size=2 * size), generator.normal(size=(len(ARMS) + 1, 3))
         state[team.position_index[3:]] *= 0.1  # nothing touches, and no joint is at its limit
@@ -49,7 +49,8 @@ def test_the_team_accelerates_as_in_drake(tmp_path):
         plant.get_applied_spatial_force_input_port().FixValue(context, applied(team, wrenches))
         expected = plant.get_generalized_acceleration_output_port().Eval(context)
         found = np.empty(size)
-        team_accelerations(tree.tree, tree.bases, tree.places, wrenches, efforts, GRAVITY, state, found)
+        forces = tree.bases, tree.places, wrenches, efforts, GRAVITY
+        team_accelerations(tree.tree, *forces, state, work, found)
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
