@@ -41,7 +41,7 @@ def run_loop(
     sample = 0
     watch(sample, cells, team, plant, nominal, departures, memory, measured, figures)
     while figures[ENDED] == RUNS:
-        _update(sample, cells, team, nominal, departures, memory)
+        update(sample, cells, team, nominal, departures, memory)
         watch_switch(sample, cells, team, plant, departures, memory, figures)
         advance(sample, team, plant, departures, memory)
         sample += 1
@@ -50,7 +50,7 @@ def run_loop(
 
 
 @compiled
-def _update(
+def update(
     sample: int, cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures,
     memory: LoopMemory,
 ) -> None:  # fmt: skip

@@ -38,6 +38,7 @@ USERS = {
     "named": MOTION | READINESS | {"wrench_share", "acceleration_at", "object_twist", "robot_effort"},
     # The fused block reads the object's twist from the plant.
     "fused": MOTION | READINESS | {"wrench_share", "acceleration_at", "robot_effort"},
+    "compiled": MOTION | READINESS | {"wrench_share", "acceleration_at", "object_twist", "robot_effort"},
     "estimate": MOTION | READINESS,
     # The next box is not known, so that the energy of its funnels is no condition.
     "boxes": MOTION | READINESS - {"funnel_margin"},

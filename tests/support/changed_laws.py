@@ -11,6 +11,10 @@ from types import FunctionType
 import numpy as np
 
 from coop_drake.answers.plan import Plan
+from coop_drake.compiled_loop import CompiledTransport, prepare
+from coop_drake.compiled_loop.departing import departures_of, memory_of
+from coop_drake.compiled_loop.looping import update
+from coop_drake.compiled_loop.watching import begin_figures, watch
 from coop_drake.diagram import build_closed_loop
 from coop_drake.geometry.boundary import edges_of
 from coop_drake.laws import ScheduledGains
@@ -20,6 +24,7 @@ from coop_drake.planning.execution.transport_kernels import cross_cell
 from coop_drake.planning.improvement.box_crossing import cross_box
 from coop_drake.planning.improvement.object_motion import object_motion
 from coop_drake.plant import set_configuration
+from coop_drake.scenario import Deployment
 from coop_drake.simulation.stall import blocking_margin
 from coop_drake.simulation.telemetry import Telemetry
 from tests.support.small_loop import small_maps, small_problem
@@ -123,6 +128,26 @@ def crossed():
     return np.array([*state, seconds])
 
 
+def compiled_results(transport: CompiledTransport):
+    """All that the compiled loop computes at a sample: of a team that moves, and of one that is ready."""
+    plan, deployment = transport.plan, transport.scenario.deployment
+    transition, found = plan.transitions[0], []
+    middle = 0.5 * (transition.goal_lower + transition.goal_upper)
+    n = len(plan.start)
+    for axes, away, speed in ((0.9 * middle, 0.3, 0.03), (middle, 0.01, 0.0)):
+        departures = departures_of(transport, deployment)
+        memory, figures = memory_of(transport, departures), begin_figures()
+        memory.state[transport.team.places[0]] = [*(transition.target - [away, 0.5 * away]), *axes]
+        memory.state[transport.team.places[1]] = speed * np.linspace(0.5, 1.0, n)
+        memory.governors[:] = transition.target - [0.8 * away, 0.3 * away]
+        parts = transport.cells, transport.team, transport.plant, transport.nominal, departures, memory
+        update(40, *parts[:2], *parts[3:])
+        watch(40, *parts, np.full(n + 2, np.nan), figures)
+        numbers = memory.efforts[0], memory.governors.ravel(), memory.reports[0].ravel(), figures
+        found.append([repr(number) for row in numbers for number in row.tolist()])
+    return found
+
+
 def stalled(plan: Plan, sample):
     """The message about a team that is not ready, for each condition that may be the worst."""
     worse = [
@@ -134,7 +159,9 @@ def stalled(plan: Plan, sample):
 
 def main(names: list[str]) -> None:
     """Print, for every law (module:function), which results change with it."""
-    _, plan = small_problem()
+    scenario, plan = small_problem()
+    sampled = replace(scenario, deployment=Deployment(control_rate=200.0))
+    transport = prepare(sampled, plan, small_maps())
     named, fused = Loop("named", plan), Loop("fused", plan)
     sample = named.sample()
     results = {
@@ -142,6 +169,7 @@ def main(names: list[str]) -> None:
         "fused": lambda: fused.numbers().tolist(),
         "estimate": lambda: estimated(plan).tolist(),
         "boxes": lambda: crossed().tolist(),
+        "compiled": lambda: compiled_results(transport),
         "stall": lambda: stalled(plan, sample),
     }
     before = {name: result() for name, result in results.items()}
