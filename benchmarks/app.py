@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from benchmarks.adversaries.measured import adversary_tasks
+from benchmarks.apart import apart_tasks
 from benchmarks.breaking import breaking_tasks
 from benchmarks.commands import bench_commands
 from benchmarks.compiled_runs import compiled_tasks
@@ -114,6 +115,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *compiled_tasks(),
         *adversary_tasks(),
         *message_tasks(),
+        *apart_tasks(),
     ]
 
 

@@ -1,0 +1,72 @@
+"""What a robot in a process of its own costs: runs in lock-step beside the same runs in one process."""
+
+from __future__ import annotations
+
+import resource
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from time import perf_counter
+
+from benchmarks.ring_teams import ring_transport
+from benchmarks.rows import Row
+from benchmarks.tasks import Task
+from coop_drake.answers.log import SimulationLog
+from coop_drake.nodes import simulate_in_processes
+from coop_drake.scenario import Deployment
+from coop_drake.simulation import simulate
+
+__all__ = ["apart_tasks", "costs"]
+
+_TEAMS = (2, 4, 8)
+"""Numbers of robots."""
+
+_RATE = 200.0
+"""Control rate [Hz]."""
+
+_SIMULATED = 1.0
+"""Simulated time of a run [s]: 200 samples."""
+
+
+def apart_tasks() -> list[Task]:
+    """One team after the other, with the machine to itself."""
+    return [_task(robots) for robots in _TEAMS]
+
+
+def _task(robots: int) -> Task:
+    return Task(f"apart/{robots}_robots", lambda rows: costs(robots, _SIMULATED), alone=True)
+
+
+def costs(robots: int, simulated: float) -> list[Row]:
+    """Simulated time over wall time of both, and CPU time of all processes together.
+
+    Args:
+        robots: Number of robots.
+        simulated: Simulated time [s].
+    """
+    with ring_transport(robots) as (scenario, plan, maps):
+        brief = replace(
+            scenario,
+            deployment=Deployment(control_rate=_RATE),
+            simulator=replace(scenario.simulator, max_time=simulated),
+        )
+        together = _measured(lambda: simulate(brief, plan, maps))
+        apart = _measured(lambda: simulate_in_processes(brief, plan, maps))
+    name = f"apart/{robots}_robots"
+    return [
+        Row(f"{name}/times_real_time", simulated / apart[0], "", "one process", simulated / together[0]),
+        Row(f"{name}/cpu", apart[1], "s", "one process", together[1]),
+        Row(f"{name}/cpu_each_robot_and_sample", 1e6 * apart[2] / (robots * _RATE * simulated), "us"),
+    ]
+
+
+def _measured(run: Callable[[], SimulationLog]) -> Sequence[float]:
+    """Wall time, CPU time of all processes, and that of other processes alone, start included [s]."""
+    own, children, wall = _cpu(resource.RUSAGE_SELF), _cpu(resource.RUSAGE_CHILDREN), perf_counter()
+    run()
+    others = _cpu(resource.RUSAGE_CHILDREN) - children
+    return perf_counter() - wall, _cpu(resource.RUSAGE_SELF) - own + others, others
+
+
+def _cpu(who: int) -> float:
+    used = resource.getrusage(who)
+    return used.ru_utime + used.ru_stime
