@@ -33,6 +33,9 @@ class PlannerSettings:
         angle_resolution: Slices of angles are not split below this width [rad].
         length_resolution: Slices of prismatic joints are not split below this width [m].
         max_slices: Work budget of explorations, in slices made by all of them.
+        min_clearance: Least clearance of the object's path in a cell, half the width of the passage there,
+            and of the target where the cell is left [m]. Narrower ones take minutes. For very large or very
+            small teams it is scaled to the team.
         max_transition_time: Longest estimated time of one transition that is accepted [s].
         strategy: ``portfolio`` samples, certifies and proves; ``cells`` explores by cells alone; ``paper``
             explores as the paper's Algorithms 1 and 2 are printed, at margin zero.
@@ -43,6 +46,7 @@ class PlannerSettings:
     angle_resolution: Positive = 0.002
     length_resolution: Positive = 0.001
     max_slices: Annotated[int, Limits(above=0)] = 4_000
+    min_clearance: Positive = 0.001
     max_transition_time: Positive = 60.0
     strategy: Literal["portfolio", "cells", "paper"] = "portfolio"
 

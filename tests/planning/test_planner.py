@@ -76,7 +76,7 @@ def test_channels_that_all_stall_are_undecided_with_the_passage_named(asked):
     result = ask(problem)
     assert isinstance(result, Undecided)
     assert len(questions) == 3
-    assert "plan along it cannot be executed: cell 2: the object's passage through (5.000," in result.reason
+    assert "plan along it cannot be executed: cell 2 is refused by planner.min_clearance: " in result.reason
 
 
 def test_a_stall_at_no_margin_is_not_asked_again(asked):

@@ -30,10 +30,6 @@ from coop_drake.planning.travel_time import travel_time
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
 
-NARROWEST = 1e-3
-"""Necks and goal regions with less clearance are refused, because the governor would need minutes there [m].
-"""
-
 GOAL_REGION_FRACTION = 0.9
 """The region of the goal need not be wider than this fraction of the position tolerance [-]."""
 
@@ -212,12 +208,12 @@ def find_route(
         region = component_at(_disc(target, problem.position_tolerance).intersection(here), Point(target))
     inradius = 0.0 if region.is_empty else BoundaryDistance(region)(target)
     route = Route(target, inradius, PassageFinder(here).find(entry, target))
-    wanted = NARROWEST
+    least = wanted = problem.settings.min_clearance
     if len(cells) == 1:
-        wanted = min(NARROWEST, GOAL_REGION_FRACTION * problem.position_tolerance)
-    if inradius < wanted or route.passage.clearance < NARROWEST:
+        wanted = min(least, GOAL_REGION_FRACTION * problem.position_tolerance)
+    if inradius < wanted or route.passage.clearance < least:
         seconds = travel_time(route.passage.length, route.passage.clearance)
-        raise StallError(_stall(problem, index, route, seconds))
+        raise StallError(_stall(problem, index, route, seconds, "min_clearance"))
     return route
 
 
@@ -225,7 +221,8 @@ def _checked(problem: PlanningProblem, plan: Plan, routes: Sequence[Route]) -> P
     """The plan; raises a StallError if one of its estimated times is too long."""
     for index, (route, transition) in enumerate(zip(routes, plan.transitions, strict=True)):
         if transition.estimated_time > problem.settings.max_transition_time:
-            raise StallError(_stall(problem, index, route, transition.estimated_time))
+            seconds = transition.estimated_time
+            raise StallError(_stall(problem, index, route, seconds, "max_transition_time"))
     return plan
 
 
@@ -244,15 +241,16 @@ def _transition(
     )
 
 
-def _stall(problem: PlanningProblem, index: int, route: Route, seconds: float) -> str:
-    passage = route.passage
+def _stall(problem: PlanningProblem, index: int, route: Route, seconds: float, refused_by: str) -> str:
+    """Return what is refused, and by which setting."""
+    passage, settings = route.passage, problem.settings
     x, y = passage.narrowest
     return (
-        f"cell {index}: the object's passage through ({x:.3f}, {y:.3f}) is {2e3 * passage.clearance:.1f} mm "
-        f"wide and {passage.length:.2f} m long, about {seconds:.0f} s, and its target "
-        f"({route.target[0]:.3f}, {route.target[1]:.3f}) has {1e3 * route.inradius:.1f} mm around it; "
-        f"expected at least {2e3 * NARROWEST:g} mm and {1e3 * NARROWEST:g} mm, and at most "
-        f"{problem.settings.max_transition_time:.0f} s"
+        f"cell {index} is refused by planner.{refused_by}: the object's passage through ({x:.3f}, {y:.3f}) "
+        f"is {2e3 * passage.clearance:.1f} mm wide and {passage.length:.2f} m long, about {seconds:.0f} s, "
+        f"and its target ({route.target[0]:.3f}, {route.target[1]:.3f}) has {1e3 * route.inradius:.1f} mm "
+        f"around it; expected at least {2e3 * settings.min_clearance:g} mm and "
+        f"{1e3 * settings.min_clearance:g} mm, and at most {settings.max_transition_time:.0f} s"
     )
 
 

@@ -182,7 +182,12 @@ def _settings(settings: PlannerSettings, scale: float) -> PlannerSettings:
     margin, (least, most) = scale * settings.margin, USUAL_MARGINS
     if settings.margin > 0.0 and not least <= margin <= most:
         margin = PlannerSettings().margin
-    return replace(settings, margin=margin, length_resolution=scale * settings.length_resolution)
+    return replace(
+        settings,
+        margin=margin,
+        length_resolution=scale * settings.length_resolution,
+        min_clearance=settings.min_clearance,  # It is meant for the usual size.
+    )
 
 
 def _scaled(polygon: Polygon, scale: float) -> Polygon:

@@ -49,6 +49,7 @@ _POSITIVE = [
     "planner.angle_resolution",
     "planner.length_resolution",
     "planner.max_slices",
+    "planner.min_clearance",
     "planner.max_transition_time",
     "maps.tolerance",
     "simulator.max_time",
