@@ -16,8 +16,6 @@ Pose = Annotated[tuple[float, ...], Wire("d", "m, m, rad", listed=True)]
 State = Annotated[tuple[float, ...], Wire("d", "m, rad, m/s, rad/s", listed=True)]
 Efforts = Annotated[tuple[float, ...], Wire("d", "N, N m", listed=True)]
 Values = Annotated[tuple[float, ...], Wire("d", listed=True, finite=False)]
-Place = Annotated[tuple[float, ...], Wire("d", "m", listed=True)]
-Reals = Annotated[tuple[float, ...], Wire("d", listed=True)]
 
 
 @message(1, "any", "client")
@@ -123,8 +121,7 @@ class Effort(NamedTuple):
     Attributes:
         number: Number of the sample that it was computed from.
         team_messages: How many messages this robot has sent to the supervisor in this session.
-        state: State of the process: 0: it follows the plan; 1: it holds; 2: it waits for the present cell;
-            3: it ends.
+        state: State of the process: 0: it follows the plan; 1: it holds.
         efforts: Base wrench and joint torques, shape (3 + n_k,).
     """
 
@@ -200,7 +197,7 @@ class HoldRequest(NamedTuple):
 
 @message(50, "team", "supervisor")
 class Switch(NamedTuple):
-    """The current cell, sent when it changes and to a robot that joins.
+    """The current cell, sent when it changes.
 
     Attributes:
         cell: Index of the cell.
@@ -222,31 +219,3 @@ class Hold(NamedTuple):
 
     held: Flag
     number: Number
-
-
-@message(52, "team", "supervisor")
-class ReferenceRequest(NamedTuple):
-    """A robot has joined late: the robot that receives this answers with its ``Reference``.
-
-    Attributes:
-        robot: Index of the robot that has joined.
-    """
-
-    robot: Small
-
-
-@message(53, "team", "both")
-class Reference(NamedTuple):
-    """What all robots keep alike, from a robot to the supervisor, and from there to one that joins late.
-
-    Attributes:
-        robot: Index of the robot that has joined.
-        time: Simulated time of the sample that it belongs to.
-        position: The reference point p_G in W, shape (2,).
-        clock: State of the block ``funnel_clock``, empty where a scenario has no holds.
-    """
-
-    robot: Small
-    time: Seconds
-    position: Place
-    clock: Reals

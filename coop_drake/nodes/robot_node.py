@@ -15,7 +15,7 @@ from coop_drake.scenario import Deployment
 from coop_drake.systems import robot_record
 from coop_drake.tree.pose import FloatArray
 
-FOLLOWS, HOLDS, WAITS = range(3)
+FOLLOWS, HOLDS = range(2)
 """States of a robot, see ``messages.Effort``."""
 
 

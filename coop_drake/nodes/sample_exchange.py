@@ -15,6 +15,7 @@ from coop_drake.messages import (
     SUPERVISOR,
     Effort,
     Present,
+    Reason,
     Sample,
     Status,
     Telemetry,
@@ -34,7 +35,7 @@ TOLERATED = 0.02
 by it."""
 
 
-STATES = ("follows the plan", "holds", "waits", "ends")
+STATES = ("follows the plan", "holds")
 """States of a robot in words, see ``messages.Effort``."""
 
 
@@ -78,6 +79,7 @@ class SampleExchange:
         self.sample, self.missing = 0, dict[int, float]()
         self._last: dict[tuple[int, type], Any] = {}
         self._asked: dict[int, float] = {}
+        self._sizes: list[int] = []
         self._answered: dict[int, float] = {}
 
     def trouble(self) -> str:
@@ -133,6 +135,7 @@ class SampleExchange:
     def _ask(self, time: float, measured: Sequence[FloatArray], *, step: bool) -> None:
         """Ask all who are there, and wait for their answers, which replace the last ones."""
         asked = [index for index in self._everyone if index not in self.missing]
+        self._sizes = [(len(own) - 3) // 2 for own in measured]  # As many efforts as own coordinates.
         self._asked[self.sample] = clocks.monotonic()
         for index in asked:
             self._end.send(index, self._question(index, time, measured, step=step))
@@ -166,6 +169,18 @@ class SampleExchange:
         told = 0 if status is None else status.team_messages[index]
         return Sample(self.sample, time, step, told, tuple(own[-3:]), tuple(own[:-3]))
 
+    def _fits(self, sender: int, message: Any) -> bool:
+        """Whether an answer is about a sample that has been, and its lists are as long as they must be."""
+        robots = len(self._everyone) - 1
+        if isinstance(message, Effort):
+            fits = len(message.efforts) == self._sizes[sender] and message.state < len(STATES)
+        elif isinstance(message, Status):
+            fits = len(message.team_messages) == robots and len(message.causes) in (0, 1 + robots)
+        else:
+            known = self._last.get((sender, Telemetry))
+            fits = known is None or len(known.values) == len(message.values)
+        return fits and message.number <= self.sample
+
     def _sent(self, robot: int) -> int:
         known = self._last.get((robot, Effort))
         return 0 if known is None else known.team_messages
@@ -174,6 +189,9 @@ class SampleExchange:
         """Keep an answer that is newer than the last; return who answered the present question, and how."""
         kind = type(message)
         if not isinstance(message, Effort | Telemetry | Status) or sender in self.missing:
+            return sender, type(None)
+        if not self._fits(sender, message):
+            self._end.efforts.refusals.add(Reason.VALUE)
             return sender, type(None)
         known = self._last.get((sender, kind))
         if known is None or message.number >= known.number:
