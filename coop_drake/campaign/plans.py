@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ _KEPT = 4
 """Plans with their maps that a process keeps in memory; runs of one batch mostly have one."""
 
 
+@cache
 def versions() -> dict[str, str]:
     """Return the versions that a result depends on."""
     return {name: version(name) for name in ("coop-drake", "drake", "numpy")}

@@ -34,6 +34,7 @@ def replay(
         ProcessError: The run differs from the one that was counted.
     """
     from coop_drake.answers.log import SimulationLog
+    from coop_drake.answers.plan_file import plan_digest
     from coop_drake.campaign.measuring import record_of_log
     from coop_drake.campaign.plans import Plans
     from coop_drake.campaign.running.making import run_digest
@@ -52,7 +53,7 @@ def replay(
     with DrawingProcesses(figures=figures) as drawing:
         code = carry_out(task, plan, results, reporter, drawing, None, simulation, fresh_maps=False)
     log = SimulationLog.load(results.path / "log.npz")
-    again = record_of_log(run, scenario.name, log, plan, run_digest(scenario, plan, "drake"))
+    again = record_of_log(run, scenario.name, log, plan, run_digest(scenario, plan_digest(plan), "drake"))
     _compare(again, folder, batches, reporter)
     return code
 

@@ -36,6 +36,7 @@ class RunMaker:
     def __init__(self, variation: Variation, plans: Plans, tier: Tier, logs: Path) -> None:
         self._variation, self._plans, self._tier, self._logs = variation, plans, tier, logs
         self._transport: CompiledTransport | None = None
+        self._digest: tuple[Plan, str] | None = None
 
     def begun(self, run: Run) -> RunRecord:
         """Return the record of a run that has not ended."""
@@ -53,7 +54,7 @@ class RunMaker:
         try:
             plan, maps = self._plans.with_maps(run)
             scenario = self._variation.scenario_of(run)
-            digest = run_digest(scenario, plan, self._tier)
+            digest = run_digest(scenario, self._digest_of(plan), self._tier)
             if self._tier == "compiled":
                 return replace(begun, digest=digest, **vars(self._compiled(scenario, plan, maps)))
             log = simulated(scenario, plan, maps)
@@ -66,6 +67,12 @@ class RunMaker:
         if keep == "all" or (keep == "lost" and not record.arrived):
             log.save(self._logs / f"{run.index}.npz")
         return record
+
+    def _digest_of(self, plan: Plan) -> str:
+        """Return the digest of a plan; it takes as long as a compiled run, so that the last one is kept."""
+        if self._digest is None or self._digest[0] is not plan:
+            self._digest = plan, plan_digest(plan)
+        return self._digest[1]
 
     def _compiled(self, scenario: Scenario, plan: Plan, maps: Maps) -> RunOutcome:
         """Make a run by the compiled loop; runs that differ in their deployments alone share their arrays."""
@@ -91,7 +98,13 @@ def simulated(scenario: Scenario, plan: Plan, maps: Maps) -> SimulationLog:
         return simulate(scenario, plan, maps)
 
 
-def run_digest(scenario: Scenario, plan: Plan, tier: Tier) -> str:
-    """Return the digest of what a run of a scenario along a plan depends on."""
-    parts = {"scenario": scenario_digest(scenario), "plan": plan_digest(plan), "tier": tier}
+def run_digest(scenario: Scenario, plan: str, tier: Tier) -> str:
+    """Return the digest of what a run of a scenario along a plan depends on.
+
+    Args:
+        scenario: The scenario.
+        plan: Digest of the plan.
+        tier: By which loop the run is made.
+    """
+    parts = {"scenario": scenario_digest(scenario), "plan": plan, "tier": tier}
     return content_digest({**parts, "versions": versions()})
