@@ -14,6 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from benchmarks.adversaries.measured import adversary_tasks
 from benchmarks.apart import apart_tasks
 from benchmarks.breaking import breaking_tasks
+from benchmarks.campaign_costs import campaign_tasks
 from benchmarks.commands import bench_commands
 from benchmarks.compiled_runs import compiled_tasks
 from benchmarks.contents import TOPICS, WHOLE, show_contents
@@ -116,6 +117,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *adversary_tasks(),
         *message_tasks(),
         *apart_tasks(),
+        *campaign_tasks(),
     ]
 
 

@@ -22,6 +22,7 @@ TOPICS = {
     "compiled": "runs of the compiled loop beside those of Drake's: how many a second, and their differences",
     "breaking": "departures that an axis bears, by a search for the worst, beside those that are certified",
     "apart": "processes of their own: messages beside a pipe, runs of 2, 4 and 8 robots beside one process",
+    "campaign": "campaigns: the scheduler, processes, files, two workers, memory of a worker over 2,000 runs",
     "adversaries": "altered plans and proofs beside the exact checker; how long it checks random answers",
 }
 """What every topic is about."""

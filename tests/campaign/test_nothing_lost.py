@@ -127,8 +127,12 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     waited_for(lambda: not processes(CHILD, str(folder.path)))
     assert len(undisturbed.files(folder)) < len(undisturbed.batches)
 
-    last = begun(undisturbed, folder.path, "--json", "--workers", 2)
+    quick = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "5s"}
+    last = begun(undisturbed, folder.path, "--json", "--workers", 2, env=quick)
+    hanging = child_of(folder.path).parent  # a worker again
+    kill(hanging, signal.SIGSTOP)
     said, _ = last.communicate(timeout=300)
+    kill(hanging)
     facts = json.loads(said)
     assert (last.returncode, facts["done"], facts["lost"]) == (0, RUNS, 0)
     assert undisturbed.files(folder) == undisturbed.files(undisturbed.folder)

@@ -46,7 +46,7 @@ def place(
     import distributed
 
     waiting = iter(orders)
-    with _client(workers, scheduler) as client:
+    with client_of(workers, scheduler) as client:
 
         def submit(order: Order) -> distributed.Future:
             return client.submit(make_batch, order, key=f"batch-{order.batch.digest}", pure=False)
@@ -67,7 +67,7 @@ def place(
 
 
 @contextmanager
-def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
+def client_of(workers: int | None, scheduler: str | None) -> Iterator[Client]:
     """Connect to a scheduler, or start one with workers that end with the block."""
     import dask
     import distributed
@@ -82,7 +82,8 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
             n_workers=workers or os.cpu_count() or 1,
             threads_per_worker=1,
             host="127.0.0.1",
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",  # Dask serves something in any case; no port is taken twice.
+            scheduler_kwargs={"dashboard": False},
             memory_limit=0,  # Runs use their memory in processes that the workers start.
             silence_logs=50,
         )

@@ -1,0 +1,129 @@
+"""What a campaign costs besides its runs: placing batches, starting processes, files; memory of a worker."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from resource import getpagesize
+from tempfile import TemporaryDirectory
+from time import perf_counter, process_time
+
+from benchmarks.isolated import in_own_process
+from benchmarks.rows import Row
+from benchmarks.tasks import Task
+from coop_drake.campaign import load_campaign
+from coop_drake.campaign.batches import Batch, Batching
+from coop_drake.campaign.plans import Plans
+from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.running import Order, make_batch, run_campaign
+from coop_drake.campaign.running.placing import client_of
+from coop_drake.campaign.variation import Variation
+
+__all__ = ["campaign_tasks", "placing", "worker_memory"]
+
+_EMPTY = 2000
+"""Batches of which nothing is made."""
+_RUNS = 2000
+"""Runs after which the memory of a worker is looked at."""
+_LIMIT = 1800.0
+"""Longest that these may take [CPU s]; they take some minutes."""
+_SHORT = """
+runs:
+  scenarios: [base]
+  count: {count}
+  batch: {batch}
+  set: {{goal.object: {{x: 0.9, y: 2.3, theta: 1.6}}, goal.joints: {{}}}}
+  vary: {{deployment.mass_error: !Uniform {{min: -0.1, max: 0.1}}}}
+"""
+"""A transport of two seconds, so that what is not simulation shows."""
+
+
+def campaign_tasks() -> list[Task]:
+    """The scheduler with empty tasks; processes, files, one and two workers; memory over many runs."""
+    return [
+        Task("campaign/scheduler", lambda rows: placing(), alone=True),
+        Task("campaign/batches", lambda rows: _batches(), alone=True),
+        Task("campaign/workers", lambda rows: _workers(), alone=True),
+        Task("campaign/memory", lambda rows: _memory()),
+    ]
+
+
+def placing(batches: int = _EMPTY) -> Sequence[Row]:
+    """Processor time of the command, which holds the scheduler, for a batch of which nothing is made."""
+    with client_of(2, None) as client:
+        client.gather(client.map(_nothing, range(2), pure=False))
+        spent, began = process_time(), perf_counter()
+        client.gather(client.map(_nothing, range(batches), pure=False))
+        spent, began = process_time() - spent, perf_counter() - began
+    name = "campaign/scheduler/empty_batch"
+    return [
+        Row(f"{name}/cpu", 1e3 * spent / batches, "ms"),
+        Row(f"{name}/wall", 1e3 * began / batches, "ms"),
+    ]
+
+
+def _nothing(index: int) -> None:
+    """A task that does nothing."""
+
+
+def _batches() -> Sequence[Row]:
+    """What processes and files cost: from batches of 1, 5 and 100 runs."""
+    rows, seconds = [], {}
+    for size in (1, 5, 100):
+        with _campaign(size, size) as (folder, orders):
+            make_batch(orders[0])
+            seconds[size] = folder.costs([orders[0].batch])[0]["cpu_seconds"]
+            content = (folder.path / orders[0].batch.file).stat().st_size
+        rows.append(Row(f"campaign/batches/of_{size}/bytes_a_run", content / size, "bytes"))
+    run = (seconds[100] - seconds[1]) / 99
+    return [
+        *rows,
+        Row("campaign/batches/process/start", seconds[1] - run, "CPU s"),
+        Row("campaign/batches/process/run", run, "CPU s"),
+    ]
+
+
+def _workers() -> Sequence[Row]:
+    """How much quicker two workers are than one, in runs a second; the machine must have two idle cores."""
+    seconds = {}
+    for workers in (1, 2):
+        with _campaign(400, 50) as (folder, orders):
+            began = perf_counter()
+            run_campaign(load_campaign(orders[0].campaign), folder.path, workers=workers)
+            seconds[workers] = perf_counter() - began
+    efficiency = seconds[1] / (2.0 * seconds[2])
+    return [Row("campaign/workers/two/efficiency", efficiency, "of twice one worker")]
+
+
+def worker_memory(runs: int = _RUNS, batch: int = 100) -> list[float]:
+    """Resident memory of a worker after every batch of so many runs of Drake's loop [MB]."""
+    sizes = []
+    with _campaign(runs, batch) as (_, orders):
+        for order in orders:
+            make_batch(order)
+            pages = int(Path("/proc/self/statm").read_text().split()[1])
+            sizes.append(1e-6 * pages * getpagesize())
+    return sizes
+
+
+def _memory() -> Sequence[Row]:
+    sizes = in_own_process(worker_memory, limit=_LIMIT).value
+    name = f"campaign/memory/worker_over_{_RUNS}_runs"
+    known = [] if sizes is None else [("first_batch", sizes[0]), ("last_batch", sizes[-1])]
+    return [Row(f"{name}/{figure}", size, "MB") for figure, size in known]
+
+
+@contextmanager
+def _campaign(count: int, batch: int) -> Iterator[tuple[CampaignFolder, list[Order]]]:
+    """A campaign of short runs in a folder of its own, planned, with its batches."""
+    with TemporaryDirectory() as place:
+        file = Path(place) / "short.campaign.yaml"
+        file.write_text(_SHORT.format(count=count, batch=batch))
+        variation = Variation(load_campaign(file))
+        folder = CampaignFolder(Path(place) / "out")
+        plans = Plans(variation, folder.plans)
+        plans.with_maps(variation.run(0))
+        folder.campaign.write_bytes(file.read_bytes())
+        batches: list[Batch] = list(Batching(variation, plans).batches())
+        yield folder, [Order(str(file), str(folder.path), one, 60.0) for one in batches]

@@ -1,0 +1,22 @@
+"""The benchmark of campaigns looks at what it says."""
+
+from benchmarks.campaign_costs import campaign_tasks, placing, worker_memory
+
+
+def test_a_worker_has_a_size_after_every_batch():
+    sizes = worker_memory(2, 1)
+    assert len(sizes) == 2
+    assert all(size > 10.0 for size in sizes)
+
+
+def test_empty_batches_cost_something():
+    rows = placing(5)
+    assert [row.name for row in rows] == [
+        "campaign/scheduler/empty_batch/cpu",
+        "campaign/scheduler/empty_batch/wall",
+    ]
+    assert all(row.value > 0.0 for row in rows)
+
+
+def test_the_tasks_name_their_topic():
+    assert {task.name.split("/")[0] for task in campaign_tasks()} == {"campaign"}
