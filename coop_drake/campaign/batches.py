@@ -83,7 +83,7 @@ class Batching:
         """Yield all batches: Drake's first, because they take longest."""
         for tier in get_args(Tier):
             for scenario in range(len(self._variation.scenarios)):
-                indices, size = self._variation.indices(scenario, tier), self._variation.runs.batch
+                indices, size = self._variation.indices(scenario, tier), self._variation.runs.batch_of(tier)
                 for first in range(indices.start, indices.stop, size):
                     yield self.batch(scenario, tier, first, min(first + size, indices.stop))
 

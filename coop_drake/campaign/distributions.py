@@ -9,6 +9,9 @@ import numpy as np
 
 from coop_drake.typed_data import DataError, Limits, NotNegative
 
+_BETWEEN = 0.3819660112501051
+"""Where in an interval a number is tried for a key [-]: at no simple fraction of it."""
+
 
 @dataclass(frozen=True)
 class Deterministic:
@@ -50,8 +53,8 @@ class Uniform:
         return float(generator.uniform(self.min, self.max))
 
     def extremes(self) -> tuple[float, ...]:
-        """Return the ends of the interval."""
-        return self.min, self.max
+        """Return the ends of the interval, and a number between that is not whole."""
+        return self.min, self.max, self.min + _BETWEEN * (self.max - self.min)
 
 
 @dataclass(frozen=True)

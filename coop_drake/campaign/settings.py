@@ -37,8 +37,10 @@ class Runs:
             too, so that the report can say how far the tiers differ.
         budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it; null for what
             every scenario requires.
-        batch: Runs that one process makes, and one file holds.
-        time_limit: Longest that a process may take for each of its runs, besides its start [s].
+        batch: Runs that one process makes, and one file holds; null for 20 of Drake's loop, and 2000 of the
+            compiled one.
+        time_limit: Longest that a process may take for each of its runs; for the first one ten minutes more,
+            in which it starts and may compile kernels [s].
         keep: Of which of Drake's runs the log is kept, too; any run can be made again later.
     """
 
@@ -51,9 +53,13 @@ class Runs:
     tier: Literal["drake", "compiled", "both"] = "drake"
     paired: Annotated[int, Limits(at_least=0)] = 20
     budget: str | None = None
-    batch: Count = 20
+    batch: Count | None = None
     time_limit: Positive = 120.0
     keep: Literal["none", "lost", "all"] = "none"
+
+    def batch_of(self, tier: Tier) -> int:
+        """Runs of a batch of a tier: with a process of its own it takes a minute or so."""
+        return self.batch or {"drake": 20, "compiled": 2000}[tier]
 
     def __post_init__(self) -> None:
         if not self.scenarios:

@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeVar
 
 T = TypeVar("T")
 
-_PATIENCE = 120.0
+_PATIENCE = 300.0
 """Longest that a test waits [s]; machines are busy where tests run."""
 
 

@@ -23,7 +23,8 @@ _ATTEMPTS = 3
 """How many processes try a run before it counts as lost: one may be killed, or starve, by no fault of it."""
 
 _START = 600.0
-"""Longest that a process may take to start [s]: it may have to compile all kernels, on a busy machine."""
+"""How much longer a process may take until its first run has ended [s]: it reads models and maps, and may
+have to compile all kernels, on a busy machine."""
 
 
 @dataclass(frozen=True)
@@ -125,21 +126,21 @@ def _lines(order: Order, begin: int) -> Iterator[tuple[str, Any]]:
 
 
 def _timely(stream: IO[bytes], time_limit: float) -> Iterator[bytes]:
-    """Yield the lines of a stream.
+    """Yield the lines of a stream, of which the second says that the first run has ended.
 
     Raises:
         TimeoutError: The next one has not come in time.
     """
-    rest, allowed = b"", _START
+    rest, seen = b"", 0
     with selectors.DefaultSelector() as selector:
         selector.register(stream, selectors.EVENT_READ)
-        while selector.select(allowed):
+        while selector.select(time_limit if seen >= 2 else time_limit + _START):
             part = os.read(stream.fileno(), 1 << 16)
             if not part:
                 return
             *lines, rest = (rest + part).split(b"\n")
+            seen += len(lines)
             yield from lines
-            allowed = time_limit
     raise TimeoutError
 
 
