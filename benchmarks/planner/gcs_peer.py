@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 from time import process_time
@@ -106,7 +107,8 @@ def _regions(
         if process_time() - begin > budget:
             break
         seed = Hyperellipsoid.MakeHypersphere(1e-2, configuration)
-        regions.append(IrisNp2(checker, seed, domain, options))
+        with suppress(RuntimeError):  # It refuses seeds that are nearer to a wall or limit than its margin.
+            regions.append(IrisNp2(checker, seed, domain, options))
     return regions
 
 
