@@ -39,9 +39,11 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("schema --out scenario.schema.json", "for editors"),
         ("schema", "the same on standard output"),
     ),
-    "world": (("world real.scenario.yaml", "wait for supervisor and robots, simulate, record"),),
-    "robot-node": (("robot-node real.scenario.yaml 1", "be the second robot"),),
-    "supervisor": (("supervisor real.scenario.yaml --addresses keys/addresses.yaml", "be the supervisor"),),
+    "world": (
+        (f"world {_BASE}", "with a control rate in it: wait for supervisor and robots, simulate, record"),
+    ),
+    "robot-node": ((f"robot-node {_BASE} 1", "be the second robot"),),
+    "supervisor": ((f"supervisor {_BASE} --addresses keys/addresses.yaml", "be the supervisor"),),
     "keys": (
         ("keys --robots 2 --out keys", "for processes on this machine that prove who they are"),
         ("keys --robots 3 --world 192.168.1.10 --supervisor 192.168.1.11", "for several machines"),
