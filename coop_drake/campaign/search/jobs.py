@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
+import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import asdict, dataclass, replace
 from math import inf
+from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +28,7 @@ from coop_drake.campaign.search.settings import Breaking, Searches
 from coop_drake.campaign.search.trials import Trials
 from coop_drake.campaign.search.worst import in_column, search_worst
 from coop_drake.campaign.settings import Campaign
+from coop_drake.errors import ProcessError
 from coop_drake.files import write_atomically
 from coop_drake.interrupts import uninterrupted
 from coop_drake.progress import Progress
@@ -104,6 +109,9 @@ def run_jobs(campaign: Campaign, folder: Path, workers: int, progress: Progress 
 
     Returns:
         How many were made.
+
+    Raises:
+        ProcessError: A process was lost.
     """
     jobs = jobs_of(campaign, folder)
     missing = [job for job in jobs if not job.file().exists()]
@@ -115,18 +123,35 @@ def run_jobs(campaign: Campaign, folder: Path, workers: int, progress: Progress 
     context, drake = multiprocessing.get_context("spawn"), any(job.asked.tier == "drake" for job in missing)
     with uninterrupted():
         # Drake keeps some memory of every plant, which ends with the process.
-        pool = ProcessPoolExecutor(workers, mp_context=context, max_tasks_per_child=1 if drake else None)
+        pool = ProcessPoolExecutor(
+            workers, context, _end_with_command, max_tasks_per_child=1 if drake else None
+        )
         futures = [pool.submit(carry_out, job) for job in missing]
     try:
         for count, future in enumerate(as_completed(futures), start=1 + len(jobs) - len(missing)):
             future.result()
             if progress is not None:
                 progress(f"{count} of {len(jobs)} searches", count / len(jobs))
+    except BrokenProcessPool as error:
+        message = "a process that searched was lost; the same command goes on from here"
+        raise ProcessError(message) from error
     finally:  # After Ctrl-C `shutdown` alone would wait for searches that are being made.
         for process in list((pool._processes or {}).values()):
             process.terminate()
         pool.shutdown(cancel_futures=True)
     return len(missing)
+
+
+def _end_with_command() -> None:
+    """Let this process end when the one that started it has ended, however that was."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None  # only processes of a pool call this
+
+    def watch(sentinel: int) -> None:
+        wait([sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, args=(parent.sentinel,), daemon=True).start()
 
 
 def carry_out(job: Job) -> None:
