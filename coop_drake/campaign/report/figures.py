@@ -49,15 +49,19 @@ def breaking_svg(points: Sequence[BreakingPoint]) -> str:
         return ""
     names = [f"{point.departure.replace('_', ' ')}, {point.scenario}" for point in points]
     figure, (ax,) = _panels(1, len(points), names, width=5.0)
-    ends = np.array([point.kept for point in points])
+    ends = np.array([max(point.kept, 0.5) for point in points])  # the scale is logarithmic from one half
     places = np.arange(len(points))[::-1] + 0.35
     ax.barh(places, ends, height=0.5, color=[GREEN if end >= 1.0 else VERMILLION for end in ends])
     for place, point in zip(places, points, strict=True):
         beyond = "" if np.isfinite(point.lost) else " or more"
         text = f"{point.kept:.2g}{beyond}"
-        ax.annotate(text, (point.kept, place), (5.0, 0.0), textcoords="offset points", va="center")
+        ax.annotate(text, (max(point.kept, 0.5), place), (5.0, 0.0), textcoords="offset points", va="center")
     ax.axvline(1.0, color=INK, linewidth=1.5)
-    ax.set_xlim(0.0, 1.25 * max(1.0, ends.max()))
+    largest = int(np.ceil(np.log2(max(2.0, ends.max())))) + 1
+    ax.set_xscale("log", base=2)
+    ax.set_xlim(0.5, 2.0 ** (largest + 0.8))
+    ticks = 2.0 ** np.arange(-1, largest + 1)
+    ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     ax.set_xlabel("largest multiple of what is certified at which no run was lost [-]")
     return _svg(figure)
 

@@ -82,6 +82,15 @@ def headline(report: Report) -> str:
         every = report.questions[-1]
         wrong = "1 wrong answer" if every.wrong == 1 else f"{every.wrong:,} wrong answers"
         return f"{every.count:,} questions: {wrong}, {every.undecided:,} undecided."
+    if report.findings:
+        lost = sum(not one.arrived for one in report.findings)
+        runs = sum(one.evaluations for one in report.findings)
+        found = "None" if lost == 0 else f"{lost:,}"
+        return f"{found} of {len(report.findings):,} searches, with {runs:,} runs, found a run that is lost."
+    if report.breaking:
+        least = min(report.breaking, key=lambda point: point.kept)
+        name = least.departure.replace("_", " ")
+        return f"No run was lost up to {least.kept:.2g} times what is certified ({name}, {least.scenario})."
     return "There are no results yet."
 
 
