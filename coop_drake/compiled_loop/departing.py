@@ -152,5 +152,5 @@ def memory_of(transport: CompiledTransport, departures: LoopDepartures) -> LoopM
         rates=np.full((max(int(departures.periods[3]), 1), efforts), MOVING),
         efforts=np.zeros((2, efforts)),
         channels=np.full((robots, channels, READY_SIZE), NOTHING),
-        reports=np.zeros((2, robots, READY_SIZE)),
+        reports=np.full((2, robots, READY_SIZE), NOTHING),
     )

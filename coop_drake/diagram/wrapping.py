@@ -17,6 +17,7 @@ from pydrake.systems.primitives import (
 )
 
 from coop_drake.diagram.radio import build_radio, seed_of
+from coop_drake.laws.channels import NOTHING
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.scenario import Deafness, Deployment, Messages, PoseBias, RobotDepartures, Silence
 from coop_drake.systems import Interruption, LossyMeasurement, MeasurementNoise
@@ -116,7 +117,8 @@ class Wrapping:
             return message
         blocks: list[tuple[str, LeafSystem]] = []
         if silence is not None:
-            blocks.append((name, self._interruption(message.size(), silence, held=True)))
+            before = NOTHING if use == 0 else 0.0
+            blocks.append((name, self._interruption(message.size(), silence, held=True, before=before)))
         if offset:
             blocks.append((f"{name}_of_samples", ZeroOrderHold(period, message.size(), offset)))
         radio = build_radio(self._deployment, self._robot, use)
@@ -177,7 +179,9 @@ class Wrapping:
             seed=seed_of(self._deployment, self._robot, LOSS_USES[name]),
         )
 
-    def _interruption(self, size: int, silence: Silence | Deafness, *, held: bool) -> Interruption:
+    def _interruption(
+        self, size: int, silence: Silence | Deafness, *, held: bool, before: float = 0.0
+    ) -> Interruption:
         return Interruption(
             size,
             self._deployment.period or 0.0,
@@ -185,6 +189,7 @@ class Wrapping:
             duration=silence.duration,
             held=held,
             offset=self._own.sample_offset,
+            before=before,
         )
 
 

@@ -27,6 +27,7 @@ class Interruption(Block):
         duration: How long it lasts [s]; None for ever.
         held: Whether the last sample is held; otherwise zero.
         offset: Time of the first sample [s].
+        before: Every component of the signal before the first sample.
 
     Raises:
         ValueError: The period or the duration is not positive.
@@ -41,6 +42,7 @@ class Interruption(Block):
         duration: float | None = None,
         held: bool = False,
         offset: float = 0.0,
+        before: float = 0.0,
     ) -> None:
         super().__init__()
         if not period > 0.0 or not (duration is None or duration > 0.0):
@@ -51,7 +53,7 @@ class Interruption(Block):
         self._begin, self._held = begin - 1e-6 * period, held
         self._end = inf if duration is None else self._begin + duration
         self._wanted = self.DeclareVectorInputPort("wanted", size)
-        self.DeclareDiscreteState(np.zeros(size))
+        self.DeclareDiscreteState(np.full(size, before))
         self.DeclareVectorOutputPort("given", size, self._write_given)
         self.DeclarePeriodicDiscreteUpdateEvent(period_sec=period, offset_sec=offset, update=self._remember)
 

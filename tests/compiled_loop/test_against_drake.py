@@ -58,6 +58,7 @@ CASES = {
     "pose and odometry": of_one(pose_bias=PoseBias(0.004, -0.002, 0.001), odometry_scale=0.05),
     "clock": of_one(clock_error=0.03, switch_delay=0.02),
     "silence": of_one(silence=Silence(0.5, 0.02, motors="limp")),
+    "silence from the start": of_one(silence=Silence(0.0, 1.2)),
     "held motors": of_one(silence=Silence(0.5, 0.02, motors="held")),
     "floor": at_200_hz(floor=Floor(coulomb_friction=5.0, viscous_friction=5.0, slope=0.01)),
     "push": at_200_hz(pushes=(Push("robot_1", (15.0, 5.0), 0.5, 0.5, torque=1.0),)),

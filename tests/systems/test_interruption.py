@@ -6,7 +6,7 @@ from pydrake.systems.primitives import TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from coop_drake.systems import Interruption
-from tests.support.system_checks import port_sizes
+from tests.support.system_checks import evaluate, port_sizes
 
 PERIOD = 0.1
 
@@ -45,3 +45,8 @@ def test_without_a_duration_it_never_comes_back():
 def test_wrong_times_are_refused(wrong):
     with pytest.raises(ValueError, match="positive period and duration"):
         Interruption(1, **{"period": PERIOD, "begin": 1.0, **wrong})
+
+
+def test_what_is_held_from_the_start_is_what_was_before():
+    block = Interruption(2, 0.1, begin=0.0, held=True, before=-1.0)
+    np.testing.assert_array_equal(evaluate(block, {"wanted": [3.0, 4.0]}, "given"), [-1.0, -1.0])
