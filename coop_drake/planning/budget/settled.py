@@ -17,7 +17,6 @@ from coop_drake.compiled import compiled
 from coop_drake.laws.axis_table import (
     GOAL_LOWER,
     GOAL_UPPER,
-    LOG_GAIN,
     POSITION_GAIN,
     RAMP_RATE,
     RATE_GAIN,
@@ -26,6 +25,7 @@ from coop_drake.laws.axis_table import (
 )
 from coop_drake.laws.nominal_axes import lag_factors
 from coop_drake.laws.ppc import ramped_gain
+from coop_drake.laws.slopes import slope_bounds
 from coop_drake.planning.budget.axis_tube import AxisConditions
 from coop_drake.planning.budget.law_fit import fit_law, law_memory
 from coop_drake.tree.pose import FloatArray
@@ -36,6 +36,9 @@ is counted."""
 
 ATTEMPTS = 40
 """Largest number of larger and larger departures that are tried [-]."""
+
+LONG_AFTER = 100.0
+"""Time at which gains are ramped in and funnels closed [s]."""
 
 GROWTH = 1.01
 """Factor by which departures are enlarged for the next attempt [-]."""
@@ -100,8 +103,9 @@ def settle(
 @compiled
 def tail_samples(row: FloatArray, conditions: AxisConditions) -> int:
     """Return for how many samples an axis is followed after its funnel is closed, ``TIME_CONSTANTS`` long."""
-    width, k1, k2 = row[GOAL_UPPER] - row[GOAL_LOWER], row[POSITION_GAIN], row[RATE_GAIN]
-    stiffness, damping = k1 * k2 + 16.0 * row[LOG_GAIN] / (width * width), k1 + k2
+    middle = 0.5 * (row[GOAL_LOWER] + row[GOAL_UPPER])
+    slopes = slope_bounds(row, LONG_AFTER, middle, 0.0, 0.0)
+    stiffness, damping = -slopes[0], -slopes[2]
     slowest = min(stiffness / damping, 0.5 * damping)
     return int(np.ceil(TIME_CONSTANTS / (slowest * conditions.period))) + 2
 
