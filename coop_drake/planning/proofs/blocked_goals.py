@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shapely
+from shapely import MultiPolygon
+from shapely.errors import ShapelyError
 
 from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.answers.proof import InfeasibilityProof
@@ -42,10 +44,7 @@ def blocked_goal(problem: PlanningProblem) -> tuple[InfeasibilityProof | None, i
         question = relaxed(problem, chosen)[0]
         swept = SweptTree(question.tree)
         pairs = BodyPairs(swept)
-        # At the goal pose the team meets no other part of the floor.
-        floor = nearby(question.workspace, question.goal_pose[None, :2], question.tree.reach)
-        whole = shrunk(question.workspace, 0.0)
-        boxes, made = _blocked(question, CellMaker(swept, pairs, whole if floor.is_empty else floor))
+        boxes, made = _blocked(question, CellMaker(swept, pairs, _floor_at_goal(question)))
         slices += made
         beyond = goal_beyond_limits(question) is not None
         if boxes or beyond:
@@ -72,6 +71,15 @@ def touch_at_goal(problem: PlanningProblem) -> str | None:
                 if hull.distance(problem.workspace.boundary) - shape.radius < TOUCH:
                     return f"at the goal pose {body.name} all but touches a wall, or touches it"
     return None
+
+
+def _floor_at_goal(question: PlanningProblem) -> MultiPolygon:
+    """The part of the floor that the team may meet at its goal pose; all of it if geometry fails."""
+    try:
+        near = nearby(question.workspace, question.goal_pose[None, :2], question.tree.reach)
+    except ShapelyError:  # The floor crosses itself.
+        near = MultiPolygon()
+    return shrunk(question.workspace, 0.0) if near.is_empty else near
 
 
 def _blocked(question: PlanningProblem, maker: CellMaker) -> tuple[list[Intervals], int]:
