@@ -113,7 +113,7 @@ def report_command(
         written = write_report(
             report,
             folder.path,
-            lambda run: f"coop-drake campaign replay {file} {run.run} --tier {run.tier}{at}",
+            lambda run: f"coop-drake campaign replay {file} {run.run}{at}",
         )
         reporter.facts["files"] = [str(path) for path in written]
         reporter.say(f"The report is {escape(str(written[0]))}; open it in a browser")
@@ -128,7 +128,7 @@ def replay_command(
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make one run again, to the last bit as it was counted, with its recording and figures."""
+    """Make one run again by Drake's loop, to the last bit as counted, with its recording and figures."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         from coop_drake.cli.campaign_replay import replay
 

@@ -65,7 +65,7 @@ def _compare(
     counted = [row for row in folder.table(mine).to_pylist() if row["run"] == again.run]
     reporter.facts.update(run=again.run, counted=bool(counted))
     if not counted:
-        reporter.say(f"Run {again.run} has not been counted by Drake's loop yet")
+        reporter.say(f"Drake's loop has not counted run {again.run}; values and seed are those of any tier")
         return
     differing = [name for name, value in counted[0].items() if not _same(value, getattr(again, name))]
     if differing:
