@@ -77,13 +77,9 @@ class TeamLink(Block):
         super().__init__()
         self._exchange = exchange
         sizes = [3 + n for n in joints]
-        self._inputs = [
-            (
-                self.DeclareVectorInputPort(f"robot_{k}_state", 2 * size),
-                self.DeclareVectorInputPort(f"robot_{k}_object_pose", 3),
-            )
-            for k, size in enumerate(sizes)
-        ]
+        states = [self.DeclareVectorInputPort(f"robot_{k}_state", 2 * size) for k, size in enumerate(sizes)]
+        poses = [self.DeclareVectorInputPort(f"robot_{k}_object_pose", 3) for k in range(len(sizes))]
+        self._inputs = [*zip(states, poses, strict=True)]
         self.DeclareDiscreteState(np.zeros(sum(sizes)))
         ends = np.cumsum(sizes)
         for k, (size, end) in enumerate(zip(sizes, ends, strict=True)):

@@ -8,7 +8,8 @@ import pytest
 from pydrake.systems.framework import Diagram, LeafSystem
 
 from coop_drake import systems
-from coop_drake.diagram import build_closed_loop
+from coop_drake.diagram import build_closed_loop, build_world
+from coop_drake.nodes import DirectExchange
 from coop_drake.scenario import (
     Control,
     Deployment,
@@ -66,6 +67,9 @@ def blocks():
         loop = build_closed_loop(replace(scenario, **changes), plan, maps, blocks=blocks)
         for leaf in leaves(loop.diagram):
             found.setdefault(type(leaf).__name__, (leaf, loop))
+    scenario, plan = own
+    world = build_world(replace(scenario, deployment=EVERYTHING), plan, DirectExchange())
+    found["TeamLink"] = world.link, world
     return found
 
 
@@ -103,7 +107,7 @@ def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_ar
     failures = {"Interruption", "LossyMeasurement", "MessageChannel"}
     holds = {"FunnelClock", "HoldMonitor", "HoldReceiver", "HoldSupervisor"}
     laws = {"CellPlanner", "AxisPpc", "TeamController", "StatePredictor", "NominalAxes", "NominalGovernor"}
-    assert remembering == laws | holds | failures
+    assert remembering == laws | holds | failures | {"TeamLink"}
 
 
 @pytest.mark.parametrize("name", BLOCKS)
