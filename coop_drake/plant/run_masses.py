@@ -71,7 +71,8 @@ def joint_inertias(team: TeamPlant) -> FloatArray:
 def bodies_of_team(team: TeamPlant, tree: ComponentTree) -> Bodies:
     """Return the mass properties of all bodies of a team, for its rate terms and for budgets."""
     return tuple(
-        (m.component, m.mass, *m.p_CBcm.round(ROUNDED).tolist(), m.inertia) for m in team_masses(team, tree)
+        (float(m.component), m.mass, *m.p_CBcm.round(ROUNDED).tolist(), m.inertia)
+        for m in team_masses(team, tree)
     )
 
 
