@@ -78,15 +78,15 @@ class LoopNominal(NamedTuple):
             [m], shape (3,).
         axis_gains: K_a [1/s^2], zeta_a [1/s] and the lag of the nominal axes [s], shape (3,) or (0,).
         mountings: Those of all robots, see ``place_on_axes``, shape (M,).
-        departures: Largest departures of (theta, q) from their nominal motions in every cell, shape
-            (C, 1 + n) or (0, 0) [rad or m].
+        distances: Least distances of (theta, q) to the bounds of their funnels that the budget states for
+            every cell, shape (C, 1 + n) or (0, 0) [rad or m].
     """
 
     flow: FloatArray
     position: FloatArray
     axis_gains: FloatArray
     mountings: FloatArray
-    departures: FloatArray
+    distances: FloatArray
 
 
 class LoopDepartures(NamedTuple):

@@ -42,7 +42,7 @@ def run_loop(
     watch(sample, cells, team, plant, nominal, departures, memory, measured, figures)
     while figures[ENDED] == RUNS:
         update(sample, cells, team, nominal, departures, memory)
-        watch_switch(sample, cells, team, plant, departures, memory, figures)
+        watch_switch(sample, cells, team, plant, nominal, departures, memory, figures)
         advance(sample, team, plant, departures, memory)
         sample += 1
         watch(sample, cells, team, plant, nominal, departures, memory, measured, figures)

@@ -17,7 +17,7 @@ from coop_drake.errors import ScenarioError
 from coop_drake.fields import HarmonicMap, VelocityField
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.laws.hand_over import governed_gains
-from coop_drake.plant import TeamPlant, base_chain, build_team_plant, read_component_tree, team_tree
+from coop_drake.plant import TeamPlant, base_chain, build_team_plant, read_component_tree, read_team_tree
 from coop_drake.scenario import Scenario
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.stall import patience
@@ -136,7 +136,7 @@ def _cells(scenario: Scenario, plan: Plan, knowledge: Sequence[RobotKnowledge], 
 
 
 def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, fused: FusedTeam) -> LoopPlant:
-    whole = team_tree(team, tree)
+    whole = read_team_tree(team, tree)
     shapes, walls = TeamClearance(scenario.workspace.polygon, tree).kernel_arguments
     rows = [(0, 0)]
     for k, robot in enumerate(team.robots):
@@ -181,7 +181,7 @@ def _reach(tree: ComponentTree) -> FloatArray:
 def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -> LoopNominal:
     """Return the nominal motions; their flow and the age of reports follow from the control rate of a run."""
     none, tube, motion = np.empty(0), plan.tube, knowledge[0].axis_motion
-    departures = [one.tolerance.departure for one in plan.transitions if one.tolerance is not None]
+    distances = [one.tolerance.distance for one in plan.transitions if one.tolerance is not None]
     mountings = np.concatenate([base_chain(team, robot).mounting for robot in team.robots])
     gains = none
     if motion is not None:
@@ -191,5 +191,5 @@ def _nominal(plan: Plan, team: TeamPlant, knowledge: Sequence[RobotKnowledge]) -
         none if tube is None else np.array([tube.speed, 0.0, tube.radius]),
         gains,
         mountings,
-        np.array(departures) if motion is not None else np.empty((0, 0)),
+        np.array(distances) if motion is not None else np.empty((0, 0)),
     )

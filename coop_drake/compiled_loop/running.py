@@ -52,8 +52,9 @@ class RunOutcome:
         cell_margin: Distance of the object's position to the boundary of its cell's region [m].
         wall_clearance: Distance of any body to any wall [m].
         body_clearance: Distance between bodies that must not touch [m].
-        budget_share: Largest share used of what the plan's budget states: of the tube's radius, or of the
-            departure of an axis; NaN for a plan without a budget [-].
+        budget_share: Largest share used of what the plan's budget states: of the tube's radius, or the
+            least distance of an axis to its funnel's bounds over the one that it kept; NaN for a plan
+            without a budget [-].
         peak_force: Largest force of a base [N].
         peak_torque: Largest effort of a joint [N m or N]; NaN for a team without joints.
     """

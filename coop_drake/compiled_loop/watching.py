@@ -82,9 +82,11 @@ def watch(
         z[i] = memory.state[team.places[0, i]]
     cell, time = int(memory.current[now, 0]), sample * departures.times[0] - memory.current[now, 1]
     figures[SAMPLES], figures[CELL] = sample, cell
-    _watch_cell(sample, 0, cell, z, cells, plant, departures, memory, figures)
+    _watch_cell(sample, 0, cell, z, cells, plant, nominal, departures, memory, figures)
     watch_distances(z, plant, measured, figures)
-    watch_share(sample, cell, z, plant, nominal, memory, figures)
+    if nominal.flow.size:
+        led = memory.nominal[sample % memory.nominal.shape[0]]
+        _use(hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2], figures)
     _watch_efforts(team, memory, figures)
     if cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory) and _at_goal(cell, z, cells, plant):
         end(figures, ARRIVED, 0.0)
@@ -96,8 +98,8 @@ def watch(
 
 @compiled
 def watch_switch(
-    sample: int, cells: LoopCells, team: FusedTeam, plant: LoopPlant, departures: LoopDepartures,
-    memory: LoopMemory, figures: FloatArray,
+    sample: int, cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal,
+    departures: LoopDepartures, memory: LoopMemory, figures: FloatArray,
 ) -> None:  # fmt: skip
     """Measure the margins to cell, slices and funnels after the updates of a sample that switched.
 
@@ -110,15 +112,18 @@ def watch_switch(
         for i in range(z.size):
             z[i] = memory.state[team.places[0, i]]
         cell = int(memory.current[after, 0])
-        _watch_cell(sample, 1, cell, z, cells, plant, departures, memory, figures)
+        _watch_cell(sample, 1, cell, z, cells, plant, nominal, departures, memory, figures)
 
 
 @compiled
 def _watch_cell(
     sample: int, after: int, cell: int, z: FloatArray, cells: LoopCells, plant: LoopPlant,
-    departures: LoopDepartures, memory: LoopMemory, figures: FloatArray,
+    nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory, figures: FloatArray,
 ) -> None:  # fmt: skip
-    """Measure distances to funnels, slices and the cell's boundary, and end the run where one is negative."""
+    """Measure distances to funnels, slices and the cell's boundary, and end the run where one is negative.
+
+    An axis uses the least distance to its funnel's bounds that the budget states over the one that it keeps.
+    """
     for i in range(z.size - 2):
         heard, time = heard_cell(plant.axis_rows[1, i], sample + after, departures, memory)
         time -= after * departures.times[0]
@@ -128,6 +133,8 @@ def _watch_cell(
             figures[FUNNEL], figures[FUNNEL_AXIS], figures[FUNNEL_CELL] = margin, i, cell
         if not margin > 0.0:
             end(figures, OUT_OF_FUNNEL, margin, i)
+        if nominal.distances.size:
+            _use(nominal.distances[cell, i] / margin if margin > 0.0 else inf, figures)
         lower, upper = cells.slices[0, cell, i], cells.slices[1, cell, i]
         margin = min(z[2 + i] - lower, upper - z[2 + i])
         if not margin > 0.0:
@@ -169,20 +176,8 @@ def watch_distances(z: FloatArray, plant: LoopPlant, measured: FloatArray, figur
 
 
 @compiled
-def watch_share(
-    sample: int, cell: int, z: FloatArray, plant: LoopPlant, nominal: LoopNominal, memory: LoopMemory,
-    figures: FloatArray,
-) -> None:  # fmt: skip
-    """Measure which share is used of the distances from the nominal motions that the plan states."""
-    if not nominal.flow.size:
-        return
-    led = memory.nominal[sample % memory.nominal.shape[0]]
-    share = hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2]
-    if nominal.axis_gains.size:
-        axes = memory.axes[sample % memory.axes.shape[0], 0]
-        for i in range(z.size - 2):
-            away = abs(z[2 + i] - axes[plant.axis_rows[0, i]])
-            share = max(share, away / nominal.departures[cell, i])
+def _use(share: float, figures: FloatArray) -> None:
+    """Note which share was used of what the plan's budget states."""
     if isnan(figures[SHARE]) or share > figures[SHARE]:
         figures[SHARE] = share
 

@@ -6,7 +6,7 @@ from .robot import RobotPlant, build_robot_plant
 from .run_masses import run_setup
 from .separate_team import SeparateTeam, build_separate_team
 from .team import ObjectInertia, RobotModel, TeamPlant, build_team_plant
-from .team_tree import TeamTree, team_tree
+from .team_tree import TeamTree, read_team_tree
 from .turning import turning_coupling
 
 __all__ = [
@@ -24,9 +24,9 @@ __all__ = [
     "build_team_plant",
     "planning_problem",
     "read_component_tree",
+    "read_team_tree",
     "robot_chain",
     "run_setup",
     "set_configuration",
-    "team_tree",
     "turning_coupling",
 ]

@@ -47,7 +47,7 @@ class TeamTree:
     places: FloatArray
 
 
-def team_tree(team: TeamPlant, components: ComponentTree) -> TeamTree:
+def read_team_tree(team: TeamPlant, components: ComponentTree) -> TeamTree:
     """Read a team's plant.
 
     Args:

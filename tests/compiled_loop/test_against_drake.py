@@ -25,6 +25,7 @@ from coop_drake.scenario import (
     Waves,
 )
 from coop_drake.simulation import build_maps, simulate
+from coop_drake.verification.runs import Rows, budget_share
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.tubes import WITH_AXES, tubed_problem
 
@@ -115,7 +116,7 @@ def test_a_plan_with_a_budget_is_followed_as_in_drake(team):
     transport = prepare(replace(scenario, deployment=PRESET), plan, maps)
     outcome, log = both(transport, PRESET, maps)
     assert_agree(outcome, log, close=5e-5)
-    assert outcome.budget_share > 0.0
+    assert outcome.budget_share == pytest.approx(budget_share(Rows(log, plan)), rel=0.01)
     assert np.isnan(run(prepared()).budget_share)
 
 

@@ -8,7 +8,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.laws.chain_motion import DAMPING
 from coop_drake.laws.team_dynamics import solve_symmetric, team_accelerations, team_work
-from coop_drake.plant import build_team_plant, read_component_tree, team_tree
+from coop_drake.plant import build_team_plant, read_component_tree, read_team_tree
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 
 ARMS = [[REVOLUTE, PRISMATIC, REVOLUTE], [PRISMATIC], [REVOLUTE, REVOLUTE], []]
@@ -33,7 +33,7 @@ def test_the_team_accelerates_as_in_drake(tmp_path):
     team = build_team_plant(ring_team(tmp_path, ARMS), builder)
     plant, diagram = team.plant, builder.Build()
     plant.mutable_gravity_field().set_gravity_vector([GRAVITY, 0.0, 0.0])
-    tree = team_tree(team, read_component_tree(team))
+    tree = read_team_tree(team, read_component_tree(team))
     context = plant.GetMyMutableContextFromRoot(diagram.CreateDefaultContext())
     tree.tree[1:, DAMPING] = 0.7
     for joint in team.joints:
