@@ -23,6 +23,7 @@ RUN = PLANNED | {
     "simulated_seconds": 13.42,
     "min_workspace_clearance_m": 0.1,
     "min_body_clearance_m": 0.05,
+    "peak_speed_m_s": 1.74,
     "peak_base_wrench_n": 99.0,
     "final_position_error_m": 0.0056,
     "final_angle_error_rad": 0.0015,
@@ -41,6 +42,7 @@ def test_a_plan_states_its_estimate_and_leaves_out_what_is_not_known():
 def test_a_run_has_ten_rows_and_names_the_speed_that_is_nearest_to_its_limit():
     rows = dict(summary_rows(RUN))
     assert len(rows) == 10
+    assert rows["peak speed of the object"] == "1.74 m/s"
     assert rows["simulated transport"] == "13.42 s, estimated 13.3 s"
     assert rows["nearest to a limit of speed"] == "rate of left::elbow, 4.00 rad/s, limit 5"
     assert rows["error at the end"] == "0.0056 m, 0.0015 rad"

@@ -26,6 +26,7 @@ _ROWS = (
     ("simulated transport", "{simulated_seconds:.2f} s, estimated {estimated_seconds:.1f} s"),
     ("smallest clearance to walls", "{min_workspace_clearance_m:.4f} m"),
     ("smallest clearance between bodies", "{min_body_clearance_m:.4f} m"),
+    ("peak speed of the object", "{peak_speed_m_s:.2f} m/s"),
     ("peak base force", "{peak_base_wrench_n:.1f} N"),
     ("nearest to a limit of speed", "{nearest_to_a_limit}"),
     ("error at the end", "{final_position_error_m:.4f} m, {final_angle_error_rad:.4f} rad"),
@@ -33,13 +34,12 @@ _ROWS = (
 """Label and format, with the names of its facts, of every row of the closing table, in its order. A row has a
 place where all its facts are known."""
 
-_UNTIL_RUN = ("answer", "estimated transport")
-"""Rows that those of the simulation replace."""
+_UNTIL_RUN = ("answer", "planning took", "estimated transport")
+"""Rows that make room for those of a simulation, but for ``--verbose``."""
 
 _MORE_ROWS = (
     ("departure of the object under its budget", "{tube_radius_m:.4f} m at most"),
     ("base force for the position under it", "{tube_force_n:.1f} N at most"),
-    ("peak speed of the object", "{peak_speed_m_s:.2f} m/s"),
     ("slices made", "{slices}"),
     ("smallest path clearance in a cell", "{narrowest_neck_m:.3f} m"),
     ("gains", "{gains}"),
@@ -77,7 +77,7 @@ def summary_rows(facts: Mapping[str, Any], *, verbose: bool = False) -> list[tup
         (label, form.format_map(known))
         for label, form in (*_ROWS, *_MORE_ROWS)[: None if verbose else len(_ROWS)]
         if known.keys() >= {field for _, field, _, _ in Formatter().parse(form) if field}
-        and not ("outcome" in known and label in _UNTIL_RUN)
+        and (verbose or "outcome" not in known or label not in _UNTIL_RUN)
     ]
     every = [(f"peak {speed['name']}", _beside_limit(speed)) for speed in speeds if verbose]
     return rows + every

@@ -38,7 +38,12 @@ PATIENCE = 300.0
 """Longest that a command is waited for [s]; machines are busy where tests run."""
 
 CHILD = "coop_drake.campaign.running.child"
-PROGRAM = "from coop_drake.entry_point import main; main()"
+PROGRAM = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # It is ignored where tests run in the background.
+from coop_drake.entry_point import main
+main()
+"""
 
 
 class Undisturbed:
