@@ -72,7 +72,7 @@ CASES: Mapping[str, Case] = {
     "noise": Case(_measured(**_NOISE), _measured(**{name: 20.0 * size for name, size in _NOISE.items()})),
     "bounded errors": Case(_measured(waves=_waves(0.0015)), _measured(waves=_waves(0.04))),
     "delay": Case(_measured(delay=0.02), _measured(delay=0.05), known=False),
-    "lost measurements": Case(_measured(loss=0.3), _measured(loss=0.8)),
+    "lost measurements": Case(_measured(loss=0.3), _measured(loss=0.9)),
     "late measurements": Case(_measured(late=0.5, late_by=0.02), _measured(late=0.8, late_by=0.5)),
     "lost reports": Case({"messages": {"loss": 0.7}}, {"messages": {"loss": 1.0}}),
     "late reports": Case({"messages": {"delay": 0.2}}),

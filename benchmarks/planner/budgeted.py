@@ -85,8 +85,9 @@ def plan_with_budgets(case: Case) -> dict[str, Planned]:
     budgets["refused"] = most.scaled(TOO_MUCH)
     gain_set = scenario.gain_sets["scheduled"]
     assert isinstance(gain_set, ScheduledGains)
-    for budget in budgets.values():
-        plan_repeatedly(first_question(), 1, PATIENCE, budget, gain_set)
+    for budget in budgets.values():  # The small question has another team.
+        small = None if budget is None else replace(budget, bodies=(), rotors=())
+        plan_repeatedly(first_question(), 1, PATIENCE, small, gain_set)
     return {
         label: min(
             plan_repeatedly(problem, REPEATS, PATIENCE, budget, gain_set), key=lambda done: done.cpu_seconds

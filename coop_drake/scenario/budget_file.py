@@ -74,6 +74,12 @@ def read_budget(
         allowed = "all, position, or a file with a budget"
         raise ScenarioError(str(scenario.path), "--budget", choice, allowed)
     budget: Budget = read_file(Budget, Path(choice))
+    components, joints = len(tree.components), len(tree.joints)
+    if budget.bodies and (
+        max(body[0] for body in budget.bodies) >= components or len(budget.rotors) not in (0, joints)
+    ):
+        team = f"the team's own, with {components} components and {joints} joints"
+        raise ScenarioError(choice, "bodies, rotors", f"{len(budget.bodies)}, {len(budget.rotors)}", team)
     return budget
 
 

@@ -50,7 +50,7 @@ def rate_terms(
     Args:
         tree: The team.
         bodies: All bodies.
-        rotors: Inertia that its rotor adds to every joint, shape (n,) [kg m^2 or kg].
+        rotors: Inertia that its rotor adds to every joint, shape (n,), or empty for none [kg m^2 or kg].
         joints: Configurations of the joints, shape (configurations, n) [rad or m].
 
     Returns:
@@ -58,7 +58,8 @@ def rate_terms(
     """
     count, axes = len(joints), 1 + joints.shape[1]
     mass = np.zeros((count, 2 + axes, 2 + axes))
-    mass[:, range(3, 2 + axes), range(3, 2 + axes)] = rotors
+    if len(rotors):
+        mass[:, range(3, 2 + axes), range(3, 2 + axes)] = rotors
     pairs = list(combinations_with_replacement(range(axes), 2))
     force = np.zeros((count, 2 + axes, len(pairs)))
     movers, frames = _placed(tree, joints)

@@ -188,7 +188,13 @@ def test_a_budget_that_is_too_large_is_answered_with_one_that_holds(folder, tmp_
 
 @pytest.mark.parametrize(
     ("text", "key"),
-    [("{delay: -1}", "delay"), ("{dealy: 1}", "dealy"), ("{model_error: 1.5}", "model_error")],
+    [
+        ("{delay: -1}", "delay"),
+        ("{dealy: 1}", "dealy"),
+        ("{model_error: 1.5}", "model_error"),
+        ("{bodies: [[9, 1, 0, 0, 1]], rotors: []}", "bodies, rotors"),
+        ("{bodies: [[0, 1, 0, 0, 1]], rotors: [1, 1, 1, 1, 1]}", "bodies, rotors"),
+    ],
 )
 def test_bad_budgets_are_bad_input(folder, tmp_path, text, key):
     (tmp_path / "budget.yaml").write_text(text)
