@@ -128,7 +128,7 @@ def replay_command(
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make one run again by Drake's loop, to the last bit as counted, with its recording and figures."""
+    """Make one run again by Drake's loop, with recording and figures, and compare it with the counted one."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         from coop_drake.cli.campaign_replay import replay
 

@@ -86,7 +86,7 @@ class MessageClient:
 
     @property
     def sockets(self) -> list[zmq.Socket[bytes]]:
-        """On which something may arrive."""
+        """The sockets to wait on: messages and events of connections."""
         return [self._socket, self._monitor]
 
     @property

@@ -101,7 +101,7 @@ class MessageServer:
 
     @property
     def sockets(self) -> list[zmq.Socket[bytes]]:
-        """On which something may arrive."""
+        """The sockets to wait on: messages and events of connections."""
         return [self._socket, self._monitor]
 
     def receive(self, limit: float = 0.0) -> tuple[int, Any] | None:

@@ -51,7 +51,10 @@ def margin_of(record: RunRecord, name: str) -> float:
 
 
 def in_column(margin: float, name: str) -> float:
-    """Return what the column has that a margin stands for, or the other way round."""
+    """Return the value of a column for a margin that is driven down; called twice, it gives the margin back.
+
+    Only the used share of a budget is another number than its margin: the margin is what is left of it [-].
+    """
     return 1.0 - margin if name == "budget_share" else margin
 
 
