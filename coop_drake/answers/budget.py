@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Annotated
 
-from coop_drake.tree.rate_terms import BODY, Bodies
+from coop_drake.tree.bodies import BODY, Bodies
 from coop_drake.typed_data import EXACT, DataError, Limits, NotNegative, Positive, Vector, check_fields
 
 _Exact = Annotated[NotNegative, EXACT]

@@ -12,9 +12,9 @@ from coop_drake.plant.planar_chain import bodies_inertia, rotor_inertia
 from coop_drake.plant.team import TeamPlant, build_team_plant
 from coop_drake.scenario import Floor, Messages, Scenario
 from coop_drake.scenario.digest import scenario_digest
+from coop_drake.tree.bodies import Bodies
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.rate_terms import Bodies
 from coop_drake.verification.runs import BodyMass, RunSetup
 
 ROUNDED = 12

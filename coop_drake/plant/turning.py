@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from coop_drake.laws.rate_terms import rate_terms
 from coop_drake.plant.component_tree import read_component_tree
 from coop_drake.plant.run_masses import bodies_of_team, joint_inertias
 from coop_drake.plant.team import TeamPlant
-from coop_drake.tree.rate_terms import rate_terms
 
 CONFIGURATIONS = 3000
 """Number of configurations that are tried [-]: ten times as many give 4 % more for `elbow`."""

@@ -14,7 +14,7 @@ from coop_drake.scenario.measured_bounds import rate_levers, wave_bounds
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.reading import read_file
 from coop_drake.tree import ComponentTree
-from coop_drake.tree.rate_terms import Bodies
+from coop_drake.tree.bodies import Bodies
 
 ALL = "all"
 """The choice that stands for the departures of the scenario's section ``deployment``."""

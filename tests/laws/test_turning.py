@@ -10,6 +10,7 @@ from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Cell
 from coop_drake.laws import Funnel, ScheduledGains, transition_gains
 from coop_drake.laws.axis_table import axis_table, bounds_of, track_row
+from coop_drake.laws.rate_terms import rate_terms
 from coop_drake.laws.slopes import slope_bounds
 from coop_drake.planning.budget.coupling import cell_couplings
 from coop_drake.plant import build_team_plant, turning_coupling
@@ -17,7 +18,6 @@ from coop_drake.plant.component_tree import read_component_tree
 from coop_drake.plant.configuration import set_configuration
 from coop_drake.plant.run_masses import bodies_of_team, joint_inertias
 from coop_drake.scenario import load_scenario
-from coop_drake.tree.rate_terms import rate_terms
 from coop_drake.verification.budgets.rate_terms import couplings
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 

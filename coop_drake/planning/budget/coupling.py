@@ -8,9 +8,9 @@ import numpy as np
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.plan import Cell
+from coop_drake.laws.rate_terms import rate_terms
 from coop_drake.tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.rate_terms import rate_terms
 
 CONFIGURATIONS = 64
 """Configurations of the joints that are tried in every cell [-]."""

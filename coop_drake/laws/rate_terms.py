@@ -1,0 +1,123 @@
+"""Centripetal and Coriolis terms: how much the rates of a team's axes accelerate them by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from coop_drake.compiled import compiled
+from coop_drake.laws.chain_motion import (
+    COLUMNS,
+    COM_X,
+    COM_Y,
+    INERTIA,
+    MASS,
+    PARENT,
+    POSITION,
+    RATE,
+    ROTOR,
+    SLIDE_X,
+    SLIDE_Y,
+    TURN,
+    X,
+    Y,
+)
+from coop_drake.laws.team_dynamics import TeamWork, team_accelerations, team_work
+from coop_drake.tree.bodies import Bodies
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray, PlanarPose
+
+
+def rate_terms(
+    tree: ComponentTree, bodies: Bodies, rotors: Sequence[float], joints: FloatArray
+) -> FloatArray:
+    """Return how much pairs of rates accelerate the axes (theta, q...) where nothing is commanded.
+
+    The acceleration of axis i is -(M^-1 C)_i, the sum over j and k <= j of a coefficient times w_j w_k. These
+    coefficients do not depend on the object's pose.
+
+    Args:
+        tree: The team.
+        bodies: All bodies.
+        rotors: Inertia that its rotor adds to every joint, shape (n,), or empty for none [kg m^2 or kg].
+        joints: Configurations of the joints, shape (configurations, n) [rad or m].
+
+    Returns:
+        Sizes of the coefficients, [..., i, j, k], zero for k > j, shape (configurations, axes, axes, axes).
+    """
+    chain, axes = _chain_of(tree, bodies), 1 + joints.shape[1]
+    for row, component in zip(chain[1:], tree.components[1:], strict=True):
+        if len(rotors) and component.joint is not None:
+            row[ROTOR] = rotors[component.joint.index]
+    coefficients = np.zeros((len(joints), axes, axes, axes))
+    _write_coefficients(chain, np.ascontiguousarray(joints), coefficients)
+    return coefficients
+
+
+def _chain_of(tree: ComponentTree, bodies: Bodies) -> FloatArray:
+    """Return the team as a chain of ``laws/chain_motion.py``; its state is (x, y, theta, q...) and rates."""
+    chain, size = np.zeros((len(tree.components), COLUMNS)), 3 + len(tree.joints)
+    frames = [PlanarPose()]
+    chain[0, RATE] = size
+    for row, component in zip(chain[1:], tree.components[1:], strict=True):
+        joint, parent = component.joint, component.parent
+        assert joint is not None
+        assert parent is not None
+        frame = frames[parent] @ joint.X_PJ
+        frames.append(frame)
+        row[[PARENT, X, Y]] = parent, frame.x, frame.y
+        row[[POSITION, RATE]] = 3 + joint.index, size + 3 + joint.index
+        if joint.kind == "revolute":
+            row[TURN] = joint.sign
+        else:
+            row[[SLIDE_X, SLIDE_Y]] = PlanarPose(angle=frame.angle).apply(np.array(joint.axis))
+    for body in bodies:
+        _add_body(chain[int(body[0])], frames[int(body[0])].apply(np.array(body[2:4])), body[1], body[4])
+    return chain
+
+
+def _add_body(row: FloatArray, centre: FloatArray, mass: float, inertia: float) -> None:
+    """Add a body to a link: the centre of mass of both, and their inertia about it."""
+    both = row[MASS] + mass
+    away = centre - row[[COM_X, COM_Y]]
+    row[INERTIA] += inertia + row[MASS] * mass / both * (away @ away)
+    row[[COM_X, COM_Y]] += mass / both * away
+    row[MASS] = both
+
+
+@compiled
+def _write_coefficients(chain: FloatArray, joints: FloatArray, coefficients: FloatArray) -> None:
+    """Write the sizes of all coefficients, by the accelerations at unit rates of one axis and of two."""
+    axes = joints.shape[1] + 1
+    n = axes + 2
+    state, efforts, own = np.zeros(2 * n), np.zeros(n), np.empty((axes, n))
+    both, work = np.empty(n), team_work(chain.shape[0])
+    for c in range(joints.shape[0]):
+        state[3:n] = joints[c]
+        for j in range(axes):
+            _accelerate(chain, state, j, j, efforts, work, own[j])
+            for k in range(j):
+                _accelerate(chain, state, j, k, efforts, work, both)
+                for i in range(axes):
+                    coefficients[c, i, j, k] = abs(both[2 + i] - own[j, 2 + i] - own[k, 2 + i])
+            for i in range(axes):
+                coefficients[c, i, j, j] = abs(own[j, 2 + i])
+
+
+@compiled
+def _accelerate(
+    chain: FloatArray,
+    state: FloatArray,
+    j: int,
+    k: int,
+    efforts: FloatArray,
+    work: TeamWork,
+    accelerations: FloatArray,
+) -> None:
+    """Write the accelerations at unit rates of axes j and k alone, without forces."""
+    n = accelerations.size
+    state[n:] = 0.0
+    state[n + 2 + j] = state[n + 2 + k] = 1.0
+    nothing, nowhere = np.empty(0, dtype=np.int64), np.empty((0, 3))
+    team_accelerations(chain, nothing, nowhere, nowhere, efforts, 0.0, state, work, accelerations)
