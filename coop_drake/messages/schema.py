@@ -82,7 +82,8 @@ class Sample(NamedTuple):
     Attributes:
         number: Number of the sample.
         time: Simulated time.
-        step: Whether the robot updates its state now; else it only shows its outputs, for the log.
+        step: Whether the robot updates its state now, after it has shown its outputs for the log; else it
+            only shows them.
         team_messages: In lock-step, the robot computes once it has so many messages of the supervisor in
             their session.
         object_pose: Pose (x, y, angle) of the object's frame L in W, angle unwrapped.
@@ -104,7 +105,7 @@ class Tick(NamedTuple):
     Attributes:
         number: Number of the sample.
         time: Simulated time.
-        step: Whether the supervisor updates its state now; else it only shows its outputs.
+        step: Whether the supervisor updates its state now; it shows its outputs as they were before.
         team_messages: In lock-step, it decides once it has so many messages of each robot in their session.
     """
 

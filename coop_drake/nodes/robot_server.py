@@ -40,8 +40,8 @@ class RobotServer(Server):
     def _answer(self, question: Sample) -> None:
         number, time = question.number, question.time
         measured = np.array([*question.robot_state, *question.object_pose])
+        self._end.efforts.send(Telemetry(number, time, tuple(self._node.look(time, measured))))
         if not question.step:
-            self._end.efforts.send(Telemetry(number, time, tuple(self._node.look(time, measured))))
             return
         effort, said = self._node.step(time, measured)
         for message in said:

@@ -46,6 +46,9 @@ class SampleExchange:
     channel is another one than that of the world, every answer says how many messages its sender has sent,
     and the next question says how many its receiver must have received.
 
+    The simulation first looks at an instant, for the log, and then takes the sample that is due there. Both
+    are one question: everybody shows what it would log before its update, then updates.
+
     A process that is gone, or gives no answer for too long, is missing for the rest of the run. The drives of
     a robot without answers hold its last effort for ``TOLERATED``. Then they open the line of the emergency
     stop, which is common to all drives, and all robots brake.
@@ -53,6 +56,7 @@ class SampleExchange:
     Args:
         end: The world's sockets, with sessions.
         robots: Number of robots N.
+        period: Control period [s].
         pacing: Keeps the pace of the wall clock; None for lock-step, in which every sample waits.
         gone: Returns the processes that are known to have ended.
         patience: How long a process may take for an answer in lock-step [s].
@@ -67,6 +71,7 @@ class SampleExchange:
         self,
         end: WorldEnd,
         robots: int,
+        period: float,
         *,
         pacing: Pacing | None = None,
         gone: Callable[[], Collection[int]] = tuple,
@@ -74,13 +79,14 @@ class SampleExchange:
         before: Callable[[int], None] = lambda sample: None,
     ) -> None:
         self._end, self._gone, self._patience, self._before = end, gone, patience, before
-        self._pacing = pacing
+        self._pacing, self._period = pacing, period
         self._everyone = [*range(robots), SUPERVISOR]
         self.sample, self.missing = 0, dict[int, float]()
         self._last: dict[tuple[int, type], Any] = {}
         self._asked: dict[int, float] = {}
         self._sizes: list[int] = []
         self._answered: dict[int, float] = {}
+        self._sampled = -1
 
     def trouble(self) -> str:
         """Return who is missing since when; empty where everybody is there."""
@@ -109,22 +115,31 @@ class SampleExchange:
 
     def step(self, time: float, measured: Sequence[FloatArray]) -> list[FloatArray]:
         """See ``Exchange``."""
-        self._before(self.sample)
-        if self._pacing is not None:
-            self._pacing.wait(time)
-        self._ask(time, measured, step=True)
+        if self._sampled != self.sample:
+            self._take_sample(time, measured)
         self.sample += 1
         return [self._effort(k, time, own) for k, own in enumerate(measured)]
 
     def look(self, time: float, measured: Sequence[FloatArray]) -> FloatArray:
         """See ``Exchange``."""
-        self._ask(time, measured, step=False)
+        if time == self.sample * self._period:
+            self._take_sample(time, measured)
+        else:
+            self._ask(time, measured, step=False)
         needed = {(SUPERVISOR, Status), *((k, Telemetry) for k in self._everyone[:-1])}
         if not needed <= self._last.keys():
             raise MessagingError(self.trouble())
         status = self._last[SUPERVISOR, Status]
         shown = [self._last[k, Telemetry].values for k in self._everyone[:-1]]
         return np.concatenate([*shown, [status.cell, status.entry, status.arrived, *status.causes]])
+
+    def _take_sample(self, time: float, measured: Sequence[FloatArray]) -> None:
+        """Let everybody compute once, which shows before the update what it would log."""
+        self._before(self.sample)
+        if self._pacing is not None:
+            self._pacing.wait(time)
+        self._ask(time, measured, step=True)
+        self._sampled = self.sample
 
     def _effort(self, robot: int, time: float, measured: FloatArray) -> FloatArray:
         """Return what the drives of a robot do."""

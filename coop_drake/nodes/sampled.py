@@ -24,12 +24,17 @@ class SampledDiagram:
     def __init__(self, diagram: Diagram) -> None:
         self.diagram = diagram
         self.context = diagram.CreateDefaultContext()
+        self._inputs: dict[str, FloatArray] = {}
 
     def at(self, time: float, inputs: Mapping[str, FloatArray]) -> None:
-        """Set the time [s] and the inputs."""
-        self.context.SetTime(time)
+        """Set the time [s] and the inputs; what was computed for the same ones is not computed again."""
+        if time != self.context.get_time():
+            self.context.SetTime(time)
         for name, value in inputs.items():
-            self.diagram.GetInputPort(name).FixValue(self.context, value)
+            known = self._inputs.get(name)
+            if known is None or known.tobytes() != value.tobytes():
+                self.diagram.GetInputPort(name).FixValue(self.context, value)
+                self._inputs[name] = value.copy()
 
     def update(self) -> None:
         """Carry out the discrete updates of one sample."""

@@ -31,10 +31,10 @@ class SupervisorServer(Server):
 
     def _answer(self, question: Tick) -> None:
         number, time = question.number, question.time
+        cell, entry, arrived, *causes = self._node.look(time)
         if question.step:
             for message in self._node.step(time):
                 self._end.send_to_all(message)
         sent = tuple(peer.sent for _, peer in sorted(self._end.team.peers.items()))
-        cell, entry, arrived, *causes = self._node.look(time)
         codes = tuple(int(cause) for cause in causes)
         self._end.efforts.send(Status(number, time, sent, int(cell), float(entry), bool(arrived), codes))

@@ -61,7 +61,13 @@ def run_world(
     """
     end, outcome = WorldEnd(book, question_of(scenario, plan), keys), INTERRUPTED
     exchange = SampleExchange(
-        end, len(book.robots), pacing=pacing, gone=gone, patience=patience, before=before
+        end,
+        len(book.robots),
+        control_period(scenario),
+        pacing=pacing,
+        gone=gone,
+        patience=patience,
+        before=before,
     )
     world = build_world(scenario, plan, exchange)
     try:

@@ -40,7 +40,7 @@ class Answers:
 )
 def test_an_answer_that_does_not_fit_changes_nothing(sender, wrong):
     end = Answers((sender, wrong), (0, GOOD), (SUPERVISOR, STATUS))
-    exchange = SampleExchange(end, 1)
+    exchange = SampleExchange(end, 1, 0.01)
     (effort,) = exchange.step(0.0, [np.zeros(2 * 4 + 3)])
     assert effort.tolist() == [1.0, 2.0, 3.0, 4.0]
     assert exchange.facts()["processes"][0]["state"] == "follows the plan"
