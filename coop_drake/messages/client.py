@@ -13,6 +13,7 @@ from coop_drake.messages.agreement import ANY_QUESTION, REASONS, Question, Tap
 from coop_drake.messages.codec import decode, encode, header_of
 from coop_drake.messages.incoming import Incoming
 from coop_drake.messages.keys import KeyPair
+from coop_drake.messages.outgoing import SOUND, Links, Outgoing
 from coop_drake.messages.refusals import Reason, Refusals, RefusedError
 from coop_drake.messages.schema import WORLD, Hello, Present, TurnedAway, Welcome
 from coop_drake.messages.sockets import FAILURES, next_event, next_parts, open_socket, wait_for, watch_socket
@@ -40,6 +41,7 @@ class MessageClient:
         server_key: The server's public key, None for no encryption.
         context: Of ZeroMQ; a new one by default. The address ``inproc://...`` needs a common one.
         tap: Is shown every message.
+        links: What goes wrong with messages that it sends.
 
     Attributes:
         address: Where the server listens.
@@ -48,7 +50,7 @@ class MessageClient:
         session: Number of the session, 0 where there is none.
         sessions: How many there have been.
         incoming: What came in this session.
-        sent: Messages sent in this session.
+        outgoing: What is sent in this session.
         unsent: Messages that could not be sent.
         heard: When the server was heard last [s].
         refusals: What was refused.
@@ -66,8 +68,10 @@ class MessageClient:
         server_key: str | None = None,
         context: zmq.Context[Any] | None = None,
         tap: Tap | None = None,
+        links: Links = SOUND,
     ) -> None:
-        self.address, self.session, self.sessions, self.sent, self.unsent = address, 0, 0, 0, 0
+        self.address, self.session, self.sessions, self.unsent = address, 0, 0, 0
+        self.outgoing = Outgoing(links.between(channel, sender, server))
         self.incoming, self.refusals, self.heard = Incoming(None), Refusals(), -math.inf
         self.server, self.trouble = server, "nothing answers there"
         self._sender, self._question, self._tap = sender, question, tap
@@ -83,6 +87,11 @@ class MessageClient:
             self._socket.curve_serverkey = server_key.encode()
         self._monitor = watch_socket(self._socket, zmq.EVENT_HANDSHAKE_SUCCEEDED | zmq.EVENT_DISCONNECTED)
         self._socket.connect(address)
+
+    @property
+    def sent(self) -> int:
+        """Messages sent in this session, see :class:`Outgoing`."""
+        return self.outgoing.sent
 
     @property
     def sockets(self) -> list[zmq.Socket[bytes]]:
@@ -129,11 +138,14 @@ class MessageClient:
         return None
 
     def send(self, message: Any) -> bool:
-        """Send a message; False where there is no session or the server does not take any more."""
-        sent = self.session != 0 and self._put(encode(message, self._sender, self.session, self.sent + 1))
-        self.sent += sent
+        """Send a message; False where there is no session, the server does not take it or will not get it."""
+        sent = self.session != 0 and self.outgoing.send(message, self._sender, self.session, self._put)
         self.unsent += not sent
         return sent
+
+    def advance(self, sample: int) -> None:
+        """Send what is late and due at a sample."""
+        self.outgoing.advance(sample, self._put)
 
     def close(self) -> None:
         """Close everything; what was sent may leave for a fifth of a second."""
@@ -178,7 +190,8 @@ class MessageClient:
         if isinstance(answer, TurnedAway):
             self.trouble = REASONS.get(answer.reason, "it does not know this process")
             return
-        self.session, self.sent, self.incoming = answer.session, 0, Incoming(None)
+        self.session, self.incoming = answer.session, Incoming(None)
+        self.outgoing.restart()
         self.sessions, self.heard = self.sessions + 1, monotonic()
         self.send(Present())
 

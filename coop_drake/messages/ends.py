@@ -12,6 +12,7 @@ from coop_drake.messages.address_book import AddressBook
 from coop_drake.messages.agreement import ANY_QUESTION, Question, Tap
 from coop_drake.messages.client import MessageClient
 from coop_drake.messages.keys import KeyPair
+from coop_drake.messages.outgoing import SOUND, Links
 from coop_drake.messages.refusals import Refusals
 from coop_drake.messages.schema import SUPERVISOR, WORLD
 from coop_drake.messages.server import MessageServer
@@ -61,6 +62,16 @@ class _End:
         for end in self._all:
             both.counts.update(end.refusals.counts)
         return both
+
+    def advance(self, sample: int) -> dict[int, list[Any]]:
+        """Send what is late and due at a sample; return what each process takes of it from a server's end."""
+        for client in self.clients:
+            client.advance(sample)
+        due: dict[int, list[Any]] = {}
+        for server in self.servers:
+            for index, messages in server.advance(sample).items():
+                due.setdefault(index, []).extend(messages)
+        return due
 
     def close(self) -> None:
         """Close all sockets."""
@@ -115,14 +126,21 @@ class WorldEnd(_End):
         book: Who listens where.
         question: What all must agree on.
         keys: The world's keys, None where the book has none.
+        links: What goes wrong with messages that it sends.
     """
 
     def __init__(
-        self, book: AddressBook, question: Question = ANY_QUESTION, keys: KeyPair | None = None
+        self,
+        book: AddressBook,
+        question: Question = ANY_QUESTION,
+        keys: KeyPair | None = None,
+        links: Links = SOUND,
     ) -> None:
         known = {k: book.key_of(k) for k in (*range(len(book.robots)), SUPERVISOR)}
         self.sensors, self.efforts = (
-            MessageServer(address, known, channel=channel, sender=WORLD, question=question, keys=keys)
+            MessageServer(
+                address, known, channel=channel, sender=WORLD, question=question, keys=keys, links=links
+            )
             for address, channel in _channels(book)
         )
         super().__init__([self.sensors, self.efforts], [])
@@ -159,12 +177,18 @@ class RobotEnd(_End):
         robot: Its index.
         question: What all must agree on.
         keys: Its keys, None where the book has none.
+        links: What goes wrong with messages that it sends.
     """
 
     def __init__(
-        self, book: AddressBook, robot: int, question: Question = ANY_QUESTION, keys: KeyPair | None = None
+        self,
+        book: AddressBook,
+        robot: int,
+        question: Question = ANY_QUESTION,
+        keys: KeyPair | None = None,
+        links: Links = SOUND,
     ) -> None:
-        self.sensors, self.efforts = _world_clients(book, robot, question, keys)
+        self.sensors, self.efforts = _world_clients(book, robot, question, keys, links)
         self.team = MessageClient(
             book.supervisor.team,
             SUPERVISOR,
@@ -173,6 +197,7 @@ class RobotEnd(_End):
             question=question,
             keys=keys,
             server_key=book.supervisor.key,
+            links=links,
         )
         super().__init__([], [self.sensors, self.efforts, self.team])
 
@@ -193,6 +218,7 @@ class SupervisorEnd(_End):
         question: What all must agree on.
         keys: Its keys, None where the book has none.
         tap: Is shown every message of the team's channel.
+        links: What goes wrong with messages that it sends.
     """
 
     def __init__(
@@ -201,8 +227,9 @@ class SupervisorEnd(_End):
         question: Question = ANY_QUESTION,
         keys: KeyPair | None = None,
         tap: Tap | None = None,
+        links: Links = SOUND,
     ) -> None:
-        self.sensors, self.efforts = _world_clients(book, SUPERVISOR, question, keys)
+        self.sensors, self.efforts = _world_clients(book, SUPERVISOR, question, keys, links)
         self.team = MessageServer(
             book.supervisor.team,
             {k: robot.key for k, robot in enumerate(book.robots)},
@@ -211,6 +238,7 @@ class SupervisorEnd(_End):
             question=question,
             keys=keys,
             tap=tap,
+            links=links,
         )
         super().__init__([self.team], [self.sensors, self.efforts])
 
@@ -232,7 +260,7 @@ def _channels(book: AddressBook) -> tuple[tuple[str, Literal["sensors", "efforts
 
 
 def _world_clients(
-    book: AddressBook, sender: int, question: Question, keys: KeyPair | None
+    book: AddressBook, sender: int, question: Question, keys: KeyPair | None, links: Links
 ) -> list[MessageClient]:
     return [
         MessageClient(
@@ -243,6 +271,7 @@ def _world_clients(
             question=question,
             keys=keys,
             server_key=book.world.key,
+            links=links,
         )
         for address, channel in _channels(book)
     ]

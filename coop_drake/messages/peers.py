@@ -7,6 +7,7 @@ import secrets
 from dataclasses import dataclass, field
 
 from coop_drake.messages.incoming import RATE, Incoming
+from coop_drake.messages.outgoing import Outgoing
 
 SILENCE = 0.5
 """A name is free for another process when the one that has it has not been heard for so long [s]."""
@@ -26,7 +27,7 @@ class Peer:
         session: That of its present session, 0 for none.
         route: Its connection, None for none.
         incoming: What came in this session.
-        sent: Messages sent to it in this session.
+        outgoing: What is sent to it in this session.
         unsent: Messages that could not be sent to it, in all sessions.
         sessions: Number of its sessions.
         heard: When it was heard last, by a clock that never goes back [s].
@@ -39,11 +40,16 @@ class Peer:
     session: int = 0
     route: bytes | None = None
     incoming: Incoming = field(default_factory=Incoming)
-    sent: int = 0
+    outgoing: Outgoing = field(default_factory=Outgoing)
     unsent: int = 0
     sessions: int = 0
     heard: float = -math.inf
     offers: dict[bytes, int] = field(default_factory=dict)
+
+    @property
+    def sent(self) -> int:
+        """Messages sent to it in this session, see :class:`Outgoing`."""
+        return self.outgoing.sent
 
     def taken(self, route: bytes, now: float) -> bool:
         """Whether another connection has this name and is being heard."""
@@ -63,7 +69,8 @@ class Peer:
     def begin(self, route: bytes) -> None:
         """Begin the session that was offered to a connection; the one before is over."""
         self.session, self.route = self.offers.pop(route), route
-        self.incoming, self.sent, self.sessions = Incoming(self.rate), 0, self.sessions + 1
+        self.incoming, self.sessions = Incoming(self.rate), self.sessions + 1
+        self.outgoing.restart()
 
     def end(self) -> None:
         """End the session: the connection is gone."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from time import monotonic
 from typing import Any
 
@@ -22,6 +23,7 @@ from coop_drake.messages.codec import Header, decode, encode, header_of
 from coop_drake.messages.doorkeeper import Doorkeeper
 from coop_drake.messages.incoming import RATE
 from coop_drake.messages.keys import KeyPair
+from coop_drake.messages.outgoing import SOUND, Links, Outgoing
 from coop_drake.messages.peers import Peer
 from coop_drake.messages.refusals import Reason, Refusals, RefusedError
 from coop_drake.messages.schema import SUPERVISOR, Hello, TurnedAway, Welcome
@@ -48,6 +50,7 @@ class MessageServer:
         context: Of ZeroMQ; a new one by default. The address ``inproc://...`` needs a common one.
         tap: Is shown every message.
         rate: Largest rate of the messages of each process in the long run [1/s].
+        links: What goes wrong with messages that it sends.
 
     Raises:
         MessagingError: It cannot listen at the address.
@@ -70,8 +73,12 @@ class MessageServer:
         context: zmq.Context[Any] | None = None,
         tap: Tap | None = None,
         rate: float = RATE,
+        links: Links = SOUND,
     ) -> None:
-        self.peers = {index: Peer(index, key, rate) for index, key in peers.items()}
+        self.peers = {
+            index: Peer(index, key, rate, outgoing=Outgoing(links.between(channel, sender, index)))
+            for index, key in peers.items()
+        }
         self.refusals = Refusals()
         self._sender, self._question, self._tap = sender, question, tap
         self._allowed = {
@@ -128,14 +135,20 @@ class MessageServer:
             wait_for(self.sockets, left)
 
     def send(self, peer: int, message: Any) -> bool:
-        """Send a message to a process; False where it has no session or does not take any more."""
+        """Send a message to a process; False where it has no session, does not take it or will not get it."""
         known = self.peers[peer]
-        sent = known.route is not None and self._put(
-            known, known.route, encode(message, self._sender, known.session, known.sent + 1)
+        sent = known.route is not None and known.outgoing.send(
+            message, self._sender, known.session, partial(self._put, known, known.route)
         )
-        known.sent += sent
         known.unsent += not sent
         return sent
+
+    def advance(self, sample: int) -> dict[int, list[Any]]:
+        """Send what is late and due at a sample; return the messages that each process takes."""
+        return {
+            index: peer.outgoing.advance(sample, partial(self._put, peer, peer.route or b""))
+            for index, peer in self.peers.items()
+        }
 
     def close(self) -> None:
         """Close everything; what was sent may leave for a fifth of a second."""

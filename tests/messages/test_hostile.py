@@ -75,7 +75,7 @@ def test_reordered_and_lost_messages_are_counted(pairs):
     assert [message.cell for _, message in heard] == [4, 5]
     assert pairs.refused(2) == {"SEQUENCE": 2}
     assert pairs.server.peers[0].incoming.lost == 2
-    honest.sent = 5
+    honest.outgoing.restart(5)
     exchange(pairs, honest)
 
 
@@ -92,7 +92,7 @@ def test_malformed_messages_are_refused_with_and_without_a_session(pairs):
     counts = pairs.refused(2 * len(bad) + 2)
     assert sum(counts.values()) == 2 * len(bad) + 2
     assert {"LENGTH", "MAGIC", "PARTS", "KIND"} <= set(counts)
-    honest.sent = 2
+    honest.outgoing.restart(2)
     exchange(pairs, honest)
 
 
