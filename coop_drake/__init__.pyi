@@ -1,4 +1,5 @@
 from .answers import (
+    BeyondLimits,
     Found,
     Infeasible,
     Plan,
@@ -34,6 +35,7 @@ from .viz import (
 )
 
 __all__ = [
+    "BeyondLimits",
     "ClosedLoop",
     "CoopDrakeError",
     "Diagnosis",

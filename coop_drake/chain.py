@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from coop_drake.answers.plan import Found, Infeasible, Plan, PlanningResult, Undecided
+from coop_drake.answers.plan import BeyondLimits, Found, Infeasible, Plan, PlanningResult, Undecided
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.errors import PlanError
@@ -39,8 +39,8 @@ def plan(
         progress: Called with a stage and the fraction of it that is done.
 
     Returns:
-        `Found` with the plan in ``plan``, `Infeasible` with the reason and a proof, or `Undecided` with what
-        stood in the way.
+        `Found` with the plan in ``plan``, `BeyondLimits` with one that limits refuse, `Infeasible` with the
+        reason and a proof, or `Undecided` with what stood in the way.
 
     Raises:
         ScenarioError: The scenario's models make no team, or there is no gain set of that name.
@@ -89,7 +89,7 @@ def verify(
     problem, gain_sets = _problem_and_gains(question)
     if isinstance(answer, Path | str):
         return verify_file(answer, problem, gain_sets, progress)
-    if isinstance(answer, Found):
+    if isinstance(answer, Found | BeyondLimits):
         answer = answer.plan
     if isinstance(answer, Plan):
         return verify_plan(answer, problem, gain_sets, progress)

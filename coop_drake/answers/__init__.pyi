@@ -1,11 +1,12 @@
 from .cell_table import table_1
 from .log import SimulationLog
-from .plan import Cell, Found, Infeasible, Plan, PlanningResult, Transition, Undecided
+from .plan import BeyondLimits, Cell, Found, Infeasible, Plan, PlanningResult, Transition, Undecided
 from .plan_file import load_plan, save_plan
 from .problem import PlannerSettings, PlanningProblem
 from .search_report import SearchReport
 
 __all__ = [
+    "BeyondLimits",
     "Cell",
     "Found",
     "Infeasible",

@@ -1,13 +1,14 @@
-"""The limits of the bases and joints of a team, and what a plan states about their speeds."""
+"""Limits of the bases and joints of a team, what a plan states of speeds, and which limits refuse it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
 
 from coop_drake.tree.pose import FloatArray
-from coop_drake.typed_data import Bounds
+from coop_drake.typed_data import EXACT, Bounds, Limits, NotNegative, Positive
 
 
 def _none() -> FloatArray:
@@ -62,3 +63,29 @@ class SpeedStatement:
     joint_rate_limits: Bounds
     base_speeds: Bounds
     turn_rates: Bounds
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A limit of the scenario with which a plan cannot be carried out.
+
+    Attributes:
+        limit: Key of the limit in the scenario, such as ``planner.min_clearance``.
+        cell: Index of the cell in which the plan breaks it most.
+        value: What the plan has there, or needs [m, s, rad/s^2 or m/s^2].
+        allowed: The limit [m, s, rad/s^2 or m/s^2].
+    """
+
+    limit: str
+    cell: Annotated[int, Limits(at_least=0), EXACT]
+    value: Annotated[NotNegative, EXACT]
+    allowed: Annotated[Positive, EXACT]
+
+    def describe(self) -> str:
+        """Say which limit is broken where, and by how much."""
+        what, unit, scale = {
+            "planner.min_clearance": ("the object's path or its target has a clearance of", "mm", 1e3),
+            "planner.max_transition_time": ("the transition takes about", "s", 1.0),
+        }.get(self.limit, ("a joint is accelerated by", "rad/s^2 or m/s^2", 1.0))
+        value, allowed = f"{scale * self.value:.3g} {unit}", f"{scale * self.allowed:.3g} {unit}"
+        return f"{self.limit}: in cell {self.cell} {what} {value}; the limit is {allowed}"

@@ -1,4 +1,4 @@
-"""The planner's answers: a plan of cells and transitions, a proof that there is none, or neither.
+"""The planner's answers: a plan of cells and transitions, within limits or not, a proof, or neither.
 
 The fields of what is written to files stand in the order of the files; their types are checked when read.
 """
@@ -12,7 +12,7 @@ from shapely import Polygon
 
 from coop_drake.answers.axis_tracking import AxisTracking
 from coop_drake.answers.budget import Budget, Tolerance
-from coop_drake.answers.limits import SpeedStatement
+from coop_drake.answers.limits import Refusal, SpeedStatement
 from coop_drake.answers.position_tube import PositionTube
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.answers.region import Points, Region
@@ -96,6 +96,8 @@ class Plan:
         speeds: Limits of speed that are kept, and what follows for the bases; null where no limit is known.
         age_factor: The gains are those of the gain set for so many times the age of its commands, so that
             limits of acceleration are kept.
+        refused_by: Limits of the scenario that the plan breaks: it shows that a way exists, but cannot be
+            carried out. Empty for a plan that can.
     """
 
     problem: str = ""
@@ -111,6 +113,7 @@ class Plan:
     tube: PositionTube | None = None
     age_factor: Annotated[Positive, EXACT] = 1.0
     axis_tracking: AxisTracking | None = None
+    refused_by: tuple[Refusal, ...] = ()
 
     def governed(self, index: int) -> Polygon:
         """Return the region to which the governor keeps p_G in a cell: Q_i, or less where there is a tube."""
@@ -139,6 +142,25 @@ class Found:
 
 
 @dataclass(frozen=True)
+class BeyondLimits:
+    """A way exists, but no plan was found that can be carried out within the scenario's limits.
+
+    Attributes:
+        plan: Its cells are proved free and lead from start to goal; ``refused_by`` names the limits.
+        report: What the search did.
+    """
+
+    plan: Plan
+    report: SearchReport
+
+    @property
+    def reason(self) -> str:
+        """Which limits refuse the plan, and where, in a sentence."""
+        broken = "; ".join(refusal.describe() for refusal in self.plan.refused_by)
+        return f"a way exists, but it cannot be carried out within the scenario's limits: {broken}"
+
+
+@dataclass(frozen=True)
 class Infeasible:
     """No plan exists: the over-approximations separate start from goal.
 
@@ -161,4 +183,4 @@ class Undecided:
     report: SearchReport
 
 
-PlanningResult = Found | Infeasible | Undecided
+PlanningResult = Found | BeyondLimits | Infeasible | Undecided

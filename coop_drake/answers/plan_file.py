@@ -46,6 +46,13 @@ def load_plan(path: Path | str) -> Plan:
     plan = read_plan(document)
     check_plan(plan, document.file)
     document.check_digest()
+    if plan.refused_by:
+        limits = "; ".join(refusal.describe() for refusal in plan.refused_by)
+        document.refuse(
+            "refused_by",
+            limits,
+            "no limit that a plan breaks; with other limits `plan` may find one that can be carried out",
+        )
     return plan
 
 

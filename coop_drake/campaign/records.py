@@ -73,7 +73,8 @@ class QuestionRecord:
         robots: Number of robots.
         joints: Number of joints of the whole team.
         kind: Shape of the object, and whether any joint slides.
-        verdict: ``plan``, ``infeasible``, ``undecided``, or ``failed`` where the planner raised an error.
+        verdict: ``plan``, ``beyond limits``, ``infeasible``, ``undecided``, or ``failed`` where the planner
+            raised an error.
         cpu_seconds: Processor time of the planner [s].
         first_plan_seconds: Processor time until the first plan was certified; NaN if none was [s].
         cells: Cells of the plan.
@@ -82,7 +83,7 @@ class QuestionRecord:
         peer: The other planners that searched for a way; the last one found it if any did. Empty if none did.
         peer_found: Whether one was found.
         peer_seconds: Processor time of the other planners together; NaN if none searched [s].
-        reason: Why the question is undecided or the answer is wrong; else empty.
+        reason: Why the question is undecided, beyond limits, or its answer wrong; else empty.
         corners: Number of corners of the floor.
         width_ratio: Width of the floor's passages over that of the narrowest straight corridor in which the
             team is known to fit; NaN on floors without passages of one width [-].

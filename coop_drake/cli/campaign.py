@@ -226,7 +226,17 @@ def _show_questions(
     table = folder.questions(batches)
     rows = summarise_questions(table) if table.num_rows else ()
     reporter.facts["questions"] = [{**asdict(row), "wrong": row.wrong} for row in rows]
-    headings = ("asked", "plans", "no way", "undecided", "wrong", "CPU time", "95 %", "largest")
+    headings = (
+        "asked",
+        "plans",
+        "beyond limits",
+        "no way",
+        "undecided",
+        "wrong",
+        "CPU time",
+        "95 %",
+        "largest",
+    )
     if rows:
         reporter.table(campaign.name, [row.cells() for row in rows], headings, "questions by")
     if rows and rows[-1].wrong:

@@ -27,7 +27,7 @@ def plan_command(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Plan only: write the plan, or the proof that there is none."""
+    """Plan only: write the plan, a way that limits refuse, or the proof that there is none."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "plan")
@@ -47,10 +47,16 @@ def plan_of(
     """Plan, and note the facts; without a plan say so, and set the exit code.
 
     It holds under the ``budget`` that the option of this name says, or else the scenario's ``deployment``.
-    The plan with its table of cells, or the proof that there is none, goes to the folder if one is given. If
-    the plan will be ``simulated``, this is prepared at the same time.
+    The plan with its table of cells, a way that limits refuse, or the proof that there is none, goes to the
+    folder if one is given. If the plan will be ``simulated``, this is prepared at the same time.
     """
-    from coop_drake.answers import Found
+    return report_answer(task, answer_to(task, reporter, budget, simulated=simulated), folder, reporter)
+
+
+def answer_to(
+    task: Task, reporter: Reporter, budget: str | None = None, *, simulated: bool = False
+) -> PlanningResult:
+    """Ask the planner, and note the facts; see ``plan_of``."""
     from coop_drake.memory import peak_memory_mb
     from coop_drake.planning.planner import plan
 
@@ -68,22 +74,33 @@ def plan_of(
         else:
             result = work(progress=progress)
     reporter.facts.update(planning_facts(result), peak_memory_mb=peak_memory_mb())
+    return result
+
+
+def report_answer(
+    task: Task, result: PlanningResult, folder: ResultFolder | None, reporter: Reporter
+) -> Plan | None:
+    """Write an answer and return its plan; without a plan say so, and set the exit code."""
+    from coop_drake.answers import Found
+
     if folder is not None:
         _write(result, task, folder)
     if isinstance(result, Found):
         return result.plan
     reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
     reporter.say(f"[bold]{answer_of(result)}[/]: {escape(result.reason)}")
-    if folder is not None and folder.certificate.exists():
-        reporter.say(f"The proof is in {escape(str(folder.certificate))}")
-    reporter.say(f"What blocks, and what would help: coop-drake why {escape(str(task.scenario.path))}")
+    for what, path in (("proof", folder.certificate), ("way", folder.way)) if folder is not None else ():
+        if path.exists():
+            reporter.say(f"The {what} is in {escape(str(path))}")
+    if folder is not None:
+        reporter.say(f"What blocks, and what would help: coop-drake why {escape(str(task.scenario.path))}")
     reporter.code = ExitCode.of(answer_of(result))
     return None
 
 
 def _write(result: PlanningResult, task: Task, folder: ResultFolder) -> None:
-    """Write the plan with its table of cells, or the proof that there is none."""
-    from coop_drake.answers import Found, Infeasible, save_plan, table_1
+    """Write the plan with its table of cells, a way that limits refuse, or the proof that there is none."""
+    from coop_drake.answers import BeyondLimits, Found, Infeasible, save_plan, table_1
     from coop_drake.answers.proof_file import save_proof
     from coop_drake.files import write_atomically
 
@@ -91,5 +108,7 @@ def _write(result: PlanningResult, task: Task, folder: ResultFolder) -> None:
     if isinstance(result, Found):
         save_plan(result.plan, folder.plan)
         write_atomically(folder.path / "table_1.md", table_1(result.plan).encode())
+    elif isinstance(result, BeyondLimits):
+        save_plan(result.plan, folder.way)
     elif isinstance(result, Infeasible) and result.proof is not None:
         save_proof(result.proof, task.problem, folder.certificate)

@@ -47,12 +47,14 @@ class ExitCode(IntEnum):
     BAD_INPUT = 2
     INFEASIBLE = 3
     UNDECIDED = 4
+    BEYOND_LIMITS = 5
     INTERRUPTED = 130
 
     @classmethod
     def of(cls, answer: str) -> ExitCode:
-        """Return the code for an answer: ``found``, ``infeasible``, or any other, which is undecided."""
-        return {"found": cls.DONE, "infeasible": cls.INFEASIBLE}.get(answer, cls.UNDECIDED)
+        """Return the code for an answer as ``answer_of`` gives it; any other one is undecided."""
+        codes = {"found": cls.DONE, "infeasible": cls.INFEASIBLE, "beyond limits": cls.BEYOND_LIMITS}
+        return codes.get(answer, cls.UNDECIDED)
 
 
 class Reporter:

@@ -15,7 +15,7 @@ from coop_drake.viz.figure_names import joints_figure_name
 
 _LARGEST_FRAME = 500
 _FILES = {
-    "plan": ("plan.json", "certificate.json", "table_1.md"),
+    "plan": ("plan.json", "way.json", "certificate.json", "table_1.md"),
     "simulation": (
         "maps.json",
         "log.npz",
@@ -85,6 +85,11 @@ class ResultFolder:
     def plan(self) -> Path:
         """The plan."""
         return self.path / "plan.json"
+
+    @property
+    def way(self) -> Path:
+        """The plan along a way that exists, which limits refuse."""
+        return self.path / "way.json"
 
     @property
     def certificate(self) -> Path:

@@ -107,19 +107,24 @@ def process_lines(facts: Mapping[str, Any]) -> list[str]:
 
 
 def answer_of(result: PlanningResult) -> str:
-    """Return ``found``, ``infeasible`` or ``undecided``."""
-    return type(result).__name__.lower()
+    """Return ``found``, ``beyond limits``, ``infeasible`` or ``undecided``."""
+    return {"BeyondLimits": "beyond limits"}.get(type(result).__name__, type(result).__name__.lower())
 
 
 def planning_facts(result: PlanningResult) -> dict[str, Any]:
     """Return what the planner answered and what it took."""
-    from coop_drake.answers import Found
+    from coop_drake.answers import BeyondLimits, Found
 
     report = result.report
     facts: dict[str, Any] = {"answer": answer_of(result), "cells": 0, "slices": report.slices}
     first = report.first_plan_cpu_seconds
     facts["first_plan_cpu_seconds"] = None if first is None else round(first, 4)
-    facts.update(plan_facts(result.plan) if isinstance(result, Found) else {"reason": result.reason})
+    if isinstance(result, Found | BeyondLimits):
+        facts.update(plan_facts(result.plan))
+    if isinstance(result, BeyondLimits):
+        facts["refused_by"] = [asdict(refusal) for refusal in result.plan.refused_by]
+    if not isinstance(result, Found):
+        facts["reason"] = result.reason
     return facts
 
 

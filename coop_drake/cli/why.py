@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rich.markup import escape
 
 from coop_drake.cli.options import Machine, PictureFolder, Quiet, ScenarioPath
-from coop_drake.cli.plan import plan_of
+from coop_drake.cli.plan import answer_to, report_answer
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import summary_rows
@@ -35,17 +35,28 @@ def why_command(
         reporter.facts.update(facts_of(diagnosis), diagnosis_cpu_seconds=round(process_time() - before, 4))
         folder.begin("diagnosis")
         if diagnosis.answer is Answer.FOUND:
-            _show_plan(task, reporter)
+            _show_plan(task, folder, reporter)
         else:
             _show_diagnosis(diagnosis, task, folder, reporter)
             reporter.code = ExitCode.of(diagnosis.answer.value)
 
 
-def _show_plan(task: Task, reporter: Reporter) -> None:
-    """Show the rows that `plan` shows: a channel was found, of which a plan is made."""
-    if plan_of(task, None, reporter):
+def _show_plan(task: Task, folder: ResultFolder, reporter: Reporter) -> None:
+    """Show the rows that `plan` shows: a channel was found, of which a plan is made; limits may refuse it."""
+    from coop_drake.answers import BeyondLimits
+    from coop_drake.drawing import house_style, save_figure
+    from coop_drake.viz.floor_figures import refused_figure
+
+    result = answer_to(task, reporter)
+    if report_answer(task, result, None, reporter):
         reporter.table(task.name, summary_rows(reporter.facts))
         reporter.say("Nothing blocks: there is a plan")
+    if isinstance(result, BeyondLimits):
+        with house_style():
+            figure = refused_figure(task.problem, result.plan)
+            for name in ("why.png", "why.svg"):
+                save_figure(figure, folder.path / name)
+        reporter.say(f"The picture is {escape(str(folder.path / 'why.png'))}")
 
 
 def _show_diagnosis(diagnosis: Diagnosis, task: Task, folder: ResultFolder, reporter: Reporter) -> None:

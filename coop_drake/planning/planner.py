@@ -12,12 +12,13 @@ from shapely.errors import ShapelyError
 
 from coop_drake.answers.budget import Budget
 from coop_drake.answers.digest import problem_digest
-from coop_drake.answers.plan import Found, Infeasible, Plan, PlanningResult, Undecided
+from coop_drake.answers.plan import BeyondLimits, Found, Infeasible, Plan, PlanningResult, Undecided
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PlanError, StallError, TooQuickError
 from coop_drake.laws import GainSet, ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
+from coop_drake.planning.execution.refusals import refusals, without_limits
 from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.planning.sampling.local_floor import local_question
 from coop_drake.planning.search.search import find_path
@@ -46,7 +47,7 @@ def plan(
 
     A path may be found that cannot be executed, because a passage is less than a millimetre wide or takes
     minutes. The search is then repeated with a smaller margin, which gives other cells. If that does not
-    help, the answer is Undecided.
+    help, the answer is a plan for a team without limits, and the limits that it breaks.
 
     On a large floor a plan is looked for near a short route first, so that time grows with the length of the
     way. What is free on that part of the floor is free on the floor.
@@ -59,14 +60,17 @@ def plan(
         progress: Called with a phase and the fraction of it that is done.
 
     Returns:
-        Found with the plan, Infeasible with the reason, or Undecided with the reason.
+        Found with the plan, BeyondLimits with a plan that limits refuse, Infeasible or Undecided.
     """
-    local = local_question(problem)
+    local, near = local_question(problem), None
     if local is not None:
         near = _answer(local, gain_set, gain_set_name, budget, progress, partial(find_path, routed=True))
+        if isinstance(near, Found | BeyondLimits):
+            near = replace(near, plan=replace(near.plan, problem=problem_digest(problem)))
         if isinstance(near, Found):
-            return Found(replace(near.plan, problem=problem_digest(problem)), near.report)
-    return _answer(problem, gain_set, gain_set_name, budget, progress, find_path)
+            return near
+    answer = _answer(problem, gain_set, gain_set_name, budget, progress, find_path)
+    return near if isinstance(answer, Undecided) and isinstance(near, BeyondLimits) else answer
 
 
 def _answer(
@@ -78,26 +82,46 @@ def _answer(
     search: Callable[..., tuple[CoveredPath | Channel | NoChannel, SearchReport]],
 ) -> PlanningResult:
     """Answer a question by a search, with smaller margins where its paths cannot be executed."""
-    question, report, stall = problem, SearchReport(0), ""
+    question, report, stall, too_quick, way = problem, SearchReport(0), "", False, None
     for _ in range(1 + FINER_ATTEMPTS):
         answer, latest = search(question, progress)
         report = _added(report, latest)
         if isinstance(answer, NoChannel):
             if answer.proved:
                 return Infeasible(answer.reason, report, answer.proof)
-            return Undecided(stall or answer.reason, report)
+            stall = stall or answer.reason
+            break
+        way = answer
         try:
             made = _made(question, answer, gain_set, gain_set_name, budget, progress)
         except (GeometryError, PlanError, StallError, ShapelyError) as error:
             stall = f"a free path exists, but a plan along it cannot be executed: {error}"
-            if answer.margin == 0.0 or isinstance(error, TooQuickError):
+            too_quick = isinstance(error, TooQuickError)
+            if answer.margin == 0.0 or too_quick:
                 break
             question = replace(question, settings=replace(question.settings, margin=0.5 * answer.margin))
         else:
             if isinstance(made, Plan):
                 return Found(made, report)
             return Undecided(made.describe(), report)
-    return Undecided(stall, report)
+    refused = way and _without_limits(problem, way, gain_set, gain_set_name, slowly=too_quick)
+    return BeyondLimits(refused, report) if refused else Undecided(stall, report)
+
+
+def _without_limits(
+    problem: PlanningProblem, found: Channel | CoveredPath, gain_set: GainSet, name: str, *, slowly: bool
+) -> Plan | None:
+    """A plan for a team without limits, and the limits that refuse it; None if there is none."""
+    factor = 1.0
+    if slowly and isinstance(gain_set, ScheduledGains):
+        factor, gain_set = AGE_FACTORS[-1], gain_set.slowed(AGE_FACTORS[-1])
+    try:
+        made = quickest_plan(without_limits(problem), found, gain_set, gain_set_name=name)
+    except (GeometryError, PlanError, StallError, ShapelyError):
+        return None
+    broken = refusals(problem, made)
+    digest = problem_digest(problem)
+    return replace(made, problem=digest, age_factor=factor, refused_by=broken) if broken else None
 
 
 def _made(

@@ -27,7 +27,7 @@ class Verified:
     """An answer of the planner that holds.
 
     Attributes:
-        answer: ``found`` or ``infeasible``.
+        answer: ``found``, ``beyond limits`` or ``infeasible``.
         subject: What was verified, in words.
         checks: The statements that were checked.
         proved: What these prove together, in a sentence.

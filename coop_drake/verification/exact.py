@@ -19,6 +19,7 @@ from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.gains import check_gains
 from coop_drake.verification.problem_match import check_problem
 from coop_drake.verification.question import question_of
+from coop_drake.verification.refusals import check_refusals
 from coop_drake.verification.speeds import check_accelerations, check_speeds
 
 
@@ -41,6 +42,8 @@ def verify_plan(
     """
     same = check_problem(plan, problem)
     exact = _exactly(problem, plan_document(plan), progress)
+    if plan.refused_by:
+        return _verified_way(plan, (same, *exact, check_refusals(plan, problem)))
     checks = [same, *exact, check_gains(plan, gain_sets)]
     checks += [
         further
@@ -58,6 +61,18 @@ def verify_plan(
         tuple(checks),
         "no body touches a wall or another body in any state of the cells, which lead from start to goal",
         f"{_unproved_of_control(plan)}; the estimated times; that the robots are as in their models",
+    )
+
+
+def _verified_way(plan: Plan, checks: tuple[Check, ...]) -> Verified:
+    """What is verified of a plan that limits refuse."""
+    limits = " and ".join(refusal.limit for refusal in plan.refused_by)
+    return Verified(
+        "beyond limits",
+        f"a way of {len(plan.cells)} cells, refused by {limits}",
+        checks,
+        "no body touches a wall or another body in any state of the cells, which lead from start to goal",
+        "that no other way keeps the limits; the estimated times; that the robots are as in their models",
     )
 
 

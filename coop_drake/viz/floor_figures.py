@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,7 +15,7 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem, at_goal
 from coop_drake.drawing.canvas import legend_above, new_figure
-from coop_drake.drawing.colours import INK, SKY
+from coop_drake.drawing.colours import INK, OUTSIDE, SKY
 from coop_drake.drawing.floor import draw_polygon, draw_team, draw_workspace, frame_of, team_legend
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
@@ -52,6 +54,21 @@ def overview_figure(problem: PlanningProblem, plan: Plan | None = None, caption:
     free = problem.start[3:] if plan is None else _joints_at_end(plan)
     goal = at_goal(problem.goal_pose, problem.goal_joints, free)
     _draw_ends(ax, problem.tree, problem.start, goal)
+    return figure
+
+
+def refused_figure(problem: PlanningProblem, plan: Plan) -> Figure:
+    """Draw a plan that limits refuse, and the team in the cells that break them most."""
+    broken = "; ".join(refusal.describe() for refusal in plan.refused_by)
+    figure = overview_figure(
+        problem, plan, f"A way exists; the dark red team is where limits refuse it. {broken}."
+    )
+    ax = figure.axes[0]
+    for refusal in plan.refused_by:
+        transition = plan.transitions[refusal.cell]
+        axes = 0.5 * (transition.goal_lower + transition.goal_upper)
+        draw_team(ax, problem.tree, np.concatenate([transition.target, axes]), colour=OUTSIDE, zorder=4.0)
+        _label(ax, refusal.limit, transition.target, color=OUTSIDE)
     return figure
 
 
@@ -111,9 +128,13 @@ def _draw_ends(ax: Axes, tree: ComponentTree, start: FloatArray, goal: FloatArra
     for label, z in (("start", start), ("goal", goal)):
         draw_team(ax, tree, z)
         ax.plot(z[0], z[1], "o", color=INK, markersize=3, zorder=5)
-        ax.annotate(
-            label, (z[0], z[1]), xytext=(5, 4), textcoords="offset points", zorder=6, fontweight="bold"
-        )
+        _label(ax, label, z)
+
+
+def _label(ax: Axes, label: str, position: FloatArray, **style: Any) -> None:
+    """Write a word beside a position (x, y) [m]."""
+    place = (float(position[0]), float(position[1]))
+    ax.annotate(label, place, xytext=(5, 4), textcoords="offset points", zorder=6, fontweight="bold", **style)
 
 
 def _joints_at_end(plan: Plan) -> FloatArray:

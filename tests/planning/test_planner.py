@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 from shapely import box
 
-from coop_drake.answers import Found, Infeasible, SearchReport, Undecided
+from coop_drake.answers import BeyondLimits, Found, Infeasible, SearchReport, Undecided
+from coop_drake.answers.limits import Refusal
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning import planner
 from coop_drake.planning.boxes.channel import NoChannel
@@ -70,17 +71,23 @@ def test_a_channel_that_stalls_is_searched_again_at_half_the_margin(asked):
     assert [question.settings.margin for question in questions] == [0.1, channel.margin / 2]
 
 
-def test_channels_that_all_stall_are_undecided_with_the_passage_named(asked):
+def test_channels_that_all_stall_are_a_way_with_the_limit_named(asked):
     problem, channel = bent_channel(cells=3)
     questions = asked(*[blocked(channel)] * 3)
     result = ask(problem)
-    assert isinstance(result, Undecided)
+    assert isinstance(result, BeyondLimits)
     assert len(questions) == 3
-    assert "plan along it cannot be executed: cell 2 is refused by planner.min_clearance: " in result.reason
+    assert result.plan.refused_by[0] == Refusal(
+        "planner.min_clearance", 2, pytest.approx(5e-5, rel=0.1), 1e-3
+    )
+    assert (
+        "planner.min_clearance: in cell 2 the object's path or its target has a clearance of 0.0"
+        in result.reason
+    )
 
 
 def test_a_stall_at_no_margin_is_not_asked_again(asked):
     problem, channel = bent_channel(cells=3)
     questions = asked(replace(blocked(channel), margin=0.0))
-    assert isinstance(ask(problem), Undecided)
+    assert isinstance(ask(problem), BeyondLimits)
     assert len(questions) == 1

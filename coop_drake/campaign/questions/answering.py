@@ -12,7 +12,7 @@ from time import process_time
 
 import shapely
 
-from coop_drake.answers import Found, Infeasible, PlanningResult, Undecided
+from coop_drake.answers import BeyondLimits, Found, Infeasible, PlanningResult, Undecided
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.campaign.questions.peers import Searched, search_by_peers
 from coop_drake.campaign.questions.question import Question, random_question
@@ -23,6 +23,14 @@ from coop_drake.errors import CoopDrakeError, RefusalError
 from coop_drake.files import write_atomically
 from coop_drake.planning.planner import plan
 from coop_drake.verification import verify_plan, verify_proof
+
+VERDICTS = {
+    Found: "plan",
+    BeyondLimits: "beyond limits",
+    Infeasible: "infeasible",
+    Undecided: "undecided",
+}
+"""Names of the planner's answers in records."""
 
 
 class _OutOfTimeError(CoopDrakeError):
@@ -70,7 +78,7 @@ def answer(question: Question, settings: QuestionSettings) -> tuple[QuestionReco
         record = replace(record, verdict="failed", reason=failure)
     refusal = _refusal(question, result)
     record = replace(record, verified=refusal == "", reason=record.reason or refusal or "")
-    if isinstance(result, Found):
+    if isinstance(result, Found | BeyondLimits):
         margin = sampled_margin(question.problem, result.plan, settings.samples, question.number)
         return replace(record, sampled_margin=margin), Searched()
     seconds = settings.peer_time if isinstance(result, Infeasible) else settings.patient_peer_time
@@ -112,7 +120,6 @@ def _planned(question: Question, limit: float) -> tuple[PlanningResult, str]:
 
 def _described(question: Question, result: PlanningResult) -> QuestionRecord:
     problem = question.problem
-    verdict = {Found: "plan", Infeasible: "infeasible", Undecided: "undecided"}[type(result)]
     first = result.report.first_plan_cpu_seconds
     return QuestionRecord(
         question.number,
@@ -121,10 +128,10 @@ def _described(question: Question, result: PlanningResult) -> QuestionRecord:
         question.robots,
         len(problem.tree.joints),
         question.kind,
-        verdict,
+        VERDICTS[type(result)],
         first_plan_seconds=nan if first is None else first,
-        cells=len(result.plan.cells) if isinstance(result, Found) else 0,
-        reason=result.reason if isinstance(result, Undecided) else "",
+        cells=len(result.plan.cells) if isinstance(result, Found | BeyondLimits) else 0,
+        reason=result.reason if isinstance(result, Undecided | BeyondLimits) else "",
         # Every ring repeats its first corner at its end.
         corners=int(shapely.get_num_coordinates(problem.workspace)) - 1 - len(problem.workspace.interiors),
         width_ratio=question.width_ratio,
@@ -134,7 +141,7 @@ def _described(question: Question, result: PlanningResult) -> QuestionRecord:
 def _refusal(question: Question, result: PlanningResult) -> str | None:
     """Why the exact checker refuses an answer, empty if it accepts it; None if there is nothing to check."""
     try:
-        if isinstance(result, Found):
+        if isinstance(result, Found | BeyondLimits):
             verify_plan(result.plan, question.problem, question.scenario.gain_sets)
         elif isinstance(result, Infeasible):
             if result.proof is None:

@@ -35,6 +35,7 @@ class Questions:
         group: The value, or the values, of all questions in the group.
         count: Questions asked.
         plans: Answered with a plan.
+        beyond_limits: Answered with a plan that limits of the scenario refuse.
         infeasible: Answered with a proof that there is none.
         undecided: Answered with neither.
         refused: Answers that the exact checker refused, and errors of the planner.
@@ -48,6 +49,7 @@ class Questions:
     group: str
     count: int
     plans: int
+    beyond_limits: int
     infeasible: int
     undecided: int
     refused: int
@@ -63,7 +65,7 @@ class Questions:
 
     def cells(self) -> tuple[str, ...]:
         """Return a row of a table."""
-        counts = (self.count, self.plans, self.infeasible, self.undecided, self.wrong)
+        counts = (self.count, self.plans, self.beyond_limits, self.infeasible, self.undecided, self.wrong)
         times = (self.seconds.median, self.seconds.high, self.seconds.largest)
         name = ALL if self.axis == ALL else f"{self.axis} {self.group}"
         return name, *map(str, counts), *(f"{time:.2g} s" for time in times)
@@ -99,12 +101,12 @@ def _groups(columns: dict[str, NDArray[Any]]) -> Iterator[tuple[str, str, NDArra
 
 
 def _count(axis: str, group: str, columns: dict[str, NDArray[Any]]) -> Questions:
-    plans, infeasible, undecided = (
-        columns["verdict"] == verdict for verdict in ("plan", "infeasible", "undecided")
+    plans, beyond, infeasible, undecided = (
+        columns["verdict"] == verdict for verdict in ("plan", "beyond limits", "infeasible", "undecided")
     )
     found = columns["peer_found"].astype(bool)
     refused = ~columns["verified"].astype(bool) & ~undecided
-    contact = plans & (columns["sampled_margin"].astype(float) <= 0.0)
+    contact = (plans | beyond) & (columns["sampled_margin"].astype(float) <= 0.0)
     seconds = distribution(columns["cpu_seconds"].astype(float))
     assert seconds is not None  # every question took some time
     return Questions(
@@ -112,6 +114,7 @@ def _count(axis: str, group: str, columns: dict[str, NDArray[Any]]) -> Questions
         group,
         len(plans),
         plans=int(plans.sum()),
+        beyond_limits=int(beyond.sum()),
         infeasible=int(infeasible.sum()),
         undecided=int(undecided.sum()),
         refused=int(refused.sum()),

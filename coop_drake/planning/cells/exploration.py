@@ -59,8 +59,9 @@ class Verdict(Enum):
     def explanation(self, slices: int) -> str:
         """Why an exploration of so many slices ended without an answer, in a sentence."""
         why = {
-            Verdict.BUDGET: "the budget of slices is spent",
-            Verdict.RESOLUTION: "every undecided slice is as narrow as the resolution",
+            Verdict.BUDGET: "the budget planner.max_slices is spent",
+            Verdict.RESOLUTION: "every undecided slice is as narrow as planner.angle_resolution and "
+            "planner.length_resolution allow",
         }
         return f"no answer after {slices} slices: {why.get(self, self.value)}"
 

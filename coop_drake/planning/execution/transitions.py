@@ -24,14 +24,12 @@ from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.execution.acceleration_limits import check_accelerations, planned_accelerations
 from coop_drake.planning.execution.channel_ends import Bounds, check_ends, goal_intervals, turned_to_start
 from coop_drake.planning.execution.estimate import plan_time, timed
+from coop_drake.planning.execution.refusals import GOAL_REGION_FRACTION
 from coop_drake.planning.execution.speed_shares import limits_of, speed_shares, stated_speeds
 from coop_drake.planning.execution.targets import choose_targets
 from coop_drake.planning.travel_time import travel_time
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
-
-GOAL_REGION_FRACTION = 0.9
-"""The region of the goal need not be wider than this fraction of the position tolerance [-]."""
 
 DISC_VERTICES = 32
 """Vertices of the last goal region, a polygon inside the disc of the position tolerance."""
