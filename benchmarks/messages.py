@@ -58,11 +58,11 @@ def _rows() -> list[Row]:
             Row(f"apart/messages/{name}/cpu", 1e6 * processor, "us", "pipe", 1e6 * piped[1]),
         ]
     data = encode(_SAMPLE, WORLD, 1, 1)
-    kind = header_of(data).kind
+    allowed = (header_of(data).kind,)
     pickled = pickle.dumps(_SAMPLE)
     for name, work, peer in (
         ("encode", lambda: encode(_SAMPLE, WORLD, 1, 1), lambda: pickle.dumps(_SAMPLE)),
-        ("decode", lambda: decode(data, header_of(data).kind, (kind,)), lambda: pickle.loads(pickled)),
+        ("decode", lambda: decode(data, header_of(data), allowed), lambda: pickle.loads(pickled)),
     ):
         rows.append(Row(f"apart/messages/bytes/{name}", _each(work), "us", "pickle", _each(peer)))
     rows.append(Row("apart/messages/bytes/size", len(data), "bytes", "pickle", len(pickled)))

@@ -10,7 +10,7 @@ from typing import Any
 import zmq
 
 from coop_drake.messages.agreement import ANY_QUESTION, REASONS, Question, Tap
-from coop_drake.messages.codec import decode, encode, header_of
+from coop_drake.messages.codec import OPENING, decode, encode, header_of
 from coop_drake.messages.incoming import Incoming
 from coop_drake.messages.keys import KeyPair
 from coop_drake.messages.outgoing import SOUND, Links, Outgoing
@@ -166,14 +166,14 @@ class MessageClient:
             if len(parts) > 1:
                 raise RefusedError(Reason.PARTS)
             header = header_of(data)
-            if header.sender != self.server:
-                raise RefusedError(Reason.SENDER)
-            if header.kind in _OPENING:
-                self._answered(decode(data, header.kind, _OPENING))
+            if header.kind in OPENING:
+                if header.sender != self.server:
+                    raise RefusedError(Reason.SENDER)
+                self._answered(decode(data, header, _OPENING))
                 return None
             if not self.session or header.session != self.session:
                 raise RefusedError(Reason.SESSION)
-            message = decode(data, header.kind, self._allowed)
+            message = decode(data, header, self._allowed)
             self.incoming.take(header.sequence)
         except RefusedError as refused:
             self.refusals.add(refused.reason)

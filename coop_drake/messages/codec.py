@@ -3,6 +3,10 @@
 All numbers are little-endian. A message is its header, then its fixed part, then its lists. The fixed part
 has the fields in their order, a list as its number of items (2 bytes). The length of the whole must be what
 these say.
+
+The header of the messages that open a session says which version of the schema and which process speaks.
+In the session both are known, so that all other messages have its random number, and their own one in as few
+bytes as it needs.
 """
 
 from __future__ import annotations
@@ -13,37 +17,48 @@ from collections.abc import Collection, Hashable
 from functools import cache
 from typing import Any, NamedTuple, get_args, get_type_hints
 
-import coop_drake.messages.schema  # noqa: F401  (registers all messages)
 from coop_drake.messages.refusals import Reason, RefusedError
+from coop_drake.messages.schema import Hello, TurnedAway, Welcome
 from coop_drake.messages.wire import KINDS, MESSAGES, MOST_ITEMS, Wire
 
 MAGIC = 0xCD0D
-"""The first two bytes of every message."""
+"""Stands in every message that opens a session."""
 
-VERSION = 1
+VERSION = 2
 """Version of the schema; grows when a message of the same bytes would mean something else."""
 
-HEADER = struct.Struct("<HBBBII")
-"""Magic, version, kind, sender, session, number of the message in its session."""
+OPENING = frozenset(KINDS[cls].code for cls in (Hello, Welcome, TurnedAway))
+"""Kinds of the messages that open a session, or refuse one."""
+
+OPENING_HEADER = struct.Struct("<BHBB")
+"""Kind, magic, version, sender: the header of a message that opens a session."""
+
+SESSION_HEADER = struct.Struct("<BI")
+"""Kind and session: the header of all other messages, then their number, see :func:`_number_bytes`."""
+
+_MOST_NUMBER_BYTES = 5
+"""Bytes of the largest number of a message, 2^32 - 1."""
 
 LONGEST = 65536
 """No message is longer [bytes]."""
 
 
 class Header(NamedTuple):
-    """What stands before every message, without magic and version.
+    """What stands before every message.
 
     Attributes:
         kind: Code of the message's class.
-        sender: Index of a robot, or that of the world or supervisor.
+        sender: Index of a robot, or that of the world or supervisor; -1 in a session, which says it.
         session: What the server drew for this session, 0 before.
         sequence: Number of the message in its session and direction, from 1 on; 0 before a session.
+        size: Size of the header [bytes].
     """
 
     kind: int
     sender: int
     session: int
     sequence: int
+    size: int
 
 
 class Layout(NamedTuple):
@@ -77,7 +92,7 @@ def encode(message: Any, sender: int, session: int, sequence: int) -> bytes:
 
     Args:
         message: A message of the schema.
-        sender: Who sends it.
+        sender: Who sends it; only messages that open a session say it.
         session: The session.
         sequence: Number of the message in it.
 
@@ -86,7 +101,11 @@ def encode(message: Any, sender: int, session: int, sequence: int) -> bytes:
     """
     cls: Any = type(message)
     layout = layout_of(cls)
-    head = HEADER.pack(MAGIC, VERSION, KINDS[cls].code, sender, session, sequence)
+    code = KINDS[cls].code
+    if code in OPENING:
+        head = OPENING_HEADER.pack(code, MAGIC, VERSION, sender)
+    else:
+        head = SESSION_HEADER.pack(code, session) + _number_bytes(sequence)
     try:
         if not layout.lists:
             return head + layout.fixed.pack(*message)
@@ -101,41 +120,73 @@ def encode(message: Any, sender: int, session: int, sequence: int) -> bytes:
         raise ValueError(f"{message}: {error}") from error
 
 
+def _number_bytes(number: int) -> bytes:
+    """Return a number in seven bits a byte, the lowest first; all bytes but the last have an eighth bit."""
+    parts = bytearray()
+    while number > 0x7F:
+        parts.append(number & 0x7F | 0x80)
+        number >>= 7
+    parts.append(number)
+    return bytes(parts)
+
+
+def _read_number(data: bytes, start: int) -> tuple[int, int]:
+    """Return a number of :func:`_number_bytes` and where it ends."""
+    number = 0
+    for k, part in enumerate(data[start : start + _MOST_NUMBER_BYTES]):
+        number |= (part & 0x7F) << 7 * k
+        if part < 0x80:
+            if (part == 0 and k > 0) or number >= 2**32:
+                break  # Fewer bytes would do, or none: a number has one form alone.
+            return number, start + k + 1
+    raise RefusedError(Reason.LENGTH)
+
+
 def header_of(data: bytes) -> Header:
     """Read the header of a message.
 
     Raises:
         RefusedError: It is no message of this version of the schema.
     """
-    if not HEADER.size <= len(data) <= LONGEST:
+    if not 0 < len(data) <= LONGEST:
         raise RefusedError(Reason.LENGTH)
-    magic, version, *rest = HEADER.unpack_from(data)
+    kind = data[0]
+    if kind not in MESSAGES:
+        raise RefusedError(Reason.KIND)
+    if kind not in OPENING:
+        if len(data) <= SESSION_HEADER.size:
+            raise RefusedError(Reason.LENGTH)
+        sequence, end = _read_number(data, SESSION_HEADER.size)
+        return Header(kind, -1, SESSION_HEADER.unpack_from(data)[1], sequence, end)
+    if len(data) < OPENING_HEADER.size:
+        raise RefusedError(Reason.LENGTH)
+    _, magic, version, sender = OPENING_HEADER.unpack_from(data)
     if magic != MAGIC:
         raise RefusedError(Reason.MAGIC)
     if version != VERSION:
         raise RefusedError(Reason.VERSION)
-    return Header(*rest)
+    return Header(kind, sender, 0, 0, OPENING_HEADER.size)
 
 
-def decode(data: bytes, kind: int, allowed: Collection[int]) -> Any:
+def decode(data: bytes, header: Header, allowed: Collection[int]) -> Any:
     """Read what follows the header of a message.
 
     Args:
         data: The whole message.
-        kind: Code from its header.
+        header: Its header.
         allowed: Codes that its sender may send.
 
     Raises:
         RefusedError: The kind is not allowed, the length is not that of the kind, or a value is not allowed.
     """
-    if kind not in allowed or kind not in MESSAGES:
+    if header.kind not in allowed:
         raise RefusedError(Reason.KIND)
-    cls = MESSAGES[kind]
+    cls = MESSAGES[header.kind]
     layout = layout_of(cls)
-    end = HEADER.size + layout.fixed.size
+    end = header.size + layout.fixed.size
     if len(data) < end:
         raise RefusedError(Reason.LENGTH)
-    values = list(layout.fixed.unpack_from(data, HEADER.size))
+    values = list(layout.fixed.unpack_from(data, header.size))
     wires = tuple(layout.wires.values())
     if layout.lists:
         sizes = [values[k] * struct.calcsize(wires[k].code) for k in layout.lists]
@@ -147,13 +198,12 @@ def decode(data: bytes, kind: int, allowed: Collection[int]) -> Any:
     elif len(data) != end:
         raise RefusedError(Reason.LENGTH)
     if layout.checked:
-        _check(data, values, layout)
+        _check(data, header.size, values, layout)
     return cls._make(values)
 
 
-def _check(data: bytes, values: list[Any], layout: Layout) -> None:
+def _check(data: bytes, at: int, values: list[Any], layout: Layout) -> None:
     """Refuse real numbers that a field does not allow, and truth values other than 0 and 1."""
-    at = HEADER.size
     for value, wire in zip(values, layout.wires.values(), strict=True):
         if wire.code == "d" and wire.finite:
             if not (all(map(math.isfinite, value)) if wire.listed else math.isfinite(value)):

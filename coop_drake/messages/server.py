@@ -177,7 +177,7 @@ class MessageServer:
                 return None
             peer = self._session(peer, route, header)
             peer.incoming.limit(monotonic())
-            message = decode(data, header.kind, self._allowed[peer.sender])
+            message = decode(data, header, self._allowed[peer.sender])
             peer.incoming.take(header.sequence)
         except RefusedError as refused:
             self.refusals.add(refused.reason)
@@ -189,8 +189,6 @@ class MessageServer:
         """Return the process that has the session of a message, which may begin it."""
         if peer is None:
             raise RefusedError(Reason.SESSION)
-        if header.sender != peer.sender:
-            raise RefusedError(Reason.SENDER)
         if peer.offers.get(route) == header.session:
             if peer.taken(route, monotonic()):
                 raise RefusedError(Reason.SENDER)
@@ -203,7 +201,7 @@ class MessageServer:
 
     def _greet(self, route: bytes, header: Header, data: bytes, frame: zmq.Frame) -> None:
         """Offer a session, or turn a process away."""
-        hello = decode(data, header.kind, (header.kind,))
+        hello = decode(data, header, (header.kind,))
         peer = self.peers.get(header.sender)
         if peer is None:
             raise RefusedError(Reason.SENDER)

@@ -7,7 +7,15 @@ import struct
 from typing import Any
 
 from coop_drake.messages.agreement import REASONS
-from coop_drake.messages.codec import HEADER, LONGEST, MAGIC, VERSION, layout_of
+from coop_drake.messages.codec import (
+    LONGEST,
+    MAGIC,
+    OPENING,
+    OPENING_HEADER,
+    SESSION_HEADER,
+    VERSION,
+    layout_of,
+)
 from coop_drake.messages.refusals import Reason
 from coop_drake.messages.schema import MOST_ROBOTS, SUPERVISOR, WORLD
 from coop_drake.messages.wire import KINDS, MOST_ITEMS, Kind
@@ -42,6 +50,9 @@ _CHANNELS = {
     ),
 }
 
+_LEAST = SESSION_HEADER.size + 1
+"""Size of the header of a message in a session with a number below 128 [bytes]."""
+
 _TOP = f"""# Messages between processes
 
 What crosses between the processes of a team, byte by byte. `python -m docs.generate` makes this page from
@@ -50,20 +61,30 @@ numbers are IEEE 754 with 64 bits. [Processes of their own](../how_to/apart.md) 
 
 ## Header
 
-Every message begins with these {HEADER.size} bytes.
+A message that opens a session, `Hello`, `Welcome` or `TurnedAway`, begins with {OPENING_HEADER.size} bytes.
 
 | byte | bytes | field | meaning |
 |---|---|---|---|
-| 0 | 2 | magic | {MAGIC:#06x} |
-| 2 | 1 | version | {VERSION} |
-| 3 | 1 | kind | which message follows, see below |
+| 0 | 1 | kind | which message follows, see below |
+| 1 | 2 | magic | {MAGIC:#06x} |
+| 3 | 1 | version | {VERSION} |
 | 4 | 1 | sender | index of the robot; {WORLD} is the world, {SUPERVISOR} the supervisor |
-| 5 | 4 | session | what the server drew in `Welcome`; 0 before |
-| 9 | 4 | number | of the message in its session and direction, from 1 on; 0 before a session |
 
-A message is as long as its header, its fixed part and its lists together, never longer than {LONGEST}
-bytes. The fixed part has the fields in their order, and in place of a list the number of its items, at most
-{MOST_ITEMS}; the lists follow in the same order. A team has at most {MOST_ROBOTS} robots.
+Every other message belongs to a session, in which sender and version are known. It begins
+with {_LEAST} to {_LEAST + 4} bytes.
+
+| byte | bytes | field | meaning |
+|---|---|---|---|
+| 0 | 1 | kind | which message follows |
+| 1 | 4 | session | what the server drew in `Welcome`, the same in both directions |
+| 5 | 1 to 5 | number | of the message in its session and direction, from 1 on |
+
+The number stands in seven bits a byte, the lowest first; all bytes but the last have their eighth bit set.
+
+Bytes of fields are counted from the end of the header. A message is as long as its header, its fixed
+part and its lists together, never longer than {LONGEST} bytes. The fixed part has the fields in their order,
+and in place of a list the number of its items, at most {MOST_ITEMS}; the lists follow in the same order. A
+team has at most {MOST_ROBOTS} robots.
 """
 
 
@@ -79,13 +100,16 @@ def message_page() -> str:
 def _message(cls: Any, kind: Kind) -> str:
     layout = layout_of(cls)
     about = " ".join((inspect.getdoc(cls) or "").split("\n\n")[0].split())
-    size = HEADER.size + layout.fixed.size
-    length = f"{size} bytes and its lists" if layout.lists else f"{size} bytes"
+    header = OPENING_HEADER.size if kind.code in OPENING else _LEAST
+    size = header + layout.fixed.size
+    length = (
+        f"{size} bytes{'' if kind.code in OPENING else ' or more'}{' and its lists' * bool(layout.lists)}"
+    )
     sender = "either end" if kind.sender == "both" else f"the {kind.sender}"
     lines = [f"### {cls.__name__}, kind {kind.code}", "", f"From {sender}; {length}. {about}", ""]
     if layout.wires:
         lines += ["| byte | bytes | field | type | unit | meaning |", "|---|---|---|---|---|---|"]
-    meanings, at = field_meanings(cls), HEADER.size
+    meanings, at = field_meanings(cls), 0
     for name, wire in layout.wires.items():
         each = struct.calcsize("<" + wire.code)
         size = 2 if wire.listed else each

@@ -8,7 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coop_drake.messages import Effort, Ready, Reason, Sample, Status
-from coop_drake.messages.codec import HEADER, LONGEST, MAGIC, VERSION, decode, encode, header_of, layout_of
+from coop_drake.messages.codec import (
+    LONGEST,
+    MAGIC,
+    OPENING,
+    OPENING_HEADER,
+    VERSION,
+    decode,
+    encode,
+    header_of,
+    layout_of,
+)
 from coop_drake.messages.refusals import RefusedError
 from coop_drake.messages.wire import KINDS, MESSAGES, MOST_ITEMS, allowed_kinds, message
 
@@ -34,13 +44,14 @@ def messages():
 
 
 def read(data):
-    return decode(data, header_of(data).kind, MESSAGES)
+    return decode(data, header_of(data), MESSAGES)
 
 
 @given(messages(), st.integers(0, 255), st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
 def test_every_message_comes_back_as_it_was(sent, sender, session, sequence):
     data = encode(sent, sender, session, sequence)
-    assert header_of(data) == (KINDS[type(sent)].code, sender, session, sequence)
+    kind = KINDS[type(sent)].code
+    assert header_of(data)[:4] == ((kind, sender, 0, 0) if kind in OPENING else (kind, -1, session, sequence))
     assert read(data) == sent
     assert type(read(data)) is type(sent)
 
@@ -57,7 +68,8 @@ def test_any_other_length_is_refused(sent, data):
 @given(
     st.one_of(
         st.binary(max_size=80),
-        st.binary(max_size=80).map(lambda rest: HEADER.pack(MAGIC, VERSION, 16, 0, 1, 1) + rest),
+        st.binary(max_size=80).map(lambda rest: b"\x10" + rest),
+        st.binary(max_size=80).map(lambda rest: OPENING_HEADER.pack(1, MAGIC, VERSION, 0) + rest),
     )
 )
 def test_random_bytes_are_refused_or_read_and_raise_nothing_else(data):
@@ -65,7 +77,8 @@ def test_random_bytes_are_refused_or_read_and_raise_nothing_else(data):
         found = read(data)
     except RefusedError:
         return
-    assert encode(found, *header_of(data)[1:]) == data
+    _, sender, session, sequence, _ = header_of(data)
+    assert encode(found, sender, session, sequence) == data
 
 
 @given(messages(), st.data())
@@ -80,10 +93,12 @@ def test_a_changed_byte_is_refused_or_gives_another_message_of_the_schema(sent, 
     ("data", "reason"),
     [
         (b"", Reason.LENGTH),
-        (b"\0" * HEADER.size, Reason.MAGIC),
-        (HEADER.pack(MAGIC, VERSION + 1, 4, 0, 1, 1), Reason.VERSION),
-        (HEADER.pack(MAGIC, VERSION, 200, 0, 1, 1), Reason.KIND),
-        (HEADER.pack(MAGIC, VERSION, 4, 0, 1, 1) + b"\0" * LONGEST, Reason.LENGTH),
+        (OPENING_HEADER.pack(1, MAGIC + 1, VERSION, 0), Reason.MAGIC),
+        (OPENING_HEADER.pack(1, MAGIC, VERSION + 1, 0), Reason.VERSION),
+        (b"\xc8" * 20, Reason.KIND),
+        (b"\4" + b"\0" * LONGEST, Reason.LENGTH),
+        (b"\4\1\0\0\0\x81\0", Reason.LENGTH),
+        (b"\4\1\0\0\0\xff\xff\xff\xff\x7f", Reason.LENGTH),
         (encode(Ready(1, True), 0, 1, 1)[:-1] + b"\2", Reason.VALUE),
         (encode(Effort(1, 0, 0, (float("nan"),)), 0, 1, 1), Reason.VALUE),
         (encode(Effort(1, 0, 0, (1.0, float("inf"))), 0, 1, 1), Reason.VALUE),
@@ -99,7 +114,7 @@ def test_each_departure_has_its_reason(data, reason):
 
 def test_a_length_that_counts_more_than_there_is_is_refused_before_it_is_read():
     data = bytearray(encode(Effort(1, 0, 0, (1.0, 2.0)), 0, 1, 1))
-    struct.pack_into("<H", data, HEADER.size + 9, 65535)
+    struct.pack_into("<H", data, header_of(data).size + 9, 65535)
     with pytest.raises(RefusedError) as refused:
         read(bytes(data))
     assert refused.value.reason is Reason.LENGTH
@@ -107,11 +122,11 @@ def test_a_length_that_counts_more_than_there_is_is_refused_before_it_is_read():
 
 def test_a_kind_is_allowed_on_its_channel_and_from_its_sender_alone():
     data = encode(Ready(1, True), 0, 1, 1)
-    kind = header_of(data).kind
-    assert decode(data, kind, allowed_kinds("team", ("robot",))) == Ready(1, True)
+    header = header_of(data)
+    assert decode(data, header, allowed_kinds("team", ("robot",))) == Ready(1, True)
     for channel, sender in (("sensors", "robot"), ("team", "supervisor")):
         with pytest.raises(RefusedError) as refused:
-            decode(data, kind, allowed_kinds(channel, (sender,)))
+            decode(data, header, allowed_kinds(channel, (sender,)))
         assert refused.value.reason is Reason.KIND
 
 

@@ -10,7 +10,7 @@ from coop_drake.messages import Effort, Hello, Ready, Switch, make_keys
 from coop_drake.messages.codec import LONGEST, encode
 from coop_drake.messages.incoming import BURST, Incoming
 from coop_drake.messages.refusals import RefusedError
-from coop_drake.messages.schema import SUPERVISOR
+from coop_drake.messages.schema import SUPERVISOR, Welcome
 from tests.support.message_pairs import LIMIT, Pairs
 
 
@@ -42,8 +42,8 @@ def test_a_name_that_is_unknown_or_of_somebody_else_is_refused(pairs):
     stranger.send(encode(Hello(5, 1, 2), 9, 0, 0))
     assert pairs.refused(1) == {"SENDER": 1}
     other = pairs.connect(1)
-    other._put(encode(Ready(1, True), 0, other.session, 2))
-    assert pairs.refused(2) == {"SENDER": 2}
+    other._put(encode(Ready(1, True), 0, honest.session, 2))
+    assert pairs.refused(2) == {"SENDER": 1, "SESSION": 1}
     exchange(pairs, honest)
 
 
@@ -91,7 +91,7 @@ def test_malformed_messages_are_refused_with_and_without_a_session(pairs):
     honest._put(encode(Effort(1, 1, 0, (1.0,)), 0, honest.session, 2))
     counts = pairs.refused(2 * len(bad) + 2)
     assert sum(counts.values()) == 2 * len(bad) + 2
-    assert {"LENGTH", "MAGIC", "PARTS", "KIND"} <= set(counts)
+    assert {"LENGTH", "PARTS", "KIND"} <= set(counts)
     honest.outgoing.restart(2)
     exchange(pairs, honest)
 
@@ -126,8 +126,8 @@ def test_a_client_refuses_what_is_not_its_servers(pairs):
     route, server = pairs.server.peers[0].route, pairs.server._socket
     switch = Switch(1, 2)
     for data in (
-        b"noise",
-        encode(switch, 9, honest.session, 1),
+        b"\4",
+        encode(Welcome(1, 2), 9, 0, 0),
         encode(switch, SUPERVISOR, honest.session + 1, 1),
         encode(Ready(1, True), SUPERVISOR, honest.session, 1),
     ):
@@ -158,7 +158,7 @@ def test_a_message_that_is_too_long_closes_its_connection(pairs):
     stranger.send(bytes(LONGEST + 1))
 
     def heard_again():  # What is sent before the connection is open again goes with the one that was closed.
-        stranger.send(b"short")
+        stranger.send(b"\4")
         return pairs.server.refusals.total > 0
 
     pairs.settle(heard_again)

@@ -47,8 +47,8 @@ def test_a_transport_needs_a_few_hundred_bytes_between_robots(tmp_path):
     data, said = recorded.read_bytes(), []
     while data:
         sent, size = data[:2]
-        kind = header_of(data[2 : 2 + size]).kind
-        said.append((bool(sent), decode(data[2 : 2 + size], kind, MESSAGES), size))
+        whole = data[2 : 2 + size]
+        said.append((bool(sent), decode(whole, header_of(whole), MESSAGES), size))
         data = data[2 + size :]
     ready = [message for sent, message, _ in said if isinstance(message, Ready) and not sent]
     switches = [message for sent, message, _ in said if isinstance(message, Switch) and sent]
@@ -57,7 +57,7 @@ def test_a_transport_needs_a_few_hundred_bytes_between_robots(tmp_path):
     opening = [message for _, message, _ in said if type(message).__name__ in ("Hello", "Welcome", "Present")]
     assert len(ready) + len(switches) + len(opening) == len(said)
     assert sum(isinstance(message, Present) for message in opening) == 2
-    assert sum(size for _, _, size in said) < 600
+    assert sum(size for _, _, size in said) < 400
 
 
 def test_processes_with_another_plan_are_turned_away(capfd):
