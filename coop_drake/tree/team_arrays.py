@@ -60,22 +60,35 @@ def place(team: TeamArrays, z: FloatArray) -> FloatArray:
     """
     poses = np.empty((len(team.links), 5))
     for c in range(len(team.links)):
-        p = team.links[c, 0]
-        if p < 0:
-            x, y, angle = z[0], z[1], z[2]
-        else:
-            jx, jy = team.joints[c, 0], team.joints[c, 1]
-            x, y = moved(poses[p, 0], poses[p, 1], poses[p, 2], poses[p, 3], jx, jy)
-            angle = poses[p, 4] + team.joints[c, 2]
-            q = z[team.links[c, 1]]
-            if team.links[c, 2] == 1:
-                angle += team.joints[c, 3] * q
-            else:
-                ax, ay = team.joints[c, 4], team.joints[c, 5]
-                x += (cos(angle) * ax - sin(angle) * ay) * q
-                y += (sin(angle) * ax + cos(angle) * ay) * q
-        poses[c, 0], poses[c, 1], poses[c, 2], poses[c, 3], poses[c, 4] = x, y, cos(angle), sin(angle), angle
+        place_component(team, z, c, poses)
     return poses
+
+
+@compiled(inlined=True)
+def place_component(team: TeamArrays, z: FloatArray, c: int, poses: FloatArray) -> None:
+    """Write the pose of one component, whose parent's pose is there, as ``place`` does.
+
+    Args:
+        team: The team.
+        z: Configuration, shape (3 + n,) [m, rad].
+        c: The component.
+        poses: Poses as ``place`` returns them, shape (C, 5); row ``c`` is written [m, rad].
+    """
+    p = team.links[c, 0]
+    if p < 0:
+        x, y, angle = z[0], z[1], z[2]
+    else:
+        jx, jy = team.joints[c, 0], team.joints[c, 1]
+        x, y = moved(poses[p, 0], poses[p, 1], poses[p, 2], poses[p, 3], jx, jy)
+        angle = poses[p, 4] + team.joints[c, 2]
+        q = z[team.links[c, 1]]
+        if team.links[c, 2] == 1:
+            angle += team.joints[c, 3] * q
+        else:
+            ax, ay = team.joints[c, 4], team.joints[c, 5]
+            x += (cos(angle) * ax - sin(angle) * ay) * q
+            y += (sin(angle) * ax + cos(angle) * ay) * q
+    poses[c, 0], poses[c, 1], poses[c, 2], poses[c, 3], poses[c, 4] = x, y, cos(angle), sin(angle), angle
 
 
 def team_arrays(tree: ComponentTree) -> TeamArrays:

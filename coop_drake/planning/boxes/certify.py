@@ -19,6 +19,9 @@ LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.
 """Padding of a box in every angle and joint [rad or m], and clearance that it needs at both ends [m]; the
 widest comes first, because wide boxes are crossed faster."""
 
+FIRST_LEVELS = LEVELS[2:]
+"""The levels with which the longest boxes are laid: without wide paddings each holds more of the path."""
+
 SMALLEST_LEVELS = (*LEVELS, (0.0003, 0.0001))
 """``LEVELS`` and a further level, for passages of a millimetre [rad or m, m]."""
 
@@ -101,7 +104,7 @@ class Certifier:
         Returns:
             The boxes, or None if a part of the path cannot be covered.
         """
-        levels = SMALLEST_LEVELS if smallest else LEVELS
+        levels = SMALLEST_LEVELS if smallest else FIRST_LEVELS if longest else LEVELS
         finest = SMALLEST_SPACING if smallest else FINEST_SPACING
         samples = densified(path, self._scale, SPACING)
         boxes: list[PathBox] = []

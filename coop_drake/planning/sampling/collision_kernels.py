@@ -122,16 +122,32 @@ def _far(team: TeamArrays, poses: FloatArray, a: int, b: int, gap: float) -> boo
     return far
 
 
+@compiled(inlined=True)
+def _pair_apart(team: TeamArrays, poses: FloatArray, k: int, gap: float) -> bool:
+    """Whether the two pieces of a pair keep the gap."""
+    a, b = team.pairs[k, 0], team.pairs[k, 1]
+    return _far(team, poses, a, b, gap) or _apart(team, poses, a, b, gap) or _apart(team, poses, b, a, gap)
+
+
 @compiled
 def bodies_apart(team: TeamArrays, poses: FloatArray, gap: float) -> bool:
     """Whether no two bodies come closer than the gap."""
     for k in range(len(team.pairs)):
-        a, b = team.pairs[k, 0], team.pairs[k, 1]
-        if _far(team, poses, a, b, gap):
-            continue
-        if not _apart(team, poses, a, b, gap) and not _apart(team, poses, b, a, gap):
+        if not _pair_apart(team, poses, k, gap):
             return False
     return True
+
+
+@compiled(inlined=True)
+def _piece_clearance(
+    team: TeamArrays, grid: ObstacleGrid, poses: FloatArray, piece: int, most: float
+) -> float:
+    """Distance of a piece from the obstacles, at most ``most``; -1 where it meets one or is outside."""
+    X, first, last = poses[team.pieces[piece, 0]], team.pieces[piece, 1], team.pieces[piece, 2]
+    return ring_clearance(
+        grid, team.vertices, first, last, team.radii[piece], team.discs[piece],
+        X[0], X[1], X[2], X[3], most,
+    )  # fmt: skip
 
 
 @compiled
@@ -146,14 +162,25 @@ def team_clearance(team: TeamArrays, grid: ObstacleGrid, poses: FloatArray, most
     """
     best = most
     for piece in range(len(team.pieces) - 1, -1, -1):
-        X, first, last = poses[team.pieces[piece, 0]], team.pieces[piece, 1], team.pieces[piece, 2]
-        best = ring_clearance(
-            grid, team.vertices, first, last, team.radii[piece], team.discs[piece],
-            X[0], X[1], X[2], X[3], best,
-        )  # fmt: skip
+        best = _piece_clearance(team, grid, poses, piece, best)
         if best < 0.0:
             return -1.0
     return best
+
+
+@compiled
+def component_is_free(
+    team: TeamArrays, grid: ObstacleGrid, poses: FloatArray, component: int, gap: float
+) -> bool:
+    """Whether a component touches no wall and keeps the gap from the components before it."""
+    for piece in range(len(team.pieces)):
+        if team.pieces[piece, 0] == component and _piece_clearance(team, grid, poses, piece, 0.0) < 0.0:
+            return False
+    for k in range(len(team.pairs)):
+        latest = max(team.pieces[team.pairs[k, 0], 0], team.pieces[team.pairs[k, 1], 0])
+        if latest == component and not _pair_apart(team, poses, k, gap):
+            return False
+    return True
 
 
 @compiled

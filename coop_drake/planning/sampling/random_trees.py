@@ -9,7 +9,7 @@ import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.planning.sampling.collision_kernels import is_free, segment_is_free
-from coop_drake.planning.sampling.guided_samples import draw_near, furthest_row, guide_row
+from coop_drake.planning.sampling.guided_samples import SampledRegion, draw, furthest_row, guide_row
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.tree.pose import FloatArray, IntArray
 from coop_drake.tree.team_arrays import TeamArrays
@@ -140,10 +140,7 @@ def connect(
     grid: ObstacleGrid,
     start: FloatArray,
     roots: FloatArray,
-    guide: FloatArray,
-    spread: FloatArray,
-    lower: FloatArray,
-    upper: FloatArray,
+    region: SampledRegion,
     scale: FloatArray,
     gap: float,
     step: float,
@@ -156,10 +153,7 @@ def connect(
         grid: The floor.
         start: Free configuration, shape (d,).
         roots: Free goal configurations, shape (R, d).
-        guide: Configurations to sample around, shape (G, d); may be empty.
-        spread: How far around, per axis; 0 for axes that the guide does not know, shape (d,).
-        lower: Lower ends of the box sampled uniformly, shape (d,).
-        upper: Upper ends, shape (d,).
+        region: What is sampled.
         scale: How far a unit of each axis moves the team, shape (d,).
         gap: Distance that pairs of bodies must keep [m].
         step: Distance between checks [m].
@@ -170,21 +164,22 @@ def connect(
         number of samples drawn.
     """
     capacity = 2 * len(uniforms) + len(roots) + 1
+    lower, upper = region.lower, region.upper
     trees = (_empty_tree(capacity, lower, upper), _empty_tree(capacity, lower, upper))
     counts = np.array([1, len(roots)])
     for side in range(2):
         for k in range(counts[side]):
             _add(trees[side], k, start if side == 0 else roots[k], -1)
-    side, fronts = 0, np.array([0, len(guide) - 1])
+    side, fronts = 0, np.array([0, len(region.guide) - 1])
     for row in range(len(uniforms)):
-        at = guide_row(uniforms[row, 1], fronts[side], len(guide))
-        z = draw_near(uniforms[row], at, guide, spread, lower, upper)
+        at = guide_row(region, uniforms[row, 1], fronts[side])
+        z = draw(team, grid, region, uniforms[row], at, gap)
         other = 1 - side
         before = counts[side]
         counts[side], _ = _grow(team, grid, trees[side], before, z, 40.0 * step, gap, scale, step)
         if counts[side] > before:
             z = trees[side].nodes[before]
-            fronts[side] = furthest_row(guide, fronts[side], side, z)
+            fronts[side] = furthest_row(region, fronts[side], side, z)
             counts[other], met = _grow(team, grid, trees[other], counts[other], z, np.inf, gap, scale, step)
             if met:
                 return _join(trees[0], trees[1], counts), row + 1

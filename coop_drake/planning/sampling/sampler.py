@@ -9,6 +9,7 @@ import numpy as np
 from shapely import MultiPolygon
 
 from coop_drake.planning.sampling.collision_kernels import is_free
+from coop_drake.planning.sampling.guided_samples import SampledRegion
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_for_team
 from coop_drake.planning.sampling.random_trees import connect, shortened
 from coop_drake.planning.sampling.subsystems import Subsystem, SubsystemHierarchy
@@ -32,6 +33,11 @@ SHORTCUTS = 60
 
 DISC_SAMPLES_FACTOR = 2
 """The disc gets this many times the samples of the others, because it has no guide path."""
+
+EVERYWHERE, WHERE_TREES_END = (400, 1), (0, 12)
+"""Two ways to sample around a guide path: the number of its rows above which most samples are drawn where a
+tree has come furthest, and the values that are tried of each component's axes until it is free [-]. The first
+way gives straighter paths; the second one finds paths of large teams, few of whose samples are free."""
 
 SPACING = 0.1
 """Distance between samples of guide paths, and of paths before shortcuts, in any scaled axis [m]."""
@@ -132,6 +138,28 @@ class Sampler:
                 return _NO_PATH
         return _NO_PATH if best is None else best.path
 
+    def direct_path(self, samples: int) -> FloatArray:
+        """Find a path for the whole team at once, around the disc's path, else around one of the object.
+
+        Samples are free component by component, and lie where the trees have come furthest.
+
+        Args:
+            samples: Samples drawn at most for each subsystem.
+
+        Returns:
+            As ``path``.
+        """
+        robots, subsystem = self._hierarchy.robots, self._hierarchy.subsystem
+        disc = self._disc_path(samples)
+        whole = None if disc is None else self._guide(subsystem(robots), disc, samples, WHERE_TREES_END)[0]
+        self._report(0.5)
+        if whole is None:
+            alone, _ = self._guide(subsystem(()), disc, samples, WHERE_TREES_END)
+            self.object_blocked = alone is None
+            if alone is not None:
+                whole, _ = self._guide(subsystem(robots), alone, samples, WHERE_TREES_END)
+        return _NO_PATH if whole is None else whole.path
+
     def _disc_path(self, samples: int) -> GuidePath | None:
         """Path of the disc: the route if there is one, else sampled."""
         route = self._hierarchy.route
@@ -141,7 +169,11 @@ class Sampler:
         return None if disc is None else replace(disc, has_theta=False)
 
     def _guide(
-        self, subsystem: Subsystem, around: GuidePath | None, samples: int
+        self,
+        subsystem: Subsystem,
+        around: GuidePath | None,
+        samples: int,
+        way: tuple[int, int] = EVERYWHERE,
     ) -> tuple[GuidePath | None, int]:
         """Path of a subsystem, sampled around a guide path, and the number of samples drawn for it."""
         guide, spread = _sampling_region(subsystem, around)
@@ -152,11 +184,17 @@ class Sampler:
             return None, 0
         length = 0.0 if around is None else np.hypot(*np.diff(around.path[:, :2], axis=0).T).sum()
         samples *= max(1, int(length / SAMPLED_LENGTH))
-        path, drawn = self._connect(subsystem, roots, guide, spread, samples)
+        path, drawn = self._connect(subsystem, roots, guide, spread, samples, way)
         return (GuidePath(self._shortened(subsystem, path), subsystem.joints) if len(path) else None), drawn
 
     def _connect(
-        self, subsystem: Subsystem, roots: FloatArray, guide: FloatArray, spread: FloatArray, samples: int
+        self,
+        subsystem: Subsystem,
+        roots: FloatArray,
+        guide: FloatArray,
+        spread: FloatArray,
+        samples: int,
+        way: tuple[int, int],
     ) -> tuple[FloatArray, int]:
         tree = subsystem.question.tree
         lower = np.array([*self._bounds[:2], -np.pi, *tree.joint_lower])
@@ -167,10 +205,7 @@ class Sampler:
             self._grid,
             subsystem.start,
             roots,
-            guide,
-            spread,
-            lower,
-            upper,
+            SampledRegion(guide, spread, lower, upper, *way),
             subsystem.scale,
             self._gap,
             COLLISION_STEP,

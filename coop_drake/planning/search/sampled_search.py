@@ -44,6 +44,10 @@ FIRST_SMOOTHINGS = (0.05, 600), (0.05, 3_000)
 """Spacing of samples [m] and number of moves with which a new path is smoothed; the longer smoothing follows
 only if boxes cannot cover the path after the shorter one."""
 
+FEW_JOINTS = 3
+"""Teams with more joints than this [-] are sampled as a whole at once, because samples of robot after robot
+often fail; others in later attempts, because the first one gives paths that are quicker to follow."""
+
 LIGHT_ATTEMPTS = 4
 """Attempts with few samples, before those with many begin."""
 
@@ -107,7 +111,8 @@ class SampledSearch:
         clearance = CLEARANCES[(number - 1) % len(CLEARANCES)]
         workspace = marginal_workspace(self._problem, clearance)
         sampler = Sampler(self._hierarchy, workspace, BODY_GAP, number - 1, progress)
-        path = sampler.path(_samples(number))
+        direct = number > 1 or len(self._problem.goal_joints) > FEW_JOINTS
+        path = sampler.direct_path(_samples(number)) if direct else sampler.path(_samples(number))
         self.object_blocked = self.object_blocked + 1 if sampler.object_blocked else 0
         if len(path) == 0:
             return None
