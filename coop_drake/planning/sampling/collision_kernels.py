@@ -132,10 +132,10 @@ def _pair_apart(team: TeamArrays, poses: FloatArray, k: int, gap: float) -> bool
 @compiled
 def bodies_apart(team: TeamArrays, poses: FloatArray, gap: float) -> bool:
     """Whether no two bodies come closer than the gap."""
-    for k in range(len(team.pairs)):
-        if not _pair_apart(team, poses, k, gap):
-            return False
-    return True
+    k = 0
+    while k < len(team.pairs) and _pair_apart(team, poses, k, gap):
+        k += 1
+    return k == len(team.pairs)
 
 
 @compiled(inlined=True)

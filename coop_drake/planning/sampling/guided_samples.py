@@ -1,4 +1,4 @@
-"""Compiled samples around a guide path, along all of it or where trees have come far, free if some tries help."""
+"""Compiled samples around a guide path: along it or where trees have come far, component by component."""
 
 from __future__ import annotations
 
@@ -102,8 +102,7 @@ def _value(region: SampledRegion, u: FloatArray, at: int, k: int, number: float)
 def draw(
     team: TeamArrays, grid: ObstacleGrid, region: SampledRegion, u: FloatArray, at: int, gap: float
 ) -> FloatArray:
-    """Draw one sample; component by component, from the object outwards, its axes get other values until
-    it is free.
+    """Draw one sample whose components, from the object outwards, get other values until they are free.
 
     Few samples of a large team are free otherwise.
 

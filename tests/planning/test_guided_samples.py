@@ -1,0 +1,51 @@
+"""Samples around a guide: component by component they are free far more often, and stay within the region."""
+
+import numpy as np
+import pytest
+
+from benchmarks.planner.family import crowd_problem
+from coop_drake.planning.questions.margins import marginal_workspace
+from coop_drake.planning.sampling.collision_kernels import is_free
+from coop_drake.planning.sampling.guided_samples import SampledRegion, draw
+from coop_drake.planning.sampling.narrow_passages import are_free
+from coop_drake.planning.sampling.obstacle_grid import grid_for_team
+from coop_drake.planning.sampling.sampler import Sampler
+from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
+from coop_drake.tree.team_arrays import team_arrays
+
+SAMPLES = 400
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return crowd_problem(4)
+
+
+def test_samples_of_a_large_team_are_free_more_often_component_by_component(problem):
+    team = team_arrays(problem.tree)
+    grid = grid_for_team(problem.workspace, team)
+    lower = np.array([0.0, 0.0, -np.pi, *problem.tree.joint_lower])
+    upper = np.array([14.0, 20.0, np.pi, *problem.tree.joint_upper])
+    spread = np.array([0.3, 0.3, *[0.0] * (len(lower) - 2)])
+    guide = problem.start[None, :].astype(float)
+    uniforms = np.random.default_rng(3).random((SAMPLES, 2 + len(lower)))
+    free = {}
+    for tries in (1, 12):
+        region = SampledRegion(guide, spread, lower, upper, 0, tries)
+        samples = np.array([draw(team, grid, region, u, 0, 0.0) for u in uniforms])
+        assert (samples >= lower).all()
+        assert (samples <= upper).all()
+        free[tries] = sum(is_free(team, grid, z, 0.0) for z in samples)
+    assert free[12] > 0.95 * SAMPLES > free[1]
+
+
+def test_the_path_for_the_whole_team_at_once_is_free_and_repeats(problem):
+    def path():
+        workspace = marginal_workspace(problem, 0.015)
+        return Sampler(SubsystemHierarchy(problem), workspace, 0.01, 0).direct_path(4_000)
+
+    found = path()
+    assert np.array_equal(found[0], problem.start)
+    assert np.array_equal(found[-1, :2], problem.goal_pose[:2])
+    assert are_free(problem, found).all()
+    assert np.array_equal(found, path())
