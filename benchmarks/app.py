@@ -31,6 +31,7 @@ from benchmarks.planner.growth import growth_tasks
 from benchmarks.planner.head_to_head import Effort, head_to_head_tasks
 from benchmarks.planner.ours import compile_kernels
 from benchmarks.planner.stages import stage_tasks
+from benchmarks.planner.teams import team_tasks
 from benchmarks.simulating import simulating_tasks
 from benchmarks.starting import starting_tasks
 from benchmarks.table import show
@@ -105,6 +106,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *stage_tasks(effort.limit),
         *budget_tasks(effort.limit),
         *growth_tasks(effort.limit),
+        *team_tasks(effort.limit),
         *contradiction_tasks(),
         *starting_tasks(),
         *breaking_tasks(),

@@ -22,8 +22,13 @@ def call(*arguments, **more):
 
 @pytest.mark.parametrize(
     "flags",
-    [[], ["--robots", 3, "--arm", "0.3,0.2,0.2"], ["--robots", 4, "--arm", "0.5", "--base-radius", 0.2]],
-    ids=["two", "three with elbows", "four without joints"],
+    [
+        [],
+        ["--robots", 3, "--arm", "0.3,0.2,0.2"],
+        ["--robots", 4, "--arm", "0.5", "--base-radius", 0.2],
+        ["--robots", 6],
+    ],
+    ids=["two", "three with elbows", "four without joints", "six"],
 )
 def test_a_new_scenario_has_a_plan(tmp_path, flags):
     done = call("mine", *flags, "--out", tmp_path / "mine", "--json")
@@ -72,7 +77,7 @@ def test_a_floor_plan_takes_the_place_of_the_rooms(tmp_path):
 
 
 REFUSED = {
-    "one robot": (["--robots", 1], "--robots: 1 is not allowed; expected two to four"),
+    "one robot": (["--robots", 1], "--robots: 1 is not allowed; expected two to six"),
     "no arm": (["--arm", "long"], "is no list of lengths"),
     "flat": (["--width", 0], "--width: 0.0 is not allowed"),
     "no start": (["--floor-plan", "hall.svg"], "--start: None is not allowed; expected X Y THETA"),

@@ -92,11 +92,13 @@ def corridor_problem(
     )
 
 
-def crowd_problem(robots: int) -> PlanningProblem:
+def crowd_problem(robots: int, width: float = 2.6, door: float = 3.0) -> PlanningProblem:
     """Carry a hexagon with two to six robots across the same floor, twice as large.
 
     Args:
         robots: How many of the six facets are held.
+        width: Width of the corridor [m].
+        door: Width of the doorway [m].
     """
     angles = np.array(_HEXAGON_TURNS[:robots]) * pi / 3
     corners = (np.arange(6) - 0.5) * pi / 3
@@ -105,7 +107,8 @@ def crowd_problem(robots: int) -> PlanningProblem:
         PlanarPose(_HEXAGON_APOTHEM * float(np.cos(a)), _HEXAGON_APOTHEM * float(np.sin(a)), float(a))
         for a in angles
     ]
-    floor = affinity.scale(corridor_floor(1.3, 1.5, wide_start=True), 2.0, 2.0, origin=(0.0, 0.0))
+    floor = corridor_floor(0.5 * width, 0.5 * door, wide_start=True)
+    floor = affinity.scale(floor, 2.0, 2.0, origin=(0.0, 0.0))
     tree = team_tree(ConvexShape(vertices), grasps, (0.4,) * robots, 1)
     return _problem(floor, tree, (3.2, 4.0, 1.57), (10.0, 16.0, 4.663))
 

@@ -10,17 +10,24 @@ from coop_drake.checking.team import Question
 
 __all__ = ["RefusedError", "check"]
 
+STEPS, STEPS_EACH = 2 * 10**8, 10**6
+"""Elementary steps that are allowed, a minute; and more for each cell or slice, a third of a second [-]."""
+
 
 def check(question: Any, answer: Any, progress: Any = lambda phase, share: None) -> list[tuple[str, int]]:
     """Check an answer to a question, both as ``json.load`` gives them; ``progress`` gets phase and fraction.
 
     Returns the statements that hold, each with how often it was checked. Raises ``RefusedError`` if one does
-    not or is not shown in 2 * 10^8 elementary steps, a minute, or a document is not as the format says.
+    not or is not shown in the allowed steps, or a document is not as the format says.
     """
-    plane.work_left[0] = 2 * 10**8
-    formats = {("coop_drake plan", 3): check_plan, ("coop_drake proof of infeasibility", 3): check_proof}
+    formats = {
+        ("coop_drake plan", 3): (check_plan, "cells"),
+        ("coop_drake proof of infeasibility", 3): (check_proof, "slices"),
+    }
     try:
-        found = formats[answer["format"], answer["version"]](Question(question), answer, progress)
+        checked, parts = formats[answer["format"], answer["version"]]
+        plane.work_left[0] = STEPS + STEPS_EACH * len(answer[parts])
+        found = checked(Question(question), answer, progress)
         return [(statement, count) for statement, count in found if count > 0]
     except (LookupError, TypeError, ValueError, AttributeError, RecursionError, MemoryError) as error:
         raise RefusedError(f"document: {type(error).__name__}: {str(error)[:200]}") from error

@@ -22,7 +22,7 @@ _QUESTIONS: tuple[tuple[str, str, Any], ...] = (
     ("robots", "How many robots", 2),
     ("arm", "Lengths of an arm's links from the base on [m], with a joint between each two", "0.35,0.4"),
     ("base_radius", "Radius of a base [m]", 0.25),
-    ("length", "Length of the object [m]", 0.8),
+    ("length", "Length of the object [m]", None),
     ("width", "Width of the object [m]", 0.5),
 )
 
@@ -30,7 +30,7 @@ _QUESTIONS: tuple[tuple[str, str, Any], ...] = (
 def new_command(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name of scenario and folder.")],
     robots: Annotated[
-        int | None, typer.Option("--robots", metavar="N", help="Number of robots, 2 to 4; default 2.")
+        int | None, typer.Option("--robots", metavar="N", help="Number of robots, 2 to 6; default 2.")
     ] = None,
     arm: Annotated[
         str | None,
@@ -47,7 +47,11 @@ def new_command(
     ] = None,
     length: Annotated[
         float | None,
-        typer.Option("--length", metavar="M", help="Length of the object in metres; default 0.8."),
+        typer.Option(
+            "--length",
+            metavar="M",
+            help="Length of the object in metres; default 0.8, or 1.4 for more than four robots.",
+        ),
     ] = None,
     width: Annotated[
         float | None, typer.Option("--width", metavar="M", help="Width of the object in metres; default 0.5.")
@@ -107,8 +111,9 @@ def new_command(
             raise typer.BadParameter(f"{flag} is for a floor plan; name it with --floor-plan.")
     folder = out if out is not None else Path(name)
     with reporting(machine=machine, quiet=quiet) as reporter:
-        from coop_drake.scenario.starter import Starter
+        from coop_drake.scenario.starter import Starter, usual_length
 
+        said.setdefault("length", usual_length(said.get("robots", 2)))
         workspace = None if floor_plan is None else _section(floor_plan, unit, scale, layer, folder)
         starter = Starter(name, **said, door=door, workspace=workspace, start=start, goal=goal)
         reporter.code = _write(starter, folder, reporter, force=force)
@@ -116,8 +121,11 @@ def new_command(
 
 def _asked(flags: dict[str, Any]) -> dict[str, Any]:
     """Ask for every value that no flag gave."""
+    from coop_drake.scenario.starter import usual_length
+
     answers = dict(flags)
-    for key, question, default in _QUESTIONS:
+    for key, question, usual in _QUESTIONS:
+        default = usual_length(answers["robots"]) if usual is None else usual
         if flags[key] is None:
             answers[key] = typer.prompt(question, default=default, type=type(default))
     return answers
@@ -166,7 +174,7 @@ def _write(starter: Starter, folder: Path, reporter: Reporter, *, force: bool) -
 
     files = {
         f"{starter.name}.scenario.yaml": starter_text(starter),
-        "object.sdf": object_model(starter.length, starter.width),
+        "object.sdf": object_model(starter.length, starter.width, robots=starter.robots),
         "robot.sdf": robot_model("robot", starter.links, starter.base_radius),
     }
     for name in files:

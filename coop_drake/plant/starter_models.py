@@ -20,19 +20,18 @@ _SLIDE_RATE = 0.5
 """Largest rate of sliding joints [m/s]: that of usual linear axes."""
 
 
-def object_model(length: float, width: float, mass: float = 1.0) -> str:
+def object_model(length: float, width: float, mass: float = 1.0, robots: int = 4) -> str:
     """SDF of a box of a length along x, a width along y [m] and a mass [kg].
 
-    Every side has a grasp frame in its middle, x outwards.
+    Grasp frames have x outwards. Up to four robots hold the middles of the sides; more of them hold the ends,
+    and the long sides at quarters of the length.
     """
-    grasps = (
-        (0.5 * length, 0.0, 0.0),
-        (-0.5 * length, 0.0, pi),
-        (0.0, 0.5 * width, pi / 2),
-        (0.0, -0.5 * width, -pi / 2),
-    )
+    off = 0.0 if robots <= 4 else 0.25 * length
+    grasps = [(0.5 * length, 0.0, 0.0), (-0.5 * length, 0.0, pi)]
+    for x in (off, -off) if off else (0.0,):
+        grasps += [(x, 0.5 * width, pi / 2), (-x, -0.5 * width, -pi / 2)]
     return boxes_model(
-        [(0.0, 0.0, length, width)], grasps, mass, "The carried object, with a grasp frame on every side."
+        [(0.0, 0.0, length, width)], grasps, mass, "The carried object, with grasp frames on every side."
     )
 
 

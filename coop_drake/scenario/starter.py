@@ -17,6 +17,9 @@ _WALL = 0.2
 _DOOR_CLEARANCE = 0.2
 """Distance between the team and each side of the door, if no width is given [m]."""
 
+_LENGTHS = 0.8, 1.4
+"""Length of the object for up to four robots and for more, of which two stand at one side [m]."""
+
 _BASE_SPEED, _TURN_RATE = 1.0, 2.0
 """Largest speed [m/s] and turn rate [rad/s] of the bases: those of usual mobile bases."""
 
@@ -29,7 +32,7 @@ class Starter:
 
     Attributes:
         name: Name of the scenario.
-        robots: Number of robots, two to four.
+        robots: Number of robots, two to six.
         links: Lengths of an arm's links from the base's centre to the end effector [m].
         base_radius: Radius of a base [m].
         length: Length of the object [m].
@@ -58,8 +61,8 @@ class Starter:
         Raises:
             ScenarioError: Naming the option of the command line.
         """
-        if not 2 <= self.robots <= 4:
-            raise ScenarioError("coop-drake new", "--robots", self.robots, "two to four")
+        if not 2 <= self.robots <= 6:
+            raise ScenarioError("coop-drake new", "--robots", self.robots, "two to six")
         if not 1 <= len(self.links) <= 4:
             raise ScenarioError("coop-drake new", "--arm", list(self.links), "one to four lengths")
         lengths = {"--base-radius": self.base_radius, "--length": self.length, "--width": self.width}
@@ -91,6 +94,11 @@ class Starter:
     def doorway(self) -> float:
         """Width of the door [m]."""
         return round(2.0 * (self.half_width + _DOOR_CLEARANCE), 2) if self.door is None else self.door
+
+
+def usual_length(robots: int) -> float:
+    """Length of the object if none is given, by the number of robots [m]."""
+    return _LENGTHS[robots > 4]
 
 
 def starter_text(starter: Starter) -> str:

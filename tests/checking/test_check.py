@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from coop_drake import checking
 from coop_drake.checking import RefusedError, check
 
 ROOT = Path(__file__).parents[2]
@@ -43,6 +44,13 @@ def refused(question, answer):
 def test_the_proof_on_paper_holds_with_all_the_edges_that_paper_lists():
     counts = dict(check(QUESTION, PROOF))
     assert [count for name, count in counts.items() if name.startswith("edges")] == [48]
+
+
+def test_steps_are_allowed_for_each_slice(monkeypatch):
+    monkeypatch.setattr(checking, "STEPS", 0)
+    check(QUESTION, PROOF)
+    monkeypatch.setattr(checking, "STEPS_EACH", 10**3)
+    assert "more steps are needed than are allowed" in refused(QUESTION, PROOF)
 
 
 CELL = ("slices", 0, "cells", 0, "polygon")
