@@ -12,7 +12,7 @@ from benchmarks.tasks import Task
 __all__ = ["TOPICS", "WHOLE", "show_contents"]
 
 TOPICS = {
-    "planner": "plans and proofs beside OMPL and beside the planner without its parts; budgets; growth; teams",
+    "planner": "plans and proofs beside OMPL and beside the planner without its parts; growth; teams",
     "starting": "commands from start to end beside the import of all of Drake; their memory",
     "command": "whole commands in processes of their own",
     "mapping": "harmonic maps: accuracy, speed, how both grow",
