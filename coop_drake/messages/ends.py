@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Callable
 from typing import Any, Literal
+
+import zmq
 
 from coop_drake.errors import MessagingError
 from coop_drake.messages.address_book import AddressBook
@@ -16,7 +19,6 @@ from coop_drake.messages.outgoing import SOUND, Links
 from coop_drake.messages.refusals import Refusals
 from coop_drake.messages.schema import SUPERVISOR, WORLD
 from coop_drake.messages.server import MessageServer
-from coop_drake.messages.sockets import wait_for
 
 
 def name_of(index: int) -> str:
@@ -36,6 +38,11 @@ class _End:
         self.servers, self.clients = servers, clients
         self._all: tuple[MessageServer | MessageClient, ...] = (*servers, *clients)
         self._arrived: deque[tuple[int, Any]] = deque()
+        self._poller, self._ends = zmq.Poller(), dict[Any, MessageServer | MessageClient]()
+        for end in self._all:
+            for socket in end.sockets:
+                self._poller.register(socket, zmq.POLLIN)
+                self._ends[socket] = end
 
     def receive(self, limit: float = 0.0) -> tuple[int, Any] | None:
         """Return the index of a sender and its message, None where nothing is there in time.
@@ -47,12 +54,10 @@ class _End:
         """
         deadline = time.monotonic() + limit
         while not self._arrived:
-            self._poll()
             left = deadline - time.monotonic()
+            self._poll(left)
             if not self._arrived and left <= 0.0:
                 return None
-            if not self._arrived:
-                self._wait(left)
         return self._arrived.popleft()
 
     @property
@@ -78,19 +83,17 @@ class _End:
         for end in self._all:
             end.close()
 
-    def _poll(self) -> None:
-        """Take one message of every end, so that none waits for another."""
-        for server in self.servers:
-            if (taken := server.receive()) is not None:
-                self._arrived.append(taken)
-        for client in self.clients:
-            if (message := client.poll()) is not None:
-                self._arrived.append((client.server, message))
-
-    def _wait(self, seconds: float) -> None:
-        sockets = [socket for end in self._all for socket in end.sockets]
-        soon = [client.patience for client in self.clients]
-        wait_for(sockets, min([seconds, *soon]))
+    def _poll(self, seconds: float) -> None:
+        """Wait until something comes, then take one message of every end, so that none waits for another."""
+        asking = [client for client in self.clients if not client.session]
+        limit = min([max(seconds, 0.0), *(client.patience for client in asking)])
+        ready = [self._ends[socket] for socket, _ in self._poller.poll(math.ceil(1e3 * limit))]
+        for end in dict.fromkeys((*ready, *asking)):
+            if isinstance(end, MessageServer):
+                if (taken := end.receive()) is not None:
+                    self._arrived.append(taken)
+            elif (message := end.poll()) is not None:
+                self._arrived.append((end.server, message))
 
     def _wait_until(self, done: Callable[[], bool], limit: float, complaint: Callable[[], str]) -> None:
         """Poll until something holds; messages that arrive meanwhile are kept for :meth:`receive`.
@@ -100,13 +103,10 @@ class _End:
         """
         deadline = time.monotonic() + limit
         while not done():
-            before = len(self._arrived)
-            self._poll()
             left = deadline - time.monotonic()
+            self._poll(left)
             if left <= 0.0 and not done():
                 raise MessagingError(f"{complaint()} (waited for {limit:g} s)")
-            if len(self._arrived) == before and not done():
-                self._wait(left)
 
     def _open_clients(self, limit: float) -> None:
         def complaint() -> str:
