@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from math import exp
-
 import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory, LoopPlant
+from coop_drake.laws.actuators import lag_behind
 from coop_drake.laws.friction import base_friction
 from coop_drake.laws.team_dynamics import team_accelerations, team_work
 from coop_drake.systems.team_kernels import FusedTeam, read_own
@@ -51,11 +50,7 @@ def advance(
 @compiled
 def _follow(ahead: float, acting: FloatArray, departures: LoopDepartures, memory: LoopMemory) -> None:
     """Write the efforts that act a time after the sample, at which ``acting`` acted."""
-    lag = departures.times[2]
-    left = exp(-ahead / lag) if lag > 0.0 else 0.0
-    for i in range(acting.size):
-        held = memory.efforts[0, i]
-        memory.efforts[1, i] = held + left * (acting[i] - held)
+    lag_behind(departures.times[2], ahead, memory.efforts[0], acting, memory.efforts[1])
 
 
 @compiled

@@ -20,7 +20,7 @@ from coop_drake.diagram.radio import build_radio, seed_of
 from coop_drake.laws.channels import NOTHING
 from coop_drake.laws.sampling import whole_periods
 from coop_drake.scenario import Deafness, Deployment, Messages, PoseBias, RobotDepartures, Silence
-from coop_drake.systems import Interruption, LossyMeasurement, MeasurementNoise
+from coop_drake.systems import Interruption, LaggingEffort, LossyMeasurement, MeasurementNoise
 from coop_drake.tree.pose import FloatArray
 
 Holding: TypeAlias = DiscreteTimeDelay | ZeroOrderHold | LossyMeasurement
@@ -98,7 +98,10 @@ class Wrapping:
         size = effort.size()
         limits = effort_limits(self._deployment, size - 3)
         blocks: list[tuple[str, LeafSystem]] = [("actuator_limits", Saturation(-limits, limits))]
-        if lag := self._deployment.actuators.lag:
+        lag, period = self._deployment.actuators.lag, self._deployment.period
+        if lag and period is not None:
+            blocks.append(("actuator_lag", LaggingEffort(size, lag, period, self._own.sample_offset)))
+        elif lag:
             blocks.append(("effort_in_kilonewtons", Gain(1.0 / _KILO, size)))
             blocks.append(("actuator_lag", FirstOrderLowPassFilter(lag, size)))
             blocks.append(("lagged_effort", Gain(_KILO, size)))

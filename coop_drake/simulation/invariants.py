@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from coop_drake.answers.plan import Plan
+from coop_drake.compiled import prepared
 from coop_drake.geometry.boundary import BoundaryDistance
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.step_kernels import margins
@@ -87,21 +88,18 @@ class Invariants:
             (BoundaryDistance(cell.tidied).edges, np.array(cell.lower), np.array(cell.upper))
             for cell in plan.cells
         ]
+        self._margins: Callable[..., tuple[Any, ...]] | None = None
         self._axes = ("object angle", *plan.joint_names)
 
     def check(self, sample: Sample) -> Margins:
         """Measure every margin, and say which invariant is broken if one is."""
-        measured = _Measured(
-            *margins(
-                *self._clearance.kernel_arguments,
-                sample.z,
-                *self._cells[sample.cell],
-                sample.funnel_lower,
-                sample.funnel_upper,
-                sample.commanded_wrenches,
-                sample.measured_wrenches,
-            )
+        arguments = (
+            *(sample.z, *self._cells[sample.cell], sample.funnel_lower, sample.funnel_upper),
+            *(sample.commanded_wrenches, sample.measured_wrenches),
         )
+        if self._margins is None:
+            self._margins = prepared(margins, self._clearance.kernel_arguments, *arguments)
+        measured = _Measured(*self._margins(*arguments))
         broken = [*self._broken(sample, measured)]
         if self._exact:
             broken.extend(_inexact(sample, measured.wrench_error))

@@ -10,9 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydrake.systems.framework import Context, System
 
+from coop_drake.compiled import prepared
 from coop_drake.diagram import TELEMETRY, ClosedLoop, World
 from coop_drake.laws import total_wrench
-from coop_drake.simulation.step_kernels import largest_difference
+from coop_drake.simulation.step_kernels import row_figures
+from coop_drake.systems.block import NUMBER
 from coop_drake.systems.team_kernels import telemetry_parts
 from coop_drake.tree.pose import FloatArray
 
@@ -85,42 +87,59 @@ class Telemetry:
     def __init__(self, loop: ClosedLoop | World, root: Context) -> None:
         self._team, self._root = loop.team, root
         self._plant_context = self._team.plant.GetMyContextFromRoot(root)
-        self._grasps = np.array([[robot.X_LE.x, robot.X_LE.y] for robot in self._team.robots])
-        self._rates = self._team.plant.num_positions() + self._team.velocity_index
+        rates = self._team.plant.num_positions() + self._team.velocity_index
+        self._z = len(self._team.position_index)
+        self._own = np.concatenate([self._team.position_index, rates])
         self._ports = _PortRow(root)
-        self._places = _places(loop, self._ports)
+        places = [np.asarray(part, dtype=np.intp) for part in _places(loop, self._ports)]
+        self._order = np.concatenate([part.ravel() for part in places])
+        ends = np.cumsum([part.size for part in places]).tolist()
+        parts = zip(places, ends, strict=True)
+        self._parts = [(slice(end - part.size, end), part.shape) for part, end in parts]
+        at, none = (
+            _Places(*[np.empty(part.shape) for part in places]),
+            self._team.grasps.errors(self._plant_context),
+        )
+        figures = at.governors, at.accelerations, at.realised, at.energy_margins, none
+        self._figures = prepared(row_figures, (), *figures, at.clock_lag, at.causes)
+        grasps = np.array([[robot.X_LE.x, robot.X_LE.y] for robot in self._team.robots])
+        self._load = grasps, self._team.object_inertia.p_LLcm
+        self._total = prepared(total_wrench, (), at.commanded_wrenches, *self._load, NUMBER)
 
     def read(self) -> Sample:
         """Read the present instant."""
-        team, at, values = self._team, self._places, self._ports.read()
-        state = team.plant.GetPositionsAndVelocities(self._plant_context)
-        z, governors = state[team.position_index], values[at.governors]
-        base_wrenches, commanded = values[at.base_wrenches], values[at.commanded_wrenches]
-        cell, entry, arrived = values[at.instant]
+        team, row = self._team, self._ports.read()[self._order]
+        at = _Places(*[row[part].reshape(shape) for part, shape in self._parts])
+        state = team.plant.GetPositionsAndVelocities(self._plant_context)[self._own]
+        z, errors = state[: self._z], team.grasps.errors(self._plant_context)
+        spread, difference, margin, error, lag, held = self._figures(
+            *(at.governors, at.accelerations, at.realised, at.energy_margins, errors, at.clock_lag, at.causes)
+        )
+        cell, entry, arrived = at.instant.tolist()
         return Sample(
             time=self._root.get_time(),
             cell=int(cell),
-            entry=float(entry),
+            entry=entry,
             z=z,
-            rates=state[self._rates],
-            accelerations=values[at.realised],
-            base_poses=values[at.base_poses],
-            governor_position=governors[0],
-            governor_spread=largest_difference(governors, governors[:1]),
-            funnel_lower=values[at.funnel_lower],
-            funnel_upper=values[at.funnel_upper],
-            energy_margin=float(values[at.energy_margins].min()),
-            object_wrench=total_wrench(commanded, self._grasps, team.object_inertia.p_LLcm, z[2]),
-            commanded_wrenches=commanded,
+            rates=state[self._z :],
+            accelerations=at.realised,
+            base_poses=at.base_poses,
+            governor_position=at.governors[0],
+            governor_spread=spread,
+            funnel_lower=at.funnel_lower,
+            funnel_upper=at.funnel_upper,
+            energy_margin=margin,
+            object_wrench=self._total(at.commanded_wrenches, *self._load, float(z[2])),
+            commanded_wrenches=at.commanded_wrenches,
             measured_wrenches=team.grasps.wrenches(self._plant_context),
-            grasp_error=float(team.grasps.errors(self._plant_context).max()),
-            base_wrenches=base_wrenches,
-            joint_torques=values[at.joint_torques],
-            acceleration_error=largest_difference(values[at.accelerations], values[at.realised][None, :3]),
-            ready_margins=values[at.ready_margins],
-            held=float(values[at.causes].any()),
-            clock_lag=float(values[at.clock_lag].sum()),
-            causes=values[at.causes],
+            grasp_error=error,
+            base_wrenches=at.base_wrenches,
+            joint_torques=at.joint_torques,
+            acceleration_error=difference,
+            ready_margins=at.ready_margins,
+            held=held,
+            clock_lag=lag,
+            causes=at.causes,
             arrived=bool(arrived),
         )
 

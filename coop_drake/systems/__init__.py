@@ -12,6 +12,7 @@ from coop_drake.systems.hold_monitor import REQUEST_SIZE, HoldMonitor
 from coop_drake.systems.hold_receiver import HoldReceiver
 from coop_drake.systems.hold_supervisor import HoldSupervisor
 from coop_drake.systems.interruption import Interruption
+from coop_drake.systems.lagging_effort import LaggingEffort
 from coop_drake.systems.lossy_measurement import LossyMeasurement
 from coop_drake.systems.measurement_noise import MeasurementNoise
 from coop_drake.systems.message_channel import MessageChannel, clear_channel
@@ -50,6 +51,7 @@ __all__ = [
     "HoldReceiver",
     "HoldSupervisor",
     "Interruption",
+    "LaggingEffort",
     "LossyMeasurement",
     "MeasurementNoise",
     "MessageChannel",

@@ -93,10 +93,16 @@ class NominalGovernor(Block):
         if any(cell.gains.stiffness != gains.stiffness for cell in cells):
             raise ValueError("NominalGovernor needs the same K in all cells")
         flow = nominal_flow(gains.stiffness, gains.damping, motion.period)
-        self._motion, self._stiffness = motion, gains.stiffness
+        self._motion = motion
         self._steps = [_prepared_step(cell, flow, motion) for cell in cells]
-        self._edges = [cell.clearance.edges for cell in cells]
-        self._tracking = motion.tracking_row(cells[0])
+        tracking = motion.tracking_row(cells[0])
+        self._accelerate = prepared(accelerate_along, [tracking], VECTOR, VECTOR, VECTOR, VECTOR, VECTOR)
+        regions = [(cell.clearance.edges, gains.stiffness) for cell in cells]
+        self._margins = [prepared(nominal_margin, region, VECTOR) for region in regions]
+        self._shows = [
+            prepared(show_nominal, (*region, target, *_reports_of(motion)), VECTOR, VECTOR)
+            for region, target in zip(regions, motion.targets, strict=True)
+        ]
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE) if paced else None
@@ -115,27 +121,18 @@ class NominalGovernor(Block):
         command[:2] = (state[4:6] - state[6:8]) / self._motion.period
         expected = state[-4:] if self._motion.measurement_periods else state
         measured = self._object.Eval(context)
-        accelerate_along(self._tracking, measured, state[4:6], state, expected, command[2:])
+        self._accelerate(measured, state[4:6], state, expected, command[2:])
 
     def _write_position(self, context: Context, output: BasicVector) -> None:
         output.set_value(self._state(context)[4:6])
 
     def _write_margin(self, context: Context, output: BasicVector) -> None:
-        index = index_of(self._current.Eval(context), len(self._edges))
-        output[0] = nominal_margin(self._edges[index], self._stiffness, self._state(context)[:6])
+        index = index_of(self._current.Eval(context), len(self._margins))
+        output[0] = self._margins[index](self._state(context)[:STATE_SIZE])
 
     def _write_nominal(self, context: Context, output: BasicVector) -> None:
-        motion, index = self._motion, index_of(self._current.Eval(context), len(self._edges))
-        show_nominal(
-            self._edges[index],
-            self._stiffness,
-            motion.targets[index],
-            motion.period,
-            float(motion.report_periods),
-            motion.tube.speed,
-            self._state(context)[:STATE_SIZE],
-            output.get_mutable_value(),
-        )
+        index = index_of(self._current.Eval(context), len(self._shows))
+        self._shows[index](self._state(context)[:STATE_SIZE], output.get_mutable_value())
 
     def _step(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         motion, state = self._motion, self._state(context)
@@ -151,6 +148,11 @@ class NominalGovernor(Block):
     def _state(self, context: Context) -> FloatArray:
         state: FloatArray = context.get_discrete_state_vector().value()
         return state
+
+
+def _reports_of(motion: NominalMotion) -> tuple[float, float, float]:
+    """Return the control period [s], for how many of them a report is used [-], and p_G's speed [m/s]."""
+    return motion.period, float(motion.report_periods), motion.tube.speed
 
 
 def _prepared_step(

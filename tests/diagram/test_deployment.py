@@ -51,6 +51,10 @@ def test_an_ideal_team_has_nothing_round_its_controllers():
             {"actuators": ActuatorLimits(lag=0.01)},
             {"effort_in_kilonewtons", "actuator_lag", "lagged_effort"},
         ),
+        (
+            {"control_rate": 200.0, "actuators": ActuatorLimits(lag=0.01)},
+            {"effort_hold", "radio", "actuator_lag"},
+        ),
     ],
 )
 def test_only_what_is_switched_on_is_there_beside_a_limit(deployment, more):

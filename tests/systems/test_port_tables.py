@@ -11,6 +11,7 @@ from coop_drake import systems
 from coop_drake.diagram import build_closed_loop, build_world
 from coop_drake.nodes import DirectExchange
 from coop_drake.scenario import (
+    ActuatorLimits,
     Control,
     Deployment,
     Floor,
@@ -39,6 +40,7 @@ EVERYTHING = Deployment(
     messages=Messages(loss=0.1),
     robots={"*": RobotDepartures(silence=Silence(1.0))},
     floor=Floor(coulomb_friction=1.0),
+    actuators=ActuatorLimits(lag=0.01),
 )
 
 
@@ -104,7 +106,7 @@ def test_a_block_without_state_has_none_and_any_other_says_which(blocks, name):
 
 def test_only_switches_jumps_holds_what_is_predicted_and_what_models_failures_are_remembered(blocks):
     remembering = {name for name in BLOCKS if any(map(len, state_of(blocks[name][0].CreateDefaultContext())))}
-    failures = {"Interruption", "LossyMeasurement", "MessageChannel"}
+    failures = {"Interruption", "LaggingEffort", "LossyMeasurement", "MessageChannel"}
     holds = {"FunnelClock", "HoldMonitor", "HoldReceiver", "HoldSupervisor"}
     laws = {"CellPlanner", "AxisPpc", "TeamController", "StatePredictor", "NominalAxes", "NominalGovernor"}
     assert remembering == laws | holds | failures | {"TeamLink"}

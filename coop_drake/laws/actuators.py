@@ -1,0 +1,26 @@
+"""How the efforts of actuators follow what is asked of them."""
+
+from __future__ import annotations
+
+from math import exp
+
+from coop_drake.compiled import compiled
+from coop_drake.tree.pose import FloatArray
+
+
+@compiled
+def lag_behind(lag: float, elapsed: float, held: FloatArray, before: FloatArray, given: FloatArray) -> None:
+    """Write the efforts of actuators that are first-order low passes: y = u + exp(-t / T) (y_0 - u).
+
+    The formula is exact where the effort asked for is held.
+
+    Args:
+        lag: Time constant T [s]; 0 for actuators that follow at once.
+        elapsed: Time t since ``before`` acted [s].
+        held: Efforts u that are asked for since then, shape (m,) [N, N m].
+        before: Efforts y_0 that acted then, shape (m,).
+        given: Receives the efforts y that act now, shape (m,).
+    """
+    left = exp(-elapsed / lag) if lag > 0.0 else 0.0
+    for i in range(held.size):
+        given[i] = held[i] + left * (before[i] - held[i])
