@@ -12,6 +12,7 @@ from coop_drake.diagram.robot_controller import TELEMETRY
 from coop_drake.diagram.wrapping import Holding, Wrapping
 from coop_drake.scenario import Deployment
 from coop_drake.systems import LossyMeasurement, build_selector
+from coop_drake.tree.pose import FloatArray
 
 
 @dataclass(frozen=True)
@@ -22,11 +23,13 @@ class DeployedController:
         diagram: The whole; it has the same ports as the controller inside.
         controller: The controller inside.
         delays: Blocks that hold measurements, in the order of the signals.
+        heard: Blocks that hold the current cell, in this order.
     """
 
     diagram: Diagram
     controller: Diagram
     delays: tuple[Holding, ...]
+    heard: tuple[Holding, ...] = ()
 
     def prepare(self, root: Context) -> None:
         """Set p_G and held measurements to their values at the start."""
@@ -35,6 +38,33 @@ class DeployedController:
             governor = self.controller.GetSubsystemByName("governor_state")
             governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), pose[:2])
         _prepare(self.delays, root)
+
+    def begin(self, root: Context, cell: int, object_pose: FloatArray, joints: FloatArray) -> None:
+        """Set all states to those of a robot that begins a cell at rest.
+
+        Args:
+            root: The context, of this Diagram alone, in which the inputs are set.
+            cell: Index of the cell, which is also that of the input ``current_cell``.
+            object_pose: Where the object rests, the same for all robots, (x, y, angle) in W.
+            joints: Where the robot's own joints rest [rad or m].
+        """
+        time, inside = root.get_time(), self.controller
+        self.diagram.SetDefaultContext(root)
+        root.SetTime(time)
+        if inside.HasSubsystemNamed("governor_state"):
+            governor = inside.GetSubsystemByName("governor_state")
+            governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), object_pose[:2])
+        axes = np.array([object_pose[2], *joints])
+        for name, values in (
+            ("nominal_governor", (object_pose[:2],)),
+            ("nominal_axes", (axes,)),
+            ("axis_ppc", (cell, axes)),
+        ):
+            if inside.HasSubsystemNamed(name):
+                block = inside.GetSubsystemByName(name)
+                state = block.GetMyMutableContextFromRoot(root).get_mutable_discrete_state_vector()
+                state.SetFromVector(block.state_at_rest(*values))
+        _prepare(self.heard, root)
 
 
 def _prepare(delays: tuple[Holding, ...], root: Context) -> None:
@@ -130,4 +160,4 @@ def deploy(
         builder.ExportOutput(request, "hold_request")
     for output in (*TELEMETRY, *(["clock"] if held else [])):
         builder.ExportOutput(controller.GetOutputPort(output), output)
-    return DeployedController(builder.Build(), controller, tuple(wrapping.delays))
+    return DeployedController(builder.Build(), controller, tuple(wrapping.delays), tuple(wrapping.heard))

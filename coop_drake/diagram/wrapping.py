@@ -48,6 +48,7 @@ class Wrapping:
         self._builder, self._deployment, self._robot = builder, deployment, robot
         self._own = deployment.of_robot(name)
         self.delays: list[Holding] = []
+        self.heard: list[Holding] = []
 
     def measure(self, entry: InputPort) -> None:
         """Export an input of the controller with its constant errors, noise, delay and losses."""
@@ -70,6 +71,7 @@ class Wrapping:
             blocks.append(("clock_error", _affine(np.ones(2), np.array([0.0, -self._own.clock_error]))))
         if self._deployment.period is not None:
             delays = self._delays(2, whole_periods(self._own.switch_delay, self._deployment.period))
+            self.heard.extend(delays)
             blocks.extend((f"switch_delay{i or ''}", delay) for i, delay in enumerate(delays))
         self._lead(entry, blocks)
 

@@ -84,6 +84,7 @@ class Sample(NamedTuple):
         time: Simulated time.
         step: Whether the robot updates its state now, after it has shown its outputs for the log; else it
             only shows them.
+        stopped: Whether the line of the emergency stop is open, so that the drives of all robots brake.
         team_messages: In lock-step, the robot computes once it has so many messages of the supervisor in
             their session.
         object_pose: Pose (x, y, angle) of the object's frame L in W, angle unwrapped.
@@ -93,6 +94,7 @@ class Sample(NamedTuple):
     number: Number
     time: Seconds
     step: Flag
+    stopped: Flag
     team_messages: Number
     object_pose: Pose
     robot_state: State
@@ -106,12 +108,14 @@ class Tick(NamedTuple):
         number: Number of the sample.
         time: Simulated time.
         step: Whether the supervisor updates its state now; it shows its outputs as they were before.
+        stopped: Whether the line of the emergency stop is open, so that the drives of all robots brake.
         team_messages: In lock-step, it decides once it has so many messages of each robot in their session.
     """
 
     number: Number
     time: Seconds
     step: Flag
+    stopped: Flag
     team_messages: Numbers
 
 
@@ -122,7 +126,9 @@ class Effort(NamedTuple):
     Attributes:
         number: Number of the sample that it was computed from.
         team_messages: How many messages this robot has sent to the supervisor in this session.
-        state: State of the process: 0: it follows the plan; 1: it holds.
+        state: State of the process: 0: it follows the plan; 1: it holds; 2: its drives brake, and it waits to
+            begin its cell anew; 3: it does not know the current cell; 4: it rests where it cannot begin its
+            cell anew.
         efforts: Base wrench and joint torques, shape (3 + n_k,).
     """
 
@@ -139,11 +145,15 @@ class Telemetry(NamedTuple):
     Attributes:
         number: Number of the sample.
         time: Simulated time.
+        team_messages: As in ``Effort``.
+        state: As in ``Effort``.
         values: In the order of the robot's outputs for the log.
     """
 
     number: Number
     time: Seconds
+    team_messages: Number
+    state: Small
     values: Values
 
 
@@ -154,6 +164,8 @@ class Status(NamedTuple):
     Attributes:
         number: Number of the sample.
         time: Simulated time.
+        knows: Whether it knows the current cell; a supervisor that was started again first learns it from
+            the robots.
         team_messages: How many messages it has sent to each robot in their session.
         cell: Index of the current cell.
         entry: Simulated time at which it was entered.
@@ -163,6 +175,7 @@ class Status(NamedTuple):
 
     number: Number
     time: Seconds
+    knows: Flag
     team_messages: Numbers
     cell: Index
     entry: Seconds
@@ -198,7 +211,7 @@ class HoldRequest(NamedTuple):
 
 @message(50, "team", "supervisor")
 class Switch(NamedTuple):
-    """The current cell, sent when it changes.
+    """The current cell, sent when it changes, and as the answer to ``Place``.
 
     Attributes:
         cell: Index of the cell.
@@ -220,3 +233,51 @@ class Hold(NamedTuple):
 
     held: Flag
     number: Number
+
+
+@message(52, "team", "robot")
+class Place(NamedTuple):
+    """Which cell a robot is in, sent once a session with the supervisor begins while a run is under way.
+
+    It is sent again every tenth of a second until the supervisor answers with ``Switch``.
+
+    Attributes:
+        known: Whether it knows the current cell; a robot that was started again does not.
+        cell: Index of the cell.
+        sample: Number of the control period at whose begin it was entered.
+    """
+
+    known: Flag
+    cell: Index
+    sample: Number
+
+
+@message(53, "team", "robot")
+class AtRest(NamedTuple):
+    """A robot can begin its cell anew from where it rests, sent ten times a second while the drives brake.
+
+    Attributes:
+        sample: Number of the sample.
+        object_pose: Pose (x, y, angle) of the object's frame L in W as this robot measures it at rest.
+    """
+
+    sample: Number
+    object_pose: Pose
+
+
+@message(54, "team", "supervisor")
+class Begin(NamedTuple):
+    """All robots begin the current cell anew from rest, at the same sample and from the same pose.
+
+    Each of them sets p_G and its reference of the object's angle to this pose, and its joints' references to
+    its own joints.
+
+    Attributes:
+        cell: Index of the cell.
+        sample: Number of the sample at which they begin.
+        object_pose: Pose (x, y, angle) of the object's frame L in W.
+    """
+
+    cell: Index
+    sample: Number
+    object_pose: Pose

@@ -50,6 +50,10 @@ class DirectExchange:
         """See ``Exchange``; nobody can be missing."""
         return ""
 
+    def stopped(self) -> bool:
+        """See ``Exchange``; nobody can be missing."""
+        return False
+
     def look(self, time: float, measured: Sequence[FloatArray]) -> FloatArray:
         """See ``Exchange``."""
         assert self.supervisor is not None

@@ -41,6 +41,13 @@ from coop_drake.scenario.digest import scenario_digest
 _CONTEXT = get_context("fork") if sys.platform == "linux" else get_context("spawn")
 """A copy has imported already what this process has; libraries of macOS may not be used in one."""
 
+_FRESH = get_context("spawn")
+"""Starts a process again during a run: a copy of one that simulates would have its sockets, too."""
+
+RESTARTS = 3
+"""How often a process is started again: often enough for accidents, and an error that comes back each time
+ends the run soon."""
+
 _OPENING = 30.0
 """How long processes wait for each other at the start [s]: a slow machine imports Drake for some seconds."""
 
@@ -118,25 +125,40 @@ class LocalTeam:
         plan: The plan.
         maps: The harmonic map of every transition.
         book: Who listens where.
+        restarts: How often ``revive`` starts each of them again.
     """
 
     def __init__(
-        self, scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap], book: AddressBook
+        self,
+        scenario: Scenario,
+        plan: Plan,
+        maps: Sequence[HarmonicMap],
+        book: AddressBook,
+        *,
+        restarts: int = 0,
     ) -> None:
         self.work: dict[int, Callable[..., int]] = {SUPERVISOR: run_supervisor}
         self._arguments: dict[int, tuple[Any, ...]] = {SUPERVISOR: (scenario, plan, book)}
         for k in range(len(book.robots)):
             self.work[k], self._arguments[k] = run_robot, (scenario, plan, maps, k, book)
         self.processes: dict[int, BaseProcess] = {}
+        self._left = dict.fromkeys(self.work, restarts)
 
     def __enter__(self) -> LocalTeam:
         for index in self.work:
-            self.start(index)
+            self._start(index, _CONTEXT)
         return self
 
-    def start(self, index: int) -> None:
-        """Start a process, or start it again."""
-        process = _CONTEXT.Process(
+    def revive(self, index: int) -> bool:
+        """Start a process again that has ended, unless this was done too often; return whether it was."""
+        if not self._left[index]:
+            return False
+        self._left[index] -= 1
+        self._start(index, _FRESH)
+        return True
+
+    def _start(self, index: int, context: Any) -> None:
+        process = context.Process(
             target=_served,
             args=(name_of(index), self.work[index], self._arguments[index], os.getpid()),
             daemon=True,

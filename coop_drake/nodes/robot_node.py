@@ -3,55 +3,76 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import inf
 from typing import Any
 
 import numpy as np
 
 from coop_drake.diagram.deployment import deploy
 from coop_drake.diagram.robot_controller import RobotKnowledge, build_robot_controller
-from coop_drake.messages import Hold, HoldRequest, Ready, Switch
+from coop_drake.laws.readiness import begin_margin
+from coop_drake.laws.sampling import period_of
+from coop_drake.messages import AtRest, Begin, Hold, HoldRequest, Place, Ready, Switch
 from coop_drake.nodes.sampled import SampledDiagram, row_of
+from coop_drake.nodes.states import AGAIN, ASKS, FOLLOWS, HOLDS, OUTSIDE, STANDS
+from coop_drake.nodes.stillness import Stillness
 from coop_drake.scenario import Deployment
-from coop_drake.systems import robot_record
+from coop_drake.systems import axis_laws, robot_record
 from coop_drake.tree.pose import FloatArray
 
-FOLLOWS, HOLDS = range(2)
-"""States of a robot, see ``messages.Effort``."""
+Said = list[Ready | HoldRequest | AtRest]
+"""What a robot tells the supervisor."""
 
 
 class RobotNode:
     """Computes one robot's efforts and messages from its own measurements and what the supervisor says.
+
+    While its drives brake, it stands: it sets its states to those of a robot that begins the current cell at
+    rest where it is, and says so where it may. On the supervisor's order it begins, as all others do.
 
     Args:
         knowledge: What the robot knows before the run.
         deployment: How the team departs from the ideal one; sensors and actuators are part of the world.
         robot: Index k of the robot.
         name: Its name.
+
+    Attributes:
+        place: The current cell as the robot knows it.
+        state: Its state, see ``messages.Effort``.
     """
 
     def __init__(self, knowledge: RobotKnowledge, deployment: Deployment, robot: int, name: str) -> None:
         controller = build_robot_controller(knowledge)
-        deployed = deploy(controller, deployment, robot, name, bodiless=True)
-        self._controller, self._sampled = controller, SampledDiagram(deployed.diagram)
+        self._deployed = deploy(controller, deployment, robot, name, bodiless=True)
+        self._controller, self._sampled = controller, SampledDiagram(self._deployed.diagram)
         self._period, self._held = knowledge.period or 0.0, knowledge.hold is not None
-        joints = knowledge.joints.stop - knowledge.joints.start
-        self._state_size = 2 * (3 + joints)
-        self._logged = [name for name, size in robot_record(joints, holds=self._held).items() if size]
+        self._joints = knowledge.joints.stop - knowledge.joints.start
+        self._state_size = 2 * (3 + self._joints)
+        axes = [0, *range(1 + knowledge.joints.start, 1 + knowledge.joints.stop)]
+        self._tables = [law.table for law in axis_laws(knowledge.plan, axes)]
+        record = robot_record(self._joints, holds=self._held)
+        self._logged = [name for name, size in record.items() if size]
         self._cell, self._hold_message = np.zeros(2), np.zeros(2)
-        self._said = Ready(0, False)
+        self._said, self._told_rest = Ready(0, False), -inf
+        self.place, self.state = Place(True, 0, 0), FOLLOWS
+        self._order: Begin | None = None
+        self._still = Stillness(self._period)
         start = np.array(knowledge.plan.start[:3])
         self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self._state_size), start])))
-        deployed.prepare(self._sampled.context)
+        self._deployed.prepare(self._sampled.context)
 
     def _inputs(self, measured: FloatArray) -> dict[str, FloatArray]:
         own = {"robot_state": measured[: self._state_size], "object_pose": measured[self._state_size :]}
         heard = {"current_cell": self._cell}
         return own | heard | ({"hold_message": self._hold_message} if self._held else {})
 
-    @property
-    def state(self) -> int:
-        """The state of the robot as its efforts say it, see ``messages.Effort``."""
-        return HOLDS if self._held and self._hold_message[0] > 0.0 else FOLLOWS
+    def forget(self) -> None:
+        """Know no current cell: the process was started again during a run."""
+        self.place, self.state = Place(False, 0, 0), ASKS
+
+    def meet(self) -> None:
+        """Tell the supervisor again what holds: it may be another process, which has heard nothing yet."""
+        self._said, self._told_rest = Ready(self.place.cell, False), -inf
 
     def look(self, time: float, measured: FloatArray) -> FloatArray:
         """Return the robot's record for the log at an instant; nothing changes.
@@ -63,23 +84,86 @@ class RobotNode:
         self._sampled.at(time, self._inputs(measured))
         return row_of(self._sampled, self._controller, self._logged)
 
-    def step(self, time: float, measured: FloatArray) -> tuple[FloatArray, list[Ready | HoldRequest]]:
-        """Compute a sample; return the effort from now on, and what the robot tells the supervisor."""
+    def step(self, time: float, measured: FloatArray, *, stopped: bool = False) -> tuple[FloatArray, Said]:
+        """Compute a sample; return the effort from now on, and what the robot tells the supervisor.
+
+        Args:
+            time: Time of the sample [s].
+            measured: Its own state, then the object's pose, as it measures them.
+            stopped: Whether the drives brake.
+        """
+        if not self._follows(time, measured, stopped=stopped):
+            return np.zeros(3 + self._joints), self._stand(time, measured) if self.place.known else []
         self._sampled.at(time, self._inputs(measured))
         self._sampled.update()
+        self.state = HOLDS if self._held and self._hold_message[0] > 0.0 else FOLLOWS
         return self._sampled.output("robot_effort"), self._messages()
 
     def hear(self, messages: Iterable[Any]) -> None:
         """Take in what the supervisor says; it counts from the next instant on."""
         for message in messages:
             if isinstance(message, Switch):
-                self._cell = np.array([message.cell, message.sample * self._period])
+                self._enter(message.cell, message.sample)
             elif isinstance(message, Hold):
                 self._hold_message = np.array(message, dtype=float)
+            elif isinstance(message, Begin) and len(message.object_pose) == 3:
+                self._order = message if message.cell < len(self._tables) else None
 
-    def _messages(self) -> list[Ready | HoldRequest]:
+    def _enter(self, cell: int, sample: int) -> None:
+        if self.state == ASKS:
+            self.state = STANDS
+        self.place, self._cell = Place(True, cell, sample), np.array([cell, sample * self._period])
+
+    def _follows(self, time: float, measured: FloatArray, *, stopped: bool) -> bool:
+        """Whether the robot follows the plan in this sample, which it may begin anew now by an order."""
+        number, order = period_of(time, self._period), self._order
+        if not stopped or not self.place.known:
+            return self.state in (FOLLOWS, HOLDS)
+        if order is not None and number >= order.sample:
+            self._order = None
+            if number == order.sample:
+                self._enter(order.cell, order.sample)
+                self._begin(time, measured, np.array(order.object_pose))
+                return True
+        return False
+
+    def _begin(self, time: float, measured: FloatArray, object_pose: FloatArray) -> None:
+        """Set all states to those of a robot that begins the current cell at rest."""
+        self._sampled.at(time, self._inputs(measured))
+        joints = measured[3 : 3 + self._joints]
+        self._deployed.begin(self._sampled.context, self.place.cell, object_pose, joints)
+        self._said, self._told_rest = Ready(self.place.cell, False), -inf
+
+    def _stand(self, time: float, measured: FloatArray) -> Said:
+        """Wait as a robot that begins the current cell here and now; say so where this is allowed."""
+        if self.state not in (STANDS, OUTSIDE):
+            self._still.restart()
+        self.state, told, self._cell = STANDS, self._told_rest, np.array([self.place.cell, time])
+        self._begin(time, measured, measured[self._state_size :])
+        self._told_rest = told
+        rates = measured[3 + self._joints : self._state_size]
+        twist = self._sampled.output("object_state")[3:]
+        if not self._still.sees_rest(np.concatenate([rates, twist])):
+            return []
+        if not self._may_begin(measured):
+            self.state = OUTSIDE
+            return []
+        if time - told < AGAIN:
+            return []
+        self._told_rest = time
+        pose = tuple(float(part) for part in measured[self._state_size :])
+        return [AtRest(period_of(time, self._period), pose)]
+
+    def _may_begin(self, measured: FloatArray) -> bool:
+        """Whether Delta E and the energies of all axes allow to begin the current cell at rest here."""
+        margin = row_of(self._sampled, self._controller, ["energy_margin"])[0]
+        axes = [measured[self._state_size + 2], *measured[3 : 3 + self._joints]]
+        rows = zip(self._tables[self.place.cell], axes, strict=True)
+        return bool(margin >= 0.0 and min(begin_margin(row, float(x)) for row, x in rows) >= 0.0)
+
+    def _messages(self) -> Said:
         """Return what is new: a report only where the supervisor would come to another conclusion by it."""
-        said: list[Ready | HoldRequest] = []
+        said: Said = []
         index, margin = self._sampled.output("ready")
         cell = int(self._cell[0])
         ready = index == cell and margin >= 0.0

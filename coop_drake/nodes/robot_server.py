@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
+from time import monotonic
 from typing import Any
 
 import numpy as np
 
-from coop_drake.messages import SUPERVISOR, Effort, RobotEnd, Sample, Telemetry
+from coop_drake.messages import SUPERVISOR, Effort, RobotEnd, Sample, Switch, Telemetry
 from coop_drake.nodes.robot_node import RobotNode
 from coop_drake.nodes.serving import Server
+from coop_drake.nodes.states import AGAIN
 
 
 class RobotServer(Server):
     """Serves one robot.
+
+    In a session with the supervisor that begins while a run is under way, it first says which cell it is in,
+    until the supervisor answers with ``Switch``.
 
     Args:
         node: The robot.
@@ -24,6 +30,7 @@ class RobotServer(Server):
     def __init__(self, node: RobotNode, end: RobotEnd, *, lock_step: bool = True) -> None:
         super().__init__(end, [SUPERVISOR], lock_step=lock_step)
         self._node, self._end, self._session = node, end, end.team.sessions
+        self._placed, self._placing = 0, -inf
 
     def _receive(self, sender: int, message: Any) -> None:
         if self._end.team.sessions != self._session:
@@ -35,15 +42,39 @@ class RobotServer(Server):
         return {SUPERVISOR: question.team_messages}
 
     def _hear(self, sender: int, message: Any) -> None:
+        if isinstance(message, Switch):
+            self._placed = self._end.team.sessions
         self._node.hear([message])
 
+    def _begin(self, question: Sample) -> None:
+        if question.number == 0:
+            self._placed = self._end.team.sessions
+        else:
+            self._node.forget()
+
+    def _say_place(self) -> None:
+        """Say which cell this is, where the supervisor may not know, and not a moment ago."""
+        now = monotonic()
+        if self._placed == self._end.team.sessions or now - self._placing < AGAIN:
+            return
+        if self._end.team.send(self._node.place):
+            self._placing = now
+            self._node.meet()
+
     def _answer(self, question: Sample) -> None:
-        number, time = question.number, question.time
+        number, time, node, team = question.number, question.time, self._node, self._end.team
         measured = np.array([*question.robot_state, *question.object_pose])
-        self._end.efforts.send(Telemetry(number, time, tuple(self._node.look(time, measured))))
+        self._say_place()
+        shown = tuple(node.look(time, measured))
+        self._end.efforts.send(Telemetry(number, time, self._sent, node.state, shown))
         if not question.step:
             return
-        effort, said = self._node.step(time, measured)
+        effort, said = node.step(time, measured, stopped=question.stopped)
         for message in said:
-            self._end.team.send(message)
-        self._end.efforts.send(Effort(number, self._end.team.sent, self._node.state, tuple(effort)))
+            team.send(message)
+        self._end.efforts.send(Effort(number, self._sent, node.state, tuple(effort)))
+
+    @property
+    def _sent(self) -> int:
+        """Messages sent to the supervisor; for those of a session that is over it cannot wait."""
+        return self._end.team.sent if self._end.team.session else 0

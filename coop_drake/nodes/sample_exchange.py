@@ -23,20 +23,18 @@ from coop_drake.messages import (
     WorldEnd,
     name_of,
 )
+from coop_drake.nodes.attendance import TOLERATED, Attendance
 from coop_drake.nodes.pacing import Pacing
 from coop_drake.nodes.serving import TURN
+from coop_drake.nodes.states import ASKS, FOLLOWS, HOLDS, STATES
+from coop_drake.nodes.stillness import Stillness
 from coop_drake.tree.pose import FloatArray
 
 PATIENCE = 5.0
 """How long a process may take for an answer in lock-step before the run goes on without it [s]."""
 
-TOLERATED = 0.02
-"""How long drives hold the last effort of a robot that gives no other [s]: shipped transports lose nothing
-by it."""
-
-
-STATES = ("follows the plan", "holds")
-"""States of a robot in words, see ``messages.Effort``."""
+REJOIN = 60.0
+"""How long a team at rest waits for a process that is missing [s]: time to start it again by hand."""
 
 
 class SampleExchange:
@@ -46,25 +44,27 @@ class SampleExchange:
     channel is another one than that of the world, every answer says how many messages its sender has sent,
     and the next question says how many its receiver must have received.
 
+    A process that is gone, or gives no answer for too long, is missing, see ``Attendance``, until it answers
+    again. In lock-step nobody who is missing is asked before the team rests. Then the simulated time waits.
+
     The simulation first looks at an instant, for the log, and then takes the sample that is due there. Both
     are one question: everybody shows what it would log before its update, then updates.
-
-    A process that is gone, or gives no answer for too long, is missing for the rest of the run. The drives of
-    a robot without answers hold its last effort for ``TOLERATED``. Then they open the line of the emergency
-    stop, which is common to all drives, and all robots brake.
 
     Args:
         end: The world's sockets, with sessions.
         robots: Number of robots N.
-        period: Control period [s].
+        period: Time between two samples [s].
         pacing: Keeps the pace of the wall clock; None for lock-step, in which every sample waits.
         gone: Returns the processes that are known to have ended.
+        revive: Starts a process again that has ended; returns whether it did.
         patience: How long a process may take for an answer in lock-step [s].
+        rejoin: How long a team at rest waits for who is missing [s], by the wall clock.
         before: Called before every sample with its number.
+        tell: Is told what happens to processes.
 
     Attributes:
         sample: Number of the present sample.
-        missing: Since which simulated time each missing process is missing [s].
+        attendance: Who is missing, and whether the drives brake.
     """
 
     def __init__(
@@ -75,59 +75,70 @@ class SampleExchange:
         *,
         pacing: Pacing | None = None,
         gone: Callable[[], Collection[int]] = tuple,
+        revive: Callable[[int], bool] = lambda index: False,
         patience: float = PATIENCE,
+        rejoin: float = REJOIN,
         before: Callable[[int], None] = lambda sample: None,
+        tell: Callable[[str], None] = lambda words: None,
     ) -> None:
-        self._end, self._gone, self._patience, self._before = end, gone, patience, before
-        self._pacing, self._period = pacing, period
-        self._everyone = [*range(robots), SUPERVISOR]
-        self.sample, self.missing = 0, dict[int, float]()
+        self._end, self._patience, self._before, self._pacing = end, patience, before, pacing
+        self._everyone, self._period = [*range(robots), SUPERVISOR], period
+        self.attendance = Attendance(rejoin=rejoin, gone=gone, revive=revive, tell=tell)
+        self.sample, self._still = 0, Stillness(period)
         self._last: dict[tuple[int, type], Any] = {}
-        self._asked: dict[int, float] = {}
+        self._states = dict[int, int]()
+        self._counts = dict[int, Any]()
+        self._asked: dict[int, tuple[float, float]] = {}
         self._sizes: list[int] = []
         self._answered: dict[int, float] = {}
         self._sampled = -1
 
+    @property
+    def missing(self) -> dict[int, float]:
+        """Since which simulated time each missing process is missing [s]."""
+        return self.attendance.missing
+
     def trouble(self) -> str:
-        """Return who is missing since when; empty where everybody is there."""
-        said = (f"{name_of(k)} has not answered since t = {t:.6g} s" for k, t in sorted(self.missing.items()))
-        return "; ".join(said)
+        """See ``Exchange``."""
+        return self.attendance.trouble
+
+    def stopped(self) -> bool:
+        """See ``Exchange``."""
+        return self.attendance.stopped
 
     def facts(self) -> dict[str, Any]:
         """Return what a run reports about its processes: answers, messages of the team, ages of commands."""
         processes = []
         for index in self._everyone:
-            effort = self._last.get((index, Effort))
-            said = self._last.get((index, Status if index == SUPERVISOR else Effort))
-            counts = () if said is None else np.atleast_1d(said.team_messages)
-            state = "missing" if index in self.missing else "" if effort is None else STATES[effort.state]
+            state = "missing" if index in self.missing else STATES[self._states.get(index, FOLLOWS)]
             processes.append(
                 {
                     "name": name_of(index),
-                    "state": state or "there",
+                    "state": "there" if index == SUPERVISOR and state != "missing" else state,
                     "missing_since": self.missing.get(index),
-                    "team_messages": int(sum(counts)),
+                    "team_messages": int(np.sum(self._counts.get(index, 0))),
                 }
             )
         ages = {} if self._pacing is None else {"command_ages": asdict(self._pacing.ages())}
-        refused = self._end.refusals.counts
-        return {"processes": processes, "refused": {why.name: n for why, n in refused.items()}, **ages}
+        refused = {why.name: n for why, n in self._end.refusals.counts.items()}
+        return {"processes": processes, "refused": refused, **self.attendance.facts(), **ages}
 
     def step(self, time: float, measured: Sequence[FloatArray]) -> list[FloatArray]:
         """See ``Exchange``."""
         if self._sampled != self.sample:
             self._take_sample(time, measured)
         self.sample += 1
-        return [self._effort(k, time, own) for k, own in enumerate(measured)]
+        return [self._effort(k, own) for k, own in enumerate(measured)]
 
     def look(self, time: float, measured: Sequence[FloatArray]) -> FloatArray:
         """See ``Exchange``."""
         if time == self.sample * self._period:
             self._take_sample(time, measured)
-        else:
+        elif not self.trouble():
             self._ask(time, measured, step=False)
         needed = {(SUPERVISOR, Status), *((k, Telemetry) for k in self._everyone[:-1])}
         if not needed <= self._last.keys():
+            self.attendance.give_up()
             raise MessagingError(self.trouble())
         status = self._last[SUPERVISOR, Status]
         shown = [self._last[k, Telemetry].values for k in self._everyone[:-1]]
@@ -138,80 +149,145 @@ class SampleExchange:
         self._before(self.sample)
         if self._pacing is not None:
             self._pacing.wait(time)
-        self._ask(time, measured, step=True)
-        self._sampled = self.sample
+        self._sampled, attendance = self.sample, self.attendance
+        rests = self._still.sees_rest(np.concatenate([own[(len(own) - 3) // 2 : -3] for own in measured]))
+        attendance.see(time, self._states, rests=rests)
+        robots = self.missing.keys() - {SUPERVISOR}
+        if self._pacing is None and self.missing and rests and (attendance.stopped or not robots):
+            self._await(time, measured)
+        if not attendance.trouble:
+            self._ask(time, measured, step=True)
+            self._close_line(time)
 
-    def _effort(self, robot: int, time: float, measured: FloatArray) -> FloatArray:
+    def _close_line(self, time: float) -> None:
+        """Let the drives go on where all robots have begun their cell at the present sample."""
+        efforts = [self._last.get((k, Effort)) for k in self._everyone[:-1]]
+        begun = all(e and e.number == self.sample and e.state in (FOLLOWS, HOLDS) for e in efforts)
+        if self.attendance.stopped and begun and not self.missing:
+            self.attendance.close_line(time)
+
+    def _effort(self, robot: int, measured: FloatArray) -> FloatArray:
         """Return what the drives of a robot do."""
-        stopped = any(time - since > TOLERATED for k, since in self.missing.items() if k != SUPERVISOR)
         known = self._last.get((robot, Effort))
-        return braking_effort(measured[:-3]) if stopped or known is None else np.array(known.efforts)
+        if self.attendance.stopped or known is None:
+            return braking_effort(measured[:-3])
+        return np.array(known.efforts)
 
-    def _ask(self, time: float, measured: Sequence[FloatArray], *, step: bool) -> None:
-        """Ask all who are there, and wait for their answers, which replace the last ones."""
-        asked = [index for index in self._everyone if index not in self.missing]
+    def _await(self, time: float, measured: Sequence[FloatArray]) -> None:
+        """Wait with the simulated time at rest until all are there and know the current cell, or in vain."""
+        while not self.attendance.in_vain():
+            if not self._ask(time, measured, step=False, waits_for_all=True):
+                for index in [*self.missing]:
+                    self.attendance.back(index)
+                return
+        self.attendance.give_up()
+
+    def _ask(
+        self, time: float, measured: Sequence[FloatArray], *, step: bool, waits_for_all: bool = False
+    ) -> set[int]:
+        """Ask all who are there, and wait for their answers, which replace the last ones; return who is late.
+
+        Where the pace is that of the wall clock, those who are missing are asked, too, and not waited for.
+        """
+        everyone = waits_for_all or self._pacing is not None
+        asked = [index for index in self._everyone if everyone or index not in self.missing]
         self._sizes = [(len(own) - 3) // 2 for own in measured]  # As many efforts as own coordinates.
-        self._asked[self.sample] = clocks.monotonic()
+        self._asked[self.sample] = clocks.monotonic(), time
         for index in asked:
             self._end.send(index, self._question(index, time, measured, step=step))
         kind = Effort if step else Telemetry
-        waiting = {(index, Status if index == SUPERVISOR else kind) for index in asked}
-        limit = self._patience if self._pacing is None else self._pacing.allowed
-        deadline = clocks.monotonic() + limit
+        waiting = {
+            (index, Status if index == SUPERVISOR else kind)
+            for index in asked
+            if waits_for_all or index not in self.missing
+        }
+        deadline = clocks.monotonic() + (TURN if waits_for_all else self._limit())
         while waiting and (left := deadline - clocks.monotonic()) > 0.0:
             if (taken := self._end.receive(min(TURN, left))) is not None:
-                waiting.discard(self._keep(time, *taken))
-                continue
-            gone = {index for index, _ in waiting if self._has_gone(index)}
-            self._lose(gone)
-            waiting = {(index, wanted) for index, wanted in waiting if index not in gone}
+                waiting.discard(self._keep(*taken, admits=everyone))
+            elif not waits_for_all:
+                gone = {index for index, _ in waiting if self._has_gone(index)}
+                self._lose(gone)
+                waiting = {(index, wanted) for index, wanted in waiting if index not in gone}
         late = {index for index, _ in waiting}
-        bound = TOLERATED if self._pacing else -1.0
-        self._lose({index for index in late if time - self._answered.get(index, time) > bound})
+        if not waits_for_all:
+            bound = TOLERATED if self._pacing else -1.0
+            self._lose(k for k in late if k not in self.missing and time - self._since(k, time) > bound)
+        return late
+
+    def _limit(self) -> float:
+        """How long answers are waited for [s]; while the drives brake nothing depends on them."""
+        if self._pacing is None:
+            return self._patience
+        return max(self._pacing.allowed, TOLERATED if self.attendance.stopped else 0.0)
+
+    def _since(self, index: int, time: float) -> float:
+        return self._answered.get(index, time if self._pacing else 0.0)
 
     def _has_gone(self, index: int) -> bool:
         """Whether a process has ended, or its connection is closed, which a sign of life shows."""
-        return index in self._gone() or not self._end.send(index, Present())
+        return self.attendance.ended(index) or not self._end.send(index, Present())
 
-    def _lose(self, indices: Collection[int]) -> None:
-        """Go on without processes from the last instant that they have answered."""
-        self.missing |= {index: self._answered.get(index, 0.0) for index in indices}
+    def _lose(self, indices: Any) -> None:
+        """Go on without processes; what they have sent to the team need not be waited for."""
+        lost = set(indices)
+        for index in lost:
+            self._counts.pop(index, None)
+        self.attendance.lose({index: self._since(index, 0.0) for index in lost})
 
     def _question(self, index: int, time: float, measured: Sequence[FloatArray], *, step: bool) -> Any:
+        stopped, robots = self.attendance.stopped, self._everyone[:-1]
         if index == SUPERVISOR:
-            return Tick(self.sample, time, step, tuple(self._sent(k) for k in self._everyone[:-1]))
-        status, own = self._last.get((SUPERVISOR, Status)), measured[index]
-        told = 0 if status is None else status.team_messages[index]
-        return Sample(self.sample, time, step, told, tuple(own[-3:]), tuple(own[:-3]))
+            sent = tuple(self._counts.get(k, 0) for k in robots)
+            return Tick(self.sample, time, step, stopped, sent)
+        told, own = self._counts.get(SUPERVISOR), measured[index]
+        return Sample(
+            self.sample, time, step, stopped, told[index] if told else 0, tuple(own[-3:]), tuple(own[:-3])
+        )
 
     def _fits(self, sender: int, message: Any) -> bool:
         """Whether an answer is about a sample that has been, and its lists are as long as they must be."""
         robots = len(self._everyone) - 1
-        if isinstance(message, Effort):
-            fits = len(message.efforts) == self._sizes[sender] and message.state < len(STATES)
-        elif isinstance(message, Status):
+        if isinstance(message, Status):
             fits = len(message.team_messages) == robots and len(message.causes) in (0, 1 + robots)
+        elif isinstance(message, Effort):
+            fits = len(message.efforts) == self._sizes[sender] and message.state < len(STATES)
         else:
             known = self._last.get((sender, Telemetry))
             fits = known is None or len(known.values) == len(message.values)
+            fits = fits and message.state < len(STATES)
         return fits and message.number <= self.sample
 
-    def _sent(self, robot: int) -> int:
-        known = self._last.get((robot, Effort))
-        return 0 if known is None else known.team_messages
+    def _keep(self, sender: int, message: Any, *, admits: bool) -> tuple[int, type]:
+        """Keep an answer that is newer than the last; return who answered the present question, and how.
 
-    def _keep(self, time: float, sender: int, message: Any) -> tuple[int, type]:
-        """Keep an answer that is newer than the last; return who answered the present question, and how."""
-        kind = type(message)
-        if not isinstance(message, Effort | Telemetry | Status) or sender in self.missing:
-            return sender, type(None)
+        Args:
+            sender: Who answers.
+            message: The answer.
+            admits: Whether one who is missing may come back.
+        """
+        kind, nothing = type(message), (sender, type(None))
+        was_missing = sender in self.missing
+        if not isinstance(message, Effort | Telemetry | Status) or (was_missing and not admits):
+            return nothing
         if not self._fits(sender, message):
             self._end.efforts.refusals.add(Reason.VALUE)
-            return sender, type(None)
+            return nothing
+        asked, time = self._asked[message.number]
+        present, age = message.number == self.sample, clocks.monotonic() - asked
+        if was_missing and not present and not (self._pacing and age <= self._pacing.allowed):
+            return nothing
+        self._counts[sender] = message.team_messages
+        if not isinstance(message, Status):
+            self._states[sender] = message.state
+        knows = message.knows if isinstance(message, Status) else message.state != ASKS
         known = self._last.get((sender, kind))
+        if not knows:
+            return nothing
         if known is None or message.number >= known.number:
-            self._last[sender, kind] = message
-            self._answered[sender] = time
-        if isinstance(message, Effort) and self._pacing is not None:
-            self._pacing.note(clocks.monotonic() - self._asked[message.number])
-        return sender, kind if message.number == self.sample else type(None)
+            self._last[sender, kind], self._answered[sender] = message, time
+        if was_missing and self._pacing is not None:
+            self.attendance.back(sender)
+        elif isinstance(message, Effort) and self._pacing is not None:
+            self._pacing.note(age)
+        return (sender, kind) if present else nothing

@@ -56,6 +56,7 @@ class Server(ABC):
     def __init__(self, end: RobotEnd | SupervisorEnd, team: Iterable[int], *, lock_step: bool) -> None:
         self._sockets, self._lock_step = end, lock_step
         self._mail = {index: Mail() for index in team}
+        self._questions, self._begun = deque[Any](), False
 
     def run(self, wanted: Callable[[], bool], silence: float = 30.0) -> int:
         """Answer until the world says goodbye; return the outcome that it names.
@@ -67,25 +68,37 @@ class Server(ABC):
         Raises:
             MessagingError: The world was silent for too long, or the process is not wanted any more.
         """
-        pending: Sample | Tick | None = None
         waited = 0.0
         while True:
             taken = self._sockets.receive(TURN)
             waited = 0.0 if taken is not None else waited + TURN
             if taken is None and (waited > silence or not wanted()):
                 raise MessagingError(f"the world has said nothing for {waited:.1f} s")
-            # Everything that is there first: after a stop only the newest question is answered.
+            # Everything that is there first: it may count for the next answer.
             while taken is not None:
                 sender, message = taken
                 if isinstance(message, Goodbye):
                     return message.outcome
                 if isinstance(message, Sample | Tick):
-                    pending = message
+                    self._queue(message)
                 elif sender != WORLD:
                     self._receive(sender, message)
                 taken = self._sockets.receive()
-            if pending is not None and self._answered(pending):
-                pending = None
+            while self._questions and self._answered(self._questions[0]):
+                self._questions.popleft()
+
+    def _queue(self, question: Sample | Tick) -> None:
+        """Add a question.
+
+        In lock-step it replaces those that the world does not wait for any more. Otherwise all steps that are
+        late are made up for, but for those before the drives brake.
+        """
+        if not self._begun:
+            self._begun = True
+            self._begin(question)
+        replaced = self._lock_step or question.stopped
+        kept = () if replaced else (asked for asked in self._questions if asked.step)
+        self._questions = deque((*kept, question))
 
     def _receive(self, sender: int, message: Any) -> None:
         if isinstance(message, Present):
@@ -102,6 +115,10 @@ class Server(ABC):
                 self._hear(index, message)
         self._answer(question)
         return True
+
+    @abstractmethod
+    def _begin(self, question: Any) -> None:
+        """See the first question; where it is not about sample 0, the process was started again."""
 
     @abstractmethod
     def _counts(self, question: Any) -> Mapping[int, int]:

@@ -9,8 +9,10 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.diagram.hold import add_supervisor
-from coop_drake.messages import Hold, HoldRequest, Ready, Switch
+from coop_drake.laws.sampling import period_of, whole_periods
+from coop_drake.messages import AtRest, Begin, Hold, HoldRequest, Place, Ready, Switch
 from coop_drake.nodes.sampled import SampledDiagram
+from coop_drake.nodes.states import AHEAD
 from coop_drake.scenario import Hold as HoldSettings
 from coop_drake.systems import CellPlanner
 from coop_drake.tree.pose import FloatArray
@@ -22,6 +24,9 @@ _NOTHING = np.array([-1.0, -1.0])
 class SupervisorNode:
     """Switches the cells of a team and holds it, by what robots report.
 
+    While all drives brake it waits until all robots rest where they can begin the current cell anew, and
+    orders that they do. Where it was started again during a run, it learns the current cell from the robots.
+
     Args:
         robots: Number of robots N.
         cells: Number of cells of the plan.
@@ -30,7 +35,7 @@ class SupervisorNode:
     """
 
     def __init__(self, robots: int, cells: int, period: float, hold: HoldSettings | None) -> None:
-        builder, self._period = DiagramBuilder(), period
+        builder, self._period, self._robots, self._cells = DiagramBuilder(), period, robots, cells
         planner = builder.AddNamedSystem("cell_planner", CellPlanner(robots, cells, period=period))
         for k in range(robots):
             builder.ExportInput(planner.GetInputPort(f"robot_{k}_ready"), f"robot_{k}_ready")
@@ -47,26 +52,85 @@ class SupervisorNode:
         self._logged = ("current_cell", "arrived", *(["causes"] if self._held else []))
         subjects = ("ready", *(["request"] if self._held else []))
         self._heard = {f"robot_{k}_{subject}": _NOTHING for k in range(robots) for subject in subjects}
-        self._cell = 0
+        self._planner, self._place = planner, Place(True, 0, 0)
+        self._places, self._resting = dict[int, Place](), dict[int, AtRest]()
+        self._order: Begin | None = None
+        self._stopped, self._since = False, 0
+
+    @property
+    def knows(self) -> bool:
+        """Whether it knows the current cell."""
+        return self._place.known
+
+    def forget(self) -> None:
+        """Know no current cell: the process was started again during a run."""
+        self._place = Place(False, 0, 0)
+
+    def answers(self) -> list[tuple[int, Switch]]:
+        """Return robots that have said which cell they are in, and what to answer; none until it knows it.
+
+        A supervisor that does not know waits for all robots. They may differ where the one before it ended
+        while it spoke to them; the latest cell is the current one.
+        """
+        if not self.knows:
+            known = [place for place in self._places.values() if place.known]
+            if len(self._places) < self._robots or not known:
+                return []
+            self._enter(*max(place[1:] for place in known))
+        said, self._places = self._places, {}
+        return [(robot, Switch(*self._place[1:])) for robot in said]
+
+    def _enter(self, cell: int, sample: int) -> None:
+        """Be in a cell, of which no robot has reported anything yet."""
+        sampled = self._sampled
+        sampled.diagram.SetDefaultContext(sampled.context)
+        state = self._planner.GetMyMutableContextFromRoot(sampled.context).get_mutable_discrete_state_vector()
+        state.SetFromVector([cell, sample * self._period])
+        self._heard = dict.fromkeys(self._heard, _NOTHING)
+        self._place = Place(True, cell, sample)
 
     def look(self, time: float) -> FloatArray:
         """Return the supervisor's record for the log at an instant [s]; nothing changes."""
         self._sampled.at(time, self._heard)
         return np.concatenate([self._sampled.output(name) for name in self._logged])
 
-    def step(self, time: float) -> list[Switch | Hold]:
-        """Compute a sample, and return what all robots are told."""
+    def step(self, time: float, *, stopped: bool = False) -> list[Switch | Hold | Begin]:
+        """Compute a sample, and return what all robots are told.
+
+        Args:
+            time: Time of the sample [s].
+            stopped: Whether the drives brake.
+        """
+        number, order = period_of(time, self._period), self._order
+        if stopped and not self._stopped:
+            self._since = number
+        self._stopped = stopped
+        if order is not None and number >= order.sample:
+            self._order, self._since = None, order.sample
+            self._enter(order.cell, order.sample)
+        elif stopped or not self.knows:
+            return self._gathered(number)
         self._sampled.at(time, self._heard)
         self._sampled.update()
-        said: list[Switch | Hold] = []
+        said: list[Switch | Hold | Begin] = []
         cell, entry = self._sampled.output("current_cell")
-        if int(cell) != self._cell:
-            self._cell = int(cell)
-            said.append(Switch(self._cell, round(entry / self._period)))
+        if int(cell) != self._place.cell:
+            self._place = Place(True, int(cell), round(entry / self._period))
+            said.append(Switch(*self._place[1:]))
         if self._held:
             held, number = self._sampled.output("hold_message")
             said.append(Hold(bool(held), int(number)))
         return said
+
+    def _gathered(self, number: int) -> list[Switch | Hold | Begin]:
+        """Return the order to begin, once all robots have said that they rest since the drives brake."""
+        robots = range(self._robots)
+        resting = all(k in self._resting and self._resting[k].sample > self._since for k in robots)
+        if self._order is not None or not resting or not self.knows:
+            return []
+        sample = number + 1 + whole_periods(AHEAD, self._period)
+        self._order = Begin(self._place.cell, sample, self._resting[0].object_pose)
+        return [self._order]
 
     def hear(self, robot: int, messages: Iterable[Any]) -> None:
         """Take in what a robot says; it counts from the next instant on."""
@@ -75,6 +139,10 @@ class SupervisorNode:
                 self._heard[f"robot_{robot}_ready"] = np.array([message.cell, 0.0 if message.ready else -1.0])
             elif isinstance(message, HoldRequest):
                 self._heard[f"robot_{robot}_request"] = np.array(message, dtype=float)
+            elif isinstance(message, Place) and message.cell < self._cells:
+                self._places[robot] = message
+            elif isinstance(message, AtRest) and len(message.object_pose) == 3:
+                self._resting[robot] = message
 
     def release(self) -> None:
         """Free all memory."""

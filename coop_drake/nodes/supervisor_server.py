@@ -29,12 +29,20 @@ class SupervisorServer(Server):
     def _hear(self, sender: int, message: Any) -> None:
         self._node.hear(sender, [message])
 
+    def _begin(self, question: Tick) -> None:
+        if question.number > 0:
+            self._node.forget()
+
     def _answer(self, question: Tick) -> None:
-        number, time = question.number, question.time
-        cell, entry, arrived, *causes = self._node.look(time)
+        number, time, node = question.number, question.time, self._node
+        for robot, answer in node.answers():
+            self._end.team.send(robot, answer)
+        cell, entry, arrived, *causes = node.look(time)
         if question.step:
-            for message in self._node.step(time):
+            for message in node.step(time, stopped=question.stopped):
                 self._end.send_to_all(message)
-        sent = tuple(peer.sent for _, peer in sorted(self._end.team.peers.items()))
+        sent = tuple(peer.sent if peer.session else 0 for _, peer in sorted(self._end.team.peers.items()))
         codes = tuple(int(cause) for cause in causes)
-        self._end.efforts.send(Status(number, time, sent, int(cell), float(entry), bool(arrived), codes))
+        self._end.efforts.send(
+            Status(number, time, node.knows, sent, int(cell), float(entry), bool(arrived), codes)
+        )

@@ -13,8 +13,8 @@ from coop_drake.errors import MessagingError
 from coop_drake.fields import HarmonicMap
 from coop_drake.messages import AddressBook, Goodbye, KeyPair, WorldEnd, local_book, name_of
 from coop_drake.nodes.pacing import Pacing
-from coop_drake.nodes.processes import LocalTeam, question_of, robots_of
-from coop_drake.nodes.sample_exchange import PATIENCE, SampleExchange
+from coop_drake.nodes.processes import RESTARTS, LocalTeam, question_of, robots_of
+from coop_drake.nodes.sample_exchange import PATIENCE, REJOIN, SampleExchange
 from coop_drake.nodes.serving import TURN
 from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
@@ -34,6 +34,9 @@ def run_world(
     opening: float = 60.0,
     pacing: Pacing | None = None,
     patience: float = PATIENCE,
+    rejoin: float = REJOIN,
+    revive: Callable[[int], bool] = lambda index: False,
+    tell: Callable[[str], None] = lambda words: None,
     before: Callable[[int], None] = lambda sample: None,
     report: Callable[[dict[str, Any]], None] = lambda facts: None,
     progress: Progress | None = None,
@@ -50,6 +53,9 @@ def run_world(
         opening: How long to wait for the others [s].
         pacing: Keeps the pace of the wall clock, see ``SampleExchange``; as ``patience`` and ``before``.
         patience: How long a process may take for an answer in lock-step [s].
+        rejoin: How long a team at rest waits for who is missing [s], by the wall clock.
+        revive: Starts a process again that has ended; returns whether it did.
+        tell: Is told what happens to processes.
         before: Called before every sample with its number.
         report: Called at the end with facts about the processes.
         progress: Called with the stage and the fraction done, if given.
@@ -67,7 +73,10 @@ def run_world(
         pacing=pacing,
         gone=gone,
         patience=patience,
+        rejoin=rejoin,
+        revive=revive,
         before=before,
+        tell=tell,
     )
     world = build_world(scenario, plan, exchange)
     try:
@@ -112,6 +121,8 @@ def simulate_in_processes(
     scenario: Scenario,
     plan: Plan,
     maps: Sequence[HarmonicMap],
+    *,
+    restarts: int = RESTARTS,
     **options: Any,
 ) -> SimulationLog:
     """Start all robots and the supervisor as processes on this machine, and be the world for them.
@@ -120,6 +131,7 @@ def simulate_in_processes(
         scenario: The scenario.
         plan: A plan for it.
         maps: The harmonic map of every transition.
+        restarts: How often each of them is started again where it ends before the run is over.
         options: As for :func:`run_world`.
 
     Raises:
@@ -128,8 +140,8 @@ def simulate_in_processes(
     """
     control_period(scenario)
     book = local_book(robots_of(scenario))
-    with LocalTeam(scenario, plan, maps, book) as team:
-        return run_world(scenario, plan, book, gone=team.gone, **options)
+    with LocalTeam(scenario, plan, maps, book, restarts=restarts) as team:
+        return run_world(scenario, plan, book, gone=team.gone, revive=team.revive, **options)
 
 
 def wall_clock(scenario: Scenario) -> Pacing:

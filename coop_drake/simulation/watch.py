@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
 from pydrake.systems.framework import Context, EventStatus
 
 from coop_drake.answers.plan import Plan
@@ -13,10 +12,6 @@ from coop_drake.simulation.invariants import Invariants, Margins
 from coop_drake.simulation.recorder import Recorder
 from coop_drake.simulation.stall import at_goal, blocking_margin, narrowest_funnel, patience
 from coop_drake.simulation.telemetry import Sample, Telemetry
-
-AT_REST = 0.02
-"""Rate of every axis below which a team that stops counts as at rest [m/s or rad/s]: it moves by less than
-its narrowest clearance in the time in which brakes act."""
 
 
 class Watch:
@@ -63,7 +58,7 @@ class Watch:
         self._report(sample)
         if self._observer is not None:
             self._observer(sample)
-        if isinstance(self._loop, World) and self._loop.link.trouble:
+        if isinstance(self._loop, World) and (self._loop.link.trouble or self._loop.link.stopped):
             self._see_stop(sample, margins, self._loop.link.trouble)
         elif margins.violation:
             self.violation = margins.violation
@@ -76,10 +71,10 @@ class Watch:
         return EventStatus.ReachedTermination(self._loop.diagram, self.violation or "arrived")
 
     def _see_stop(self, sample: Sample, margins: Margins, trouble: str) -> None:
-        """Watch a team that is not complete until it rests or touches something: it cannot go on."""
+        """Watch a team whose drives brake for contacts, until it begins its cell anew or cannot go on."""
         if not min(margins.workspace_clearance, margins.body_clearance) > 0.0:
-            self.violation = f"{trouble}; {margins.violation}"
-        elif np.abs(sample.rates).max() < AT_REST:
+            self.violation = f"{trouble or 'while the drives braked'}; {margins.violation}"
+        elif trouble:
             self.violation = f"{trouble}; the team rests since t = {sample.time:.6g} s, without contact"
 
     def give_up(self, why: str) -> None:

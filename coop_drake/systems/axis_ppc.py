@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, EventStatus
 
 from coop_drake.compiled import prepared
@@ -73,7 +74,7 @@ class AxisPpc(Block):
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self._ready = self.DeclareVectorInputPort("ready", READY_SIZE)
         self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE) if paced else None
-        self.DeclareDiscreteState([0.0, *first_jumps(self._tables[0], start)])
+        self.DeclareDiscreteState(self.state_at_rest(0, start))
         timed = [self._cell, self._clock] if self._clock is not None else [self._cell]
         read = {self.time_ticket(), *(self.input_port_ticket(port.get_index()) for port in timed)}
         states = {self.input_port_ticket(port.get_index()) for port in (self._object, self._robot)}
@@ -84,6 +85,10 @@ class AxisPpc(Block):
         self.DeclareVectorOutputPort("funnels", 2 * axes, self._write_funnels, read)
         if len(laws) > 1:
             self.declare_update(self._remember, period, offset)
+
+    def state_at_rest(self, cell: int, axes: FloatArray | None) -> FloatArray:
+        """Return the state where a cell is begun at rest at these axes; None for no jumps."""
+        return np.array([cell, *first_jumps(self._tables[cell], axes)])
 
     def _states(self, context: Context, axes: int) -> tuple[FloatArray, FloatArray]:
         object_state = self._object.Eval(context)

@@ -73,9 +73,7 @@ class NominalAxes(Block):
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._robot = self.DeclareVectorInputPort("robot_state", 2 * (2 + axes))
         self._law = self.DeclareVectorInputPort("axis_acceleration", axes)
-        rest = np.zeros_like(motion.start)
-        past = [motion.start, rest] * motion.measurement_periods
-        group = self.DeclareDiscreteState(np.concatenate([motion.start, rest, rest, *past]))
+        group = self.DeclareDiscreteState(self.state_at_rest(motion.start))
         ports = self._object, self._robot, self._law
         of_object, of_robot, asked = (self.input_port_ticket(port.get_index()) for port in ports)
         nominal = self.discrete_state_ticket(group)
@@ -89,6 +87,11 @@ class NominalAxes(Block):
         ):
             self.DeclareVectorOutputPort(name, size, calc, read | {nominal})
         self.declare_update(self._step, motion.period, motion.offset)
+
+    def state_at_rest(self, axes: FloatArray) -> FloatArray:
+        """Return the state of a motion that begins at rest at these axes (theta, q_k) [rad or m]."""
+        rest = np.zeros_like(axes)
+        return np.concatenate([axes, rest, rest, *[axes, rest] * self._motion.measurement_periods])
 
     def _states(self, context: Context) -> FloatArray:
         """Return x^, x^' and a^, then older x^ and x^', shape (3 + 2 m, 1 + n)."""

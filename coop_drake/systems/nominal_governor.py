@@ -106,15 +106,19 @@ class NominalGovernor(Block):
         self._object = self.DeclareVectorInputPort("object_state", 6)
         self._current = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE) if paced else None
-        at_rest = np.array([*motion.start, 0.0, 0.0])
-        past = np.tile(at_rest, motion.measurement_periods)
-        group = self.DeclareDiscreteState(np.array([*at_rest, *motion.start, *motion.start, *past]))
+        group = self.DeclareDiscreteState(self.state_at_rest(motion.start))
         state = {self.discrete_state_ticket(group)}
         self.DeclareVectorOutputPort("governor_command", 4, self._write_command)
         self.DeclareVectorOutputPort("governor_position", 2, self._write_position, state)
         self.DeclareVectorOutputPort("energy_margin", 1, self._write_margin)
         self.DeclareVectorOutputPort("nominal", NOMINAL_SIZE, self._write_nominal)
         self.declare_update(self._step, motion.period, motion.offset)
+
+    def state_at_rest(self, position: FloatArray) -> FloatArray:
+        """Return the state of a motion that begins at rest, where p_G is at the object [m]."""
+        at_rest = np.array([*position, 0.0, 0.0])
+        past = np.tile(at_rest, self._motion.measurement_periods)
+        return np.array([*at_rest, *position, *position, *past])
 
     def _write_command(self, context: Context, output: BasicVector) -> None:
         state, command = self._state(context), output.get_mutable_value()

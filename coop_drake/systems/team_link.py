@@ -46,7 +46,11 @@ class Exchange(Protocol):
         ...
 
     def trouble(self) -> str:
-        """Return who is missing since when; empty where everybody is there."""
+        """Return why the run cannot go on, such as who is missing since when; empty where it can."""
+        ...
+
+    def stopped(self) -> bool:
+        """Return whether the drives brake, so that nobody follows the plan."""
         ...
 
     def look(self, time: float, measured: Sequence[FloatArray]) -> FloatArray:
@@ -89,8 +93,13 @@ class TeamLink(Block):
 
     @property
     def trouble(self) -> str:
-        """Who is missing since when; empty where everybody is there."""
+        """Why the run cannot go on; empty where it can."""
         return self._exchange.trouble()
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the drives brake, so that nobody follows the plan."""
+        return self._exchange.stopped()
 
     def _declare_effort(self, name: str, part: slice) -> None:
         def write(context: Context, output: BasicVector) -> None:

@@ -71,7 +71,7 @@ def team(request) -> Iterator[Team]:
 def test_samples_and_efforts_cross_in_lock_step(team):
     for number in range(1, 6):
         for k, robot in enumerate(team.robots):
-            sample = Sample(number, 0.005 * number, True, 0, (1.0, 2.0, 0.5), (float(k), *range(9)))
+            sample = Sample(number, 0.005 * number, True, False, 0, (1.0, 2.0, 0.5), (float(k), *range(9)))
             assert team.world.send(k, sample)
             sender, heard = robot.receive(LIMIT)
             assert (sender, heard) == (WORLD, sample)
@@ -95,9 +95,9 @@ def test_the_teams_channel_carries_reports_and_switches(team):
 
 
 def test_the_supervisor_has_the_worlds_channels_like_a_robot(team):
-    team.world.send(SUPERVISOR, Tick(7, 0.035, True, (1, 1)))
-    assert team.supervisor.receive(LIMIT) == (WORLD, Tick(7, 0.035, True, (1, 1)))
-    status = Status(7, 0.035, (0, 0), 2, 0.01, False, (0, 2, 3))
+    team.world.send(SUPERVISOR, Tick(7, 0.035, True, False, (1, 1)))
+    assert team.supervisor.receive(LIMIT) == (WORLD, Tick(7, 0.035, True, False, (1, 1)))
+    status = Status(7, 0.035, True, (0, 0), 2, 0.01, False, (0, 2, 3))
     team.supervisor.efforts.send(status)
     assert team.world.receive(LIMIT) == (SUPERVISOR, status)
     team.world.send(SUPERVISOR, Goodbye(0))

@@ -17,7 +17,7 @@ from tests.support.small_loop import small_maps
 
 pytestmark = pytest.mark.no_cover
 
-PATIENT = {"patience": 1.0}
+PATIENT = {"patience": 1.0, "rejoin": 0.0}
 
 FAULT = 40
 """Sample of the fault; the team is on its way."""

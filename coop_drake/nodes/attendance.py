@@ -1,0 +1,145 @@
+"""Who of a team is missing, and the emergency stop by which the others wait at rest until all are there."""
+
+from __future__ import annotations
+
+import time as clocks
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from coop_drake.messages import SUPERVISOR, name_of
+from coop_drake.nodes.states import ASKS, OUTSIDE, STANDS
+
+TOLERATED = 0.02
+"""How long drives hold the last effort of a robot that gives no other [s]: shipped transports lose nothing
+by it."""
+
+PATIENT_AT_REST = 0.5
+"""A robot that rests where it cannot begin its cell anew says so for this long before the run ends [s]:
+measurements have noise."""
+
+
+@dataclass
+class Stop:
+    """One time in which all drives braked.
+
+    Attributes:
+        cause: Who was missing.
+        since: When the line was opened [s].
+        rested: When the team rested, None where it did not [s].
+        resumed: When it went on, None where it did not [s].
+    """
+
+    cause: str
+    since: float
+    rested: float | None = None
+    resumed: float | None = None
+
+
+class Attendance:
+    """Keeps who is missing, since when, and whether the drives brake.
+
+    The drives of a robot without answers hold its last effort for ``TOLERATED``. Then they open the line of
+    the emergency stop, which is common to all drives, and all robots brake. The line is closed at a sample in
+    which all robots follow the plan again.
+
+    Args:
+        rejoin: How long a team at rest waits for who is missing [s], by the wall clock.
+        gone: Returns the processes that are known to have ended.
+        revive: Starts a process again that has ended; returns whether it did.
+        tell: Is told what happens.
+
+    Attributes:
+        missing: Since which simulated time each missing process is missing [s].
+        stopped: Whether the line is open.
+        stops: All times in which it was.
+        trouble: Why the run cannot go on; empty where it can.
+    """
+
+    def __init__(
+        self,
+        *,
+        rejoin: float,
+        gone: Callable[[], Collection[int]],
+        revive: Callable[[int], bool],
+        tell: Callable[[str], None],
+    ) -> None:
+        self.missing, self.stops, self.stopped = dict[int, float](), list[Stop](), False
+        self.trouble, self.revived = "", list[int]()
+        self._rejoin, self._gone, self._revive, self._tell = rejoin, gone, revive, tell
+        self._deadline: float | None = None
+
+    def ended(self, index: int) -> bool:
+        """Whether a process is known to have ended."""
+        return index in self._gone()
+
+    def lose(self, since: Mapping[int, float]) -> None:
+        """Go on without processes from the last instants that they have answered [s]."""
+        for index, time in since.items():
+            self.missing[index] = time
+            revived = self.ended(index) and self._revived(index)
+            self._tell(self._missing_words(index) + ("; it is started again" if revived else ""))
+
+    def back(self, index: int) -> None:
+        """A process answers again as it should."""
+        if self.missing.pop(index, None) is not None:
+            self._tell(f"{name_of(index)} is there again")
+
+    def see(self, time: float, states: Mapping[int, int], *, rests: bool) -> None:
+        """Open the line where it must be open; end the run where a team at rest waits in vain.
+
+        Args:
+            time: Simulated time [s].
+            states: States of the robots that have answered, see ``messages.Effort``.
+            rests: Whether the team rests.
+        """
+        late = [k for k, since in self.missing.items() if k != SUPERVISOR and time - since > TOLERATED]
+        waiting = [k for k, state in states.items() if state in (STANDS, ASKS)]
+        if not self.stopped and (late or waiting):
+            names = ", ".join(name_of(k) for k in sorted(late or waiting))
+            self.stopped = True
+            self.stops.append(Stop(names, time))
+        if self.stopped and rests and self.stops[-1].rested is None:
+            self.stops[-1].rested = time
+        if self._stranded(time, states):
+            names = ", ".join(name_of(k) for k, state in states.items() if state == OUTSIDE)
+            self.trouble = f"{names} cannot begin cell anew from rest"
+        if not (self.missing and rests):
+            self._deadline = None
+        elif self.in_vain():
+            self.give_up()
+
+    def close_line(self, time: float) -> None:
+        """All robots follow the plan again."""
+        self.stopped, self.stops[-1].resumed = False, time
+        self._tell(f"the team goes on at t = {time:.6g} s")
+
+    def in_vain(self) -> bool:
+        """Whether a team at rest has waited long enough, or waits for processes that do not come back."""
+        if self._deadline is None:
+            self._deadline = clocks.monotonic() + self._rejoin
+        late = clocks.monotonic() >= self._deadline
+        return late or any(not self._revived(index) for index in self.missing if self.ended(index))
+
+    def give_up(self) -> None:
+        """End the run without who is missing."""
+        self.trouble = "; ".join(self._missing_words(index) for index in sorted(self.missing))
+
+    def facts(self) -> dict[str, Any]:
+        """Return all stops, and how often each process was started again."""
+        restarts = {name_of(index): self.revived.count(index) for index in sorted(set(self.revived))}
+        return {"stops": [asdict(stop) for stop in self.stops], "restarts": restarts}
+
+    def _stranded(self, time: float, states: Mapping[int, int]) -> bool:
+        rested = self.stops[-1].rested if self.stopped else None
+        late = rested is not None and time - rested > PATIENT_AT_REST
+        return late and not self.missing and OUTSIDE in states.values()
+
+    def _missing_words(self, index: int) -> str:
+        return f"{name_of(index)} has not answered since t = {self.missing[index]:.6g} s"
+
+    def _revived(self, index: int) -> bool:
+        """Start a process again that has ended; return whether that was done."""
+        revived = self._revive(index)
+        self.revived += [index] * revived
+        return revived

@@ -1,0 +1,23 @@
+"""States of a robot's process, and the times by which a team at rest begins again."""
+
+from __future__ import annotations
+
+FOLLOWS, HOLDS, STANDS, ASKS, OUTSIDE = range(5)
+"""States of a robot, see ``messages.Effort``."""
+
+STATES = (
+    "follows the plan",
+    "holds",
+    "waits at rest to begin its cell anew",
+    "does not know the current cell",
+    "rests where it cannot begin its cell anew",
+)
+"""The same in words."""
+
+AGAIN = 0.1
+"""Time after which a message that has had no effect yet is sent again [s]: long for a message and its answer,
+short beside the time in which a team comes to rest."""
+
+AHEAD = 0.1
+"""Time between the order to begin and the sample at which all robots begin [s]: every robot must have heard
+it by then. While one has not, the drives brake on, and the order is given again."""
