@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
@@ -39,7 +40,9 @@ class DeployedController:
             governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), pose[:2])
         _prepare(self.delays, root)
 
-    def begin(self, root: Context, cell: int, object_pose: FloatArray, joints: FloatArray) -> None:
+    def begin(
+        self, root: Context, cell: int, object_pose: FloatArray, joints: FloatArray, table: FloatArray
+    ) -> None:
         """Set all states to those of a robot that begins a cell at rest.
 
         Args:
@@ -47,24 +50,31 @@ class DeployedController:
             cell: Index of the cell, which is also that of the input ``current_cell``.
             object_pose: Where the object rests, the same for all robots, (x, y, angle) in W.
             joints: Where the robot's own joints rest [rad or m].
+            table: The ``axis_table`` of the object's angle and these joints from now on, in this cell.
         """
-        time, inside = root.get_time(), self.controller
+        time = root.get_time()
         self.diagram.SetDefaultContext(root)
         root.SetTime(time)
-        if inside.HasSubsystemNamed("governor_state"):
-            governor = inside.GetSubsystemByName("governor_state")
-            governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), object_pose[:2])
+        self.controller.GetSubsystemByName("axis_ppc").set_table(cell, table)
         axes = np.array([object_pose[2], *joints])
-        for name, values in (
-            ("nominal_governor", (object_pose[:2],)),
-            ("nominal_axes", (axes,)),
-            ("axis_ppc", (cell, axes)),
-        ):
-            if inside.HasSubsystemNamed(name):
-                block = inside.GetSubsystemByName(name)
-                state = block.GetMyMutableContextFromRoot(root).get_mutable_discrete_state_vector()
-                state.SetFromVector(block.state_at_rest(*values))
+        self._rest(root, "nominal_axes", axes)
+        self._rest(root, "axis_ppc", cell, axes)
+        self.keep_position(root, object_pose[:2])
         _prepare(self.heard, root)
+
+    def keep_position(self, root: Context, position: FloatArray) -> None:
+        """Set p_G, and where it has one its nominal motion, to rest at a position, shape (2,) [m]."""
+        if self.controller.HasSubsystemNamed("governor_state"):
+            governor = self.controller.GetSubsystemByName("governor_state")
+            governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), position)
+        self._rest(root, "nominal_governor", position)
+
+    def _rest(self, root: Context, name: str, *values: Any) -> None:
+        """Set the state of a block, where there is one of this name, to its state at rest."""
+        if self.controller.HasSubsystemNamed(name):
+            block = self.controller.GetSubsystemByName(name)
+            state = block.GetMyMutableContextFromRoot(root).get_mutable_discrete_state_vector()
+            state.SetFromVector(block.state_at_rest(*values))
 
 
 def _prepare(delays: tuple[Holding, ...], root: Context) -> None:

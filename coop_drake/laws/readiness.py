@@ -14,8 +14,6 @@ from coop_drake.laws.axis_table import (
     GOAL_UPPER,
     REST_RATE,
     REST_REACH,
-    SLICE_LOWER,
-    SLICE_UPPER,
     track_row,
 )
 from coop_drake.laws.governor import energy_margin
@@ -29,7 +27,6 @@ __all__ = [
     "SPEED_TOLERANCE",
     "axis_arrival",
     "axis_ready",
-    "begin_margin",
     "clearance_margin",
     "funnel_margin",
     "interval_margin",
@@ -153,17 +150,3 @@ def axis_arrival(row: FloatArray, position: float, rate: float) -> float:
     """Return the margin with which, in the last cell, one axis is inside its goal and at rest."""
     inside = interval_margin(position, row[GOAL_LOWER], row[GOAL_UPPER])
     return min(inside, rest_margin(rate))
-
-
-@compiled
-def begin_margin(row: FloatArray, position: float) -> float:
-    """Return the margin with which one axis at rest may begin its cell: inside its slice, and V small enough.
-
-    Args:
-        row: The axis in the cell, a row of an ``axis_table``.
-        position: x [rad or m].
-    """
-    inside = interval_margin(position, row[SLICE_LOWER], row[SLICE_UPPER], 0.0)
-    if inside <= 0.0:
-        return inside
-    return min(inside, funnel_margin(track_row(row, 0.0, position, 0.0)[1], row[ENERGY_BOUND]))

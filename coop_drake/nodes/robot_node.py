@@ -10,8 +10,8 @@ import numpy as np
 
 from coop_drake.diagram.deployment import deploy
 from coop_drake.diagram.robot_controller import RobotKnowledge, build_robot_controller
-from coop_drake.laws.readiness import begin_margin
-from coop_drake.laws.sampling import period_of
+from coop_drake.laws.beginning import POSITION_WAITS, widen_slice
+from coop_drake.laws.sampling import period_of, whole_periods
 from coop_drake.messages import AtRest, Begin, Hold, HoldRequest, Place, Ready, Switch
 from coop_drake.nodes.sampled import SampledDiagram, row_of
 from coop_drake.nodes.states import AGAIN, ASKS, FOLLOWS, HOLDS, OUTSIDE, STANDS
@@ -57,6 +57,7 @@ class RobotNode:
         self.place, self.state = Place(True, 0, 0), FOLLOWS
         self._order: Begin | None = None
         self._still = Stillness(self._period)
+        self._waits = np.zeros(2), 0
         start = np.array(knowledge.plan.start[:3])
         self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self._state_size), start])))
         self._deployed.prepare(self._sampled.context)
@@ -96,6 +97,9 @@ class RobotNode:
             return np.zeros(3 + self._joints), self._stand(time, measured) if self.place.known else []
         self._sampled.at(time, self._inputs(measured))
         self._sampled.update()
+        position, until = self._waits
+        if period_of(time, self._period) < until:
+            self._deployed.keep_position(self._sampled.context, position)
         self.state = HOLDS if self._held and self._hold_message[0] > 0.0 else FOLLOWS
         return self._sampled.output("robot_effort"), self._messages()
 
@@ -124,28 +128,40 @@ class RobotNode:
             if number == order.sample:
                 self._enter(order.cell, order.sample)
                 self._begin(time, measured, np.array(order.object_pose))
+                until = order.sample + whole_periods(POSITION_WAITS, self._period)
+                self._waits = np.array(order.object_pose[:2]), until
                 return True
         return False
 
-    def _begin(self, time: float, measured: FloatArray, object_pose: FloatArray) -> None:
-        """Set all states to those of a robot that begins the current cell at rest."""
+    def _begin(self, time: float, measured: FloatArray, object_pose: FloatArray) -> float:
+        """Set all states to those of a robot that begins the current cell at rest.
+
+        Returns:
+            The margin with which Delta E and the energies of all axes allow that.
+        """
         self._sampled.at(time, self._inputs(measured))
-        joints = measured[3 : 3 + self._joints]
-        self._deployed.begin(self._sampled.context, self.place.cell, object_pose, joints)
+        joints, table = measured[3 : 3 + self._joints], self._tables[self.place.cell]
+        wide = np.empty_like(table)
+        margins = [
+            widen_slice(row, float(x), into)
+            for row, x, into in zip(table, [object_pose[2], *joints], wide, strict=True)
+        ]
+        self._deployed.begin(self._sampled.context, self.place.cell, object_pose, joints, wide)
         self._said, self._told_rest = Ready(self.place.cell, False), -inf
+        return float(min(row_of(self._sampled, self._controller, ["energy_margin"])[0], *margins))
 
     def _stand(self, time: float, measured: FloatArray) -> Said:
         """Wait as a robot that begins the current cell here and now; say so where this is allowed."""
         if self.state not in (STANDS, OUTSIDE):
             self._still.restart()
         self.state, told, self._cell = STANDS, self._told_rest, np.array([self.place.cell, time])
-        self._begin(time, measured, measured[self._state_size :])
+        margin = self._begin(time, measured, measured[self._state_size :])
         self._told_rest = told
         rates = measured[3 + self._joints : self._state_size]
         twist = self._sampled.output("object_state")[3:]
         if not self._still.sees_rest(np.concatenate([rates, twist])):
             return []
-        if not self._may_begin(measured):
+        if margin < 0.0:
             self.state = OUTSIDE
             return []
         if time - told < AGAIN:
@@ -153,13 +169,6 @@ class RobotNode:
         self._told_rest = time
         pose = tuple(float(part) for part in measured[self._state_size :])
         return [AtRest(period_of(time, self._period), pose)]
-
-    def _may_begin(self, measured: FloatArray) -> bool:
-        """Whether Delta E and the energies of all axes allow to begin the current cell at rest here."""
-        margin = row_of(self._sampled, self._controller, ["energy_margin"])[0]
-        axes = [measured[self._state_size + 2], *measured[3 : 3 + self._joints]]
-        rows = zip(self._tables[self.place.cell], axes, strict=True)
-        return bool(margin >= 0.0 and min(begin_margin(row, float(x)) for row, x in rows) >= 0.0)
 
     def _messages(self) -> Said:
         """Return what is new: a report only where the supervisor would come to another conclusion by it."""

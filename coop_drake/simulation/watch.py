@@ -43,6 +43,7 @@ class Watch:
         self._telemetry = Telemetry(loop, root)
         self._tolerance = position_tolerance
         self._last: Sample | None = None
+        self._returns = False
 
     @property
     def ended(self) -> bool:
@@ -60,7 +61,7 @@ class Watch:
             self._observer(sample)
         if isinstance(self._loop, World) and (self._loop.link.trouble or self._loop.link.stopped):
             self._see_stop(sample, margins, self._loop.link.trouble)
-        elif margins.violation:
+        elif margins.violation and not (self._returns and self._still_returns(margins)):
             self.violation = margins.violation
         elif sample.arrived and at_goal(self._loop.plan, sample, self._tolerance):
             self.reached = True
@@ -72,10 +73,17 @@ class Watch:
 
     def _see_stop(self, sample: Sample, margins: Margins, trouble: str) -> None:
         """Watch a team whose drives brake for contacts, until it begins its cell anew or cannot go on."""
+        self._returns = True
         if not min(margins.workspace_clearance, margins.body_clearance) > 0.0:
             self.violation = f"{trouble or 'while the drives braked'}; {margins.violation}"
         elif trouble:
             self.violation = f"{trouble}; the team rests since t = {sample.time:.6g} s, without contact"
+
+    def _still_returns(self, margins: Margins) -> bool:
+        """Whether a team that has begun its cell anew has touched nothing and is not in its slices again."""
+        free = min(margins.workspace_clearance, margins.body_clearance, margins.cell_clearance) > 0.0
+        self._returns = free and not margins.slice_margin > 0.0 and margins.funnel_margin > 0.0
+        return self._returns
 
     def give_up(self, why: str) -> None:
         """End the run without arrival; the message names the condition that was not met.
