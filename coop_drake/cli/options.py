@@ -124,6 +124,24 @@ FreeRunning = Annotated[
         help="Pace the processes by the wall clock: what comes too late is not waited for; measures ages.",
     ),
 ]
+Restarts = Annotated[
+    int,
+    typer.Option(
+        "--restarts",
+        metavar="N",
+        min=0,
+        help="With --apart: how often each process that ends too early is started again.",
+    ),
+]
+Rejoin = Annotated[
+    float,
+    typer.Option(
+        "--rejoin",
+        metavar="SECONDS",
+        min=0.0,
+        help="How long a team at rest waits for a process that is missing.",
+    ),
+]
 BlocksName = Annotated[
     Literal["named", "fused"],
     typer.Option(

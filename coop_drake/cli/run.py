@@ -21,6 +21,7 @@ from coop_drake.cli.options import (
     Machine,
     NoFigures,
     Quiet,
+    Restarts,
     ResultsFolder,
     ScenarioPath,
     Verbose,
@@ -31,6 +32,7 @@ from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import process_lines, simulation_facts, summary_rows
 from coop_drake.cli.task import Task, read_task
+from coop_drake.nodes.states import RESTARTS
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
@@ -54,6 +56,7 @@ def run_command(
     no_figures: NoFigures = False,
     blocks: BlocksName = "named",
     apart: Apart = False,
+    restarts: Restarts = RESTARTS,
     free_running: FreeRunning = False,
     machine: Machine = False,
     quiet: Quiet = False,
@@ -62,7 +65,9 @@ def run_command(
     """Plan, map, simulate and record a transport."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
-        simulation = simulation_of(task, blocks, reporter, apart=apart, free_running=free_running)
+        simulation = simulation_of(
+            task, blocks, reporter, apart=apart, restarts=restarts, free_running=free_running
+        )
         folder = ResultFolder.of(task.name, out, "plan", "simulation")
         with DrawingProcesses(figures=not no_figures) as drawing:
             plan = plan_of(task, folder, reporter, simulated=True)
@@ -74,7 +79,13 @@ def run_command(
 
 
 def simulation_of(
-    task: Task, blocks: Blocks, reporter: Reporter, *, apart: bool = False, free_running: bool = False
+    task: Task,
+    blocks: Blocks,
+    reporter: Reporter,
+    *,
+    apart: bool = False,
+    restarts: int = 0,
+    free_running: bool = False,
 ) -> Simulation:
     """Return what simulates: all in one process, or every robot in a process of its own.
 
@@ -92,7 +103,13 @@ def simulation_of(
 
     control_period(task.scenario)
     pacing = wall_clock(task.scenario) if free_running else None
-    return partial(simulate_in_processes, pacing=pacing, report=reporter.facts.update)
+    return partial(
+        simulate_in_processes,
+        restarts=restarts,
+        pacing=pacing,
+        report=reporter.facts.update,
+        tell=reporter.say,
+    )
 
 
 def _in_one_process(blocks: Blocks, *problem: Any, **options: Any) -> SimulationLog:

@@ -18,6 +18,7 @@ from coop_drake.cli.options import (
     Machine,
     NoFigures,
     Quiet,
+    Restarts,
     ResultsFolder,
     ScenarioPath,
     Verbose,
@@ -28,6 +29,7 @@ from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.run import carry_out, simulation_of
 from coop_drake.cli.summary import plan_facts
 from coop_drake.cli.task import Task, read_task
+from coop_drake.nodes.states import RESTARTS
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
@@ -53,6 +55,7 @@ def simulate_command(
     no_figures: NoFigures = False,
     blocks: BlocksName = "named",
     apart: Apart = False,
+    restarts: Restarts = RESTARTS,
     free_running: FreeRunning = False,
     machine: Machine = False,
     quiet: Quiet = False,
@@ -61,7 +64,9 @@ def simulate_command(
     """Map, simulate and record a plan that was made before."""
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
-        simulation = simulation_of(task, blocks, reporter, apart=apart, free_running=free_running)
+        simulation = simulation_of(
+            task, blocks, reporter, apart=apart, restarts=restarts, free_running=free_running
+        )
         folder = ResultFolder.of(task.name, out, "simulation")
         found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)
         with (

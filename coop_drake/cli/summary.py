@@ -94,6 +94,9 @@ def process_lines(facts: Mapping[str, Any]) -> list[str]:
         f"{process['name']}: {process['state']}, {process['team_messages']} messages sent to the team"
         for process in facts.get("processes", ())
     ]
+    for name, count in facts.get("restarts", {}).items():
+        lines.append(f"{name}: started again {'once' if count == 1 else f'{count} times'}")
+    lines += map(_stop_line, facts.get("stops", ()))
     if refused := sum(facts.get("refused", {}).values()):
         lines.append(f"{refused} messages were refused")
     if ages := facts.get("command_ages"):
@@ -104,6 +107,16 @@ def process_lines(facts: Mapping[str, Any]) -> list[str]:
         )
         lines.append(f"The wall clock was {ages['slipped']:.2f} s ahead of the simulated time at the end")
     return lines
+
+
+def _stop_line(stop: Mapping[str, Any]) -> str:
+    """Return what happened in one time in which all drives braked."""
+    line = f"All drives braked from t = {stop['since']:.2f} s on because of {stop['cause']}"
+    if stop["rested"] is not None:
+        line += f"; the team rested {stop['rested'] - stop['since']:.2f} s later"
+    if stop["resumed"] is not None:
+        line += f", and went on at t = {stop['resumed']:.2f} s"
+    return line
 
 
 def answer_of(result: PlanningResult) -> str:

@@ -14,6 +14,7 @@ from coop_drake.cli.options import (
     Machine,
     NoFigures,
     Quiet,
+    Rejoin,
     ResultsFolder,
     ScenarioPath,
     Verbose,
@@ -22,6 +23,7 @@ from coop_drake.cli.options import (
 from coop_drake.cli.reporter import reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.run import carry_out
+from coop_drake.nodes.states import REJOIN
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
 
@@ -33,6 +35,7 @@ def world_command(
     out: ResultsFolder = None,
     gains: GainsName = None,
     free_running: FreeRunning = False,
+    rejoin: Rejoin = REJOIN,
     fresh_maps: FreshMaps = False,
     live: Live = False,
     wait: Wait = False,
@@ -59,7 +62,9 @@ def world_command(
                 book=book,
                 keys=keys,
                 pacing=wall_clock(task.scenario) if free_running else None,
+                rejoin=rejoin,
                 report=reporter.facts.update,
+                tell=reporter.say,
             )
             reporter.code = carry_out(
                 task, found, folder, reporter, drawing, page, world, fresh_maps=fresh_maps

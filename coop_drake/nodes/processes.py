@@ -44,10 +44,6 @@ _CONTEXT = get_context("fork") if sys.platform == "linux" else get_context("spaw
 _FRESH = get_context("spawn")
 """Starts a process again during a run: a copy of one that simulates would have its sockets, too."""
 
-RESTARTS = 3
-"""How often a process is started again: often enough for accidents, and an error that comes back each time
-ends the run soon."""
-
 _OPENING = 30.0
 """How long processes wait for each other at the start [s]: a slow machine imports Drake for some seconds."""
 

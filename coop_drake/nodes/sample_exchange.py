@@ -26,15 +26,12 @@ from coop_drake.messages import (
 from coop_drake.nodes.attendance import TOLERATED, Attendance
 from coop_drake.nodes.pacing import Pacing
 from coop_drake.nodes.serving import TURN
-from coop_drake.nodes.states import ASKS, FOLLOWS, HOLDS, STATES
+from coop_drake.nodes.states import ASKS, FOLLOWS, HOLDS, REJOIN, STATES
 from coop_drake.nodes.stillness import Stillness
 from coop_drake.tree.pose import FloatArray
 
 PATIENCE = 5.0
 """How long a process may take for an answer in lock-step before the run goes on without it [s]."""
-
-REJOIN = 60.0
-"""How long a team at rest waits for a process that is missing [s]: time to start it again by hand."""
 
 
 class SampleExchange:

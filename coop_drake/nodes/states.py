@@ -1,4 +1,4 @@
-"""States of a robot's process, and the times by which a team at rest begins again."""
+"""States of a robot's process, and by what a team that is not complete goes on."""
 
 from __future__ import annotations
 
@@ -21,3 +21,10 @@ short beside the time in which a team comes to rest."""
 AHEAD = 0.1
 """Time between the order to begin and the sample at which all robots begin [s]: every robot must have heard
 it by then. While one has not, the drives brake on, and the order is given again."""
+
+REJOIN = 60.0
+"""How long a team at rest waits for a process that is missing [s]: time to start it again by hand."""
+
+RESTARTS = 3
+"""How often a process that ended too early is started again [-]: enough for accidents, and an error that
+comes back each time ends the run soon."""

@@ -13,9 +13,10 @@ from coop_drake.errors import MessagingError
 from coop_drake.fields import HarmonicMap
 from coop_drake.messages import AddressBook, Goodbye, KeyPair, WorldEnd, local_book, name_of
 from coop_drake.nodes.pacing import Pacing
-from coop_drake.nodes.processes import RESTARTS, LocalTeam, question_of, robots_of
-from coop_drake.nodes.sample_exchange import PATIENCE, REJOIN, SampleExchange
+from coop_drake.nodes.processes import LocalTeam, question_of, robots_of
+from coop_drake.nodes.sample_exchange import PATIENCE, SampleExchange
 from coop_drake.nodes.serving import TURN
+from coop_drake.nodes.states import REJOIN, RESTARTS
 from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import Sample, run_loop
