@@ -22,13 +22,13 @@ widest comes first, because wide boxes are crossed faster."""
 FIRST_LEVELS = LEVELS[2:]
 """The levels with which the longest boxes are laid: without wide paddings each holds more of the path."""
 
-SMALLEST_LEVELS = (*LEVELS, (0.0003, 0.0001))
-"""``LEVELS`` and a further level, for passages of a millimetre [rad or m, m]."""
+SMALLEST_LEVELS = (*LEVELS, (0.0003, 0.0001), (0.00003, 0.00001))
+"""``LEVELS`` and further levels, for passages of a tenth of a millimetre [rad or m, m]."""
 
 SPACING = 0.02
 """Distance between samples of a path in any scaled axis [m]: a box ends at a sample."""
 
-FINEST_SPACING, SMALLEST_SPACING = 0.002, 0.0005
+FINEST_SPACING, SMALLEST_SPACING = 0.002, 0.00004
 """Samples closer than this are not refined any more [m]; the second one belongs to ``SMALLEST_LEVELS``."""
 
 REFINEMENT = 4

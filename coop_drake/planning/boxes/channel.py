@@ -39,12 +39,14 @@ class Channel:
         goal_angle: The goal's theta, unwrapped along the boxes [rad].
         path: The path that the boxes were laid along, theta unwrapped like theirs, shape (m, 3 + n) [m, rad];
             None if they were found without a path.
+        ends: Where that path leaves each box, shape (boxes, 2) [m]; None without a path.
     """
 
     boxes: tuple[FreeBox, ...]
     margin: float
     goal_angle: float
     path: FloatArray | None = None
+    ends: FloatArray | None = None
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,19 @@ SHARED_FRACTION = 0.7
 overlap's own target [-]."""
 
 
+def targets_of(channel: Channel, start: FloatArray, goal: FloatArray) -> tuple[FloatArray, ...]:
+    """Targets chosen for a short time, or where the path of the boxes leaves them; see ``choose_targets``.
+
+    Overlaps that are a tenth of a millimetre wide may have parts that their boxes do not join.
+    """
+    try:
+        return choose_targets(channel, start, goal)
+    except PlanError:
+        if channel.ends is None:
+            raise
+        return (*channel.ends[:-1], goal)
+
+
 def choose_targets(channel: Channel, start: FloatArray, goal: FloatArray) -> tuple[FloatArray, ...]:
     """Choose a target for every box: poles of inaccessibility of overlapping cores, the last one the goal.
 

@@ -26,7 +26,7 @@ from coop_drake.planning.execution.channel_ends import Bounds, check_ends, goal_
 from coop_drake.planning.execution.estimate import plan_time, timed
 from coop_drake.planning.execution.refusals import GOAL_REGION_FRACTION
 from coop_drake.planning.execution.speed_shares import limits_of, speed_shares, stated_speeds
-from coop_drake.planning.execution.targets import choose_targets
+from coop_drake.planning.execution.targets import targets_of
 from coop_drake.planning.travel_time import travel_time
 from coop_drake.progress import Progress
 from coop_drake.tree.pose import FloatArray
@@ -65,7 +65,7 @@ def make_plan(
     start, goal = problem.start[:2], problem.goal_pose[:2]
     check_ends(problem, channel)
     if targets is None:
-        targets = choose_targets(channel, start, goal)
+        targets = targets_of(channel, start, goal)
     entries = (start, *targets[:-1])
     cells = []
     for index, (box, entry, target) in enumerate(zip(channel.boxes, entries, targets, strict=True)):

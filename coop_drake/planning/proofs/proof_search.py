@@ -27,6 +27,10 @@ MOST_ROBOTS = 2
 """Robots that a relaxation keeps at most: with more, it needs about as many slices as the whole question."""
 
 
+OBJECT_RESOLUTION = 0.01
+"""Slices of the object alone have one axis; they are split to this fraction of the resolution [-]."""
+
+
 @dataclass(frozen=True)
 class Refutation:
     """A proof that no plan exists.
@@ -152,6 +156,9 @@ class Proofs:
     def _exploration(self, chosen: tuple[int, ...]) -> Exploration:
         if chosen not in self._explorations:
             question, _ = relaxed(self._problem, chosen)
+            if not chosen:
+                fine = OBJECT_RESOLUTION * question.settings.angle_resolution
+                question = replace(question, settings=replace(question.settings, angle_resolution=fine))
             self._explorations[chosen] = Exploration(question, None, self._watch, self._words(chosen))
         return self._explorations[chosen]
 

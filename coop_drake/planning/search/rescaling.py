@@ -118,7 +118,8 @@ class Rescaling:
     def _channel(self, found: Channel) -> Channel:
         boxes = tuple(self._scaled_box(box, self._units[2:], "polygon", "core") for box in found.boxes)
         path = None if found.path is None else found.path * self._units
-        return replace(found, boxes=boxes, margin=self.unit * found.margin, path=path)
+        ends = None if found.ends is None else found.ends * self.unit
+        return replace(found, boxes=boxes, margin=self.unit * found.margin, path=path, ends=ends)
 
     def watched(self, watch: Watch | None) -> Watch | None:
         """A function that expresses every event in metres before it is passed on."""

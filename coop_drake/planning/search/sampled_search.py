@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -210,7 +210,10 @@ class SampledSearch:
         boxes = [regions.around(box) for box in found.boxes]
         made = [box for box in boxes if box is not None]
         complete = len(made) == len(boxes)
-        return make_channel(self._problem, made, found.margin, found.path) if complete else None
+        if not complete:
+            return None
+        ends = np.array([box.positions[-1] for box in found.boxes])
+        return replace(make_channel(self._problem, made, found.margin, found.path), ends=ends)
 
 
 def _samples(number: int) -> int:
