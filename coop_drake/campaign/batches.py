@@ -1,4 +1,4 @@
-"""The batches of a campaign: consecutive runs or questions that one process makes, and one file holds."""
+"""The batches of a campaign: consecutive runs, questions or searches of one process, and of one file."""
 
 from __future__ import annotations
 
@@ -12,41 +12,55 @@ from coop_drake.answers.digest import content_digest
 from coop_drake.campaign.plans import Plans, scenario_content, versions
 from coop_drake.campaign.questions.settings import QuestionSettings
 from coop_drake.campaign.records import QuestionRecord, Record, RunRecord
+from coop_drake.campaign.search.findings import BreakingPoint, Finding
 from coop_drake.campaign.settings import Tier
 from coop_drake.campaign.variation import Variation
 from coop_drake.typed_data import to_plain
 
 PLANNER: Literal["planner"] = "planner"
-"""In place of a tier: the batch has planning questions in place of runs."""
+SEARCH: Literal["search"] = "search"
+BREAKING: Literal["breaking"] = "breaking"
+"""In place of a tier: the batch has planning questions, searches or bisections in place of runs."""
+
+SearchKind = Literal["search", "breaking"]
+"""Searches, or bisections of departures."""
+
+_KINDS: dict[str, tuple[str, type[Record]]] = {
+    PLANNER: ("questions", QuestionRecord),
+    SEARCH: ("searches", Finding),
+    BREAKING: ("breaking", BreakingPoint),
+}
+"""The folder and the record of what is no run."""
 
 
 @dataclass(frozen=True)
 class Batch:
-    """Consecutive runs of one scenario in one tier, or consecutive planning questions.
+    """Consecutive runs of one scenario in one tier, planning questions, searches, or bisections.
 
     Attributes:
-        scenario: Index of the scenario in the campaign file; 0 for questions.
-        tier: By which loop they are made; ``planner`` for questions.
-        first: Index of the first run.
-        stop: Index behind the last run.
+        scenario: Index of the scenario in its section of the campaign file; 0 for questions.
+        tier: By which loop runs are made; ``planner`` for questions, ``search`` for searches, ``breaking``
+            for bisections.
+        first: Index of the first run, question, search or departure.
+        stop: Index behind the last one.
         digest: SHA-256 of all that their results depend on; names their file.
     """
 
     scenario: int
-    tier: Tier | Literal["planner"]
+    tier: Tier | Literal["planner"] | SearchKind
     first: int
     stop: int
     digest: str
 
     @property
     def record(self) -> type[Record]:
-        """What each of its runs or questions leaves."""
-        return QuestionRecord if self.tier == PLANNER else RunRecord
+        """What each of its runs, questions or searches leaves."""
+        return _KINDS.get(self.tier, ("runs", RunRecord))[1]
 
     @property
     def file(self) -> Path:
         """The file of its records, in the campaign's folder."""
-        return Path("questions" if self.tier == PLANNER else "runs") / f"{self.digest}.parquet"
+        return Path(_KINDS.get(self.tier, ("runs", RunRecord))[0]) / f"{self.digest}.parquet"
 
     @property
     def costs(self) -> Path:

@@ -1,4 +1,4 @@
-"""What one run or one planning question of a campaign leaves: one row of a Parquet file."""
+"""What a run, a planning question or a search of a campaign leaves: one row of a Parquet file."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from dataclasses import astuple, dataclass, fields
 from math import nan
 from typing import TYPE_CHECKING, Any, get_type_hints
+
+from coop_drake.campaign.search.findings import BreakingPoint, Finding
 
 if TYPE_CHECKING:
     import pyarrow
@@ -109,7 +111,7 @@ class QuestionRecord:
     width_ratio: float = nan
 
 
-Record = RunRecord | QuestionRecord
+Record = RunRecord | QuestionRecord | Finding | BreakingPoint
 """A row of a campaign's results."""
 
 MEASURED = "_seconds"

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from coop_drake.campaign.batches import PLANNER, Batch
+from coop_drake.campaign.batches import Batch
 from coop_drake.campaign.records import QuestionRecord, Record, RunRecord, schema_of, table_of
+from coop_drake.campaign.search.findings import BreakingPoint, Finding
 from coop_drake.files import write_atomically
 
 if TYPE_CHECKING:
@@ -70,19 +71,23 @@ class CampaignFolder:
 
     def table(self, batches: Sequence[Batch]) -> pyarrow.Table:
         """Return the records of those batches of runs that are there, sorted by run and tier."""
-        runs = self._records([one for one in batches if one.tier != PLANNER], RunRecord)
-        return runs.sort_by([("run", "ascending"), ("tier", "ascending")])
+        return self._records(batches, RunRecord).sort_by([("run", "ascending"), ("tier", "ascending")])
 
     def questions(self, batches: Sequence[Batch]) -> pyarrow.Table:
         """Return the records of those batches of questions that are there, sorted by number."""
-        asked = self._records([one for one in batches if one.tier == PLANNER], QuestionRecord)
-        return asked.sort_by("question")
+        return self._records(batches, QuestionRecord).sort_by("question")
+
+    def findings(self, batches: Sequence[Batch]) -> tuple[list[Finding], list[BreakingPoint]]:
+        """Return what searches and bisections have found, as far as they are there, in their order."""
+        found, points = (self._records(batches, kind).to_pylist() for kind in (Finding, BreakingPoint))
+        return [Finding(**row) for row in found], [BreakingPoint(**row) for row in points]
 
     def _records(self, batches: Sequence[Batch], kind: type[Record]) -> pyarrow.Table:
         import pyarrow
         import pyarrow.parquet
 
-        there = [pyarrow.parquet.read_table(self.path / one.file) for one in batches if self.has(one)]
+        mine = [one for one in batches if one.record is kind]
+        there = [pyarrow.parquet.read_table(self.path / one.file) for one in mine if self.has(one)]
         return pyarrow.concat_tables(there) if there else schema_of(kind).empty_table()
 
     def costs(self, batches: Iterable[Batch]) -> list[dict[str, Any]]:

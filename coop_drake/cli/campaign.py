@@ -75,7 +75,7 @@ def run_command(
             outcome = run_campaign(
                 campaign, folder.path, workers=workers, scheduler=scheduler, progress=progress
             )
-        reporter.facts.update(batches_made=outcome.made, searches_made=outcome.searched)
+        reporter.facts["batches_made"] = outcome.made
         _show(campaign, folder, outcome.batches, reporter)
 
 
@@ -97,10 +97,9 @@ def report_command(
     """Write report.html and report.json: rates with bounds, distributions, the worst runs."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         from coop_drake.campaign.report import make_report, write_report
-        from coop_drake.campaign.search.jobs import findings_of
 
         campaign, folder, batches = _with_batches(file, out)
-        findings, breaking = findings_of(campaign, folder.path)
+        findings, breaking = folder.findings(batches)
         report = make_report(
             campaign.name,
             folder.table(batches),
@@ -192,7 +191,7 @@ def _show(campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...]
     if campaign.runs is not None:
         _show_runs(campaign, folder, batches, reporter)
     if campaign.searches is not None or campaign.breaking is not None:
-        _show_searches(campaign, folder, reporter)
+        _show_searches(folder, batches, reporter)
     reporter.say(f"All results are in {escape(str(folder.path))}")
 
 
@@ -243,14 +242,13 @@ def _show_questions(
         reporter.code = ExitCode.FAILED_RUN
 
 
-def _show_searches(campaign: Campaign, folder: CampaignFolder, reporter: Reporter) -> None:
+def _show_searches(folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter) -> None:
     """Show what searches and bisections have found; a run lost inside the budget makes the command fail."""
     from dataclasses import asdict
 
     from coop_drake.campaign.report.searches import summarise_searches
-    from coop_drake.campaign.search.jobs import findings_of
 
-    findings, points = findings_of(campaign, folder.path)
+    findings, points = folder.findings(batches)
     reporter.facts["searches"] = [asdict(one) for one in findings]
     reporter.facts["breaking"] = [{**asdict(one), "lost": one.beyond} for one in points]
     if findings:

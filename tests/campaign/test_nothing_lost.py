@@ -19,6 +19,7 @@ from coop_drake.campaign.plans import Plans
 from coop_drake.campaign.results import CampaignFolder, write_table
 from coop_drake.campaign.running import Order, make_batch, supervising
 from coop_drake.campaign.running.making import RunMaker
+from coop_drake.campaign.search.searching import Searching
 from coop_drake.campaign.settings import load_campaign
 from coop_drake.campaign.variation import Variation
 from coop_drake.errors import ProcessError
@@ -33,6 +34,17 @@ runs:
   batch: {BATCH}
   vary:
     deployment.mass_error: !Uniform {{min: -0.1, max: 0.1}}
+"""
+SEARCHED = 2
+SEARCHES = f"""
+searches:
+  scenarios: [room.scenario.yaml]
+  set: {{deployment.preset: mobile_base}}
+  budget: all
+  count: {SEARCHED}
+  evaluations: 6
+  tier: compiled
+  batch: 1
 """
 PATIENCE = 300.0
 """Longest that a command is waited for [s]; machines are busy where tests run."""
@@ -84,8 +96,8 @@ def begun(undisturbed):
     """Starts the command in a process of its own, which Ctrl-C and limits can be sent to."""
     with ExitStack() as stack:
 
-        def start(folder, *arguments, **options):
-            words = [sys.executable, "-c", PROGRAM, "campaign", undisturbed.file, "--out", folder, *arguments]
+        def start(folder, *arguments, file=undisturbed.file, **options):
+            words = [sys.executable, "-c", PROGRAM, "campaign", file, "--out", folder, *arguments]
             pipes = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
             process = subprocess.Popen(list(map(str, words)), text=True, **pipes, **options)
             stack.enter_context(process)
@@ -102,9 +114,9 @@ def sorted_bytes(folder, campaign):
     return path.read_bytes()
 
 
-def child_of(folder, *, but=()):
+def child_of(folder, *, but=(), making=""):
     """A process that makes runs for a folder, when there is one."""
-    return waited_for(lambda: [p for p in processes(CHILD, str(folder)) if p.pid not in but])[0]
+    return waited_for(lambda: [p for p in processes(CHILD, str(folder), making) if p.pid not in but])[0]
 
 
 def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undisturbed, begun, tmp_path):
@@ -128,6 +140,7 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     first.send_signal(signal.SIGINT)
     _, said = first.communicate(timeout=PATIENCE)
     assert first.returncode == 130, said
+    assert "leaked" not in said
     waited_for(lambda: not processes(CHILD, str(folder.path)))
     assert len(undisturbed.files(folder)) < len(undisturbed.batches)
 
@@ -152,6 +165,40 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     assert (last.returncode, facts["done"], facts["lost"]) == (0, RUNS, 0)
     assert undisturbed.files(folder) == undisturbed.files(undisturbed.folder)
     assert sorted_bytes(folder, undisturbed) == sorted_bytes(undisturbed.folder, undisturbed)
+
+
+def test_searches_that_are_disturbed_find_what_others_find(undisturbed, begun, tmp_path):
+    file = undisturbed.file.with_name("searched.campaign.yaml")
+    file.write_text(SEARCHES)
+    expected = CampaignFolder(tmp_path / "expected")
+    searching = Searching(load_campaign(file), expected, "search", 0)
+    for batch in searching.batches():
+        expected.write(batch, map(searching.record, range(batch.first, batch.stop)))
+
+    def found(folder):
+        paths = [*folder.path.glob("searches/*"), *folder.path.glob("found/*")]
+        return {path.name: path.read_bytes() for path in paths}
+
+    folder = CampaignFolder(tmp_path / "searched")
+    first = begun(folder.path, "--workers", 1, file=file)
+    child = child_of(folder.path, making='"search"')
+    kill(child.pid)
+    child_of(folder.path, but=[child.pid], making='"search"')
+    first.terminate()
+    _, said = first.communicate(timeout=PATIENCE)
+    assert (first.returncode, "leaked" in said) == (128 + signal.SIGTERM, False), said
+    waited_for(lambda: not processes(CHILD, str(folder.path)))
+    assert found(folder).items() < found(expected).items()
+    second = begun(folder.path, "--workers", 2, file=file)
+    child_of(folder.path, making='"search"')
+    kill(second.pid)
+    second.communicate()
+    waited_for(lambda: not processes(CHILD, str(folder.path)))
+    last = begun(folder.path, "--workers", 2, file=file)
+    last.communicate(timeout=PATIENCE)
+    assert last.returncode == 0
+    assert found(folder) == found(expected)
+    assert len(found(folder)) == 2 * SEARCHED
 
 
 def test_a_scheduler_of_the_users_own_may_be_killed(undisturbed, begun, tmp_path):

@@ -1,8 +1,9 @@
-"""A process that makes the runs or answers the questions of one batch, writes a line for each, and ends.
+"""A process that makes the runs, questions or searches of one batch, writes a line for each, and ends.
 
 ``python -m coop_drake.campaign.running.child ORDER`` with the order as JSON. Drake keeps some memory of every
 plant, which ends with the process. Lines on standard output are JSON: ``["begun", record]`` and ``["ended",
-record]`` for each of them, ``["costs", mapping]`` at the end, ``["error", message]`` where none can be made.
+record]`` for each of them, ``["alive", null]`` after each run of a search, ``["costs", mapping]`` at the end,
+``["error", message]`` where none can be made.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from coop_drake.errors import CoopDrakeError
 
 if TYPE_CHECKING:
+    from coop_drake.campaign.batches import Batch
     from coop_drake.campaign.records import Record
     from coop_drake.campaign.results import CampaignFolder
     from coop_drake.campaign.settings import Campaign
@@ -40,14 +42,14 @@ def main(order: dict[str, Any]) -> int:
 
 
 def _make(order: dict[str, Any]) -> None:
-    from coop_drake.campaign.batches import PLANNER
     from coop_drake.campaign.results import CampaignFolder
     from coop_drake.campaign.settings import load_campaign
     from coop_drake.memory import peak_memory_mb
 
     folder = CampaignFolder(Path(order["folder"]))
     campaign = load_campaign(folder.campaign, Path(order["campaign"]))
-    made = _questions if order["batch"]["tier"] == PLANNER else _runs
+    kinds = {"planner": _questions, "search": _searches, "breaking": _searches}
+    made = kinds.get(order["batch"]["tier"], _runs)
     for begun, record in made(campaign, folder, order):
         _say("begun", asdict(begun))
         _say("ended", asdict(record()))
@@ -64,12 +66,29 @@ def _runs(campaign: Campaign, folder: CampaignFolder, order: dict[str, Any]) -> 
     batch, variation = order["batch"], Variation(campaign)
     plans = Plans(variation, folder.plans)
     place = batch["scenario"], batch["tier"], batch["first"], batch["stop"]
-    if Batching(variation, plans).batch(*place).digest != batch["digest"]:
-        raise CoopDrakeError(f"{order['campaign']}: a scenario or a model was changed while the campaign ran")
+    _compare(order, Batching(variation, plans).batch(*place))
     maker = RunMaker(variation, plans, batch["tier"], folder.path / "logs")
     for index in range(order["begin"], batch["stop"]):
         run = variation.run(index)
         yield maker.begun(run), partial(maker.record, run)
+
+
+def _searches(campaign: Campaign, folder: CampaignFolder, order: dict[str, Any]) -> Iterator[Task]:
+    """Yield the searches or bisections of a batch that are to be made."""
+    from coop_drake.campaign.search.searching import Searching
+
+    batch = order["batch"]
+    alive = partial(_say, "alive", None)
+    searching = Searching(campaign, folder, batch["tier"], batch["scenario"], alive)
+    _compare(order, searching.batch(batch["first"], batch["stop"]))
+    for index in range(order["begin"], batch["stop"]):
+        yield searching.begun(index), partial(searching.record, index)
+
+
+def _compare(order: dict[str, Any], batch: Batch) -> None:
+    """Check that what files say now gives the batch that was ordered."""
+    if batch.digest != order["batch"]["digest"]:
+        raise CoopDrakeError(f"{order['campaign']}: a scenario or a model was changed while the campaign ran")
 
 
 def _questions(campaign: Campaign, folder: CampaignFolder, order: dict[str, Any]) -> Iterator[Task]:

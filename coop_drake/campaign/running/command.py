@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import fcntl
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from coop_drake.campaign.batches import PLANNER, Batch, Batching, question_batches
 from coop_drake.campaign.plans import Plans
 from coop_drake.campaign.questions.settings import QuestionSettings
+from coop_drake.campaign.records import RunRecord
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.campaign.running.placing import place
 from coop_drake.campaign.running.supervising import Order
-from coop_drake.campaign.search.jobs import run_jobs
+from coop_drake.campaign.search.searching import Searching, search_batches, section_of
 from coop_drake.campaign.settings import Campaign
 from coop_drake.campaign.variation import Variation
 from coop_drake.errors import ScenarioError
@@ -31,13 +33,11 @@ class Outcome:
         folder: Where its results are.
         batches: All of its batches.
         made: How many of them this call has made; the others were there.
-        searched: How many searches and bisections it has made.
     """
 
     folder: CampaignFolder
     batches: tuple[Batch, ...]
     made: int
-    searched: int = 0
 
 
 def batches_of(campaign: Campaign, folder: CampaignFolder) -> tuple[Batch, ...]:
@@ -47,11 +47,12 @@ def batches_of(campaign: Campaign, folder: CampaignFolder) -> tuple[Batch, ...]:
         ScenarioError: The campaign file or a scenario is wrong.
     """
     asked = () if campaign.questions is None else tuple(question_batches(campaign.questions))
+    others = *asked, *search_batches(campaign, folder)
     if campaign.runs is None:
-        return asked
+        return others
     variation = Variation(campaign)
     variation.check()
-    return *Batching(variation, Plans(variation, folder.plans)).batches(), *asked
+    return *Batching(variation, Plans(variation, folder.plans)).batches(), *others
 
 
 def run_campaign(
@@ -63,8 +64,6 @@ def run_campaign(
     progress: Progress | None = None,
 ) -> Outcome:
     """Make all runs and searches and answer all questions of a campaign whose results are not there yet.
-
-    Searches are made on this machine.
 
     Args:
         campaign: The campaign.
@@ -85,11 +84,7 @@ def run_campaign(
     with _locked(folder):
         write_atomically(folder.campaign, campaign.path.read_bytes())
         missing = folder.missing(batches)
-        if runs := [batch for batch in missing if batch.tier != PLANNER]:
-            variation = Variation(campaign)
-            plans = Plans(variation, folder.plans)
-            for scenario in sorted({batch.scenario for batch in runs}):
-                plans.with_maps(variation.run(scenario * variation.runs_of_scenario), progress)
+        _plan(campaign, folder, missing, progress)
         there = len(batches) - len(missing)
         done: set[str] = set()
 
@@ -102,15 +97,34 @@ def run_campaign(
         orders = [Order(file, str(folder.path), one, _time_limit(campaign, one)) for one in missing]
         if orders:
             place(orders, workers, scheduler, note)
-        searched = run_jobs(campaign, folder.path, workers or os.cpu_count() or 1, progress)
-        return Outcome(folder, batches, len(done), searched)
+        return Outcome(folder, batches, len(done))
+
+
+def _plan(
+    campaign: Campaign, folder: CampaignFolder, missing: Iterable[Batch], progress: Progress | None
+) -> None:
+    """Make the plans of batches that are not there; processes find them in the folder."""
+    asked = {(batch.tier, batch.scenario): batch.record for batch in missing if batch.tier != PLANNER}
+    variation = Variation(campaign) if RunRecord in asked.values() else None
+    for kind, scenario in asked:
+        if kind == "search" or kind == "breaking":
+            _ = Searching(campaign, folder, kind, scenario).trials.budget
+        elif variation is not None:
+            first = variation.run(scenario * variation.runs_of_scenario)
+            Plans(variation, folder.plans).with_maps(first, progress)
 
 
 def _time_limit(campaign: Campaign, batch: Batch) -> float:
-    """Longest that a process may take for a run or a question of a batch [s]."""
-    limits = campaign.questions if batch.tier == PLANNER else campaign.runs
+    """Longest that a process may take for a run or a question of a batch, or for a run of a search [s]."""
+    if batch.tier == PLANNER:
+        limits: Any = campaign.questions
+    elif batch.tier == "search" or batch.tier == "breaking":
+        limits = section_of(campaign, batch.tier)
+    else:
+        limits = campaign.runs
     assert limits is not None  # or there would be no such batch
-    return limits.longest if isinstance(limits, QuestionSettings) else limits.time_limit
+    longest: float = limits.longest if isinstance(limits, QuestionSettings) else limits.time_limit
+    return longest
 
 
 @contextmanager

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import islice
 from typing import TYPE_CHECKING
 
 from coop_drake.campaign.batches import Batch
 from coop_drake.campaign.running.supervising import Order, make_batch
 from coop_drake.errors import ProcessError
-from coop_drake.interrupts import uninterrupted
+from coop_drake.interrupts import ended_by_signals, uninterrupted
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -88,5 +89,10 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Client]:
             silence_logs=50,
         )
         client = distributed.Client(cluster)
-    with cluster, client:
-        yield client
+    with ended_by_signals(), cluster, client:
+        try:
+            yield client
+        finally:  # Dask waits for batches that are being made; their processes end with their workers.
+            for worker in cluster.workers.values():
+                with suppress(ProcessLookupError):
+                    os.kill(worker.pid, signal.SIGKILL)

@@ -35,7 +35,7 @@ class Order:
         campaign: The campaign file, against which the names of scenarios are resolved.
         folder: The folder of the results, which every worker must see under this name.
         batch: The batch.
-        time_limit: Longest that a run may take [s].
+        time_limit: Longest that a run or a question may take, or a run of a search [s].
     """
 
     campaign: str
@@ -111,6 +111,8 @@ def _lines(order: Order, begin: int) -> Iterator[tuple[str, Any]]:
                 kind, content = json.loads(line)
                 if kind == "error":
                     raise ProcessError(content)
+                if kind == "alive":
+                    continue
                 if kind == "begun":
                     begun = order.batch.record(**content)
                     continue

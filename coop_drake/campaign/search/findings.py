@@ -17,10 +17,10 @@ class Finding:
         evaluations: Runs simulated.
         margin: Name of the column that was driven down, or up if it is ``budget_share``.
         before: Its value in the first run, whose departures were drawn at random [unit of the column].
-        worst: Its worst value [unit of the column].
+        worst: Its worst value [unit of the column]. Both are NaN where processes were lost in the search.
         arrived: Whether the worst run arrived.
         reason: Why not; empty if it arrived.
-        file: Scenario file of the worst run; empty where none was written.
+        file: Campaign file of the worst run, in the campaign's folder; empty where none was written.
     """
 
     scenario: str
@@ -31,7 +31,7 @@ class Finding:
     before: float
     worst: float
     arrived: bool
-    reason: str
+    reason: str = ""
     file: str = ""
 
 

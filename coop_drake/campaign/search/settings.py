@@ -33,8 +33,12 @@ class Searches:
             every scenario requires.
         factor: How many times the budget departures may be; 1 for departures inside it [-].
         margin: The margin that is driven down; ``budget_share`` is driven up.
-        seed: Seed of all searches.
+        seed: Seed of the first search; the others have those after it.
         tier: Which loop simulates the runs.
+        batch: Searches that one process makes, and one file holds; null for 1 with Drake's loop, of which
+            every run leaves some memory behind, and 10 with the compiled one.
+        time_limit: Longest that a process may take for each run of a search; for the first one ten minutes
+            more, in which it starts and may compile kernels [s].
     """
 
     scenarios: tuple[str, ...]
@@ -46,6 +50,13 @@ class Searches:
     margin: Margin = "funnel_margin"
     seed: Seed = 0
     tier: Literal["drake", "compiled"] = "drake"
+    batch: Count | None = None
+    time_limit: Positive = 120.0
+
+    @property
+    def size(self) -> int:
+        """Searches of a batch."""
+        return self.batch or {"drake": 1, "compiled": 10}[self.tier]
 
     def __post_init__(self) -> None:
         if not self.scenarios:
@@ -72,6 +83,7 @@ class Breaking:
             every scenario requires.
         seed: Seed of periods and signs.
         tier: Which loop simulates the runs.
+        time_limit: As for searches [s].
     """
 
     scenarios: tuple[str, ...]
@@ -85,6 +97,12 @@ class Breaking:
     budget: str | None = None
     seed: Seed = 0
     tier: Literal["drake", "compiled"] = "drake"
+    time_limit: Positive = 120.0
+
+    @property
+    def size(self) -> int:
+        """Departures of a batch; each takes some minutes."""
+        return 1
 
     def __post_init__(self) -> None:
         for name, values in (("scenarios", self.scenarios), ("departures", self.departures)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,10 +30,16 @@ class Trials:
         asked: The section that asks for the runs.
         scenario: Name of the scenario, one of the section's.
         folder: The folder of the results, with the plans.
+        made: Called whenever a run was made.
     """
 
     def __init__(
-        self, campaign: Campaign, asked: Searches | Breaking, scenario: str, folder: CampaignFolder
+        self,
+        campaign: Campaign,
+        asked: Searches | Breaking,
+        scenario: str,
+        folder: CampaignFolder,
+        made: Callable[[], None],
     ) -> None:
         from coop_drake.campaign.plans import Plans
         from coop_drake.campaign.running.making import RunMaker
@@ -42,7 +48,7 @@ class Trials:
         from coop_drake.campaign.variation import Variation
 
         self._section = Runs((scenario,), 1, set=asked.set, budget=asked.budget, tier=asked.tier)
-        self._campaign, self._name = campaign, scenario
+        self._campaign, self._name, self._made = campaign, scenario, made
         self.variation = Variation(File(runs=self._section, path=campaign.path))
         self._plans = Plans(self.variation, folder.plans)
         self._maker = RunMaker(self.variation, self._plans, asked.tier, folder.path / "logs")
@@ -82,7 +88,11 @@ class Trials:
         """Make one run for each choice of departures, with a seed for what is still drawn."""
         from coop_drake.campaign.variation import Run
 
-        return [self._maker.record(Run(0, 0, seed, dict(values))) for values in chosen]
+        records = []
+        for values in chosen:
+            records.append(self._maker.record(Run(0, 0, seed, dict(values))))
+            self._made()
+        return records
 
     def write_found(self, values: Mapping[str, Any], file: Path, seed: int = 0) -> Path:
         """Write a campaign file whose run 0 is the run with these departures, for ``campaign replay``."""

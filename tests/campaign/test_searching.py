@@ -1,6 +1,5 @@
 """Searches and bisections of a campaign file, and that what they find can be made again."""
 
-import json
 from dataclasses import replace
 from math import inf, isfinite
 
@@ -10,10 +9,12 @@ import yaml
 
 from coop_drake.campaign import load_campaign
 from coop_drake.campaign.plans import Plans
+from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.running import run_campaign
 from coop_drake.campaign.running.making import RunMaker
 from coop_drake.campaign.search import BreakingPoint
-from coop_drake.campaign.search.jobs import carry_out, findings_of, jobs_of, run_jobs
 from coop_drake.campaign.search.multiples import departures_at, largest_multiple, multiplied
+from coop_drake.campaign.search.searching import Searching, search_batches
 from coop_drake.campaign.variation import Variation
 from coop_drake.errors import ScenarioError
 from tests.support.scenarios import write_scenario
@@ -36,15 +37,14 @@ def campaign(tmp_path_factory):
 def searched(campaign):
     """The one search of the campaign, made in a process of its own."""
     alone = replace(campaign, breaking=None)
-    folder = campaign.path.parent / "results"
-    return alone, folder, run_jobs(alone, folder, workers=1)
+    return alone, run_campaign(alone, campaign.path.parent / "results", workers=1)
 
 
 def test_a_search_is_made_once_and_kept(searched):
-    campaign, folder, made = searched
-    assert made == 1
-    assert run_jobs(campaign, folder, workers=1) == 0
-    (finding,), points = findings_of(campaign, folder)
+    campaign, outcome = searched
+    assert outcome.made == 1
+    assert run_campaign(campaign, outcome.folder.path, workers=1).made == 0
+    (finding,), points = outcome.folder.findings(outcome.batches)
     assert points == []
     assert (finding.scenario, finding.tier, finding.seed, finding.evaluations) == ("room", "drake", 4, 2)
     assert finding.arrived
@@ -52,8 +52,9 @@ def test_a_search_is_made_once_and_kept(searched):
 
 
 def test_the_worst_run_is_found_again_to_the_last_bit(searched):
-    campaign, folder, _ = searched
-    (finding,), _ = findings_of(campaign, folder)
+    _, outcome = searched
+    (finding,), _ = outcome.folder.findings(outcome.batches)
+    folder = outcome.folder.path
     again = Variation(load_campaign(folder / finding.file))
     assert again.count == 1
     maker = RunMaker(again, Plans(again, folder / "plans"), "drake", folder)
@@ -69,32 +70,34 @@ def test_a_breaking_point_is_where_the_first_run_is_lost(campaign, searched, mon
         return replace(maker.begun(run), arrived=size < 0.006, reason="" if size < 0.006 else "left")
 
     monkeypatch.setattr(RunMaker, "record", record)
-    folder = searched[1]
-    first, second = (job for job in jobs_of(campaign, folder) if job.departure)
-    carry_out(first)
-    _, (angles,) = findings_of(campaign, folder)
+    searching = Searching(campaign, searched[1].folder, "breaking", 0)
+    angles, model = map(searching.record, range(2))
     assert angles.certified == 0.0015
     assert (angles.kept < 4.0 <= angles.lost, angles.lost - angles.kept <= 0.1) == (True, True)
     assert (angles.reason, angles.runs, angles.beyond) == ("left", 2, angles.lost)
-    carry_out(second)
-    _, (_, model) = findings_of(campaign, folder)
     assert (model.departure, model.kept, model.lost, model.beyond) == ("model", 4.0, inf, None)
     assert isinstance(model, BreakingPoint)
-    files = {job.departure: job.file() for job in jobs_of(campaign, folder)}
-    assert json.loads(files["model"].read_text())["lost"] is None
+    batches = list(searching.batches())
+    searched[1].folder.write(batches[1], [model])
+    assert searched[1].folder.findings(batches) == ([], [model])
 
 
 def test_further_searches_leave_the_results_of_earlier_ones_valid(campaign, tmp_path):
     more = replace(campaign, searches=replace(campaign.searches, count=3), breaking=None)
-    before, after = (jobs_of(one, tmp_path) for one in (campaign, more))
-    assert [job.seed for job in after] == [4, 5, 6]
-    assert after[0].file() == before[0].file()
+    folder = CampaignFolder(tmp_path)
+    before, after = (list(search_batches(one, folder)) for one in (campaign, more))
+    assert [(one.tier, one.first) for one in before] == [("search", 0), ("breaking", 0), ("breaking", 1)]
+    assert [(one.first, one.stop) for one in after] == [(0, 1), (1, 2), (2, 3)]
+    assert Searching(more, folder, "search", 0).begun(2).seed == 6
+    assert after[0].digest == before[0].digest
     other = replace(more, searches=replace(more.searches, evaluations=3))
-    assert jobs_of(other, tmp_path)[0].file() != before[0].file()
+    assert next(search_batches(other, folder)).digest != before[0].digest
+    larger = replace(more, searches=replace(more.searches, batch=2))
+    assert [(one.first, one.stop) for one in search_batches(larger, folder)] == [(0, 2), (2, 3)]
 
 
 def test_one_departure_acts_alone_at_its_multiple_and_all_errors_together(campaign, searched):
-    trials = jobs_of(campaign, searched[1])[0].trials()
+    trials = Searching(campaign, searched[1].folder, "search", 0).trials
     budget, tree = trials.budget, trials.tree
     waves = "deployment.measurements.waves"
     angles = departures_at(budget, tree, "angles", 3.0, 1)
@@ -133,4 +136,4 @@ def test_wrong_sections_are_refused_with_file_and_key(section, key, tmp_path):
 def test_a_search_needs_a_budget(campaign, searched):
     asked = replace(campaign, searches=replace(campaign.searches, budget=None))
     with pytest.raises(ScenarioError, match="what is certified"):
-        _ = jobs_of(asked, searched[1])[0].trials().budget
+        _ = Searching(asked, searched[1].folder, "search", 0).trials.budget
