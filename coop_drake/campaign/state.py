@@ -28,6 +28,7 @@ class State:
         lost: How many of these did not arrive.
         funnel_margin: Least distance of an axis to a bound of its funnel, NaN if none is known [rad or m].
         clearance: Least distance to walls and between bodies, NaN if none is known [m].
+        budget_share: Largest share used of what the plan's budget states, NaN if none is known [-].
         cpu_seconds: Processor time of a run, with its share of starting processes, NaN if not known [s].
     """
 
@@ -38,6 +39,7 @@ class State:
     lost: int
     funnel_margin: float
     clearance: float
+    budget_share: float
     cpu_seconds: float
 
     def facts(self) -> dict[str, Any]:
@@ -47,7 +49,12 @@ class State:
 
     def cells(self) -> tuple[str, ...]:
         """Return a row of a table."""
-        margins = (f"{self.funnel_margin:.4f} rad", f"{self.clearance:.4f} m", f"{self.cpu_seconds:.3f} s")
+        margins = (
+            f"{self.funnel_margin:.4f} rad",
+            f"{self.clearance:.4f} m",
+            f"{100.0 * self.budget_share:.1f} %",
+            f"{self.cpu_seconds:.3f} s",
+        )
         shown = ("" if text.startswith("nan") else text for text in margins)
         return f"{self.scenario}, {self.tier}", str(self.runs), str(self.done), str(self.lost), *shown
 
@@ -60,7 +67,7 @@ def state_of(campaign: Campaign, folder: CampaignFolder, batches: Sequence[Batch
         table = folder.table(mine)
         costs = folder.costs(mine)
         counted = sum(entry["runs"] for entry in costs)
-        column = {name: table.column(name).to_numpy() for name in ("funnel_margin", "arrived", *_CLEARANCES)}
+        column = {name: table.column(name).to_numpy() for name in _COLUMNS}
         rows.append(
             State(
                 Variation(campaign).scenarios[key[0]].name,
@@ -70,6 +77,7 @@ def state_of(campaign: Campaign, folder: CampaignFolder, batches: Sequence[Batch
                 int((~column["arrived"]).sum()),
                 _least(column["funnel_margin"]),
                 _least(np.concatenate([column[name] for name in _CLEARANCES])),
+                -_least(-column["budget_share"]),
                 sum(entry["cpu_seconds"] for entry in costs) / counted if counted else nan,
             )
         )
@@ -77,6 +85,7 @@ def state_of(campaign: Campaign, folder: CampaignFolder, batches: Sequence[Batch
 
 
 _CLEARANCES = ("wall_clearance", "body_clearance")
+_COLUMNS = ("funnel_margin", "arrived", "budget_share", *_CLEARANCES)
 
 
 def _least(values: np.ndarray) -> float:

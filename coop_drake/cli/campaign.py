@@ -208,7 +208,10 @@ def _show_runs(
         lost=sum(row.lost for row in rows),
         rows=[row.facts() for row in rows],
     )
-    headings = ("runs", "done", "lost", "least funnel margin", "least clearance", "CPU time of a run")
+    headings = (
+        "runs", "done", "lost", "least funnel margin", "least clearance", "used of budget",
+        "CPU time of a run",
+    )  # fmt: skip
     reporter.table(campaign.name, [row.cells() for row in rows], headings, "scenario, tier")
     if reporter.facts["lost"]:
         reporter.code = ExitCode.FAILED_RUN

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+
 from coop_drake.campaign.settings import Campaign
 from docs.generate.scenario_keys import Section, sections
 
@@ -27,19 +29,30 @@ is not listed is refused. `make docs` makes this page from the classes that hold
 
 def scenario_page() -> str:
     """Return the page of scenario files: one table for each section."""
-    return "\n".join([_TOP, *map(_section, sections())])
+    return "\n".join([_TOP, *_tables(sections())])
 
 
 def campaign_page() -> str:
     """Return the page of campaign files, likewise."""
-    return "\n".join([_CAMPAIGN, *map(_section, sections(Campaign))])
+    return "\n".join([_CAMPAIGN, *_tables(sections(Campaign))])
 
 
-def _section(section: Section) -> str:
+def _tables(found: Iterable[Section]) -> Iterator[str]:
+    """Yield the table of every section; sections with the same keys have one, where the first stands."""
+    places: dict[tuple[object, ...], list[Section]] = {}
+    for section in found:
+        places.setdefault((section.about, section.keys), []).append(section)
+    for same in places.values():
+        yield _section(same[0], [one.path for one in same[1:]])
+
+
+def _section(section: Section, others: list[str]) -> str:
+    also = f"The same keys stand in {', '.join(f'`{path}`' for path in others)}."
     lines = [
         f"## `{section.path}`" if section.path else "## The file",
         "",
         section.about,
+        *(["", also] if others else []),
         "",
         "| key | value | default | meaning |",
         "|---|---|---|---|",

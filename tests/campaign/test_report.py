@@ -10,7 +10,7 @@ from scipy.stats import beta
 
 from coop_drake.campaign.records import QuestionRecord, table_of
 from coop_drake.campaign.report import make_report, write_report
-from coop_drake.campaign.report.page import headline, render_page
+from coop_drake.campaign.report.page import headline, render_page, verdict
 from coop_drake.campaign.report.rates import loss_rate
 from coop_drake.campaign.report.searches import summarise_searches
 from coop_drake.campaign.search import BreakingPoint, Finding
@@ -85,6 +85,23 @@ def test_lost_runs_come_first_among_the_worst_and_the_smallest_share_next(both_t
     assert shares == sorted(shares)
     assert len(both_tiers.worst) == 10
     assert all(run.measure == "funnel_margin" for run in both_tiers.worst)
+
+
+def test_a_run_that_used_more_than_the_budget_states_is_told_first():
+    table, share = run_table(60), np.full(60, 0.4)
+    column = table.schema.get_field_index("budget_share")
+    assert verdict(make_report("inside", table.set_column(column, "budget_share", pa.array(share)))) == "good"
+    share[31] = 1.07
+    report = make_report("beyond", table.set_column(column, "budget_share", pa.array(share)))
+    assert (report.exceeded, report.most_used, report.worst[0].run) == (1, 1.07, 31)
+    assert headline(report).endswith("1 run used more than the budget states, up to 107 % of it.")
+    assert verdict(report) == "some"
+    assert 'class="headline some"' in render_page(report, replay)
+    found = Finding("base", "compiled", 1, 10, "budget_share", 0.4, 1.2, arrived=True)
+    searched = make_report("searches", findings=[found])
+    assert headline(searched).endswith("1 search used more than the budget states, up to 120 % of it.")
+    assert verdict(searched) == "some"
+    assert verdict(make_report("lost", run_table(60, lost=(3,)))) == "bad"
 
 
 def test_a_tier_without_a_column_leaves_it_empty():
@@ -174,7 +191,7 @@ def test_the_page_stands_alone_and_has_every_section(both_tiers, tmp_path):
     parser.feed(text)
     assert all(link.startswith("#") for link in parser.needed)
     assert "script" not in parser.opened
-    assert parser.opened.count("svg") == 4
+    assert parser.opened.count("svg") == 5
     assert parser.opened.count("h2") == 8
     assert "a &lt; b" in text
     assert "&lt;found&gt;.yaml" in text

@@ -34,8 +34,16 @@ class Measure:
         value = self.factor * number
         if np.isnan(value):
             return ""
-        return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
+        return significant(value)
 
+
+def significant(value: float, digits: int = 3) -> str:
+    """A number with some significant digits, and whole from 100 on."""
+    return f"{value:.0f}" if abs(value) >= 100.0 else f"{value:.{digits}g}"
+
+
+SHARE = "budget_share"
+"""Name of the column that is lost beyond one, not below zero."""
 
 MARGINS = (
     Measure("funnel_margin", "axis to the bound of its funnel", "mrad or mm", 1e3, True),
@@ -49,7 +57,7 @@ COSTS = (
     Measure("time", "time to arrival", "s", 1.0, False),
     Measure("peak_force", "largest base force", "N", 1.0, False),
     Measure("peak_torque", "largest torque", "N m", 1.0, False),
-    Measure("budget_share", "share of the budget's stated distance used", "%", 100.0, False),
+    Measure(SHARE, "used of what the budget states", "%", 100.0, False),
 )
 """What a run takes."""
 

@@ -8,8 +8,10 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from coop_drake.campaign.report.agreement import Agreement, agreement
-from coop_drake.campaign.report.columns import Runs
+from coop_drake.campaign.report.columns import SHARE, Runs
 from coop_drake.campaign.report.distributions import Group, summarise
 from coop_drake.campaign.report.influences import Influence, influences
 from coop_drake.campaign.report.questions import Questions, summarise_questions
@@ -26,6 +28,8 @@ class Report:
         title: Name of the campaign.
         facts: What was asked for: name and value, in the order shown.
         rate: How many of all runs were lost; None without runs.
+        exceeded: Runs that used more than all of what the budget states, lost or not.
+        most_used: Largest share of what the budget states that a run used; NaN where none is known [-].
         groups: The runs of every scenario and tier.
         influences: How margins depend on keys that vary.
         agreements: How far two tiers agree.
@@ -38,6 +42,8 @@ class Report:
     title: str
     facts: tuple[tuple[str, str], ...]
     rate: Rate | None
+    exceeded: int
+    most_used: float
     groups: tuple[Group, ...]
     influences: tuple[Influence, ...]
     agreements: tuple[Agreement, ...]
@@ -74,10 +80,13 @@ def make_report(
     """
     known = None if runs is None or runs.num_rows == 0 else Runs(runs)
     asked = questions is not None and questions.num_rows > 0
+    used = np.empty(0) if known is None else known.floats(SHARE)
     return Report(
         title,
         tuple(facts),
         None if known is None else loss_rate(int(known.lost.sum()), known.count, confidence),
+        int((used > 1.0).sum()),
+        float(np.nanmax(used)) if np.isfinite(used).any() else math.nan,
         () if known is None else summarise(known, confidence),
         () if known is None else influences(known),
         () if known is None else agreement(known),

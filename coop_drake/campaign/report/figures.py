@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 import matplotlib as mpl
@@ -10,9 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from coop_drake.campaign.report.columns import MEASURES, Measure
+from coop_drake.campaign.report.columns import MEASURES, SHARE, Measure
 from coop_drake.campaign.report.distributions import Distribution, Group
 from coop_drake.campaign.report.questions import ALL, Questions
+from coop_drake.campaign.report.searches import Searched
 from coop_drake.campaign.search.findings import BreakingPoint
 from coop_drake.drawing.canvas import house_style, picture_of
 from coop_drake.drawing.colours import BLUE, GREEN, GREY, INK, ORANGE, VERMILLION
@@ -22,6 +24,19 @@ _PANEL, _ROW = 2.3, 0.42
 
 _LABELS = 1.9
 """Space for the names of the rows [in]."""
+
+_BELOW = 0.9
+"""Space for numbers and names below a panel [in]."""
+
+_LEAST = 0.5
+"""Where the logarithmic scale of multiples begins [-]."""
+
+_WORDS = 34
+"""Letters in a line below a panel."""
+
+_FROM, _USUAL, _WORST = "random departures", "usual find", "worst find"
+_MOST, _MEDIAN, _LARGEST = "5 % to 95 %", "median", "largest"
+"""What the marks of two figures mean."""
 
 
 def distributions_svg(groups: Sequence[Group], measures: Sequence[Measure] = MEASURES) -> str:
@@ -34,32 +49,74 @@ def distributions_svg(groups: Sequence[Group], measures: Sequence[Measure] = MEA
         for row, group in enumerate(groups):
             if (values := group.measures.get(measure.name)) is not None:
                 _draw_hill(ax, len(groups) - 1 - row, values, measure)
-        ax.set_xlabel(f"{measure.label}\n[{measure.unit}]")
-        if measure.margin:
-            ax.axvline(0.0, color=VERMILLION, linewidth=1.5)
-            ax.set_xlim(left=min(0.0, ax.get_xlim()[0]))
-        else:
-            ax.set_xlim(left=0.0)
+        _limit(ax, measure)
     return _svg(figure)
 
 
+def searches_svg(searched: Sequence[Searched]) -> str:
+    """Draw from where to where searches drove each margin; empty without searches."""
+    shown = [one for one in MEASURES if any(one.name == row.margin for row in searched)]
+    if not shown:
+        return ""
+    names = list(dict.fromkeys(f"{row.scenario}, {row.tier}" for row in searched))
+    figure, panels = _panels(len(shown), len(names), names, width=5.0 / len(shown), row=0.3, top=0.4)
+    for ax, measure in zip(panels, shown, strict=True):
+        for row in (one for one in searched if one.margin == measure.name):
+            place = len(names) - 1 - names.index(f"{row.scenario}, {row.tier}") + 0.35
+            ends = measure.factor * np.array([row.before, row.typical, row.worst.worst])
+            ax.plot(ends, [place] * 3, color=GREY, linewidth=1.0)
+            ax.plot(ends[0], place, "o", color=GREY, markersize=4.5, label=_FROM)
+            ax.plot(ends[1], place, "o", color=BLUE, markersize=4.5, label=_USUAL)
+            colour = VERMILLION if _is_beyond(measure, row.worst.worst) else ORANGE
+            ax.plot(ends[2], place, "D", color=colour, markersize=5.0, label=_WORST)
+        _limit(ax, measure)
+    _legend(figure, panels[0])
+    return _svg(figure)
+
+
+def _legend(figure: Figure, ax: Axes) -> None:
+    """Say above the panels what the marks are, each once."""
+    marks = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))
+    figure.legend(marks.values(), marks.keys(), loc="upper center", ncols=len(marks), frameon=False)
+
+
+def _limit(ax: Axes, measure: Measure) -> None:
+    """Draw the limit of a measure that has one, and let the axis begin at zero."""
+    words = textwrap.fill(measure.label, _WORDS)
+    ax.set_xlabel(f"{words}\n[{measure.unit}]")
+    if measure.margin or measure.name == SHARE:
+        ax.axvline(0.0 if measure.margin else measure.factor, color=VERMILLION, linewidth=1.5)
+    low, high = ax.get_xlim()
+    ax.set_xlim(min(0.0, low) if measure.margin else 0.0, high + 0.02 * (high - low))
+
+
+def _is_beyond(measure: Measure, value: float) -> bool:
+    """Whether a value is beyond the limit of its measure."""
+    return value <= 0.0 if measure.margin else measure.name == SHARE and value > 1.0
+
+
 def breaking_svg(points: Sequence[BreakingPoint]) -> str:
-    """Draw up to which multiple of what is certified no run was lost; empty without points."""
+    """Draw up to which multiple of what is certified no run was lost: dots for scenarios, a bar to the least.
+
+    Empty without points.
+    """
     if not points:
         return ""
-    names = [f"{point.departure.replace('_', ' ')}, {point.scenario}" for point in points]
-    figure, (ax,) = _panels(1, len(points), names, width=5.0)
-    ends = np.array([max(point.kept, 0.5) for point in points])  # the scale is logarithmic from one half
-    places = np.arange(len(points))[::-1] + 0.35
-    ax.barh(places, ends, height=0.5, color=[GREEN if end >= 1.0 else VERMILLION for end in ends])
-    for place, point in zip(places, points, strict=True):
-        beyond = "" if np.isfinite(point.lost) else " or more"
-        text = f"{point.kept:.2g}{beyond}"
-        ax.annotate(text, (max(point.kept, 0.5), place), (5.0, 0.0), textcoords="offset points", va="center")
+    names = list(dict.fromkeys(point.departure for point in points))
+    figure, (ax,) = _panels(1, len(names), [name.replace("_", " ") for name in names], width=5.0)
+    for place, name in zip(np.arange(len(names))[::-1] + 0.35, names, strict=True):
+        own = sorted((point for point in points if point.departure == name), key=lambda point: point.kept)
+        ends = [max(point.kept, _LEAST) for point in own]
+        ax.barh(place, ends[0], height=0.5, color=GREEN if own[0].kept >= 1.0 else VERMILLION)
+        ax.plot(ends, [place] * len(ends), "o", color=BLUE, markersize=4.5)
+        beyond = "" if np.isfinite(own[0].lost) else " or more"
+        text = f"{own[0].kept:.3g}{beyond}, {own[0].scenario}"
+        ax.annotate(text, (ends[-1], place), (8.0, 0.0), textcoords="offset points", va="center")
     ax.axvline(1.0, color=INK, linewidth=1.5)
-    largest = int(np.ceil(np.log2(max(2.0, ends.max())))) + 1
+    most = max(point.kept for point in points)
+    largest = int(np.ceil(np.log2(max(2.0, most)))) + 1
     ax.set_xscale("log", base=2)
-    ax.set_xlim(0.5, 2.0 ** (largest + 0.8))
+    ax.set_xlim(_LEAST, 2.0 ** (largest + 1.8))
     ticks = 2.0 ** np.arange(-1, largest + 1)
     ax.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
     ax.set_xlabel("largest multiple of what is certified at which no run was lost [-]")
@@ -72,28 +129,36 @@ def growth_svg(questions: Sequence[Questions]) -> str:
     if not groups:
         return ""
     names = [f"{one.axis} {one.group}" for one in groups]
-    figure, (ax,) = _panels(1, len(groups), names, width=5.0, row=0.24)
+    figure, (ax,) = _panels(1, len(groups), names, width=5.0, row=0.24, top=0.4)
     places = np.arange(len(groups))[::-1] + 0.35
     for place, one in zip(places, groups, strict=True):
         times = one.seconds
-        ax.plot([times.low, times.high], [place, place], color=BLUE, alpha=0.45, linewidth=5.0)
-        ax.plot(times.median, place, "o", color=BLUE, markersize=4.5)
-        ax.plot(times.largest, place, "D", color=ORANGE, markersize=5.0)
+        ax.plot([times.low, times.high], [place, place], color=BLUE, alpha=0.45, linewidth=5.0, label=_MOST)
+        ax.plot(times.median, place, "o", color=BLUE, markersize=4.5, label=_MEDIAN)
+        ax.plot(times.largest, place, "D", color=ORANGE, markersize=5.0, label=_LARGEST)
     ax.set_xscale("log")
     ax.xaxis.set_major_formatter("{x:g}")
     ax.set_xlabel("CPU time of an answer [s]")
+    _legend(figure, ax)
     return _svg(figure)
 
 
 def _panels(
-    count: int, rows: int, names: Sequence[str], *, width: float = _PANEL, row: float = _ROW
+    count: int,
+    rows: int,
+    names: Sequence[str],
+    *,
+    width: float = _PANEL,
+    row: float = _ROW,
+    top: float = 0.1,
 ) -> tuple[Figure, list[Axes]]:
     with house_style():
-        size = (_LABELS + count * width, rows * row + 1.0)
+        size = (_LABELS + count * width, rows * row + _BELOW + top)
         figure = Figure(figsize=size)
         FigureCanvasAgg(figure)
         axes = list(figure.subplots(1, count, sharey=True, squeeze=False)[0])
-        figure.subplots_adjust(_LABELS / size[0], 0.68 / size[1], 0.99, 1.0 - 0.1 / size[1], wspace=0.12)
+        edges = _LABELS / size[0], _BELOW / size[1], 0.99, 1.0 - top / size[1]
+        figure.subplots_adjust(*edges, wspace=0.12)
         axes[0].set_yticks(np.arange(rows)[::-1] + 0.35, names)
         for ax in axes:
             ax.set_ylim(-0.1, rows)
@@ -113,8 +178,8 @@ def _draw_hill(ax: Axes, base: float, values: Distribution, measure: Measure) ->
     ax.plot(edges[[0, -1]], [base, base], color=GREY, linewidth=1.0)
     ax.plot(measure.factor * values.median, base, "o", color=BLUE, markersize=4.5)
     worst = values.least if measure.margin else values.largest
-    lost = measure.margin and worst <= 0.0
-    ax.plot(measure.factor * worst, base, "D", color=VERMILLION if lost else ORANGE, markersize=5.0)
+    colour = VERMILLION if _is_beyond(measure, worst) else ORANGE
+    ax.plot(measure.factor * worst, base, "D", color=colour, markersize=5.0)
 
 
 def _svg(figure: Figure) -> str:

@@ -7,14 +7,15 @@ from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
-from coop_drake.campaign.report.columns import COSTS, MARGINS, MEASURES, Measure
+from coop_drake.campaign.report.columns import COSTS, MARGINS, MEASURES, SHARE, Measure, significant
 from coop_drake.campaign.report.distributions import Group
 from coop_drake.campaign.report.document import Report
-from coop_drake.campaign.report.figures import breaking_svg, distributions_svg, growth_svg
+from coop_drake.campaign.report.figures import breaking_svg, distributions_svg, growth_svg, searches_svg
 from coop_drake.campaign.report.influences import Influence
 from coop_drake.campaign.report.rates import percent
 from coop_drake.campaign.report.searches import summarise_searches
 from coop_drake.campaign.report.worst import WorstRun
+from coop_drake.campaign.search.findings import BreakingPoint
 from coop_drake.drawing import colours
 from coop_drake.files import write_atomically
 from coop_drake.templates import rendered
@@ -43,31 +44,34 @@ def write_report(report: Report, directory: Path, replay: Callable[[WorstRun], s
 
 def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
     """Return the page as HTML; it needs no other file and no script."""
+    searched = summarise_searches(report.findings)
     agreed = [one for one in MEASURES if any(one.name in pair.largest for pair in report.agreements)]
     return rendered(
         "coop_drake.campaign.report",
         "report.html",
         report=report,
         headline=headline(report),
-        good=not (report.rate and report.rate.lost)
-        and all(one.arrived for one in report.findings) and not any(row.wrong for row in report.questions),
+        verdict=verdict(report),
         rows=[_row(group) for group in report.groups],
         margins=MARGINS,
         table=_influence_table(report.influences),
-        varied=[measure for measure in MARGINS if any(i.measure == measure.name for i in report.influences)],
+        varied=_varied(report.influences),
         worst=[(run, _shown(run.measure, run.margin), replay(run)) for run in report.worst],
         agreed=agreed,
         agreements=[
             (one, [_shown(measure.name, one.largest.get(measure.name, nan)) for measure in agreed])
             for one in report.agreements
         ],
-        searched=summarise_searches(report.findings),
+        searched=searched,
+        broken=_broken(report.breaking),
+        seconds=lambda time: f"{significant(time, 2)} s",
         shown=_shown,
         percent=percent,
         figures={
             "margins": distributions_svg(report.groups, MARGINS),
             "costs": distributions_svg(report.groups, COSTS),
             "breaking": breaking_svg(report.breaking),
+            "searches": searches_svg(searched),
             "growth": growth_svg(report.questions),
         },
         colours=colours,
@@ -77,7 +81,7 @@ def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
 def headline(report: Report) -> str:
     """The most important sentence of a report."""
     if report.rate is not None:
-        return report.rate.sentence
+        return report.rate.sentence + _beyond(report.exceeded, report.most_used, "run")
     if report.questions:
         every = report.questions[-1]
         wrong = "1 wrong answer" if every.wrong == 1 else f"{every.wrong:,} wrong answers"
@@ -86,12 +90,31 @@ def headline(report: Report) -> str:
         lost = sum(not one.arrived for one in report.findings)
         runs = sum(one.evaluations for one in report.findings)
         found = "None" if lost == 0 else f"{lost:,}"
-        return f"{found} of {len(report.findings):,} searches, with {runs:,} runs, found a run that is lost."
+        told = f"{found} of {len(report.findings):,} searches, with {runs:,} runs, found a run that is lost."
+        used = [one.worst for one in report.findings if one.margin == SHARE]
+        return told + _beyond(sum(one > 1.0 for one in used), max(used, default=nan), "search")
     if report.breaking:
         least = min(report.breaking, key=lambda point: point.kept)
         name = least.departure.replace("_", " ")
         return f"No run was lost up to {least.kept:.2g} times what is certified ({name}, {least.scenario})."
     return "There are no results yet."
+
+
+def verdict(report: Report) -> str:
+    """``bad`` where something was lost or is wrong, ``some`` where more was used than a budget states."""
+    lost = (report.rate is not None and report.rate.lost) or not all(one.arrived for one in report.findings)
+    if lost or any(row.wrong for row in report.questions):
+        return "bad"
+    found = any(one.margin == SHARE and one.worst > 1.0 for one in report.findings)
+    return "some" if report.exceeded or found else "good"
+
+
+def _beyond(count: int, most: float, what: str) -> str:
+    """Say that runs came nearer to their limits than a budget states; empty where none did."""
+    if count == 0:
+        return ""
+    several = f"{count:,} {what}{'es' if what == 'search' else 's'}" if count > 1 else f"1 {what}"
+    return f" {several} used more than the budget states, up to {percent(most)} of it."
 
 
 def _shown(name: str, number: float) -> str:
@@ -113,13 +136,27 @@ def _row(group: Group) -> dict[str, Any]:
     }
 
 
+def _broken(points: tuple[BreakingPoint, ...]) -> dict[str, Any]:
+    """Scenarios, and one row for each departure with the multiple of every scenario."""
+    names = list(dict.fromkeys(point.scenario for point in points))
+    rows = []
+    for departure in dict.fromkeys(point.departure for point in points):
+        own = {point.scenario: point for point in points if point.departure == departure}
+        rows.append((departure, [own.get(name) for name in names]))
+    return {"scenarios": names, "rows": rows}
+
+
+def _varied(found: tuple[Influence, ...]) -> list[Measure]:
+    """The margins of which any key clearly takes something."""
+    return [one for one in MARGINS if any(i.measure == one.name and i.clear for i in found)]
+
+
 def _influence_table(found: tuple[Influence, ...]) -> list[tuple[str, list[dict[str, Any] | None]]]:
     """One row for each key: for every margin how much is taken, and how dark the cell is."""
+    shown = _varied(found)
     largest = {
-        measure.name: max((one.taken for one in found if one.measure == measure.name), default=0.0)
-        for measure in MARGINS
+        measure.name: max(one.taken for one in found if one.measure == measure.name) for measure in shown
     }
-    shown = [measure for measure in MARGINS if largest[measure.name] > 0.0]
     rows = []
     for key in dict.fromkeys(one.key for one in found):
         own = {one.measure: one for one in found if one.key == key}

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coop_drake.campaign.report.columns import significant
 from coop_drake.campaign.report.distributions import Distribution, distribution
 
 ALL = "all"
@@ -68,7 +69,7 @@ class Questions:
         counts = (self.count, self.plans, self.beyond_limits, self.infeasible, self.undecided, self.wrong)
         times = (self.seconds.median, self.seconds.high, self.seconds.largest)
         name = ALL if self.axis == ALL else f"{self.axis} {self.group}"
-        return name, *map(str, counts), *(f"{time:.2g} s" for time in times)
+        return name, *map(str, counts), *(f"{significant(time, 2)} s" for time in times)
 
 
 def summarise_questions(table: Any) -> tuple[Questions, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coop_drake.campaign.report.columns import MARGINS, Runs
+from coop_drake.campaign.report.columns import MARGINS, SHARE, Runs
 
 LISTED = 10
 """Runs that are listed [-]."""
@@ -26,6 +26,7 @@ class WorstRun:
         measure: Name of the margin of which it had least, compared with other runs of its scenario.
         margin: What it had of this, in the unit of the column.
         share: The same over the median of its scenario and tier [-].
+        used: Share that it used of what the budget states; NaN without a budget [-].
         values: JSON of the keys that vary.
     """
 
@@ -38,11 +39,15 @@ class WorstRun:
     measure: str
     margin: float
     share: float
+    used: float
     values: str
 
 
 def worst_runs(runs: Runs, count: int = LISTED) -> tuple[WorstRun, ...]:
-    """Return lost runs first, then those with the least margins over the median of their scenario."""
+    """Return lost runs, then those that used more than the budget states, then those with the least margins.
+
+    Margins count relative to the median of their scenario and tier.
+    """
     margins = np.array([runs.floats(measure.name) for measure in MARGINS])
     shares = np.full_like(margins, np.inf)
     for _, _, rows in runs.groups:
@@ -51,8 +56,9 @@ def worst_runs(runs: Runs, count: int = LISTED) -> tuple[WorstRun, ...]:
             if known.size and (typical := float(np.median(known))) > 0.0:
                 shares[k, rows] = margins[k, rows] / typical
     shares[np.isnan(shares)] = np.inf
-    numbers = runs.integers("run")
-    order = np.lexsort((numbers, shares.min(axis=0), ~runs.lost))[:count]
+    numbers, used = runs.integers("run"), runs.floats(SHARE)
+    beyond = np.where(used > 1.0, -used, 0.0)
+    order = np.lexsort((numbers, shares.min(axis=0), beyond, ~runs.lost))[:count]
     seeds, found = runs.integers("seed"), []
     for row in order:
         k = int(np.argmin(shares[:, row]))
@@ -68,6 +74,7 @@ def worst_runs(runs: Runs, count: int = LISTED) -> tuple[WorstRun, ...]:
                 MARGINS[k].name if known_share else "",
                 float(margins[k, row]) if known_share else float("nan"),
                 float(shares[k, row]) if known_share else float("nan"),
+                float(used[row]),
                 runs.text("values", row),
             )
         )
