@@ -9,7 +9,7 @@ from resource import getpagesize
 from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 
-from benchmarks.isolated import in_own_process
+from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from coop_drake.campaign import load_campaign
@@ -18,6 +18,7 @@ from coop_drake.campaign.plans import Plans
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.campaign.running import Order, make_batch, run_campaign
 from coop_drake.campaign.running.placing import client_of
+from coop_drake.campaign.settings import Tier
 from coop_drake.campaign.variation import Variation
 
 __all__ = ["campaign_tasks", "placing", "worker_memory"]
@@ -33,10 +34,23 @@ runs:
   scenarios: [base]
   count: {count}
   batch: {batch}
-  set: {{goal.object: {{x: 0.9, y: 2.3, theta: 1.6}}, goal.joints: {{}}}}
+  set:
+    goal.object: {{x: 0.9, y: 2.3, theta: 1.6}}
+    goal.joints: {{}}
+    deployment.control_rate: 200
   vary: {{deployment.mass_error: !Uniform {{min: -0.1, max: 0.1}}}}
+  tier: {tier}
+  paired: 0
 """
-"""A transport of two seconds, so that what is not simulation shows."""
+"""A transport of two seconds, so that what is not simulation shows; sampled, because both tiers know that."""
+_SHARE = 0.01
+"""What starting a process may add to the processor time of a batch [-]."""
+_OVERHEAD, _START, _RUN = (
+    "campaign/scheduler/empty_batch/cpu",
+    "campaign/batches/process/start",
+    "campaign/batches/process/run",
+)
+"""Names of rows from which others follow."""
 
 
 def campaign_tasks() -> list[Task]:
@@ -44,6 +58,7 @@ def campaign_tasks() -> list[Task]:
     return [
         Task("campaign/scheduler", lambda rows: placing(), alone=True),
         Task("campaign/batches", lambda rows: _batches(), alone=True),
+        Task("campaign/cluster", _cluster, alone=True),
         Task("campaign/workers", lambda rows: _workers(), alone=True),
         Task("campaign/memory", lambda rows: _memory()),
     ]
@@ -56,11 +71,8 @@ def placing(batches: int = _EMPTY) -> Sequence[Row]:
         spent, began = process_time(), perf_counter()
         client.gather(client.map(_nothing, range(batches), pure=False))
         spent, began = process_time() - spent, perf_counter() - began
-    name = "campaign/scheduler/empty_batch"
-    return [
-        Row(f"{name}/cpu", 1e3 * spent / batches, "ms"),
-        Row(f"{name}/wall", 1e3 * began / batches, "ms"),
-    ]
+    wall = "campaign/scheduler/empty_batch/wall"
+    return [Row(_OVERHEAD, 1e3 * spent / batches, "ms"), Row(wall, 1e3 * began / batches, "ms")]
 
 
 def _nothing(index: int) -> None:
@@ -79,8 +91,21 @@ def _batches() -> Sequence[Row]:
     run = (seconds[100] - seconds[1]) / 99
     return [
         *rows,
-        Row("campaign/batches/process/start", seconds[1] - run, "CPU s"),
-        Row("campaign/batches/process/run", run, "CPU s"),
+        Row(_START, seconds[1] - run, "CPU s"),
+        Row(_RUN, run, "CPU s"),
+    ]
+
+
+def _cluster(rows: Sequence[Row]) -> Sequence[Row]:
+    """The batch of which starting is a small share, and how many cores a scheduler then feeds, on paper."""
+    known = {row.name: row.value for row in rows}
+    if not known.keys() >= {_OVERHEAD, _START}:
+        raise WorkerError(f"what follows from {_OVERHEAD} and {_START} needs these: measure them first")
+    batch = known[_START] / _SHARE
+    name = f"campaign/cluster/start_is_{_SHARE:.0%}"
+    return [
+        Row(f"{name}/batch", batch, "CPU s"),
+        Row(f"{name}/largest_cluster", batch / (1e-3 * known[_OVERHEAD]), "cores"),
     ]
 
 
@@ -97,9 +122,9 @@ def _workers() -> Sequence[Row]:
 
 
 def worker_memory(runs: int = _RUNS, batch: int = 100) -> list[float]:
-    """Resident memory of a worker after every batch of so many runs of Drake's loop [MB]."""
+    """Resident memory of a worker after every batch of so many runs of the compiled loop [MB]."""
     sizes = []
-    with _campaign(runs, batch) as (_, orders):
+    with _campaign(runs, batch, "compiled") as (_, orders):
         for order in orders:
             make_batch(order)
             pages = int(Path("/proc/self/statm").read_text().split()[1])
@@ -115,11 +140,11 @@ def _memory() -> Sequence[Row]:
 
 
 @contextmanager
-def _campaign(count: int, batch: int) -> Iterator[tuple[CampaignFolder, list[Order]]]:
+def _campaign(count: int, batch: int, tier: Tier = "drake") -> Iterator[tuple[CampaignFolder, list[Order]]]:
     """A campaign of short runs in a folder of its own, planned, with its batches."""
     with TemporaryDirectory() as place:
         file = Path(place) / "short.campaign.yaml"
-        file.write_text(_SHORT.format(count=count, batch=batch))
+        file.write_text(_SHORT.format(count=count, batch=batch, tier=tier))
         variation = Variation(load_campaign(file))
         folder = CampaignFolder(Path(place) / "out")
         plans = Plans(variation, folder.plans)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -94,6 +95,12 @@ class CampaignFolder:
         """Return what the batches took whose costs are known, as `note` was told."""
         files = [self.path / batch.costs for batch in batches]
         return [json.loads(file.read_bytes()) for file in files if file.exists()]
+
+    def cpu_seconds(self, batches: Iterable[Batch]) -> float:
+        """Return the mean processor time of a run, question or search with its share of starting, or NaN."""
+        costs = self.costs(batches)
+        counted = sum(entry["runs"] for entry in costs)
+        return sum(entry["cpu_seconds"] for entry in costs) / counted if counted else nan
 
     def note(self, batch: Batch, costs: dict[str, Any]) -> None:
         """Write what a batch took."""

@@ -65,8 +65,6 @@ def state_of(campaign: Campaign, folder: CampaignFolder, batches: Sequence[Batch
     for key in dict.fromkeys((batch.scenario, batch.tier) for batch in batches if batch.record is RunRecord):
         mine = [batch for batch in batches if (batch.scenario, batch.tier) == key]
         table = folder.table(mine)
-        costs = folder.costs(mine)
-        counted = sum(entry["runs"] for entry in costs)
         column = {name: table.column(name).to_numpy() for name in _COLUMNS}
         rows.append(
             State(
@@ -78,7 +76,7 @@ def state_of(campaign: Campaign, folder: CampaignFolder, batches: Sequence[Batch
                 _least(column["funnel_margin"]),
                 _least(np.concatenate([column[name] for name in _CLEARANCES])),
                 -_least(-column["budget_share"]),
-                sum(entry["cpu_seconds"] for entry in costs) / counted if counted else nan,
+                folder.cpu_seconds(mine),
             )
         )
     return tuple(rows)

@@ -192,7 +192,21 @@ def _show(campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...]
         _show_runs(campaign, folder, batches, reporter)
     if campaign.searches is not None or campaign.breaking is not None:
         _show_searches(folder, batches, reporter)
+    for kind in ("planner", "search", "breaking"):
+        _show_cost(folder, [one for one in batches if one.tier == kind], kind, reporter)
     reporter.say(f"All results are in {escape(str(folder.path))}")
+
+
+def _show_cost(folder: CampaignFolder, batches: list[Batch], kind: str, reporter: Reporter) -> None:
+    """Say how much processor time what is no run has taken, where this is known."""
+    from math import isnan
+
+    if not isnan(seconds := folder.cpu_seconds(batches)):
+        name = {"planner": "question", "search": "search", "breaking": "bisection"}[kind]
+        reporter.facts[f"cpu_seconds_of_a_{name}"] = seconds
+        reporter.say(
+            f"A {name} took {seconds:.2f} s of processor time in the mean, with all its checks and runs"
+        )
 
 
 def _show_runs(

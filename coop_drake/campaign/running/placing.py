@@ -93,6 +93,6 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Client]:
         try:
             yield client
         finally:  # Dask waits for batches that are being made; their processes end with their workers.
-            for worker in cluster.workers.values():
+            for process in [worker.pid for worker in cluster.workers.values() if worker.pid]:
                 with suppress(ProcessLookupError):
-                    os.kill(worker.pid, signal.SIGKILL)
+                    os.kill(process, signal.SIGKILL)

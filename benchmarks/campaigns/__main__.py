@@ -1,0 +1,148 @@
+"""``python -m benchmarks.campaigns``: makes the campaigns of this folder, and prints one table of each.
+
+They take hours, at the lowest priority. What is there is kept: the same command goes on after an
+interruption. Tables are Markdown, as the documentation has them.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from coop_drake.campaign import Campaign, load_campaign
+from coop_drake.campaign.report import Report, make_report
+from coop_drake.campaign.report.columns import MARGINS, SHARE, significant
+from coop_drake.campaign.report.rates import percent
+from coop_drake.campaign.report.searches import summarise_searches
+from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.running.command import batches_of
+
+NAMES = ("breaking", "searches", "questions", "inside_budgets", "drake_inside_budgets")
+"""The campaigns in the order in which they are made: what takes longest comes last."""
+
+_HERE = Path(__file__).parent
+_LEAST_PRIORITY = 19
+_FINISHED = (0, 1)
+"""Exit codes of a campaign that came to its end; 1 says that something was lost or wrong."""
+
+Line = Sequence[object]
+
+
+def main(
+    names: Annotated[list[str] | None, typer.Argument(metavar="[NAME]...", help=", ".join(NAMES))] = None,
+    out: Annotated[Path, typer.Option(help="Folder of the results.")] = Path("out/campaigns"),
+    workers: Annotated[int | None, typer.Option(min=1, help="Batches at a time; one a core.")] = None,
+    tables: Annotated[bool, typer.Option("--tables", help="Only print what is there already.")] = False,
+) -> None:
+    """Make the campaigns of the documentation, or the rest of them, and print their tables."""
+    if unknown := sorted(set(names or []) - set(NAMES)):
+        typer.echo(f"Error: names: {', '.join(unknown)}; allowed is any of {', '.join(NAMES)}", err=True)
+        raise typer.Exit(2)
+    code = 0
+    for name in names or NAMES:
+        file, folder = _HERE / f"{name}.campaign.yaml", out / name
+        if not tables:
+            code = max(code, _made(file, folder, workers))
+        print("\n".join(_tables(load_campaign(file), CampaignFolder(folder.absolute()))), flush=True)
+    raise typer.Exit(code)
+
+
+def _made(file: Path, folder: Path, workers: int | None) -> int:
+    """Make a campaign and its report in processes of the lowest priority; return the exit code.
+
+    Raises:
+        Exit: It did not come to its end; with its exit code.
+    """
+    command = [sys.executable, "-c", "from coop_drake.cli import main; main()", "campaign"]
+    options = ["--out", str(folder), *(["--workers", str(workers)] if workers else [])]
+    done = subprocess.run(
+        [*command, "run", str(file), *options], preexec_fn=lambda: os.nice(_LEAST_PRIORITY), check=False
+    )
+    if done.returncode not in _FINISHED:
+        raise typer.Exit(done.returncode)
+    subprocess.run([*command, "report", str(file), "--out", str(folder)], check=True)
+    return done.returncode
+
+
+def _tables(campaign: Campaign, folder: CampaignFolder) -> Iterator[str]:
+    """Yield the lines of the tables of a campaign."""
+    batches = batches_of(campaign, folder)
+    findings, breaking = folder.findings(batches)
+    report = make_report(
+        campaign.name, folder.table(batches), folder.questions(batches), findings=findings, breaking=breaking
+    )
+    there = len(batches) - len(folder.missing(batches))
+    yield f"\n## {campaign.name}: {there} of {len(batches)} batches"
+    seconds = folder.cpu_seconds(batches)
+    yield f"\nCPU time of each, with its share of starting processes: {seconds:.3g} s\n"
+    yield from _markdown(_runs(report))
+    yield from _markdown(_searches(report))
+    yield from _markdown(_breaking(report))
+    yield from _markdown(_questions(report))
+
+
+def _markdown(lines: Iterator[Line]) -> Iterator[str]:
+    """Yield a table in Markdown of lines of which the first has the headings; nothing without others."""
+    heads, *rows = list(lines)
+    if rows:
+        for line in (heads, ["---"] * len(heads), *rows):
+            yield "| " + " | ".join(str(cell) for cell in line) + " |"
+        yield ""
+
+
+def _runs(report: Report) -> Iterator[Line]:
+    yield "runs", "tier", "number", "lost", "at most", *(f"{m.label} [{m.unit}]" for m in MARGINS), "used"
+    for group in report.groups:
+        least = {name: values.least for name, values in group.measures.items()}
+        used = percent(group.measures[SHARE].largest) if SHARE in group.measures else ""
+        margins = (m.shown(least[m.name]) if m.name in least else "" for m in MARGINS)
+        rate = group.rate
+        yield group.scenario, group.tier, rate.runs, rate.lost, percent(rate.upper), *margins, used
+
+
+def _searches(report: Report) -> Iterator[Line]:
+    yield "searches", "driven", "number", "runs", "found a loss", "random", "usual find", "worst find"
+    for row in summarise_searches(report.findings):
+        ends = (f"{number:.4g}" for number in (row.before, row.typical, row.worst.worst))
+        yield row.scenario, row.margin, row.searches, row.runs, row.lost, *ends
+
+
+def _breaking(report: Report) -> Iterator[Line]:
+    names = list(dict.fromkeys(point.scenario for point in report.breaking))
+    yield "largest multiple of what is certified without a loss", *names
+    for departure in dict.fromkeys(point.departure for point in report.breaking):
+        own = {point.scenario: point for point in report.breaking if point.departure == departure}
+        points = [own.get(name) for name in names]
+        yield departure, *("" if p is None else f"{'' if p.beyond else '≥ '}{p.kept:.3g}" for p in points)
+
+
+def _questions(report: Report) -> Iterator[Line]:
+    yield (
+        "questions",
+        "asked",
+        "plans",
+        "no way",
+        "undecided",
+        "wrong",
+        "a peer finds",
+        "median",
+        "95 %",
+        "largest",
+    )
+    for row in report.questions:
+        name = row.group if row.axis == row.group else f"{row.axis} {row.group}"
+        times = (
+            f"{significant(t, 2)} s" for t in (row.seconds.median, row.seconds.high, row.seconds.largest)
+        )
+        counts = row.count, row.plans, row.infeasible, row.undecided, row.wrong, row.peer_found
+        yield name, *counts, *times
+
+
+if __name__ == "__main__":
+    typer.run(main)
