@@ -84,6 +84,10 @@ class PlanError(CoopDrakeError):
     """A plan or a plan file is not usable, or does not belong to the scenario."""
 
 
+class PatienceError(CoopDrakeError):
+    """Raised by a progress function: the planner shall not look for a better plan than the one it has."""
+
+
 class FieldError(CoopDrakeError):
     """A harmonic map cannot be built or its certificate failed; the message names the corner or gap."""
 

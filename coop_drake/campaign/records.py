@@ -85,7 +85,8 @@ class QuestionRecord:
         peer: The other planners that searched for a way; the last one found it if any did. Empty if none did.
         peer_found: Whether one was found.
         peer_seconds: Processor time of the other planners together; NaN if none searched [s].
-        reason: Why the question is undecided, beyond limits, or its answer wrong; else empty.
+        reason: Why the question is undecided, beyond limits, or its answer wrong, or that the time limit
+            ended the improvement of its plan; else empty.
         corners: Number of corners of the floor.
         width_ratio: Width of the floor's passages over that of the narrowest straight corridor in which the
             team is known to fit; NaN on floors without passages of one width [-].

@@ -15,7 +15,7 @@ from coop_drake.answers.digest import problem_digest
 from coop_drake.answers.plan import BeyondLimits, Found, Infeasible, Plan, PlanningResult, Undecided
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.search_report import SearchReport
-from coop_drake.errors import GeometryError, PlanError, StallError, TooQuickError
+from coop_drake.errors import GeometryError, PatienceError, PlanError, StallError, TooQuickError
 from coop_drake.laws import GainSet, ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
 from coop_drake.planning.execution.refusals import refusals, without_limits
@@ -57,7 +57,8 @@ def plan(
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
         budget: Departures from the ideal team that the plan shall tolerate; needs scheduled gains.
-        progress: Called with a phase and the fraction of it that is done.
+        progress: Called with a phase and the fraction of it that is done. If it raises PatienceError, a plan
+            is finished along the way that is certified by then; without one, the error goes to the caller.
 
     Returns:
         Found with the plan, BeyondLimits with a plan that limits refuse, Infeasible or Undecided.
@@ -93,7 +94,7 @@ def _answer(
             break
         way = answer
         try:
-            made = _made(question, answer, gain_set, gain_set_name, budget, progress)
+            made = _finished(partial(_made, question, answer, gain_set, gain_set_name, budget), progress)
         except (GeometryError, PlanError, StallError, ShapelyError) as error:
             stall = f"a free path exists, but a plan along it cannot be executed: {error}"
             too_quick = isinstance(error, TooQuickError)
@@ -122,6 +123,16 @@ def _without_limits(
     broken = refusals(problem, made)
     digest = problem_digest(problem)
     return replace(made, problem=digest, age_factor=factor, refused_by=broken) if broken else None
+
+
+def _finished(
+    make: Callable[[Progress | None], Plan | BeyondBudget], progress: Progress | None
+) -> Plan | BeyondBudget:
+    """Make a plan along a certified way, and finish it although ``progress`` has lost its patience."""
+    try:
+        return make(progress)
+    except PatienceError:
+        return make(None)
 
 
 def _made(

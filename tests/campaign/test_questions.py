@@ -189,6 +189,23 @@ def test_an_answer_takes_no_longer_than_the_limit(question):
     assert not is_wrong(record)
 
 
+def test_a_plan_whose_way_was_certified_within_the_limit_counts(question, monkeypatch):
+    def slow(problem, gains, *, gain_set_name, progress):
+        def passing(phase, fraction):
+            if phase.startswith("searching at margin"):
+                monkeypatch.setattr(answering, "process_time", lambda: 1e9)
+            progress(phase, fraction)
+
+        return plan(problem, gains, gain_set_name=gain_set_name, progress=passing)
+
+    monkeypatch.setattr(answering, "plan", slow)
+    record, found = answer(question, SMALL)
+    assert (record.verdict, record.verified, found) == ("plan", True, Searched())
+    assert record.reason.startswith(f"{answering.LATE} after {SMALL.time_limit:g} s, when it was searching")
+    assert record.sampled_margin > 0.0
+    assert not is_wrong(record)
+
+
 def test_an_undecided_question_for_which_a_peer_finds_a_way_is_kept(monkeypatch, tmp_path):
     answered(monkeypatch, Undecided("too narrow", SearchReport(7)))
     path = np.zeros((2, 5))

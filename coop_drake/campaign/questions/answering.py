@@ -19,7 +19,7 @@ from coop_drake.campaign.questions.question import Question, random_question
 from coop_drake.campaign.questions.sampled_cells import sampled_margin
 from coop_drake.campaign.questions.settings import QuestionSettings
 from coop_drake.campaign.records import QuestionRecord
-from coop_drake.errors import CoopDrakeError, RefusalError
+from coop_drake.errors import PatienceError, RefusalError
 from coop_drake.files import write_atomically
 from coop_drake.planning.planner import plan
 from coop_drake.verification import verify_plan, verify_proof
@@ -33,8 +33,8 @@ VERDICTS = {
 """Names of the planner's answers in records."""
 
 
-class _OutOfTimeError(CoopDrakeError):
-    """The planner used its time."""
+LATE = "the search for a better plan was ended"
+"""How the remark begins of a plan that was not improved to the end."""
 
 
 def ask(number: int, settings: QuestionSettings, cases: Path | None = None) -> QuestionRecord:
@@ -72,10 +72,9 @@ def answer(question: Question, settings: QuestionSettings) -> tuple[QuestionReco
         The record, and what the other planners found.
     """
     began = process_time()
-    result, failure = _planned(question, settings.time_limit)
+    result, told, failed = _planned(question, settings.time_limit)
     record = replace(_described(question, result), cpu_seconds=process_time() - began)
-    if failure:
-        record = replace(record, verdict="failed", reason=failure)
+    record = replace(record, verdict="failed" if failed else record.verdict, reason=told or record.reason)
     refusal = _refusal(question, result)
     record = replace(record, verified=refusal == "", reason=record.reason or refusal or "")
     if isinstance(result, Found | BeyondLimits):
@@ -99,23 +98,27 @@ def is_wrong(record: QuestionRecord) -> bool:
     return not record.verified or refuted or record.sampled_margin <= 0.0
 
 
-def _planned(question: Question, limit: float) -> tuple[PlanningResult, str]:
-    """The planner's answer, undecided if it takes longer than the limit; and the error that it raised."""
-    end = process_time() + limit
+def _planned(question: Question, limit: float) -> tuple[PlanningResult, str, bool]:
+    """The answer, undecided without a certified way in time; a remark; and whether the planner failed."""
+    end, late = process_time() + limit, ""
 
     def check_time(phase: str, fraction: float) -> None:
+        nonlocal late
         if process_time() > end:
-            raise _OutOfTimeError(f"not answered within {limit:g} s, when it was {phase}")
+            late = late or f"when it was {phase}"
+            raise PatienceError(f"not answered within {limit:g} s, {late}")
 
     scenario = question.scenario
     name = scenario.selected_gains
     gains = scenario.gain_sets[name]
     try:
-        return plan(question.problem, gains, gain_set_name=name, progress=check_time), ""
-    except _OutOfTimeError as error:
-        return Undecided(str(error), SearchReport(0)), ""
+        answer = plan(question.problem, gains, gain_set_name=name, progress=check_time)
+    except PatienceError as error:
+        return Undecided(str(error), SearchReport(0)), "", False
     except Exception as error:  # Whatever it is, it is a fault of the planner, to be counted as one.
-        return Undecided("", SearchReport(0)), f"{type(error).__name__}: {error}"
+        return Undecided("", SearchReport(0)), f"{type(error).__name__}: {error}", True
+    ended = f"{LATE} after {limit:g} s, {late}" if late and isinstance(answer, Found) else ""
+    return answer, ended, False
 
 
 def _described(question: Question, result: PlanningResult) -> QuestionRecord:

@@ -38,7 +38,7 @@ def search_by_peers(problem: PlanningProblem, seconds: float, seed: int) -> Sear
 
     Args:
         problem: The question.
-        seconds: CPU time of each planner [s].
+        seconds: CPU time of all planners together, of which each has the same part [s].
         seed: A positive seed.
     """
     planners: list[str] = []
@@ -46,6 +46,7 @@ def search_by_peers(problem: PlanningProblem, seconds: float, seed: int) -> Sear
     searches: list[tuple[str, Callable[..., Iterator[PeerRun]]]] = [("trees", _trees)]
     if has_ompl():
         searches.append(("OMPL", _ompl))
+    seconds /= len(searches)
     for name, search in searches:
         planners.append(name)
         own = 0.0

@@ -26,11 +26,12 @@ class QuestionSettings:
         robots: Numbers of robots; each is a third as frequent as the one before.
         most_joints: Largest number of joints of a robot; each number is a third as frequent as the one
             before.
-        time_limit: An answer that takes longer counts as undecided [CPU s].
+        time_limit: A question without a certified way after this time counts as undecided; with one, its plan
+            is finished and not improved any more [CPU s].
         samples: Configurations of every cell at which the distances of a plan are computed.
-        peer_time: How long each other planner searches for a path where it is proved that none exists
-            [CPU s].
-        patient_peer_time: How long each other planner searches where the answer is undecided [CPU s].
+        peer_time: How long the other planners search for a path where it is proved that none exists, each
+            the same time, together so long [CPU s].
+        patient_peer_time: How long they search likewise where the answer is undecided [CPU s].
         batch: Questions that one process answers, and one file holds.
     """
 
@@ -41,7 +42,7 @@ class QuestionSettings:
     most_joints: Annotated[int, Limits(at_least=1, at_most=3)] = 3
     time_limit: Positive = 60.0
     samples: Count = 40
-    peer_time: NotNegative = 1.0
+    peer_time: NotNegative = 2.0
     patient_peer_time: NotNegative = 60.0
     batch: Count = 20
 
@@ -62,4 +63,4 @@ class QuestionSettings:
         Processor time is limited by the other entries. A process on a busy machine gets a part of a
         processor, and checking an answer takes about as long as finding it.
         """
-        return 10.0 * (2.0 * self.time_limit + 2.0 * max(self.peer_time, self.patient_peer_time)) + 600.0
+        return 10.0 * (2.0 * self.time_limit + max(self.peer_time, self.patient_peer_time)) + 600.0

@@ -18,7 +18,7 @@ from shapely.errors import ShapelyError
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.search_report import SearchReport
-from coop_drake.errors import GeometryError
+from coop_drake.errors import GeometryError, PatienceError
 from coop_drake.planning.boxes.boxes import explored_channel
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
 from coop_drake.planning.cells.events import Watch
@@ -236,7 +236,7 @@ class _Search:
 
         try:
             best = self._samples.with_margin(found, report)
-        except (GeometryError, ShapelyError):
+        except (GeometryError, ShapelyError, PatienceError):
             best = found
         return self._samples.covered_path(best, found)
 
