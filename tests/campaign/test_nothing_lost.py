@@ -155,7 +155,7 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     waited_for(lambda: not processes(str(folder.path)))
     assert len(undisturbed.files(folder)) < len(undisturbed.batches)
 
-    quick = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "5s"}
+    quick = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "15s"}
     last = begun(folder.path, "--json", "--workers", 2, env=quick)
     hanging = child_of(folder.path).parent  # a worker again
     kill(hanging, signal.SIGSTOP)
