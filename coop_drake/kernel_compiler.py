@@ -18,6 +18,8 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
+from coop_drake.kernel_libraries import parts, whole_library
+
 _VIEWS = "getattr", "getitem", "static_getitem"
 """Operations of numba's intermediate code that give a part or a view of an array or a tuple."""
 
@@ -26,7 +28,7 @@ class NumbaFunction:
     """A function as numba knows it: one version for Python, one for compiled functions.
 
     Most functions are called from compiled ones only. Then the wrapper that unpacks Python's arguments, a
-    sixth of the time to compile, is left out.
+    sixth of the time to compile, is left out, and no machine code is made of the function alone.
 
     Args:
         function: The function.
@@ -48,6 +50,7 @@ class NumbaFunction:
 
     def call(self, arguments: Sequence[object]) -> object:
         """Call it with arguments of any types that numba knows."""
+        self._compile(arguments)
         return self._outer(*arguments)
 
     def entry(
@@ -62,10 +65,17 @@ class NumbaFunction:
         Returns:
             The function for just these types; and what numba keeps of it, None if it keeps nothing.
         """
-        signature = tuple(map(self._outer.typeof_pyval, arguments))
         with event.install_listener("numba:compile", _Announcer(compiling)):
-            self._outer.compile(signature)
+            signature = self._compile(arguments)
         return self._outer.overloads[signature].entry_point, self._outer._cache.kept
+
+    def _compile(self, arguments: Sequence[object]) -> tuple[types.Type, ...]:
+        """Compile it for the types of some arguments unless that was done, and return them."""
+        signature = tuple(map(self._outer.typeof_pyval, arguments))
+        if signature not in self._outer.overloads:
+            with parts():
+                self._outer.compile(signature)
+        return signature
 
 
 class _Compiler(CompilerBase):  # type: ignore[misc]
@@ -110,6 +120,12 @@ class _Lower(Lower):  # type: ignore[misc]
 class _Lowering(NativeLowering):  # type: ignore[misc]
     _name = "lowering_without_counts_of_arguments"
     lowering_class = _Lower
+
+    def run_pass(self, state: Any) -> bool:
+        if not state.flags.no_cpython_wrapper:  # Python calls it.
+            state.library = whole_library(state.targetctx.codegen(), state.func_id.func_qualname)
+        done: bool = super().run_pass(state)
+        return done
 
 
 def _held_by_caller(function: Any, kinds: Mapping[str, types.Type]) -> set[str]:
