@@ -1,6 +1,16 @@
-"""The closed loop as compiled code, for millions of runs: one call is a whole transport."""
+"""The closed loop as compiled code, for many runs: whole transports, or the controllers in Drake's loop."""
 
+from coop_drake.compiled_loop.drakes_loop import SampledLoop, build_sampled_loop, simulate_sampled
 from coop_drake.compiled_loop.preparing import CompiledTransport, prepare
 from coop_drake.compiled_loop.running import RunOutcome, run, run_many
 
-__all__ = ["CompiledTransport", "RunOutcome", "prepare", "run", "run_many"]
+__all__ = [
+    "CompiledTransport",
+    "RunOutcome",
+    "SampledLoop",
+    "build_sampled_loop",
+    "prepare",
+    "run",
+    "run_many",
+    "simulate_sampled",
+]

@@ -152,7 +152,7 @@ class LoopMemory(NamedTuple):
     nominal: FloatArray
     axes: FloatArray
     jumps: FloatArray
-    jumped: IntArray
+    jumped: FloatArray
     rates: FloatArray
     efforts: FloatArray
     channels: FloatArray

@@ -148,7 +148,7 @@ def memory_of(transport: CompiledTransport, departures: LoopDepartures) -> LoopM
         nominal=np.tile([*start[:2], 0.0, 0.0, *start[:2]], (ring, 1)),
         axes=np.tile([transport.first_axes, nothing, nothing], (ring, 1, 1)),
         jumps=first_jumps(transport.cells.tables[0], transport.first_axes),
-        jumped=np.zeros(robots, dtype=np.int64),
+        jumped=np.zeros(robots),
         rates=np.full((max(int(departures.periods[3]), 1), efforts), MOVING),
         efforts=np.zeros((2, efforts)),
         channels=np.full((robots, channels, READY_SIZE), NOTHING),

@@ -7,9 +7,9 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal, LoopPlant
 from coop_drake.compiled_loop.motion import advance
-from coop_drake.compiled_loop.robots import follow_axes, heard_cell, lead, remember_switch, report
+from coop_drake.compiled_loop.robots import TOLD, follow_axes, heard_cell, lead, remember_switch, report
 from coop_drake.compiled_loop.sensing import measure, receive
-from coop_drake.compiled_loop.watching import ENDED, RUNS, begin_figures, left_by_all, watch, watch_switch
+from coop_drake.compiled_loop.watching import ENDED, RUNS, begin_figures, left_by_all, watch
 from coop_drake.laws.channels import carry_reports
 from coop_drake.laws.nominal_axes import carry_axes
 from coop_drake.laws.random_draws import uniform_pair
@@ -41,8 +41,7 @@ def run_loop(
     sample = 0
     watch(sample, cells, team, plant, nominal, departures, memory, measured, figures)
     while figures[ENDED] == RUNS:
-        update(sample, cells, team, nominal, departures, memory)
-        watch_switch(sample, cells, team, plant, nominal, departures, memory, figures)
+        update(cells, team, nominal, departures, memory, sample)
         advance(sample, team, plant, departures, memory)
         sample += 1
         watch(sample, cells, team, plant, nominal, departures, memory, measured, figures)
@@ -51,17 +50,21 @@ def run_loop(
 
 @compiled
 def update(
-    sample: int, cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures,
-    memory: LoopMemory,
+    cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory,
+    sample: int,
 ) -> None:  # fmt: skip
     """Do what happens at a sample: all read what was before, as in Drake."""
     robots, law = team.yaws.size, np.empty(memory.jumps.size)
-    measure(sample, team, departures, memory)
+    now, told = sample * departures.times[0], np.empty(TOLD)
+    measure(sample, sample, team, departures, memory)
     held = memory.efforts[0].copy()
     for k in range(robots):
         begin = k + team.first[2, k]
         end = begin + 1 + team.first[2, k + 1] - team.first[2, k]
-        _compute(k, sample, begin, cells, team, nominal, departures, memory, law[begin:end])
+        compute(
+            k, sample, sample, now, False, begin, cells, team, nominal, departures, memory, law[begin:end],
+            told,
+        )  # fmt: skip
         _fail(k, sample, held, team, departures, memory)
     for i in range(held.size):
         limit = departures.limits[i]
@@ -77,24 +80,43 @@ def update(
 
 
 @compiled
-def _compute(
-    k: int, sample: int, begin: int, cells: LoopCells, team: FusedTeam, nominal: LoopNominal,
-    departures: LoopDepartures, memory: LoopMemory, law: FloatArray,
+def compute(
+    k: int, sample: int, number: int, now: float, whole: bool, begin: int, cells: LoopCells, team: FusedTeam,
+    nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory, law: FloatArray, told: FloatArray,
 ) -> None:  # fmt: skip
-    """Do what robot k computes at a sample: its effort, its report, its own p_G, and the law of its axes."""
+    """Do what robot k computes at a sample: its effort, its report, its own p_G, and the law of its axes.
+
+    Args:
+        k: The robot.
+        sample: Number of the sample, or of the next one between two samples.
+        number: Number of the control period whose noise and losses there are now.
+        now: Time of the run [s].
+        whole: As in ``report``.
+        begin: First row of the robot among all axes.
+        cells: The plan's cells.
+        team: The robots' models.
+        nominal: The nominal motions.
+        departures: What departs.
+        memory: What changes.
+        law: Receives the accelerations of the law of its axes, shape (1 + n_k,).
+        told: Receives what the robot tells the log, see ``TOLD``.
+    """
     seen = np.empty(6)
-    pose, robot = receive(k, sample, team, departures, memory)
+    pose, robot = receive(k, sample, number, team, departures, memory)
     chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
     estimate_object(chain, team.loads[k, :2], robot, pose, seen)
-    cell, time = heard_cell(k, sample, departures, memory)
-    governed = lead(k, sample, cell, time, cells, team, nominal, departures, memory, seen)
+    cell, time = heard_cell(k, sample, now, departures, memory)
+    governed = lead(k, sample, cell, time, cells, team, nominal, departures, memory, seen, told)
     led, led_robot = follow_axes(
-        k, sample, cell, time, governed[2:], seen, robot, cells, team, nominal, departures, memory, law
-    )
+        k, sample, cell, time, governed[2:], seen, robot, cells, team, nominal, departures, memory, law,
+        told,
+    )  # fmt: skip
     judged, judged_robot = led, led_robot
     if departures.periods[3] > 0 and cell + 1 == cells.rows.shape[0]:
         judged, judged_robot = _averaged(sample, 3 * begin - 2 * team.first[2, k], led, led_robot, memory)
-    margin = report(k, sample, cell, time, judged, judged_robot, cells, nominal, departures, memory, begin)
+    margin = report(
+        k, sample, cell, time, judged, judged_robot, cells, nominal, departures, memory, begin, whole
+    )
     memory.reports[0, k, 0], memory.reports[0, k, 1] = cell, margin
     if margin >= 0.0:
         remember_switch(k, cell, time, led, led_robot, cells, memory, begin)

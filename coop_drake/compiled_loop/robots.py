@@ -16,24 +16,38 @@ from coop_drake.systems.ready_kernels import axes_ready, robot_ready, robot_read
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
 
+TOLD, ENERGY, ACCELERATION, COMMAND = 10, 0, 1, 4
+"""What a robot tells the log beside its report, and where: Delta E where no nominal motion leads [m^2/s^2],
+the object's desired acceleration [m/s^2, rad/s^2], then what ``end_effector_command`` writes."""
+
 ON_TIME = np.array([0.0, 1.0, 0.0])
 """A clock that never stood still: lag [s], pace [-] and the derivative of the pace [1/s]."""
 
 
 @compiled
-def heard_cell(k: int, sample: int, departures: LoopDepartures, memory: LoopMemory) -> tuple[int, float]:
-    """Return the cell that robot k knows at a sample, and the time since its entry by its own clock [s]."""
+def heard_cell(
+    k: int, sample: int, now: float, departures: LoopDepartures, memory: LoopMemory
+) -> tuple[int, float]:
+    """Return the cell that robot k knows, and the time since its entry by its own clock [s].
+
+    Args:
+        k: The robot.
+        sample: Number of the sample, or of the next one between two samples.
+        now: Time of the run [s].
+        departures: What departs.
+        memory: What changes.
+    """
     heard = sample - int(departures.hearing[1, k])
     if heard < 0:  # it has heard nothing yet, and begins in the first cell
-        return 0, sample * departures.times[0]
+        return 0, now
     current = memory.current[heard % memory.current.shape[0]]
-    return int(current[0]), sample * departures.times[0] - (current[1] - departures.hearing[0, k])
+    return int(current[0]), now - (current[1] - departures.hearing[0, k])
 
 
 @compiled
 def lead(
     k: int, sample: int, cell: int, time: float, cells: LoopCells, team: FusedTeam, nominal: LoopNominal,
-    departures: LoopDepartures, memory: LoopMemory, seen: FloatArray,
+    departures: LoopDepartures, memory: LoopMemory, seen: FloatArray, told: FloatArray,
 ) -> FloatArray:  # fmt: skip
     """Return p_G' as robot k moves its own p_G, and the desired acceleration of the object's origin.
 
@@ -48,6 +62,7 @@ def lead(
         departures: What departs.
         memory: What changes.
         seen: The object's state as the robot knows it, shape (6,).
+        told: Receives Delta E, unless a nominal motion leads.
 
     Returns:
         Both, shape (4,) [m/s, m/s^2]; p_G' is zero where a nominal motion leads.
@@ -62,14 +77,14 @@ def lead(
         edges = cells.governed[first[0, cell] : first[0, cell + 1]]
         flat = cells.flats[first[2, cell] : first[2, cell + 1]]
         field = cells.fields[first[3, cell] : first[3, cell + 1]]
-        govern(cells.rows[cell], edges, flat, field, time, seen, p_G, governed)
+        told[ENERGY] = govern(cells.rows[cell], edges, flat, field, time, seen, p_G, governed)
     return governed
 
 
 @compiled
 def command(
     k: int, linear: FloatArray, axes: FloatArray, seen: FloatArray, robot: FloatArray, team: FusedTeam,
-    memory: LoopMemory,
+    memory: LoopMemory, told: FloatArray,
 ) -> None:  # fmt: skip
     """Write the effort that gives end effector and joints of robot k the desired accelerations.
 
@@ -81,8 +96,10 @@ def command(
         robot: The robot's own, shape (2 (3 + n_k),).
         team: The robots' models.
         memory: Receives the effort.
+        told: Receives the object's desired acceleration and the command of the end effector, see ``TOLD``.
     """
-    wanted, own = np.empty(6), 3 * k + team.first[2, k]
+    wanted, own = told[COMMAND:], 3 * k + team.first[2, k]
+    told[ACCELERATION], told[ACCELERATION + 1], told[ACCELERATION + 2] = linear[0], linear[1], axes[0]
     chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
     end_effector_command(team.loads[k], seen, linear, axes, wanted)
     robot_effort(chain, robot, wanted, axes, memory.efforts[0, own : own + 2 + axes.size])
@@ -92,7 +109,7 @@ def command(
 def follow_axes(
     k: int, sample: int, cell: int, time: float, linear: FloatArray, seen: FloatArray, robot: FloatArray,
     cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory,
-    law: FloatArray,
+    law: FloatArray, told: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Write the effort of robot k and what the law of its axes asks for.
 
@@ -110,6 +127,7 @@ def follow_axes(
         departures: What departs.
         memory: What changes.
         law: Receives the accelerations of the law, shape (1 + n_k,).
+        told: As in ``command``.
 
     Returns:
         The states of object and robot on which the law acts, and by which the robot is ready.
@@ -119,7 +137,7 @@ def follow_axes(
     jumps = memory.jumps[begin : begin + law.size] if memory.jumped[k] == cell else np.zeros(law.size)
     if not nominal.axis_gains.size:
         track_axes(rows, time, ON_TIME, jumps, seen, robot, law)
-        command(k, linear, law, seen, robot, team, memory)
+        command(k, linear, law, seen, robot, team, memory, told)
         return seen, robot
     ring, mounting = memory.axes.shape[0], nominal.mountings[begin : begin + law.size]
     now = memory.axes[sample % ring, :, begin : begin + law.size]
@@ -131,7 +149,7 @@ def follow_axes(
     pull_axes(law, seen, robot, then, (gains[0], gains[1]), pulled)
     carry_axes(now, law, 0.5 * departures.times[0] + lag, lag, later)
     ahead, robot_ahead = _placed(later, mounting, seen, robot)
-    command(k, linear, pulled, ahead, robot_ahead, team, memory)
+    command(k, linear, pulled, ahead, robot_ahead, team, memory, told)
     return led, led_robot
 
 
@@ -149,9 +167,9 @@ def _placed(
 @compiled
 def report(
     k: int, sample: int, cell: int, time: float, seen: FloatArray, robot: FloatArray, cells: LoopCells,
-    nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory, begin: int,
+    nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory, begin: int, whole: bool,
 ) -> float:  # fmt: skip
-    """Return the margin with which robot k is ready; of a margin below zero only the sign counts.
+    """Return the margin with which robot k is ready; of a negative one only its sign unless ``whole``.
 
     Args:
         k: This and the next three arguments are those of ``lead``.
@@ -165,12 +183,13 @@ def report(
         departures: What departs.
         memory: What changes.
         begin: Its first row among all axes.
+        whole: Whether the margin is wanted that its blocks would report.
     """
     end, last = begin + robot.size // 2 - 2, cell + 1 == cells.rows.shape[0]
     following = cell if last else cell + 1
     own, after = cells.tables[cell, begin:end], cells.tables[following, begin:end]
     margin = axes_ready(own, after, last, time, seen, robot)
-    if margin < 0.0:  # the position is not judged in vain
+    if margin < 0.0 and not whole:  # the position is not judged in vain
         return margin
     edges = cells.governed[cells.first[0, following] : cells.first[0, following + 1]]
     stiffness, inradius, tolerance = cells.numbers[following, 1], cells.numbers[cell, 0], cells.tolerances[0]

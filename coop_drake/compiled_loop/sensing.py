@@ -17,8 +17,18 @@ LOST_POSE, POSE_NOISE, STATE_NOISE = 1, 5, 6
 
 
 @compiled
-def measure(sample: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory) -> None:
-    """Write what every robot's sensors measure at a sample, before delay and losses."""
+def measure(
+    sample: int, number: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory
+) -> None:
+    """Write what every robot's sensors measure at a sample, before delay and losses.
+
+    Args:
+        sample: Number of the sample, or of the next one between two samples.
+        number: Number of the control period whose noise there is now.
+        team: The robots' models.
+        departures: What departs.
+        memory: What changes.
+    """
     now = sample % memory.poses.shape[0]
     for k in range(team.yaws.size):
         own = 3 * k + team.first[2, k]
@@ -29,9 +39,9 @@ def measure(sample: int, team: FusedTeam, departures: LoopDepartures, memory: Lo
         read_own(k, team.places, team.first, team.base_chains, team.yaws, memory.state, robot)
         for i in range(size, size + 3):
             robot[i] *= departures.odometry[k]
-        _err(departures.seeds[k, POSE_NOISE], sample, departures.errors[:3], pose)
+        _err(departures.seeds[k, POSE_NOISE], number, departures.errors[:3], pose)
         begin = 3 + 2 * own
-        _err(departures.seeds[k, STATE_NOISE], sample, departures.errors[begin : begin + robot.size], robot)
+        _err(departures.seeds[k, STATE_NOISE], number, departures.errors[begin : begin + robot.size], robot)
 
 
 @compiled
@@ -46,9 +56,12 @@ def _err(seed: int, sample: int, sizes: FloatArray, values: FloatArray) -> None:
 
 @compiled
 def receive(
-    k: int, sample: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory
+    k: int, sample: int, number: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the pose and the state that robot k has at a sample, and carry its lines over a period."""
+    """Return the pose and the state that robot k has, and carry its lines over a period.
+
+    Arguments are those of ``measure``, and the robot.
+    """
     own = 2 * (3 * k + team.first[2, k])
     end = own + 2 * (3 + team.first[2, k + 1] - team.first[2, k])
     seen = max(sample - departures.periods[0], 0) % memory.poses.shape[0]
@@ -56,21 +69,21 @@ def receive(
     if departures.probabilities[0] > 0.0 or departures.probabilities[1] > 0.0:
         pose, robot = pose.copy(), robot.copy()
         for kind, values in ((0, pose), (1, robot)):
-            _pass(departures.seeds[k, LOST_POSE + kind], sample, departures, memory.lines[k, kind], values)
+            if sample == 0:
+                for row in memory.lines[k, kind]:
+                    row[0], row[1 : 1 + values.size] = NOTHING, values
+            _pass(departures.seeds[k, LOST_POSE + kind], number, departures, memory.lines[k, kind], values)
     return pose, robot
 
 
 @compiled
-def _pass(seed: int, sample: int, departures: LoopDepartures, line: FloatArray, values: FloatArray) -> None:
+def _pass(seed: int, number: int, departures: LoopDepartures, line: FloatArray, values: FloatArray) -> None:
     """Replace measured values by those that have arrived, and carry the line over a period."""
     measured, following = np.zeros(line.shape[1] - 1), np.empty(line.shape)
     measured[: values.size] = values
-    if sample == 0:
-        for row in line:
-            row[0], row[1:] = NOTHING, measured
-    chances = uniform_pair(seed, sample)
+    chances = uniform_pair(seed, number)
     lost, late = chances[0] < departures.probabilities[0], chances[1] < departures.probabilities[1]
     if lost or late:
         values[:] = line[0, 1 : 1 + values.size]
-    carry_measurements(line, sample, measured, lost, late, following)
+    carry_measurements(line, number, measured, lost, late, following)
     line[:] = following

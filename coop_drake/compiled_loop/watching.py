@@ -82,7 +82,7 @@ def watch(
         z[i] = memory.state[team.places[0, i]]
     cell, time = int(memory.current[now, 0]), sample * departures.times[0] - memory.current[now, 1]
     figures[SAMPLES], figures[CELL] = sample, cell
-    _watch_cell(sample, 0, cell, z, cells, plant, nominal, departures, memory, figures)
+    _watch_cell(sample, cell, z, cells, plant, nominal, departures, memory, figures)
     watch_distances(z, plant, measured, figures)
     if nominal.flow.size:
         led = memory.nominal[sample % memory.nominal.shape[0]]
@@ -97,27 +97,8 @@ def watch(
 
 
 @compiled
-def watch_switch(
-    sample: int, cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal,
-    departures: LoopDepartures, memory: LoopMemory, figures: FloatArray,
-) -> None:  # fmt: skip
-    """Measure the margins to cell, slices and funnels after the updates of a sample that switched.
-
-    Drake's loop takes steps that are shorter than a period where efforts lag, and measures margins soon after
-    a sample. Where efforts do not lag, it measures them before the next one.
-    """
-    after = (sample + 1) % memory.current.shape[0]
-    if departures.times[2] > 0.0 and memory.current[after, 1] == sample * departures.times[0] > 0.0:
-        z = np.empty(memory.state.size // 2)
-        for i in range(z.size):
-            z[i] = memory.state[team.places[0, i]]
-        cell = int(memory.current[after, 0])
-        _watch_cell(sample, 1, cell, z, cells, plant, nominal, departures, memory, figures)
-
-
-@compiled
 def _watch_cell(
-    sample: int, after: int, cell: int, z: FloatArray, cells: LoopCells, plant: LoopPlant,
+    sample: int, cell: int, z: FloatArray, cells: LoopCells, plant: LoopPlant,
     nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory, figures: FloatArray,
 ) -> None:  # fmt: skip
     """Measure distances to funnels, slices and the cell's boundary, and end the run where one is negative.
@@ -125,8 +106,8 @@ def _watch_cell(
     An axis uses the least distance to its funnel's bounds that the budget states over the one that it keeps.
     """
     for i in range(z.size - 2):
-        heard, time = heard_cell(plant.axis_rows[1, i], sample + after, departures, memory)
-        time -= after * departures.times[0]
+        now = sample * departures.times[0]
+        heard, time = heard_cell(plant.axis_rows[1, i], sample, now, departures, memory)
         bounds = bounds_of(cells.tables[heard, plant.axis_rows[0, i]], time)
         margin = min(z[2 + i] - bounds[0], bounds[1] - z[2 + i])
         if margin < figures[FUNNEL]:

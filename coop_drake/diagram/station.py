@@ -69,17 +69,18 @@ def build_driven_station(scenario: Scenario) -> TransportStation:
     output  ``query_object``             abstract   geometry, for visualization
     ======= ============================ ========== ========================================================
 
-    Where efforts are held between samples, the inputs are those of :func:`build_station`.
+    Where efforts are held between samples, inputs and measurements are those of :func:`build_station`.
 
     Raises:
         ScenarioError: The models do not make a team.
     """
     builder = DiagramBuilder()
     team = build_team_plant(scenario, builder)
+    tilt_floor(team, scenario.deployment.floor)
     if scenario.deployment.period is None:
         _drive_bases(builder, team)
     else:
-        _drive_robots(builder, team, ())
+        _drive_robots(builder, team, _measure(builder, team))
     builder.ExportOutput(team.plant.get_state_output_port(), "team_state")
     builder.ExportOutput(team.plant.get_generalized_acceleration_output_port(), "generalized_acceleration")
     builder.ExportOutput(team.scene_graph.get_query_output_port(), "query_object")

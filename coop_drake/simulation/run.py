@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
@@ -11,7 +12,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_digest
-from coop_drake.diagram import Blocks, ClosedLoop, Replacements, World, build_closed_loop
+from coop_drake.diagram import Blocks, Replacements, build_closed_loop
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import read_component_tree
 from coop_drake.progress import Progress
@@ -20,6 +21,7 @@ from coop_drake.scenario.digest import scenario_digest
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.invariants import Invariants
 from coop_drake.simulation.joint_limits import joint_limits_kept_by_funnels
+from coop_drake.simulation.logged_ports import LoggedLoop
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.simulation.watch import Watch
 
@@ -55,7 +57,19 @@ def simulate(
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
         ScenarioError: The models do not make a team, or fused blocks do not know what the scenario wants.
     """
-    loop = build_closed_loop(scenario, plan, maps, blocks=blocks, replacements=replacements)
+    build = partial(build_closed_loop, scenario, plan, maps, blocks=blocks, replacements=replacements)
+    return run_and_release(build, scenario, progress=progress, observer=observer)
+
+
+def run_and_release(
+    build: Callable[[], LoggedLoop],
+    scenario: Scenario,
+    *,
+    progress: Progress | None = None,
+    observer: Callable[[Sample], None] | None = None,
+) -> SimulationLog:
+    """Build a closed loop, run it as :func:`simulate` does, and free its memory."""
+    loop = build()
     try:
         return run_loop(loop, scenario, progress=progress, observer=observer)
     finally:
@@ -68,7 +82,7 @@ def simulate(
 
 
 def run_loop(
-    loop: ClosedLoop | World,
+    loop: LoggedLoop,
     scenario: Scenario,
     *,
     progress: Progress | None = None,

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from pydrake.systems.framework import Context, EventStatus
 
 from coop_drake.answers.plan import Plan
-from coop_drake.diagram import ClosedLoop, World
+from coop_drake.diagram import World
 from coop_drake.simulation.invariants import Invariants, Margins
+from coop_drake.simulation.logged_ports import LoggedLoop
 from coop_drake.simulation.recorder import Recorder
 from coop_drake.simulation.stall import at_goal, blocking_margin, narrowest_funnel, patience
 from coop_drake.simulation.telemetry import Sample, Telemetry
@@ -28,7 +29,7 @@ class Watch:
 
     def __init__(
         self,
-        loop: ClosedLoop | World,
+        loop: LoggedLoop,
         invariants: Invariants,
         position_tolerance: float,
         root: Context,

@@ -141,7 +141,7 @@ def compiled_results(transport: CompiledTransport):
         memory.state[transport.team.places[1]] = speed * np.linspace(0.5, 1.0, n)
         memory.governors[:] = transition.target - [0.8 * away, 0.3 * away]
         parts = transport.cells, transport.team, transport.plant, transport.nominal, departures, memory
-        update(40, *parts[:2], *parts[3:])
+        update(*parts[:2], *parts[3:], 40)
         watch(40, *parts, np.full(n + 2, np.nan), figures)
         numbers = memory.efforts[0], memory.governors.ravel(), memory.reports[0].ravel(), figures
         found.append([repr(number) for row in numbers for number in row.tolist()])

@@ -1,0 +1,144 @@
+"""Drake's loop of a sampled team with one block in place of all controllers: for many runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import Demultiplexer
+
+from coop_drake.answers.log import SimulationLog
+from coop_drake.answers.plan import Plan
+from coop_drake.compiled_loop.departing import believed, departures_of, memory_of, nominal_of
+from coop_drake.compiled_loop.preparing import CompiledTransport
+from coop_drake.compiled_loop.sampled_team import SampledTeam
+from coop_drake.compiled_loop.telling import GOVERNOR, MARGIN, POSE, READY, SHOWN, WANTED
+from coop_drake.diagram.station import TransportStation, build_driven_station
+from coop_drake.plant import TeamPlant, set_configuration
+from coop_drake.scenario import Deployment
+from coop_drake.simulation.logged_ports import Places, PortRow
+from coop_drake.simulation.run import run_and_release
+from coop_drake.simulation.telemetry import Sample
+from coop_drake.systems.block import release_all
+from coop_drake.tree.pose import IntArray
+
+
+@dataclass(frozen=True)
+class SampledLoop:
+    """Drake's plant, and one block that computes what a sampled team computes.
+
+    Attributes:
+        diagram: The Diagram of the whole loop.
+        station: The simulated team.
+        controllers: The block.
+        axis_rows: Row among the M axes of (theta, q), shape (1 + n,).
+        plan: The plan that is followed.
+    """
+
+    diagram: Diagram
+    station: TransportStation
+    controllers: SampledTeam
+    axis_rows: IntArray
+    plan: Plan
+
+    @property
+    def team(self) -> TeamPlant:
+        """The simulated team."""
+        return self.station.team
+
+    def create_context(self) -> Context:
+        """Create a context at the plan's start, at rest."""
+        context = self.diagram.CreateDefaultContext()
+        set_configuration(self.team, self.team.plant.GetMyMutableContextFromRoot(context), self.plan.start)
+        return context
+
+    def release(self) -> None:
+        """Free all memory after the last context is gone; no part of the loop may be used any more."""
+        release_all(self.diagram)
+
+    def places(self, ports: PortRow) -> Places:
+        """Add all outputs that are logged, and return where they stand."""
+        robots = self.team.robots
+        told, efforts = ports.add(self.controllers, "telemetry"), ports.add(self.controllers, "efforts")
+        ends = 3 + SHOWN * len(robots)
+        shown, bounds = told[3:ends].reshape(-1, SHOWN), told[ends:].reshape(2, -1)
+        own = np.split(efforts, np.cumsum([3 + len(robot.joints) for robot in robots])[:-1])
+        realised = ports.add(self.station.diagram, "generalized_acceleration")[self.team.velocity_index]
+        nothing = np.empty(0, dtype=np.intp)
+        return Places(
+            instant=told[:3],
+            base_poses=shown[:, POSE : POSE + 3],
+            governors=shown[:, GOVERNOR : GOVERNOR + 2],
+            funnel_lower=bounds[0, self.axis_rows],
+            funnel_upper=bounds[1, self.axis_rows],
+            energy_margins=shown[:, MARGIN],
+            commanded_wrenches=shown[:, SHOWN - 3 :],
+            base_wrenches=np.array([effort[:3] for effort in own]),
+            joint_torques=np.concatenate([effort[3:] for effort in own]),
+            accelerations=shown[:, WANTED : WANTED + 3],
+            realised=realised,
+            ready_margins=shown[:, READY + 1],
+            clock_lag=nothing,
+            causes=nothing,
+        )
+
+
+def build_sampled_loop(transport: CompiledTransport, deployment: Deployment | None = None) -> SampledLoop:
+    """Build Drake's loop of a transport with one block in place of sensors, controllers and messages.
+
+    Args:
+        transport: What ``prepare`` returned.
+        deployment: The departures; None for those of the scenario that was prepared.
+
+    Raises:
+        ScenarioError: The compiled loop does not know what departs.
+    """
+    deployment = transport.scenario.deployment if deployment is None else deployment
+    departures = departures_of(transport, deployment)
+    block = SampledTeam(
+        transport.cells,
+        believed(transport.team, deployment.mass_error),
+        nominal_of(transport, float(departures.times[0])),
+        departures,
+        memory_of(transport, departures),
+    )
+    builder = DiagramBuilder()
+    station = build_driven_station(replace(transport.scenario, deployment=deployment))
+    diagram, robots = station.diagram, station.team.robots
+    builder.AddNamedSystem("transport_station", diagram)
+    builder.AddNamedSystem("sampled_team", block)
+    parts = builder.AddNamedSystem("efforts", Demultiplexer([3 + len(robot.joints) for robot in robots]))
+    builder.Connect(diagram.GetOutputPort("team_state"), block.GetInputPort("team_state"))
+    builder.Connect(block.GetOutputPort("efforts"), parts.get_input_port())
+    for k in range(len(robots)):
+        builder.Connect(parts.get_output_port(k), diagram.GetInputPort(f"robot_{k}_effort"))
+    rows = transport.plant.axis_rows[0]
+    return SampledLoop(builder.Build(), station, block, rows, transport.plan)
+
+
+def simulate_sampled(
+    transport: CompiledTransport,
+    deployment: Deployment | None = None,
+    *,
+    observer: Callable[[Sample], None] | None = None,
+) -> SimulationLog:
+    """Run Drake's loop of a transport with one block in place of all controllers.
+
+    The log agrees with that of :func:`coop_drake.simulation.simulate` to rounding, and a run takes a third of
+    the time or less.
+
+    Args:
+        transport: What ``prepare`` returned.
+        deployment: The departures; None for those of the scenario that was prepared.
+        observer: Called with every accepted step, if given.
+
+    Raises:
+        ScenarioError: The compiled loop does not know what departs.
+    """
+    deployment = transport.scenario.deployment if deployment is None else deployment
+    scenario = replace(transport.scenario, deployment=deployment)
+    build = partial(build_sampled_loop, transport, deployment)
+    return run_and_release(build, scenario, observer=observer)
