@@ -27,6 +27,7 @@ from benchmarks.messages import message_tasks
 from benchmarks.planner.ablation import ablation_tasks
 from benchmarks.planner.budgeted import budget_tasks
 from benchmarks.planner.contradiction import contradiction_tasks
+from benchmarks.planner.critical_width import critical_width_tasks
 from benchmarks.planner.growth import growth_tasks
 from benchmarks.planner.head_to_head import Effort, head_to_head_tasks
 from benchmarks.planner.ours import compile_kernels
@@ -108,6 +109,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *growth_tasks(effort.limit),
         *team_tasks(effort.limit),
         *contradiction_tasks(),
+        *critical_width_tasks(),
         *starting_tasks(),
         *breaking_tasks(),
         *(_command_task(scenario) for scenario in _COMMANDED),

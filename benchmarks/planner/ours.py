@@ -10,6 +10,7 @@ from benchmarks.planner.family import corridor_problem, first_question
 from coop_drake.answers import Found, PlanningProblem, PlanningResult
 from coop_drake.answers.budget import Budget
 from coop_drake.campaign.questions.trees_peer import run_trees
+from coop_drake.cli.summary import answer_of
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning import warm_up
 from coop_drake.planning.planner import plan
@@ -22,7 +23,7 @@ class Planned:
     """One answer, its figures and its time.
 
     Attributes:
-        answer: ``found``, ``infeasible`` or ``undecided``.
+        answer: ``found``, ``beyond limits``, ``infeasible`` or ``undecided``.
         cpu_seconds: From the question to a plan that can be executed, or to the verdict [CPU s].
         first_plan_cpu_seconds: To the first certified plan, or to the verdict [CPU s].
         slices: Compound slices swept.
@@ -90,7 +91,7 @@ def _planned(ask: Callable[[], PlanningResult]) -> Planned:
     first = report.first_plan_cpu_seconds
     found = result.plan if isinstance(result, Found) else None
     return Planned(
-        answer=type(result).__name__.lower(),
+        answer=answer_of(result),
         cpu_seconds=seconds,
         first_plan_cpu_seconds=seconds if first is None else first,
         slices=report.slices,
