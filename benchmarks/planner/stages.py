@@ -51,7 +51,7 @@ class Replacement:
     value: Any
 
 
-def _known_path(problem: PlanningProblem, hierarchy: object, known: Any, gap: float) -> Any:
+def _known_path(problem: PlanningProblem, hierarchy: object, known: Any, gap: float, share: float) -> Any:
     """Smooth the known path only, as it is smoothed before candidates are compared."""
     moves = clear_paths.COMPARED_MOVES
     return smoothed(problem, known, clear_paths.LEAST_CLEARANCE, 0.0, gap, moves=moves)
@@ -69,7 +69,7 @@ STAGES: dict[str, tuple[Replacement, ...]] = {
     "no_straightening": (Replacement(clear_paths, "STRAIGHTENINGS", ()),),
     "no_centring": (Replacement(clear_paths, "NARROW_REPEATS", 0),),
     "no_improved_path": (
-        Replacement(sampled_search, "moved_from_obstacles", lambda problem, path, gap: path),
+        Replacement(sampled_search, "moved_from_obstacles", lambda problem, path, gap, share: path),
     ),
     "no_covering": (Replacement(quickest, "cover_path", lambda *asked: None),),
     "no_narrow_boxes": (Replacement(path_covering, "LEVELS", path_covering.LEVELS[:1]),),

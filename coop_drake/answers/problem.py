@@ -37,6 +37,9 @@ class PlannerSettings:
             and of the target where the cell is left [m]. Narrower ones take minutes. For very large or very
             small teams it is scaled to the team.
         max_transition_time: Longest estimated time of one transition that is accepted [s].
+        effort: Work spent on a quicker transport once there is a certified path, as a share of the default:
+            with 0 the plan follows the path that was found first, with 2 twice the work is spent. It is
+            counted in samples and moves, not in seconds.
         strategy: ``portfolio`` samples, certifies and proves; ``cells`` explores by cells alone; ``paper``
             explores as the paper's Algorithms 1 and 2 are printed, at margin zero.
     """
@@ -48,6 +51,7 @@ class PlannerSettings:
     max_slices: Annotated[int, Limits(above=0)] = 4_000
     min_clearance: Positive = 0.001
     max_transition_time: Positive = 60.0
+    effort: Annotated[float, Limits(at_least=0.0, at_most=1000.0)] = 1.0
     strategy: Literal["portfolio", "cells", "paper"] = "portfolio"
 
 

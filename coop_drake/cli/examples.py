@@ -13,6 +13,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "plan": (
         (f"plan {_BASE}", "write out/base/plan.json and table_1.md"),
+        (f"plan {_BASE} --effort 8", "eight times the work, for a quicker transport"),
         ("plan models/closed.scenario.yaml", "exit code 3 and a proof that there is no plan"),
     ),
     "simulate": (

@@ -86,6 +86,17 @@ BudgetName = Annotated[
         "these for the object's position alone, or those of a file.",
     ),
 ]
+Effort = Annotated[
+    float | None,
+    typer.Option(
+        "--effort",
+        metavar="SHARE",
+        min=0.0,
+        max=1000.0,
+        help="Work for a quicker transport as a share of the default: 0 takes the path found first, 2 spends "
+        "twice as much; the scenario's `planner: {effort}` by default.",
+    ),
+]
 ResultsFolder = Annotated[Path | None, out_folder("Where results go; out/<scenario> by default.")]
 PictureFolder = Annotated[Path | None, out_folder("Where the picture goes; out/<scenario> by default.")]
 Machine = Annotated[

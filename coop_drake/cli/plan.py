@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from coop_drake.cli.options import BudgetName, GainsName, Machine, Quiet, ResultsFolder, ScenarioPath, Verbose
+from coop_drake.cli.options import (
+    BudgetName,
+    Effort,
+    GainsName,
+    Machine,
+    Quiet,
+    ResultsFolder,
+    ScenarioPath,
+    Verbose,
+)
 from coop_drake.cli.planning_process import beside, prepare_simulation
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
@@ -23,6 +32,7 @@ def plan_command(
     out: ResultsFolder = None,
     gains: GainsName = None,
     budget: BudgetName = None,
+    effort: Effort = None,
     machine: Machine = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -31,7 +41,7 @@ def plan_command(
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "plan")
-        if plan_of(task, folder, reporter, budget):
+        if plan_of(task, folder, reporter, budget, effort=effort):
             reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
             reporter.say(f"The plan is in {escape(str(folder.plan))}")
 
@@ -42,19 +52,27 @@ def plan_of(
     reporter: Reporter,
     budget: str | None = None,
     *,
+    effort: float | None = None,
     simulated: bool = False,
 ) -> Plan | None:
     """Plan, and note the facts; without a plan say so, and set the exit code.
 
-    It holds under the ``budget`` that the option of this name says, or else the scenario's ``deployment``.
+    It holds under the ``budget`` that the option of this name says, or else the scenario's ``deployment``;
+    ``effort`` takes the place of the scenario's.
     The plan with its table of cells, a way that limits refuse, or the proof that there is none, goes to the
     folder if one is given. If the plan will be ``simulated``, this is prepared at the same time.
     """
-    return report_answer(task, answer_to(task, reporter, budget, simulated=simulated), folder, reporter)
+    result = answer_to(task, reporter, budget, effort=effort, simulated=simulated)
+    return report_answer(task, result, folder, reporter)
 
 
 def answer_to(
-    task: Task, reporter: Reporter, budget: str | None = None, *, simulated: bool = False
+    task: Task,
+    reporter: Reporter,
+    budget: str | None = None,
+    *,
+    effort: float | None = None,
+    simulated: bool = False,
 ) -> PlanningResult:
     """Ask the planner, and note the facts; see ``plan_of``."""
     from coop_drake.memory import peak_memory_mb
@@ -67,7 +85,7 @@ def answer_to(
         tolerated = budget_of(budget, task.scenario, task.problem)
     with reporter.stage("planning", "planning", cpu=True) as progress:
         gain_set = task.scenario.gain_sets[name]
-        work = partial(plan, task.problem, gain_set, gain_set_name=name, budget=tolerated)
+        work = partial(plan, task.problem, gain_set, gain_set_name=name, budget=tolerated, effort=effort)
         if simulated:
             prepare = partial(prepare_simulation, task.scenario)
             result = beside(lambda advance: work(progress=advance), prepare, progress)

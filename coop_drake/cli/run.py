@@ -14,6 +14,7 @@ from coop_drake.cli.maps import map_cells, write_certificates
 from coop_drake.cli.options import (
     Apart,
     BlocksName,
+    Effort,
     FreeRunning,
     FreshMaps,
     GainsName,
@@ -50,6 +51,7 @@ def run_command(
     scenario: ScenarioPath,
     out: ResultsFolder = None,
     gains: GainsName = None,
+    effort: Effort = None,
     fresh_maps: FreshMaps = False,
     live: Live = False,
     wait: Wait = False,
@@ -70,7 +72,7 @@ def run_command(
         )
         folder = ResultFolder.of(task.name, out, "plan", "simulation")
         with DrawingProcesses(figures=not no_figures) as drawing:
-            plan = plan_of(task, folder, reporter, simulated=True)
+            plan = plan_of(task, folder, reporter, effort=effort, simulated=True)
             if plan:
                 with live_page(task, plan, reporter, live=live, wait=wait) as page:
                     reporter.code = carry_out(

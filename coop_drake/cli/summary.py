@@ -132,6 +132,7 @@ def planning_facts(result: PlanningResult) -> dict[str, Any]:
     facts: dict[str, Any] = {"answer": answer_of(result), "cells": 0, "slices": report.slices}
     first = report.first_plan_cpu_seconds
     facts["first_plan_cpu_seconds"] = None if first is None else round(first, 4)
+    facts["improvements"] = [[round(seconds, 4), estimate] for seconds, estimate in report.improvements]
     if isinstance(result, Found | BeyondLimits):
         facts.update(plan_facts(result.plan))
     if isinstance(result, BeyondLimits):

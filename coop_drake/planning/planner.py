@@ -6,6 +6,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
+from math import inf
+from time import thread_time
 from typing import TYPE_CHECKING
 
 from shapely.errors import ShapelyError
@@ -18,7 +20,9 @@ from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PatienceError, PlanError, StallError, TooQuickError
 from coop_drake.laws import GainSet, ScheduledGains
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
+from coop_drake.planning.execution.estimate import plan_time
 from coop_drake.planning.execution.refusals import refusals, without_limits
+from coop_drake.planning.improvement.further_paths import quicker_plans
 from coop_drake.planning.improvement.quickest import quickest_plan
 from coop_drake.planning.sampling.local_floor import local_question
 from coop_drake.planning.search.search import find_path
@@ -41,6 +45,7 @@ def plan(
     *,
     gain_set_name: str,
     budget: Budget | None = None,
+    effort: float | None = None,
     progress: Progress | None = None,
 ) -> PlanningResult:
     """Find a plan, or prove that none exists.
@@ -57,12 +62,20 @@ def plan(
         gain_set: Gains, fixed or to be scheduled.
         gain_set_name: Name under which the scenario knows them.
         budget: Departures from the ideal team that the plan shall tolerate; needs scheduled gains.
+        effort: As ``PlannerSettings`` has it, in place of that of the problem.
         progress: Called with a phase and the fraction of it that is done. If it raises PatienceError, a plan
             is finished along the way that is certified by then; without one, the error goes to the caller.
+
+    Raises:
+        ValueError: The effort is negative or no number.
 
     Returns:
         Found with the plan, BeyondLimits with a plan that limits refuse, Infeasible or Undecided.
     """
+    if effort is not None:
+        if not 0.0 <= effort < inf:
+            raise ValueError(f"effort is {effort}; allowed are numbers of 0 or more")
+        problem = replace(problem, settings=replace(problem.settings, effort=effort))
     local, near = local_question(problem), None
     if local is not None:
         near = _answer(local, gain_set, gain_set_name, budget, progress, partial(find_path, routed=True))
@@ -83,6 +96,7 @@ def _answer(
     search: Callable[..., tuple[CoveredPath | Channel | NoChannel, SearchReport]],
 ) -> PlanningResult:
     """Answer a question by a search, with smaller margins where its paths cannot be executed."""
+    began = thread_time()
     question, report, stall, too_quick, way = problem, SearchReport(0), "", False, None
     for _ in range(1 + FINER_ATTEMPTS):
         answer, latest = search(question, progress)
@@ -93,8 +107,9 @@ def _answer(
             stall = stall or answer.reason
             break
         way = answer
+        make = partial(_made, question, gain_set, gain_set_name, budget)
         try:
-            made = _finished(partial(_made, question, answer, gain_set, gain_set_name, budget), progress)
+            made = _finished(partial(make, answer), progress)
         except (GeometryError, PlanError, StallError, ShapelyError) as error:
             stall = f"a free path exists, but a plan along it cannot be executed: {error}"
             too_quick = isinstance(error, TooQuickError)
@@ -102,11 +117,30 @@ def _answer(
                 break
             question = replace(question, settings=replace(question.settings, margin=0.5 * answer.margin))
         else:
-            if isinstance(made, Plan):
-                return Found(made, report)
-            return Undecided(made.describe(), report)
+            return _found(question, answer, made, make, replace(report, improvements=()), began, progress)
     refused = way and _without_limits(problem, way, gain_set, gain_set_name, slowly=too_quick)
     return BeyondLimits(refused, report) if refused else Undecided(stall, report)
+
+
+def _found(
+    problem: PlanningProblem,
+    way: Channel | CoveredPath,
+    made: Plan | BeyondBudget,
+    make: Callable[[CoveredPath], Plan | BeyondBudget],
+    report: SearchReport,
+    began: float,
+    progress: Progress | None,
+) -> Found | Undecided:
+    """The quickest of a plan and of those along further paths; Undecided if all are beyond the budget."""
+    plans = [made] if isinstance(made, Plan) else []
+    times = [thread_time() - began]
+    for other in quicker_plans(way, made, make, problem.settings.effort, progress):
+        plans.append(other)
+        times.append(thread_time() - began)
+    if not (isinstance(made, Plan) or plans):
+        return Undecided(made.describe(), report)
+    improvements = tuple(zip(times[-len(plans) :], map(plan_time, plans), strict=True))
+    return Found(plans[-1], replace(report, improvements=improvements))
 
 
 def _without_limits(
@@ -137,11 +171,11 @@ def _finished(
 
 def _made(
     problem: PlanningProblem,
-    found: Channel | CoveredPath,
     gain_set: GainSet,
     name: str,
     budget: Budget | None,
-    progress: Progress | None,
+    found: Channel | CoveredPath,
+    progress: Progress | None = None,
 ) -> Plan | BeyondBudget:
     if budget is None:
         return _slow_enough(problem, found, gain_set, name, progress)

@@ -57,11 +57,14 @@ class CoveredPath:
         path: From start to goal, theta unwrapped, shape (m, 3 + n) [m, rad].
         margin: The margin rho that the path keeps in every box [m].
         channel: Makes the channel of these boxes; raises a GeometryError if geometry fails.
+        another: Finds another path by other samples, for a number (1, 2, ...) that these follow from and the
+            share of the usual work that it may take [-]; None if it finds none.
     """
 
     path: FloatArray
     margin: float
     channel: Callable[[], Channel]
+    another: Callable[[int, float], CoveredPath | None] = lambda number, share: None
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,10 @@ SHORTCUTS = 60
 DISC_SAMPLES_FACTOR = 2
 """The disc gets this many times the samples of the others, because it has no guide path."""
 
+FEW_JOINTS = 3
+"""Teams with more joints than this [-] are sampled as a whole at once, because samples of robot after robot
+often fail; others in later attempts, because the first one gives paths that are quicker to follow."""
+
 EVERYWHERE, WHERE_TREES_END = (400, 1), (0, 12)
 """Two ways to sample around a guide path: the number of its rows above which most samples are drawn where a
 tree has come furthest, and the values that are tried of each component's axes until it is free [-]. The first

@@ -113,7 +113,12 @@ class Rescaling:
 
     def _covered(self, found: CoveredPath) -> CoveredPath:
         path, margin = found.path * self._units, self.unit * found.margin
-        return replace(found, path=path, margin=margin, channel=lambda: self._channel(found.channel()))
+
+        def another(number: int, share: float) -> CoveredPath | None:
+            other = found.another(number, share)
+            return None if other is None else self._covered(other)
+
+        return CoveredPath(path, margin, lambda: self._channel(found.channel()), another)
 
     def _channel(self, found: Channel) -> Channel:
         boxes = tuple(self._scaled_box(box, self._units[2:], "polygon", "core") for box in found.boxes)

@@ -17,11 +17,16 @@ from coop_drake.planning.boxes.boxes import Regions, make_channel
 from coop_drake.planning.boxes.certify import Certifier, PathBox
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
 from coop_drake.planning.questions.margins import exact_footprint, marginal_workspace
-from coop_drake.planning.sampling.clear_paths import best_candidate, margins_to_try, moved_from_obstacles
+from coop_drake.planning.sampling.clear_paths import (
+    another_candidate,
+    best_candidate,
+    margins_to_try,
+    moved_from_obstacles,
+)
 from coop_drake.planning.sampling.elastic_band import smoothed
 from coop_drake.planning.sampling.local_floor import object_route
 from coop_drake.planning.sampling.narrow_passages import repaired, widened_floor
-from coop_drake.planning.sampling.sampler import Sampler
+from coop_drake.planning.sampling.sampler import FEW_JOINTS, Sampler
 from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
@@ -43,10 +48,6 @@ are the easiest to sample, and random seeds for each of them."""
 FIRST_SMOOTHINGS = (0.05, 600), (0.05, 3_000)
 """Spacing of samples [m] and number of moves with which a new path is smoothed; the longer smoothing follows
 only if boxes cannot cover the path after the shorter one."""
-
-FEW_JOINTS = 3
-"""Teams with more joints than this [-] are sampled as a whole at once, because samples of robot after robot
-often fail; others in later attempts, because the first one gives paths that are quicker to follow."""
 
 LIGHT_ATTEMPTS = 4
 """Attempts with few samples, before those with many begin."""
@@ -148,28 +149,47 @@ class SampledSearch:
         except (GeometryError, ShapelyError):
             return None
 
-    def with_margin(self, first: BoxSequence, progress: Callable[[float, float], None]) -> BoxSequence:
+    def with_margin(
+        self, first: BoxSequence, progress: Callable[[float, float], None], share: float = 1.0
+    ) -> BoxSequence:
         """Move the best path away from the walls, and cover it at the largest margin that it keeps.
 
         Args:
             first: Boxes at margin zero.
+            share: Share of the usual work that is spent on the path [-].
             progress: Called with a margin [m] and the fraction of the path that is covered.
 
         Returns:
             Boxes at a margin; at margin zero if no other margin is kept.
         """
         progress(0.0, 0.0)
-        near = best_candidate(self._problem, self._hierarchy, first.path, BODY_GAP)
-        path = moved_from_obstacles(self._problem, near, BODY_GAP)
+        near = best_candidate(self._problem, self._hierarchy, first.path, BODY_GAP, share)
+        return self._moved(near, share, progress) or self._covered(first.path, 0.0) or first
+
+    def another(self, number: int, share: float) -> CoveredPath | None:
+        """Find another path by other samples; see ``CoveredPath``."""
+        try:
+            near = another_candidate(self._problem, self._hierarchy, BODY_GAP, number, share)
+            found = None if near is None else self._moved(near, share)
+        except (GeometryError, ShapelyError):
+            return None
+        return None if found is None else self.covered_path(found, found)
+
+    def _moved(
+        self, near: FloatArray, share: float, progress: Callable[[float, float], None] | None = None
+    ) -> BoxSequence | None:
+        """Move a path away from the walls, and cover it at the largest margin that it keeps."""
+        path = moved_from_obstacles(self._problem, near, BODY_GAP, share)
         for margin in margins_to_try(self._problem, path):
-            progress(margin, 0.0)
+            if progress is not None:
+                progress(margin, 0.0)
             try:
                 found = self._covered(path, margin, progress)
             except (GeometryError, ShapelyError):
                 found = None
             if found is not None:
                 return found
-        return self._covered(path, 0.0) or self._covered(first.path, 0.0) or first
+        return self._covered(path, 0.0)
 
     def _covered(
         self,
@@ -202,7 +222,7 @@ class SampledSearch:
                 raise GeometryError("the free positions of the boxes along a path cannot be computed")
             return made
 
-        return CoveredPath(found.path, found.margin, channel)
+        return CoveredPath(found.path, found.margin, channel, self.another)
 
     def _channel(self, found: BoxSequence) -> Channel | None:
         """Boxes with all positions that are free for them; None if geometry fails."""

@@ -235,7 +235,7 @@ class _Search:
             self._phase(f"searching at margin {self._unit * margin:.3f} m")(fraction)
 
         try:
-            best = self._samples.with_margin(found, report)
+            best = self._samples.with_margin(found, report, min(1.0, self._problem.settings.effort))
         except (GeometryError, ShapelyError, PatienceError):
             best = found
         return self._samples.covered_path(best, found)
