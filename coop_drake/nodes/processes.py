@@ -30,6 +30,7 @@ from coop_drake.messages import (
     SupervisorEnd,
     name_of,
 )
+from coop_drake.nodes.fresh_process import FreshProcess
 from coop_drake.nodes.robot_node import RobotNode
 from coop_drake.nodes.robot_server import RobotServer
 from coop_drake.nodes.supervisor_node import SupervisorNode
@@ -40,9 +41,6 @@ from coop_drake.scenario.digest import scenario_digest
 
 _CONTEXT = get_context("fork") if sys.platform == "linux" else get_context("spawn")
 """A copy has imported already what this process has; libraries of macOS may not be used in one."""
-
-_FRESH = get_context("spawn")
-"""Starts a process again during a run: a copy of one that simulates would have its sockets, too."""
 
 _OPENING = 30.0
 """How long processes wait for each other at the start [s]: a slow machine imports Drake for some seconds."""
@@ -137,12 +135,15 @@ class LocalTeam:
         self._arguments: dict[int, tuple[Any, ...]] = {SUPERVISOR: (scenario, plan, book)}
         for k in range(len(book.robots)):
             self.work[k], self._arguments[k] = run_robot, (scenario, plan, maps, k, book)
-        self.processes: dict[int, BaseProcess] = {}
+        self.processes: dict[int, BaseProcess | FreshProcess] = {}
         self._left = dict.fromkeys(self.work, restarts)
 
     def __enter__(self) -> LocalTeam:
         for index in self.work:
-            self._start(index, _CONTEXT)
+            process = _CONTEXT.Process(target=_served, args=self._given(index), daemon=True)
+            with uninterrupted():
+                process.start()
+            self.processes[index] = process
         return self
 
     def revive(self, index: int) -> bool:
@@ -150,18 +151,13 @@ class LocalTeam:
         if not self._left[index]:
             return False
         self._left[index] -= 1
-        self._start(index, _FRESH)
+        with uninterrupted():
+            self.processes[index] = FreshProcess(_served, self._given(index))
         return True
 
-    def _start(self, index: int, context: Any) -> None:
-        process = context.Process(
-            target=_served,
-            args=(name_of(index), self.work[index], self._arguments[index], os.getpid()),
-            daemon=True,
-        )
-        with uninterrupted():
-            process.start()
-        self.processes[index] = process
+    def _given(self, index: int) -> tuple[Any, ...]:
+        """Return the arguments of a process' work."""
+        return name_of(index), self.work[index], self._arguments[index], os.getpid()
 
     def gone(self) -> set[int]:
         """Return the indices of the processes that have ended."""

@@ -164,11 +164,12 @@ class RobotNode:
         if margin < 0.0:
             self.state = OUTSIDE
             return []
-        if time - told < AGAIN:
+        number = period_of(time, self._period)
+        if number - told < whole_periods(AGAIN, self._period):
             return []
-        self._told_rest = time
+        self._told_rest = number
         pose = tuple(float(part) for part in measured[self._state_size :])
-        return [AtRest(period_of(time, self._period), pose)]
+        return [AtRest(number, pose)]
 
     def _messages(self) -> Said:
         """Return what is new: a report only where the supervisor would come to another conclusion by it."""
