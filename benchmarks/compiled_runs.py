@@ -67,7 +67,7 @@ def _rows(team: str, label: str, _: Sequence[Row]) -> list[Row]:
         ended = process_time()
         log = simulate(replace(scenario, deployment=replace(deployment, seed=seed)), result.plan, maps)
         seconds, drakes = seconds + ended - begun, drakes + process_time() - ended
-        record = record_of_log(Run(0, 0, seed, {}), team, log, result.plan, "")
+        record = record_of_log(Run(0, 0, seed, {}), team, log, result.plan, "", "named")
         for column in _COLUMNS:
             difference = abs(getattr(outcome, column) - getattr(record, column))
             if isfinite(difference):

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from coop_drake.campaign import Campaign, RunRecord
     from coop_drake.campaign.batches import Batch
     from coop_drake.campaign.results import CampaignFolder
+    from coop_drake.diagram import Blocks
 
 
 def replay(
@@ -40,34 +41,37 @@ def replay(
     from coop_drake.campaign.running.making import run_digest
     from coop_drake.campaign.variation import Variation
     from coop_drake.plant import planning_problem
-    from coop_drake.tuning.trial import fastest_blocks
 
     assert campaign.runs is not None  # or there would be no batches
     variation = Variation(campaign)
     run = variation.run(index)
     scenario = variation.scenario_of(run)
-    plan, maps = Plans(variation, folder.plans).with_maps(run)
+    plan = Plans(variation, folder.plans).plan_of(run)
     task = Task(scenario, planning_problem(scenario))
     results = ResultFolder.of(task.name, folder.path / "replays" / str(index), "simulation")
-    simulation = simulation_of(task, fastest_blocks(scenario, plan, maps), reporter)
+    counted = _counted(index, folder, batches)
+    blocks: Blocks = "fused" if counted and counted["blocks"] == "fused" else "named"
+    simulation = simulation_of(task, blocks, reporter)
     with DrawingProcesses(figures=figures) as drawing:
         code = carry_out(task, plan, results, reporter, drawing, None, simulation, fresh_maps=False)
     log = SimulationLog.load(results.path / "log.npz")
-    again = record_of_log(run, scenario.name, log, plan, run_digest(scenario, plan_digest(plan), "drake"))
-    _compare(again, folder, batches, reporter)
+    digest = run_digest(scenario, plan_digest(plan), "drake")
+    _compare(record_of_log(run, scenario.name, log, plan, digest, blocks), counted, reporter)
     return code
 
 
-def _compare(
-    again: RunRecord, folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter
-) -> None:
-    mine = [one for one in batches if one.tier == "drake" and one.first <= again.run < one.stop]
-    counted = [row for row in folder.table(mine).to_pylist() if row["run"] == again.run]
+def _counted(index: int, folder: CampaignFolder, batches: tuple[Batch, ...]) -> dict[str, Any] | None:
+    """Return the record of a run of Drake's loop, None if it was not counted."""
+    mine = [one for one in batches if one.tier == "drake" and one.first <= index < one.stop]
+    return next((row for row in folder.table(mine).to_pylist() if row["run"] == index), None)
+
+
+def _compare(again: RunRecord, counted: dict[str, Any] | None, reporter: Reporter) -> None:
     reporter.facts.update(run=again.run, counted=bool(counted))
     if not counted:
         reporter.say(f"Drake's loop has not counted run {again.run}; values and seed are those of any tier")
         return
-    differing = [name for name, value in counted[0].items() if not _same(value, getattr(again, name))]
+    differing = [name for name, value in counted.items() if not _same(value, getattr(again, name))]
     if differing:
         raise ProcessError(f"run {again.run} differs from the one that was counted in {', '.join(differing)}")
     reporter.say(f"Run {again.run} is the one that was counted, to the last bit")

@@ -115,9 +115,13 @@ def simulation_of(
 
 
 def _in_one_process(blocks: Blocks, *problem: Any, **options: Any) -> SimulationLog:
+    if blocks == "fused":
+        from coop_drake.compiled_loop import simulate_fused
+
+        return simulate_fused(*problem, **options)
     from coop_drake.simulation import simulate
 
-    return simulate(*problem, blocks=blocks, **options)
+    return simulate(*problem, **options)
 
 
 def carry_out(

@@ -1,6 +1,11 @@
 """The closed loop as compiled code, for many runs: whole transports, or the controllers in Drake's loop."""
 
-from coop_drake.compiled_loop.drakes_loop import SampledLoop, build_sampled_loop, simulate_sampled
+from coop_drake.compiled_loop.drakes_loop import (
+    SampledLoop,
+    build_sampled_loop,
+    simulate_fused,
+    simulate_sampled,
+)
 from coop_drake.compiled_loop.preparing import CompiledTransport, prepare
 from coop_drake.compiled_loop.running import RunOutcome, run, run_many
 
@@ -12,5 +17,6 @@ __all__ = [
     "prepare",
     "run",
     "run_many",
+    "simulate_fused",
     "simulate_sampled",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -13,14 +13,16 @@ from pydrake.systems.primitives import Demultiplexer
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.compiled_loop.departing import believed, departures_of, memory_of, nominal_of
-from coop_drake.compiled_loop.preparing import CompiledTransport
+from coop_drake.compiled_loop.preparing import CompiledTransport, prepare
 from coop_drake.compiled_loop.sampled_team import SampledTeam
 from coop_drake.compiled_loop.telling import GOVERNOR, MARGIN, POSE, READY, SHOWN, WANTED
 from coop_drake.diagram.station import TransportStation, build_driven_station
+from coop_drake.fields import HarmonicMap
 from coop_drake.plant import TeamPlant, set_configuration
-from coop_drake.scenario import Deployment
+from coop_drake.progress import Progress
+from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation.logged_ports import Places, PortRow
-from coop_drake.simulation.run import run_and_release
+from coop_drake.simulation.run import run_and_release, simulate
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems.block import release_all
 from coop_drake.tree.pose import IntArray
@@ -123,6 +125,7 @@ def simulate_sampled(
     transport: CompiledTransport,
     deployment: Deployment | None = None,
     *,
+    progress: Progress | None = None,
     observer: Callable[[Sample], None] | None = None,
 ) -> SimulationLog:
     """Run Drake's loop of a transport with one block in place of all controllers.
@@ -133,6 +136,7 @@ def simulate_sampled(
     Args:
         transport: What ``prepare`` returned.
         deployment: The departures; None for those of the scenario that was prepared.
+        progress: Called with the stage and the fraction done, if given.
         observer: Called with every accepted step, if given.
 
     Raises:
@@ -141,4 +145,33 @@ def simulate_sampled(
     deployment = transport.scenario.deployment if deployment is None else deployment
     scenario = replace(transport.scenario, deployment=deployment)
     build = partial(build_sampled_loop, transport, deployment)
-    return run_and_release(build, scenario, observer=observer)
+    return run_and_release(build, scenario, progress=progress, observer=observer)
+
+
+def simulate_fused(
+    scenario: Scenario,
+    plan: Plan,
+    maps: Sequence[HarmonicMap],
+    *,
+    progress: Progress | None = None,
+    observer: Callable[[Sample], None] | None = None,
+    prepared: Callable[..., CompiledTransport] = prepare,
+) -> SimulationLog:
+    """Run Drake's loop with one block in place of all controllers, sampled or in continuous time.
+
+    Args:
+        scenario: The scenario.
+        plan: A plan for it.
+        maps: The harmonic map of every transition.
+        progress: Called with the stage and the fraction done, if given.
+        observer: Called with every accepted step, if given.
+        prepared: In place of ``prepare``, for example one that remembers what it made.
+
+    Raises:
+        PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
+        ScenarioError: The models do not make a team, or one block does not know what the scenario wants.
+    """
+    if scenario.deployment.period is None or scenario.control.hold is not None:
+        return simulate(scenario, plan, maps, blocks="fused", progress=progress, observer=observer)
+    transport = prepared(scenario, plan, maps)
+    return simulate_sampled(transport, scenario.deployment, progress=progress, observer=observer)

@@ -32,6 +32,7 @@ runs:
   scenarios: [room.scenario.yaml]
   count: {RUNS}
   batch: {BATCH}
+  blocks: fused
   vary:
     deployment.mass_error: !Uniform {{min: -0.1, max: 0.1}}
 """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -21,6 +22,7 @@ from coop_drake.scenario.model import Scenario
 
 if TYPE_CHECKING:
     from coop_drake.compiled_loop import CompiledTransport, RunOutcome
+    from coop_drake.diagram import Blocks
 
 
 class RunMaker:
@@ -57,8 +59,8 @@ class RunMaker:
             digest = run_digest(scenario, self._digest_of(plan), self._tier)
             if self._tier == "compiled":
                 return replace(begun, digest=digest, **vars(self._compiled(scenario, plan, maps)))
-            log = simulated(scenario, plan, maps)
-            record = record_of_log(run, begun.scenario, log, plan, digest)
+            log, blocks = self._simulated(scenario, plan, maps)
+            record = record_of_log(run, begun.scenario, log, plan, digest, blocks)
         except (OSError, MemoryError):
             raise
         except Exception as error:
@@ -74,9 +76,25 @@ class RunMaker:
             self._digest = plan, plan_digest(plan)
         return self._digest[1]
 
+    def _simulated(self, scenario: Scenario, plan: Plan, maps: Maps) -> tuple[SimulationLog, Blocks]:
+        """Make a run by Drake's loop, and say with which blocks."""
+        from coop_drake.compiled_loop import simulate_fused
+        from coop_drake.simulation import simulate
+
+        if self._variation.runs.blocks == "fused":
+            with suppress(ScenarioError):  # Fused blocks have refused it before the run began.
+                return simulate_fused(scenario, plan, maps, prepared=self._prepared), "fused"
+        return simulate(scenario, plan, maps), "named"
+
     def _compiled(self, scenario: Scenario, plan: Plan, maps: Maps) -> RunOutcome:
-        """Make a run by the compiled loop; runs that differ in their deployments alone share their arrays."""
-        from coop_drake.compiled_loop import prepare, run
+        """Make a run by the compiled loop."""
+        from coop_drake.compiled_loop import run
+
+        return run(self._prepared(scenario, plan, maps), scenario.deployment)
+
+    def _prepared(self, scenario: Scenario, plan: Plan, maps: Maps) -> CompiledTransport:
+        """Return the arrays of a run; runs that differ in their deployments alone share them."""
+        from coop_drake.compiled_loop import prepare
 
         known = self._transport
         if (
@@ -85,17 +103,7 @@ class RunMaker:
             or replace(known.scenario, deployment=scenario.deployment) != scenario
         ):
             known = self._transport = prepare(scenario, plan, maps)
-        return run(known, scenario.deployment)
-
-
-def simulated(scenario: Scenario, plan: Plan, maps: Maps) -> SimulationLog:
-    """Simulate a run by Drake's loop, with fused blocks where they know all that the scenario asks for."""
-    from coop_drake.simulation import simulate
-
-    try:
-        return simulate(scenario, plan, maps, blocks="fused")
-    except ScenarioError:  # They have refused it before the run began.
-        return simulate(scenario, plan, maps)
+        return known
 
 
 def run_digest(scenario: Scenario, plan: str, tier: Tier) -> str:
