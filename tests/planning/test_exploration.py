@@ -26,15 +26,22 @@ def test_exploration_alone_finds_a_sound_channel() -> None:
     assert_channel_is_sound(problem, channel)
 
 
-def test_free_cells_of_the_graph_join_both_ends_of_a_channel() -> None:
+@pytest.mark.parametrize("budget", [12, 60, 2000])
+def test_the_path_that_is_split_is_the_cheapest_one(budget: int) -> None:
     exploration = Exploration(rod_problem(0.5))
-    outcome = exploration.run(2000)
-    graph = nx.Graph()
-    for cells in exploration.graph.by_slice.values():
-        for cell in cells:
-            beside = exploration.graph.neighbours(cell) if cell.kind is Kind.FREE else []
-            graph.add_edges_from((cell.index, other.index) for other in beside if other.kind is Kind.FREE)
-    assert nx.has_path(graph, outcome.path[0].index, outcome.path[-1].index)
+    outcome = exploration.run(budget)
+    cells, graph = exploration.graph.by_slice, nx.DiGraph()
+    for cell in (cell for index in cells for cell in cells[index]):
+        for other in (
+            other for near in exploration.slices.all[cell.slice].neighbours for other in cells[near]
+        ):
+            if cell.region.meets(other.region):
+                graph.add_edge(cell.index, other.index, weight=other.weight)
+    first, last = outcome.path[0], outcome.path[-1]
+    assert first.region.holds(exploration._problem.start[:2])
+    least = nx.dijkstra_path_length(graph, first.index, last.index)
+    along = sum(graph.edges[one.index, other.index]["weight"] for one, other in pairwise(outcome.path))
+    assert along == pytest.approx(least, rel=1e-12)
 
 
 @pytest.mark.parametrize(("name", "robots"), [("base", ()), ("base", (1,)), ("three", (2,)), ("elbow", ())])

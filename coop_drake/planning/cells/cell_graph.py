@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import heapq
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
-from math import inf
+
+import numpy as np
 
 from coop_drake.planning.cells.cells import Region
+from coop_drake.planning.cells.graph_search import NO_WAY, REACHED, Links, Search, begin, go_on, link, unlink
 from coop_drake.planning.cells.slices import Slices
 
 
@@ -33,8 +34,6 @@ class GraphCell:
         kind: What is known about it.
         region: Positions p_WL.
         weight: Cost of passing through it.
-        beside: Cells of neighbouring slices whose bounds meet this cell's; None until a search needs them.
-        tested: For the cells that a search has tested, by index, whether their regions meet this one's.
     """
 
     index: int
@@ -42,8 +41,6 @@ class GraphCell:
     kind: Kind
     region: Region
     weight: float
-    beside: list[GraphCell] | None = None
-    tested: dict[int, bool] = field(default_factory=dict)
 
 
 class CellGraph:
@@ -57,10 +54,11 @@ class CellGraph:
         self._slices = slices
         self.cells: list[GraphCell] = []
         self.by_slice: dict[int, list[GraphCell]] = {}
+        self._edges = 0
+        self._links, self._search = _links(0, 0), _search(0)
 
     def add(self, index: int, members: Sequence[tuple[Kind, Region, float]]) -> None:
         """Put the cells (kind, region, weight) of a new leaf into the graph."""
-        self._unsettle(index)
         first = len(self.cells)
         made = [
             GraphCell(first + i, index, kind, region, weight)
@@ -68,50 +66,30 @@ class CellGraph:
         ]
         self.cells += made
         self.by_slice[index] = made
+        if not made:
+            return
+        beside = [self.by_slice.get(other, ()) for other in sorted(self._slices.all[index].neighbours)]
+        ranges = np.array([(its[0].index, its[-1].index + 1) for its in beside if its], dtype=np.int64)
+        others, last = ranges.reshape(-1, 2), len(self.cells)
+        self._make_room(last, self._edges + 2 * len(made) * int((others[:, 1] - others[:, 0]).sum()))
+        self._links.weights[first:last] = [cell.weight for cell in made]
+        self._links.bounds[first:last] = [cell.region.bounds for cell in made]
+        self._edges = link(self._links, first, last, others, self._edges)
 
     def remove(self, index: int) -> None:
         """Remove the cells of a slice that is about to be halved."""
-        self._unsettle(index)
-        for cell in self.by_slice.pop(index):
-            for other in cell.tested:
-                self.cells[other].tested.pop(cell.index, None)
-            cell.beside, cell.tested = None, {}
+        if removed := self.by_slice.pop(index):
+            unlink(self._links, removed[0].index, removed[-1].index + 1)
 
-    def _unsettle(self, index: int) -> None:
-        """Discard the neighbour lists of the cells around a slice, which changes."""
-        for other in self._slices.all[index].neighbours:
-            for cell in self.by_slice.get(other, ()):
-                cell.beside = None
-
-    def neighbours(self, cell: GraphCell) -> list[GraphCell]:
-        """Cells of neighbouring slices whose regions meet this one's, in a fixed order."""
-        return [other for other in self._beside(cell) if self._meet(cell, other)]
-
-    def _beside(self, cell: GraphCell) -> list[GraphCell]:
-        if cell.beside is None:
-            west, south, east, north = cell.region.bounds
-            cell.beside = [
-                other
-                for index in sorted(self._slices.all[cell.slice].neighbours)
-                for other in self.by_slice[index]
-                if (bounds := other.region.bounds)[0] <= east
-                and bounds[2] >= west
-                and bounds[1] <= north
-                and bounds[3] >= south
-            ]
-        return cell.beside
-
-    @staticmethod
-    def _meet(cell: GraphCell, other: GraphCell) -> bool:
-        meets = cell.tested.get(other.index)
-        if meets is None:
-            # If geometry fails, cells count as joined, so that nothing is called blocked wrongly; two FREE
-            # cells count as apart, because a path of FREE cells is a proof.
-            meets = cell.region.meets(
-                other.region, otherwise=(cell.kind, other.kind) != (Kind.FREE, Kind.FREE)
-            )
-            cell.tested[other.index] = other.tested[cell.index] = meets
-        return meets
+    def _make_room(self, nodes: int, edges: int) -> None:
+        """Let the arrays hold so many nodes and edges, at least twice as many as before where they grow."""
+        links, known, stored = self._links, len(self._links.weights), len(self._links.to)
+        if nodes > known or edges > stored:
+            known = known if nodes <= known else 2 * nodes
+            self._links = _links(known, stored if edges <= stored else 2 * edges)
+            for grown, old in zip(self._links, links, strict=True):
+                grown[: len(old)] = old
+            self._search = _search(known)
 
     def cheapest(self, starts: Sequence[GraphCell], goals: set[int]) -> list[GraphCell] | None:
         """Path of least total weight by Dijkstra's algorithm; of equal costs the lower index comes first.
@@ -123,26 +101,48 @@ class CellGraph:
         Returns:
             Cells from a start to a goal, or None if no path joins them.
         """
-        best = {cell.index: cell.weight for cell in starts}
-        back: dict[int, int] = {}
-        queue = [(cost, index) for index, cost in best.items()]
-        heapq.heapify(queue)
-        while queue:
-            cost, index = heapq.heappop(queue)
-            if cost > best[index]:
-                continue
-            if index in goals:
-                return self._trace(back, index)
-            cell = self.cells[index]
-            for other in self._beside(cell):
-                through = cost + other.weight
-                if through < best.get(other.index, inf) and self._meet(cell, other):
-                    best[other.index], back[other.index] = through, index
-                    heapq.heappush(queue, (through, other.index))
-        return None
+        links, search = self._links, self._search
+        first, last = (np.array(sorted(ends), dtype=np.int64) for ends in ({c.index for c in starts}, goals))
+        begin(links, search, first, last, len(self.cells))
+        while (asked := go_on(links, search)) not in (REACHED, NO_WAY):
+            for edge in search.asked[:asked].tolist():
+                links.met[edge // 2] = self._meet(int(links.to[edge ^ 1]), int(links.to[edge]))
+        return None if asked == NO_WAY else self._trace(int(search.state[1]))
 
-    def _trace(self, back: dict[int, int], index: int) -> list[GraphCell]:
+    def _meet(self, one: int, other: int) -> bool:
+        """Whether the regions of two cells meet.
+
+        If geometry fails, cells count as joined, so that nothing is called blocked wrongly; two FREE cells
+        count as apart, because a path of FREE cells is a proof.
+        """
+        a, b = self.cells[one], self.cells[other]
+        return a.region.meets(b.region, otherwise=(a.kind, b.kind) != (Kind.FREE, Kind.FREE))
+
+    def _trace(self, index: int) -> list[GraphCell]:
         path = [index]
-        while path[-1] in back:
-            path.append(back[path[-1]])
+        while (before := int(self._search.back[path[-1]])) >= 0:
+            path.append(before)
         return [self.cells[i] for i in reversed(path)]
+
+
+_ASKED = 256
+"""Edges that are tested before a search goes on, at most [-]."""
+
+
+def _links(nodes: int, edges: int) -> Links:
+    """Arrays for so many nodes and edges, both directions counted."""
+    ints = np.int64
+    return Links(
+        np.empty(nodes),
+        np.empty((nodes, 4)),
+        np.full(nodes, -1, ints),
+        np.empty(edges, ints),
+        np.empty(edges, ints),
+        np.empty((edges + 1) // 2, ints),
+    )
+
+
+def _search(nodes: int) -> Search:
+    """Arrays for a search of so many nodes."""
+    back, heap, place, goal = (np.empty(nodes, np.int64) for _ in range(4))
+    return Search(np.empty(nodes), back, heap, place, goal, np.empty(_ASKED, np.int64), np.zeros(2, np.int64))

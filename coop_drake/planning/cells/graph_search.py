@@ -1,0 +1,202 @@
+"""Dijkstra's algorithm on a graph that changes, compiled: it stops to have edges tested, and goes on.
+
+An edge is tested only when a cheaper way would use it: a test takes longer than many steps of the search.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from coop_drake.compiled import compiled
+from coop_drake.tree.pose import FloatArray, IntArray
+
+__all__ = ["NO_WAY", "REACHED", "Links", "Search", "begin", "go_on", "link", "unlink"]
+
+REACHED, NO_WAY = -1, -2
+"""How a search ends: at a goal, or with nothing left to search."""
+
+_UNTESTED, _APART, _JOINED, _REMOVED = -1, 0, 1, 2
+"""What is known about an edge."""
+
+
+class Links(NamedTuple):
+    """Nodes and edges. Edges 2 k and 2 k + 1 are the two directions of edge k.
+
+    Attributes:
+        weights: Cost of passing through each node, shape (N,).
+        bounds: (x_min, y_min, x_max, y_max) of each node's region, shape (N, 4) [m].
+        head: First edge that leaves each node, -1 if there is none, shape (N,).
+        following: The next edge that leaves the same node, -1 after the last, shape (2 E,).
+        to: The node that an edge leads to, shape (2 E,).
+        met: Whether the regions of an edge's nodes meet: 0 or 1; -1 if untested, 2 if one was removed, (E,).
+    """
+
+    weights: FloatArray
+    bounds: FloatArray
+    head: IntArray
+    following: IntArray
+    to: IntArray
+    met: IntArray
+
+
+class Search(NamedTuple):
+    """The state of a search; a node's place in the heap is -1 where it is in none.
+
+    Attributes:
+        best: Least cost known of each node, infinite where there is none, shape (N,).
+        back: The node before it, -1 for none, shape (N,).
+        heap: Nodes that wait, the one of least cost first, of equal ones the lowest; shape (N,).
+        place: Place of each node in the heap, shape (N,).
+        goal: 1 for goals, shape (N,).
+        asked: Edges that have to be tested, shape (A,).
+        state: How many nodes wait, and the node whose edges are looked at, -1 if there is none, shape (2,).
+    """
+
+    best: FloatArray
+    back: IntArray
+    heap: IntArray
+    place: IntArray
+    goal: IntArray
+    asked: IntArray
+    state: IntArray
+
+
+@compiled
+def link(links: Links, first: int, last: int, others: IntArray, count: int) -> int:
+    """Join nodes to those of some ranges whose bounds meet theirs, by untested edges.
+
+    Args:
+        links: The graph, with room for the edges.
+        first: The first node.
+        last: The node after the last one.
+        others: Ranges of nodes, each its first and the one after its last, shape (R, 2).
+        count: Edges so far, both directions counted.
+
+    Returns:
+        Edges now.
+    """
+    for node in range(first, last):
+        west, south, east, north = links.bounds[node]
+        for row in range(len(others)):
+            for other in range(others[row, 0], others[row, 1]):
+                its = links.bounds[other]
+                if its[0] > east or its[2] < west or its[1] > north or its[3] < south:
+                    continue
+                links.met[count // 2] = _UNTESTED
+                for start, end in ((node, other), (other, node)):
+                    links.to[count], links.following[count] = end, links.head[start]
+                    links.head[start] = count
+                    count += 1
+    return count
+
+
+@compiled
+def unlink(links: Links, first: int, last: int) -> None:
+    """Remove all edges of some nodes."""
+    for node in range(first, last):
+        edge = links.head[node]
+        while edge >= 0:
+            links.met[edge // 2] = _REMOVED
+            edge = links.following[edge]
+        links.head[node] = -1
+
+
+@compiled
+def _before(search: Search, one: int, other: int) -> bool:
+    a, b = search.best[one], search.best[other]
+    return bool(a < b or (a == b and one < other))
+
+
+@compiled
+def _raise(search: Search, node: int, cost: float) -> None:
+    """Give a node a lower cost, and let it wait."""
+    heap, place = search.heap, search.place
+    search.best[node] = cost
+    at = place[node]
+    if at < 0:
+        at = search.state[0]
+        search.state[0] += 1
+    while at > 0 and _before(search, node, heap[(at - 1) // 2]):
+        heap[at] = heap[(at - 1) // 2]
+        place[heap[at]] = at
+        at = (at - 1) // 2
+    heap[at], place[node] = node, at
+
+
+@compiled
+def _pop(search: Search) -> int:
+    """Take the node of least cost out of the heap."""
+    heap, place = search.heap, search.place
+    top = heap[0]
+    place[top] = -1
+    search.state[0] -= 1
+    size = search.state[0]
+    if size > 0:
+        node, at = heap[size], 0
+        while 2 * at + 1 < size:
+            child = 2 * at + 1
+            if child + 1 < size and _before(search, heap[child + 1], heap[child]):
+                child += 1
+            if not _before(search, heap[child], node):
+                break
+            heap[at] = heap[child]
+            place[heap[at]] = at
+            at = child
+        heap[at], place[node] = node, at
+    return int(top)
+
+
+@compiled
+def begin(links: Links, search: Search, starts: IntArray, goals: IntArray, count: int) -> None:
+    """Begin a search of the first ``count`` nodes, from some of them to others."""
+    for node in range(count):
+        search.best[node], search.back[node] = np.inf, -1
+        search.place[node], search.goal[node] = -1, 0
+    search.state[0], search.state[1] = 0, -1
+    for node in goals:
+        search.goal[node] = 1
+    for node in starts:
+        _raise(search, node, links.weights[node])
+
+
+@compiled
+def go_on(links: Links, search: Search) -> int:
+    """Search until there is an answer or edges have to be tested.
+
+    Returns:
+        How many of ``asked`` have to be tested first, ``REACHED`` with the goal in ``state[1]``, or
+        ``NO_WAY``.
+    """
+    while search.state[0] > 0 or search.state[1] >= 0:
+        if search.state[1] < 0:
+            search.state[1] = _pop(search)
+            if search.goal[search.state[1]] == 1:
+                return REACHED
+        node = search.state[1]
+        unknown = 0
+        before, edge = -1, links.head[node]
+        while edge >= 0 and unknown < len(search.asked):
+            met, after = links.met[edge // 2], links.following[edge]
+            if met == _REMOVED:
+                if before < 0:
+                    links.head[node] = after
+                else:
+                    links.following[before] = after
+            else:
+                other = links.to[edge]
+                cost = search.best[node] + links.weights[other]
+                if cost < search.best[other]:
+                    if met == _UNTESTED:
+                        search.asked[unknown] = edge
+                        unknown += 1
+                    elif met == _JOINED:
+                        search.back[other] = node
+                        _raise(search, other, cost)
+                before = edge
+            edge = after
+        if unknown > 0:
+            return unknown
+        search.state[1] = -1
+    return NO_WAY
