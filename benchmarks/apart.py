@@ -13,7 +13,7 @@ from benchmarks.tasks import Task
 from coop_drake.answers.log import SimulationLog
 from coop_drake.nodes import simulate_in_processes
 from coop_drake.scenario import Deployment
-from coop_drake.simulation import simulate
+from coop_drake.simulation import Sample, simulate
 
 __all__ = ["apart_tasks", "costs"]
 
@@ -49,22 +49,24 @@ def costs(robots: int, simulated: float) -> list[Row]:
             deployment=Deployment(control_rate=_RATE),
             simulator=replace(scenario.simulator, max_time=simulated),
         )
-        together = _measured(lambda: simulate(brief, plan, maps))
-        apart = _measured(lambda: simulate_in_processes(brief, plan, maps))
+        together = _measured(lambda observer: simulate(brief, plan, maps, observer=observer))
+        apart = _measured(lambda observer: simulate_in_processes(brief, plan, maps, observer=observer))
     name = f"apart/{robots}_robots"
     return [
-        Row(f"{name}/times_real_time", simulated / apart[0], "", "one process", simulated / together[0]),
+        Row(f"{name}/times_real_time", apart[0], "", "one process", together[0]),
         Row(f"{name}/cpu", apart[1], "s", "one process", together[1]),
         Row(f"{name}/cpu_each_robot_and_sample", 1e6 * apart[2] / (robots * _RATE * simulated), "us"),
     ]
 
 
-def _measured(run: Callable[[], SimulationLog]) -> Sequence[float]:
-    """Wall time, CPU time of all processes, and that of other processes alone, start included [s]."""
-    own, children, wall = _cpu(resource.RUSAGE_SELF), _cpu(resource.RUSAGE_CHILDREN), perf_counter()
-    run()
+def _measured(run: Callable[[Callable[[Sample], None]], SimulationLog]) -> Sequence[float]:
+    """Simulated over wall time of the loop; CPU time of all, and of others alone, with start [s]."""
+    own, children = _cpu(resource.RUSAGE_SELF), _cpu(resource.RUSAGE_CHILDREN)
+    seen: list[tuple[float, float]] = []
+    run(lambda sample: seen.append((sample.time, perf_counter())))
     others = _cpu(resource.RUSAGE_CHILDREN) - children
-    return perf_counter() - wall, _cpu(resource.RUSAGE_SELF) - own + others, others
+    (begin, first), (end, last) = seen[0], seen[-1]
+    return (end - begin) / (last - first), _cpu(resource.RUSAGE_SELF) - own + others, others
 
 
 def _cpu(who: int) -> float:
