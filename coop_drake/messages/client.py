@@ -143,9 +143,13 @@ class MessageClient:
         self.unsent += not sent
         return sent
 
-    def advance(self, sample: int) -> None:
-        """Send what is late and due at a sample."""
-        self.outgoing.advance(sample, self._put)
+    def begin(self, sample: int) -> None:
+        """Begin a sample by its number."""
+        self.outgoing.sample = sample
+
+    def release(self) -> None:
+        """Send what is late and due."""
+        self.outgoing.release(self._put)
 
     def close(self) -> None:
         """Close everything; what was sent may leave for a fifth of a second."""

@@ -68,15 +68,17 @@ class _End:
             both.counts.update(end.refusals.counts)
         return both
 
-    def advance(self, sample: int) -> dict[int, list[Any]]:
-        """Send what is late and due at a sample; return what each process takes of it from a server's end."""
+    def begin(self, sample: int) -> None:
+        """Begin a sample by its number: what goes wrong with messages depends on it."""
+        for end in self._all:
+            end.begin(sample)
+
+    def release(self) -> dict[int, list[Any]]:
+        """Send what is late and due, after what is new; return what each process takes of a server's."""
         for client in self.clients:
-            client.advance(sample)
-        due: dict[int, list[Any]] = {}
-        for server in self.servers:
-            for index, messages in server.advance(sample).items():
-                due.setdefault(index, []).extend(messages)
-        return due
+            client.release()
+        due = [server.release() for server in self.servers]
+        return {index: [m for each in due for m in each.get(index, ())] for index in due[0]} if due else {}
 
     def close(self) -> None:
         """Close all sockets."""

@@ -23,7 +23,8 @@ _ONLY_LOGGED = (Telemetry, Status)
 class Link:
     """Decides by seed and number of a message whether it is lost, repeated or late.
 
-    Messages that open or close sessions, and those that only the log needs, pass.
+    Messages that open or close sessions, those that only the log needs, and those of the first sample pass: a
+    robot that does not hear of the first sample is one that was started later.
 
     Args:
         channel: The channel.
@@ -48,9 +49,8 @@ class Link:
             sample: Number of the present sample.
         """
         f = self._faults
-        if KINDS[type(message)].channel == "any" or isinstance(message, _ONLY_LOGGED):
-            return 1, False
-        if not getattr(message, "step", True):
+        opens = KINDS[type(message)].channel == "any" or sample == 0
+        if opens or isinstance(message, _ONLY_LOGGED) or not getattr(message, "step", True):
             return 1, False
         self._count += 1
         if any(self._covers(gap, sample) for gap in f.gaps):
@@ -129,11 +129,10 @@ class Outgoing:
             put(data)
         return bool(copies) and self._passed(number)
 
-    def advance(self, sample: int, put: Callable[[bytes], bool]) -> list[Any]:
-        """Send what is late and due at a sample; return the messages that the receiver takes."""
-        self.sample = sample
-        due = [kept for kept in self._kept if kept[0] <= sample]
-        self._kept = [kept for kept in self._kept if kept[0] > sample]
+    def release(self, put: Callable[[bytes], bool]) -> list[Any]:
+        """Send what is late and due at the present sample; return the messages that the receiver takes."""
+        due = [kept for kept in self._kept if kept[0] <= self.sample]
+        self._kept = [kept for kept in self._kept if kept[0] > self.sample]
         return [message for _, number, message, data in due if put(data) and self._passed(number)]
 
     def _passed(self, number: int) -> bool:

@@ -143,10 +143,15 @@ class MessageServer:
         known.unsent += not sent
         return sent
 
-    def advance(self, sample: int) -> dict[int, list[Any]]:
-        """Send what is late and due at a sample; return the messages that each process takes."""
+    def begin(self, sample: int) -> None:
+        """Begin a sample by its number."""
+        for peer in self.peers.values():
+            peer.outgoing.sample = sample
+
+    def release(self) -> dict[int, list[Any]]:
+        """Send what is late and due; return the messages that each process takes."""
         return {
-            index: peer.outgoing.advance(sample, partial(self._put, peer, peer.route or b""))
+            index: peer.outgoing.release(partial(self._put, peer, peer.route or b""))
             for index, peer in self.peers.items()
         }
 

@@ -30,6 +30,8 @@ from coop_drake.messages import (
     SupervisorEnd,
     name_of,
 )
+from coop_drake.messages.faults import NO_FAULTS, Faults
+from coop_drake.messages.outgoing import Links
 from coop_drake.nodes.fresh_process import FreshProcess
 from coop_drake.nodes.robot_node import RobotNode
 from coop_drake.nodes.robot_server import RobotServer
@@ -64,6 +66,7 @@ def run_robot(
     book: AddressBook,
     *,
     keys: KeyPair | None = None,
+    faults: Faults = NO_FAULTS,
     wanted: Callable[[], bool] = lambda: True,
 ) -> int:
     """Be one robot until the world says goodbye; return the outcome that it names.
@@ -71,11 +74,11 @@ def run_robot(
     Raises:
         MessagingError: The others cannot be reached, or fall silent.
     """
-    control_period(scenario)
+    links = Links(faults, control_period(scenario))
     team = build_station(scenario).team
     known = robot_knowledge(scenario, plan, maps, team)[robot]
     node = RobotNode(known, scenario.deployment, robot, team.robots[robot].name)
-    end = RobotEnd(book, robot, question_of(scenario, plan), keys)
+    end = RobotEnd(book, robot, question_of(scenario, plan), keys, links)
     try:
         end.open(_OPENING)
         return RobotServer(node, end).run(wanted)
@@ -90,6 +93,7 @@ def run_supervisor(
     book: AddressBook,
     *,
     keys: KeyPair | None = None,
+    faults: Faults = NO_FAULTS,
     wanted: Callable[[], bool] = lambda: True,
     tap: Callable[[str, int, bytes], object] | None = None,
 ) -> int:
@@ -100,7 +104,7 @@ def run_supervisor(
     """
     period, hold = control_period(scenario), scenario.control.hold
     node = SupervisorNode(len(book.robots), len(plan.cells), period, hold)
-    end = SupervisorEnd(book, question_of(scenario, plan), keys, tap)
+    end = SupervisorEnd(book, question_of(scenario, plan), keys, tap, Links(faults, period))
     try:
         end.open(_OPENING)
         return SupervisorServer(node, end).run(wanted)
@@ -120,6 +124,7 @@ class LocalTeam:
         maps: The harmonic map of every transition.
         book: Who listens where.
         restarts: How often ``revive`` starts each of them again.
+        faults: What goes wrong with messages that they send.
     """
 
     def __init__(
@@ -130,12 +135,13 @@ class LocalTeam:
         book: AddressBook,
         *,
         restarts: int = 0,
+        faults: Faults = NO_FAULTS,
     ) -> None:
         self.work: dict[int, Callable[..., int]] = {SUPERVISOR: run_supervisor}
         self._arguments: dict[int, tuple[Any, ...]] = {SUPERVISOR: (scenario, plan, book)}
         for k in range(len(book.robots)):
             self.work[k], self._arguments[k] = run_robot, (scenario, plan, maps, k, book)
-        self.processes: dict[int, BaseProcess | FreshProcess] = {}
+        self._faults, self.processes = faults, dict[int, BaseProcess | FreshProcess]()
         self._left = dict.fromkeys(self.work, restarts)
 
     def __enter__(self) -> LocalTeam:
@@ -157,7 +163,7 @@ class LocalTeam:
 
     def _given(self, index: int) -> tuple[Any, ...]:
         """Return the arguments of a process' work."""
-        return name_of(index), self.work[index], self._arguments[index], os.getpid()
+        return name_of(index), self.work[index], self._arguments[index], self._faults, os.getpid()
 
     def gone(self) -> set[int]:
         """Return the indices of the processes that have ended."""
@@ -173,12 +179,14 @@ class LocalTeam:
                 process.join()
 
 
-def _served(name: str, work: Callable[..., int], arguments: tuple[Any, ...], parent: int) -> NoReturn:
+def _served(
+    name: str, work: Callable[..., int], arguments: tuple[Any, ...], faults: Faults, parent: int
+) -> NoReturn:
     """Do the work of a process until its parent is gone."""
     os.setsid()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        work(*arguments, wanted=lambda: os.getppid() == parent)
+        work(*arguments, faults=faults, wanted=lambda: os.getppid() == parent)
     except CoopDrakeError as error:
         sys.stderr.write(f"{name}: {error}\n")
         sys.stderr.flush()

@@ -37,6 +37,7 @@ class RobotNode:
         name: Its name.
 
     Attributes:
+        period: Control period [s].
         place: The current cell as the robot knows it.
         state: Its state, see ``messages.Effort``.
     """
@@ -45,7 +46,7 @@ class RobotNode:
         controller = build_robot_controller(knowledge)
         self._deployed = deploy(controller, deployment, robot, name, bodiless=True)
         self._controller, self._sampled = controller, SampledDiagram(self._deployed.diagram)
-        self._period, self._held = knowledge.period or 0.0, knowledge.hold is not None
+        self.period, self._held = knowledge.period or 0.0, knowledge.hold is not None
         self._joints = knowledge.joints.stop - knowledge.joints.start
         self._state_size = 2 * (3 + self._joints)
         axes = [0, *range(1 + knowledge.joints.start, 1 + knowledge.joints.stop)]
@@ -53,10 +54,10 @@ class RobotNode:
         record = robot_record(self._joints, holds=self._held)
         self._logged = [name for name, size in record.items() if size]
         self._cell, self._hold_message = np.zeros(2), np.zeros(2)
-        self._said, self._told_rest = Ready(0, False), -inf
+        self._said, self._reported, self._told_rest = Ready(0, False), inf, -inf
         self.place, self.state = Place(True, 0, 0), FOLLOWS
         self._order: Begin | None = None
-        self._still = Stillness(self._period)
+        self._still = Stillness(self.period)
         self._waits = np.zeros(2), 0
         start = np.array(knowledge.plan.start[:3])
         self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self._state_size), start])))
@@ -73,7 +74,7 @@ class RobotNode:
 
     def meet(self) -> None:
         """Tell the supervisor again what holds: it may be another process, which has heard nothing yet."""
-        self._said, self._told_rest = Ready(self.place.cell, False), -inf
+        self._said, self._reported, self._told_rest = Ready(self.place.cell, False), inf, -inf
 
     def look(self, time: float, measured: FloatArray) -> FloatArray:
         """Return the robot's record for the log at an instant; nothing changes.
@@ -98,10 +99,10 @@ class RobotNode:
         self._sampled.at(time, self._inputs(measured))
         self._sampled.update()
         position, until = self._waits
-        if period_of(time, self._period) < until:
+        if period_of(time, self.period) < until:
             self._deployed.keep_position(self._sampled.context, position)
         self.state = HOLDS if self._held and self._hold_message[0] > 0.0 else FOLLOWS
-        return self._sampled.output("robot_effort"), self._messages()
+        return self._sampled.output("robot_effort"), self._messages(period_of(time, self.period))
 
     def hear(self, messages: Iterable[Any]) -> None:
         """Take in what the supervisor says; it counts from the next instant on."""
@@ -116,11 +117,11 @@ class RobotNode:
     def _enter(self, cell: int, sample: int) -> None:
         if self.state == ASKS:
             self.state = STANDS
-        self.place, self._cell = Place(True, cell, sample), np.array([cell, sample * self._period])
+        self.place, self._cell = Place(True, cell, sample), np.array([cell, sample * self.period])
 
     def _follows(self, time: float, measured: FloatArray, *, stopped: bool) -> bool:
         """Whether the robot follows the plan in this sample, which it may begin anew now by an order."""
-        number, order = period_of(time, self._period), self._order
+        number, order = period_of(time, self.period), self._order
         if not stopped or not self.place.known:
             return self.state in (FOLLOWS, HOLDS)
         if order is not None and number >= order.sample:
@@ -128,7 +129,7 @@ class RobotNode:
             if number == order.sample:
                 self._enter(order.cell, order.sample)
                 self._begin(time, measured, np.array(order.object_pose))
-                until = order.sample + whole_periods(POSITION_WAITS, self._period)
+                until = order.sample + whole_periods(POSITION_WAITS, self.period)
                 self._waits = np.array(order.object_pose[:2]), until
                 return True
         return False
@@ -147,7 +148,7 @@ class RobotNode:
             for row, x, into in zip(table, [object_pose[2], *joints], wide, strict=True)
         ]
         self._deployed.begin(self._sampled.context, self.place.cell, object_pose, joints, wide)
-        self._said, self._told_rest = Ready(self.place.cell, False), -inf
+        self._said, self._reported, self._told_rest = Ready(self.place.cell, False), inf, -inf
         return float(min(row_of(self._sampled, self._controller, ["energy_margin"])[0], *margins))
 
     def _stand(self, time: float, measured: FloatArray) -> Said:
@@ -164,21 +165,26 @@ class RobotNode:
         if margin < 0.0:
             self.state = OUTSIDE
             return []
-        number = period_of(time, self._period)
-        if number - told < whole_periods(AGAIN, self._period):
+        number = period_of(time, self.period)
+        if number - told < whole_periods(AGAIN, self.period):
             return []
         self._told_rest = number
         pose = tuple(float(part) for part in measured[self._state_size :])
         return [AtRest(number, pose)]
 
-    def _messages(self) -> Said:
-        """Return what is new: a report only where the supervisor would come to another conclusion by it."""
+    def _messages(self, number: int) -> Said:
+        """Return what is new: a report only where the supervisor would come to another conclusion by it.
+
+        A report of the present cell that has had no effect yet is sent again, because it may be lost, or its
+        answer.
+        """
         said: Said = []
         index, margin = self._sampled.output("ready")
         cell = int(self._cell[0])
         ready = index == cell and margin >= 0.0
-        if ready != (self._said == (cell, True)):
-            self._said = Ready(cell, bool(ready))
+        again = self._said.cell == cell and number - self._reported >= whole_periods(AGAIN, self.period)
+        if again or ready != (self._said == (cell, True)):
+            self._said, self._reported = Ready(cell, bool(ready)), number
             said.append(self._said)
         if self._held:
             asks, number = self._sampled.output("hold_request")

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 from coop_drake.messages import SUPERVISOR, Effort, RobotEnd, Sample, Switch, Telemetry
-from coop_drake.nodes.robot_node import RobotNode
+from coop_drake.nodes.robot_node import RobotNode, Said
 from coop_drake.nodes.serving import Server
 from coop_drake.nodes.states import AGAIN
+from coop_drake.tree.pose import FloatArray
 
 
 class RobotServer(Server):
@@ -31,6 +32,8 @@ class RobotServer(Server):
         super().__init__(end, [SUPERVISOR], lock_step=lock_step)
         self._node, self._end, self._session = node, end, end.team.sessions
         self._placed, self._placing = 0, -inf
+        self._stepped: int | None = None
+        self._measured = np.zeros(0)
 
     def _receive(self, sender: int, message: Any) -> None:
         if self._end.team.sessions != self._session:
@@ -64,15 +67,27 @@ class RobotServer(Server):
     def _answer(self, question: Sample) -> None:
         number, time, node, team = question.number, question.time, self._node, self._end.team
         measured = np.array([*question.robot_state, *question.object_pose])
+        self._end.begin(number)
         self._say_place()
         shown = tuple(node.look(time, measured))
+        if question.step:
+            effort, said = self._steps(question, measured)
+            for message in said:
+                team.send(message)
+            self._end.efforts.send(Effort(number, self._sent, node.state, tuple(effort)))
+        # What the log shows comes last: then the world knows that there is no effort if none has come.
         self._end.efforts.send(Telemetry(number, time, self._sent, node.state, shown))
-        if not question.step:
-            return
-        effort, said = node.step(time, measured, stopped=question.stopped)
-        for message in said:
-            team.send(message)
-        self._end.efforts.send(Effort(number, self._sent, node.state, tuple(effort)))
+        self._end.release()
+
+    def _steps(self, question: Sample, measured: FloatArray) -> tuple[FloatArray, Said]:
+        """Compute a sample, and before it with the last measurements those of which nothing was heard."""
+        said: Said = []
+        missed = 0 if self._stepped is None or question.stopped else question.number - self._stepped - 1
+        for periods in range(missed, 0, -1):
+            said += self._node.step(question.time - periods * self._node.period, self._measured)[1]
+        self._stepped, self._measured = question.number, measured
+        effort, new = self._node.step(question.time, measured, stopped=question.stopped)
+        return effort, said + new
 
     @property
     def _sent(self) -> int:

@@ -23,6 +23,8 @@ from coop_drake.messages import (
     WorldEnd,
     name_of,
 )
+from coop_drake.messages.outgoing import Links
+from coop_drake.nodes.answers import fits
 from coop_drake.nodes.attendance import TOLERATED, Attendance
 from coop_drake.nodes.pacing import Pacing
 from coop_drake.nodes.serving import TURN
@@ -43,6 +45,8 @@ class SampleExchange:
 
     A process that is gone, or gives no answer for too long, is missing, see ``Attendance``, until it answers
     again. In lock-step nobody who is missing is asked before the team rests. Then the simulated time waits.
+    Who is there, but is not heard of because messages are lost, is asked on at every sample: the last message
+    of an answer, which no fault touches, says that there is no other.
 
     The simulation first looks at an instant, for the log, and then takes the sample that is due there. Both
     are one question: everybody shows what it would log before its update, then updates.
@@ -50,7 +54,7 @@ class SampleExchange:
     Args:
         end: The world's sockets, with sessions.
         robots: Number of robots N.
-        period: Time between two samples [s].
+        links: Period of the samples, and faults of the robots' clocks.
         pacing: Keeps the pace of the wall clock; None for lock-step, in which every sample waits.
         gone: Returns the processes that are known to have ended.
         revive: Starts a process again that has ended; returns whether it did.
@@ -68,7 +72,7 @@ class SampleExchange:
         self,
         end: WorldEnd,
         robots: int,
-        period: float,
+        links: Links,
         *,
         pacing: Pacing | None = None,
         gone: Callable[[], Collection[int]] = tuple,
@@ -79,9 +83,10 @@ class SampleExchange:
         tell: Callable[[str], None] = lambda words: None,
     ) -> None:
         self._end, self._patience, self._before, self._pacing = end, patience, before, pacing
-        self._everyone, self._period = [*range(robots), SUPERVISOR], period
+        self._everyone, self._period = [*range(robots), SUPERVISOR], links.period
+        self._clock = links.faults.clock
         self.attendance = Attendance(rejoin=rejoin, gone=gone, revive=revive, tell=tell)
-        self.sample, self._still = 0, Stillness(period)
+        self.sample, self._still = 0, Stillness(links.period)
         self._last: dict[tuple[int, type], Any] = {}
         self._states = dict[int, int]()
         self._counts = dict[int, Any]()
@@ -89,6 +94,7 @@ class SampleExchange:
         self._sizes: list[int] = []
         self._answered: dict[int, float] = {}
         self._sampled = -1
+        self._expected, self._unheard = dict[int, int](), set[int]()
 
     @property
     def missing(self) -> dict[int, float]:
@@ -150,7 +156,8 @@ class SampleExchange:
         rests = self._still.sees_rest(np.concatenate([own[(len(own) - 3) // 2 : -3] for own in measured]))
         attendance.see(time, self._states, rests=rests)
         robots = self.missing.keys() - {SUPERVISOR}
-        if self._pacing is None and self.missing and rests and (attendance.stopped or not robots):
+        away = self.missing.keys() - self._unheard
+        if self._pacing is None and away and rests and (attendance.stopped or not robots):
             self._await(time, measured)
         if not attendance.trouble:
             self._ask(time, measured, step=True)
@@ -174,7 +181,7 @@ class SampleExchange:
         """Wait with the simulated time at rest until all are there and know the current cell, or in vain."""
         while not self.attendance.in_vain():
             if not self._ask(time, measured, step=False, waits_for_all=True):
-                for index in [*self.missing]:
+                for index in self.missing.keys() - self._unheard:
                     self.attendance.back(index)
                 return
         self.attendance.give_up()
@@ -187,16 +194,20 @@ class SampleExchange:
         Where the pace is that of the wall clock, those who are missing are asked, too, and not waited for.
         """
         everyone = waits_for_all or self._pacing is not None
-        asked = [index for index in self._everyone if everyone or index not in self.missing]
+        away = self.missing.keys() - self._unheard
+        asked = [index for index in self._everyone if everyone or index not in away]
         self._sizes = [(len(own) - 3) // 2 for own in measured]  # As many efforts as own coordinates.
         self._asked[self.sample] = clocks.monotonic(), time
-        for index in asked:
-            self._end.send(index, self._question(index, time, measured, step=step))
-        kind = Effort if step else Telemetry
+        self._end.begin(self.sample)
+        questions = {index: self._question(index, time, measured, step=step) for index in asked}
+        self._expected = {k: self.sample for k, question in questions.items() if self._end.send(k, question)}
+        for index, late_ones in self._end.release().items():
+            if late_ones:
+                self._expected.setdefault(index, max(question.number for question in late_ones))
+        reached = self._expected.keys() | ({*asked} - self._end.present())
         waiting = {
-            (index, Status if index == SUPERVISOR else kind)
-            for index in asked
-            if waits_for_all or index not in self.missing
+            (index, Status if index == SUPERVISOR else Telemetry)
+            for index in (asked if waits_for_all else reached - away)
         }
         deadline = clocks.monotonic() + (TURN if waits_for_all else self._limit())
         while waiting and (left := deadline - clocks.monotonic()) > 0.0:
@@ -210,7 +221,15 @@ class SampleExchange:
         if not waits_for_all:
             bound = TOLERATED if self._pacing else -1.0
             self._lose(k for k in late if k not in self.missing and time - self._since(k, time) > bound)
+            if step:
+                self._miss(time, {*asked} - late)
         return late
+
+    def _miss(self, time: float, indices: Collection[int]) -> None:
+        """Go on without processes that are there, but of which nothing has come for too long."""
+        quiet = {k for k in indices if k not in self.missing and time - self._since(k, time) > TOLERATED}
+        self._unheard |= quiet
+        self._lose(quiet)
 
     def _limit(self) -> float:
         """How long answers are waited for [s]; while the drives brake nothing depends on them."""
@@ -238,22 +257,8 @@ class SampleExchange:
             sent = tuple(self._counts.get(k, 0) for k in robots)
             return Tick(self.sample, time, step, stopped, sent)
         told, own = self._counts.get(SUPERVISOR), measured[index]
-        return Sample(
-            self.sample, time, step, stopped, told[index] if told else 0, tuple(own[-3:]), tuple(own[:-3])
-        )
-
-    def _fits(self, sender: int, message: Any) -> bool:
-        """Whether an answer is about a sample that has been, and its lists are as long as they must be."""
-        robots = len(self._everyone) - 1
-        if isinstance(message, Status):
-            fits = len(message.team_messages) == robots and len(message.causes) in (0, 1 + robots)
-        elif isinstance(message, Effort):
-            fits = len(message.efforts) == self._sizes[sender] and message.state < len(STATES)
-        else:
-            known = self._last.get((sender, Telemetry))
-            fits = known is None or len(known.values) == len(message.values)
-            fits = fits and message.state < len(STATES)
-        return fits and message.number <= self.sample
+        shown, said = self._clock(index, time), told[index] if told else 0
+        return Sample(self.sample, shown, step, stopped, said, tuple(own[-3:]), tuple(own[:-3]))
 
     def _keep(self, sender: int, message: Any, *, admits: bool) -> tuple[int, type]:
         """Keep an answer that is newer than the last; return who answered the present question, and how.
@@ -264,14 +269,15 @@ class SampleExchange:
             admits: Whether one who is missing may come back.
         """
         kind, nothing = type(message), (sender, type(None))
-        was_missing = sender in self.missing
-        if not isinstance(message, Effort | Telemetry | Status) or (was_missing and not admits):
+        was_missing, unheard = sender in self.missing, sender in self._unheard
+        if not isinstance(message, Effort | Telemetry | Status) or (was_missing and not (admits or unheard)):
             return nothing
-        if not self._fits(sender, message):
+        if message.number > self.sample or not fits(sender, message, self._sizes, self._last):
             self._end.efforts.refusals.add(Reason.VALUE)
             return nothing
         asked, time = self._asked[message.number]
-        present, age = message.number == self.sample, clocks.monotonic() - asked
+        present = message.number >= self._expected.get(sender, self.sample)
+        age = clocks.monotonic() - asked
         if was_missing and not present and not (self._pacing and age <= self._pacing.allowed):
             return nothing
         self._counts[sender] = message.team_messages
@@ -282,8 +288,11 @@ class SampleExchange:
         if not knows:
             return nothing
         if known is None or message.number >= known.number:
-            self._last[sender, kind], self._answered[sender] = message, time
-        if was_missing and self._pacing is not None:
+            self._last[sender, kind] = message
+            if kind is not Telemetry:
+                self._answered[sender] = time
+        if was_missing and kind is not Telemetry and (self._pacing is not None or unheard):
+            self._unheard.discard(sender)
             self.attendance.back(sender)
         elif isinstance(message, Effort) and self._pacing is not None:
             self._pacing.note(age)

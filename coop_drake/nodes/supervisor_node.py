@@ -137,6 +137,8 @@ class SupervisorNode:
         for message in messages:
             if isinstance(message, Ready):
                 self._heard[f"robot_{robot}_ready"] = np.array([message.cell, 0.0 if message.ready else -1.0])
+                if self.knows and message.cell < self._place.cell:  # It has not heard of the present cell.
+                    self._places[robot] = Place(True, message.cell, 0)
             elif isinstance(message, HoldRequest):
                 self._heard[f"robot_{robot}_request"] = np.array(message, dtype=float)
             elif isinstance(message, Place) and message.cell < self._cells:

@@ -35,6 +35,7 @@ class SupervisorServer(Server):
 
     def _answer(self, question: Tick) -> None:
         number, time, node = question.number, question.time, self._node
+        self._end.begin(number)
         for robot, answer in node.answers():
             self._end.team.send(robot, answer)
         cell, entry, arrived, *causes = node.look(time)
@@ -46,3 +47,4 @@ class SupervisorServer(Server):
         self._end.efforts.send(
             Status(number, time, node.knows, sent, int(cell), float(entry), bool(arrived), codes)
         )
+        self._end.release()

@@ -12,6 +12,8 @@ from coop_drake.diagram import build_world, control_period
 from coop_drake.errors import MessagingError
 from coop_drake.fields import HarmonicMap
 from coop_drake.messages import AddressBook, Goodbye, KeyPair, WorldEnd, local_book, name_of
+from coop_drake.messages.faults import NO_FAULTS, Faults
+from coop_drake.messages.outgoing import Links
 from coop_drake.nodes.pacing import Pacing
 from coop_drake.nodes.processes import LocalTeam, question_of, robots_of
 from coop_drake.nodes.sample_exchange import PATIENCE, SampleExchange
@@ -31,6 +33,7 @@ def run_world(
     book: AddressBook,
     *,
     keys: KeyPair | None = None,
+    faults: Faults = NO_FAULTS,
     gone: Callable[[], Collection[int]] = tuple,
     opening: float = 60.0,
     pacing: Pacing | None = None,
@@ -50,6 +53,7 @@ def run_world(
         plan: The plan that all have.
         book: Who listens where.
         keys: The world's keys, None where the book has none.
+        faults: What goes wrong with messages that it sends, and with the robots' clocks.
         gone: Returns the processes that are known to have ended.
         opening: How long to wait for the others [s].
         pacing: Keeps the pace of the wall clock, see ``SampleExchange``; as ``patience`` and ``before``.
@@ -66,11 +70,12 @@ def run_world(
         MessagingError: Somebody is missing.
         ScenarioError: Robots do not compute at common samples.
     """
-    end, outcome = WorldEnd(book, question_of(scenario, plan), keys), INTERRUPTED
+    links = Links(faults, control_period(scenario))
+    end, outcome = WorldEnd(book, question_of(scenario, plan), keys, links), INTERRUPTED
     exchange = SampleExchange(
         end,
         len(book.robots),
-        control_period(scenario),
+        links,
         pacing=pacing,
         gone=gone,
         patience=patience,
@@ -124,6 +129,7 @@ def simulate_in_processes(
     maps: Sequence[HarmonicMap],
     *,
     restarts: int = RESTARTS,
+    faults: Faults = NO_FAULTS,
     **options: Any,
 ) -> SimulationLog:
     """Start all robots and the supervisor as processes on this machine, and be the world for them.
@@ -133,6 +139,7 @@ def simulate_in_processes(
         plan: A plan for it.
         maps: The harmonic map of every transition.
         restarts: How often each of them is started again where it ends before the run is over.
+        faults: What goes wrong between the processes.
         options: As for :func:`run_world`.
 
     Raises:
@@ -141,8 +148,8 @@ def simulate_in_processes(
     """
     control_period(scenario)
     book = local_book(robots_of(scenario))
-    with LocalTeam(scenario, plan, maps, book, restarts=restarts) as team:
-        return run_world(scenario, plan, book, gone=team.gone, revive=team.revive, **options)
+    with LocalTeam(scenario, plan, maps, book, restarts=restarts, faults=faults) as team:
+        return run_world(scenario, plan, book, faults=faults, gone=team.gone, revive=team.revive, **options)
 
 
 def wall_clock(scenario: Scenario) -> Pacing:

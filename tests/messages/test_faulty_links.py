@@ -23,8 +23,9 @@ def sending(channel, faults, messages, sender=0, receiver=SUPERVISOR):
         return True
 
     for sample, message in enumerate(messages):
-        outgoing.advance(sample, put)
+        outgoing.sample = sample
         outgoing.send(message, sender, 1, put)
+        outgoing.release(put)
         left.append(tuple(now))
         now.clear()
     return left, outgoing.sent
@@ -46,9 +47,9 @@ def test_every_message_has_its_own_fate_by_the_seed():
     assert sending("team", faults[0], reports(200), sender=1) != first
 
 
-def test_late_messages_leave_before_what_is_sent_then_and_count_where_nothing_has_overtaken_them():
+def test_late_messages_leave_after_what_is_sent_then_and_count_where_nothing_has_overtaken_them():
     faults = Faults(team=ChannelFaults(late=1.0, late_by=0.015))
-    assert sending("team", faults, reports(5)) == ([(), (), (1,), (2,), (3,)], 3)
+    assert sending("team", faults, reports(6)) == ([(1,), (), (), (2,), (3,), (4,)], 4)
     mixed, sent = sending("team", Faults(seed=3, team=ChannelFaults(late=0.5, late_by=0.03)), reports(40))
     order = [number for numbers in mixed for number in numbers]
     assert order != sorted(order)
@@ -86,8 +87,9 @@ def test_both_ends_count_what_is_lost_and_refused():
         pairs.settle(lambda: client.session and peer.session == client.session, client)
         left.clear()
         for sample in range(40):
-            client.advance(sample)
+            client.begin(sample)
             client.send(Ready(sample, True))
+            client.release()
         heard = pairs.settle(lambda: peer.incoming.received + pairs.server.refusals.total == 1 + len(left))
         newer = [number for k, number in enumerate(left) if number > max(left[:k], default=1)]
         assert [message.cell + 2 for _, message in heard] == newer

@@ -6,10 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from coop_drake.messages import SUPERVISOR, Effort, Reason, Refusals, Status
+from coop_drake.messages import SUPERVISOR, Effort, Reason, Refusals, Status, Telemetry
+from coop_drake.messages.outgoing import Links
 from coop_drake.nodes.sample_exchange import SampleExchange
 
 GOOD = Effort(0, 1, 0, (1.0, 2.0, 3.0, 4.0))
+SHOWN = Telemetry(0, 0.0, 1, 0, ())
 STATUS = Status(0, 0.0, True, (0,), 0, 0.0, False, ())
 
 
@@ -22,6 +24,15 @@ class Answers:
 
     def send(self, index, message):
         return True
+
+    def begin(self, sample):
+        pass
+
+    def release(self):
+        return {}
+
+    def present(self):
+        return {0, SUPERVISOR}
 
     def receive(self, limit):
         return self.waiting.popleft() if self.waiting else None
@@ -39,8 +50,8 @@ class Answers:
     ],
 )
 def test_an_answer_that_does_not_fit_changes_nothing(sender, wrong):
-    end = Answers((sender, wrong), (0, GOOD), (SUPERVISOR, STATUS))
-    exchange = SampleExchange(end, 1, 0.01)
+    end = Answers((sender, wrong), (0, GOOD), (0, SHOWN), (SUPERVISOR, STATUS))
+    exchange = SampleExchange(end, 1, Links(period=0.01))
     (effort,) = exchange.step(0.0, [np.zeros(2 * 4 + 3)])
     assert effort.tolist() == [1.0, 2.0, 3.0, 4.0]
     assert exchange.facts()["processes"][0]["state"] == "follows the plan"
