@@ -15,6 +15,7 @@ from coop_drake.cli.task import Task, read_task
 if TYPE_CHECKING:
     from coop_drake.answers import Plan
     from coop_drake.messages import AddressBook, KeyPair
+    from coop_drake.messages.faults import Faults
 
 Addresses = Annotated[
     Path,
@@ -65,3 +66,15 @@ def place_of(task: Task, addresses: Path, key: Path | None, index: int) -> tuple
     book = load_address_book(addresses, robots_of(task.scenario))
     beside = addresses.parent / key_file(index)
     return book, load_own_keys(book, index, key or (beside if beside.exists() else None))
+
+
+def faults_of(task: Task, path: Path | None) -> Faults:
+    """Read what goes wrong between the processes of a team, nothing without a file.
+
+    Raises:
+        ScenarioError: The file is wrong, or is about a robot that the team does not have.
+    """
+    from coop_drake.messages.faults import NO_FAULTS, load_faults
+    from coop_drake.nodes import robots_of
+
+    return NO_FAULTS if path is None else load_faults(path, robots_of(task.scenario))

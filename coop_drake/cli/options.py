@@ -135,6 +135,14 @@ FreeRunning = Annotated[
         help="Pace the processes by the wall clock: what comes too late is not waited for; measures ages.",
     ),
 ]
+FaultsFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--faults",
+        metavar="FILE",
+        help="What goes wrong between processes apart: messages lost, late or repeated, clocks apart (YAML).",
+    ),
+]
 Restarts = Annotated[
     int,
     typer.Option(

@@ -7,8 +7,16 @@ from typing import Annotated
 import typer
 
 from coop_drake.cli.maps import map_cells
-from coop_drake.cli.node_options import ADDRESSES, Addresses, OwnKey, PlanFile, place_of, problem_of
-from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath
+from coop_drake.cli.node_options import (
+    ADDRESSES,
+    Addresses,
+    OwnKey,
+    PlanFile,
+    faults_of,
+    place_of,
+    problem_of,
+)
+from coop_drake.cli.options import FaultsFile, GainsName, Machine, Quiet, ScenarioPath
 from coop_drake.cli.reporter import ExitCode, reporting
 
 
@@ -19,6 +27,7 @@ def robot_node_command(
     key: OwnKey = None,
     plan: PlanFile = None,
     gains: GainsName = None,
+    faults: FaultsFile = None,
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
@@ -33,6 +42,8 @@ def robot_node_command(
         book, keys = place_of(task, addresses, key, robot)
         maps = map_cells(task, found, reporter)
         reporter.say(f"Robot {robot} looks for the world and the supervisor")
-        outcome = run_robot(task.scenario, found, maps, robot, book, keys=keys)
+        outcome = run_robot(
+            task.scenario, found, maps, robot, book, keys=keys, faults=faults_of(task, faults)
+        )
         reporter.facts.update(robot=robot, outcome=outcome)
         reporter.code = ExitCode.DONE if outcome == 0 else ExitCode.FAILED_RUN

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import typer
@@ -15,6 +16,7 @@ from coop_drake.cli.options import (
     Apart,
     BlocksName,
     Effort,
+    FaultsFile,
     FreeRunning,
     FreshMaps,
     GainsName,
@@ -59,6 +61,7 @@ def run_command(
     blocks: BlocksName = "named",
     apart: Apart = False,
     restarts: Restarts = RESTARTS,
+    faults: FaultsFile = None,
     free_running: FreeRunning = False,
     machine: Machine = False,
     quiet: Quiet = False,
@@ -68,7 +71,13 @@ def run_command(
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
         simulation = simulation_of(
-            task, blocks, reporter, apart=apart, restarts=restarts, free_running=free_running
+            task,
+            blocks,
+            reporter,
+            apart=apart,
+            restarts=restarts,
+            faults=faults,
+            free_running=free_running,
         )
         folder = ResultFolder.of(task.name, out, "plan", "simulation")
         with DrawingProcesses(figures=not no_figures) as drawing:
@@ -87,6 +96,7 @@ def simulation_of(
     *,
     apart: bool = False,
     restarts: int = 0,
+    faults: Path | None = None,
     free_running: bool = False,
 ) -> Simulation:
     """Return what simulates: all in one process, or every robot in a process of its own.
@@ -96,18 +106,23 @@ def simulation_of(
     """
     if free_running and not apart:
         raise typer.BadParameter("--free-running needs --apart: it paces processes of their own.")
+    if faults and not apart:
+        raise typer.BadParameter("--faults needs --apart: they are those of messages between processes.")
     if not apart:
         return partial(_in_one_process, blocks)
     if blocks == "fused":
         raise typer.BadParameter("--apart and --blocks fused do not go together: one block drives the team.")
+    from coop_drake.cli.node_options import faults_of
     from coop_drake.diagram import control_period
     from coop_drake.nodes import simulate_in_processes, wall_clock
 
     control_period(task.scenario)
+    wrong = faults_of(task, faults)
     pacing = wall_clock(task.scenario) if free_running else None
     return partial(
         simulate_in_processes,
         restarts=restarts,
+        faults=wrong,
         pacing=pacing,
         report=reporter.facts.update,
         tell=reporter.say,

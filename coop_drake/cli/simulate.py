@@ -12,6 +12,7 @@ from coop_drake.cli.live import live_page
 from coop_drake.cli.options import (
     Apart,
     BlocksName,
+    FaultsFile,
     FreeRunning,
     FreshMaps,
     Live,
@@ -56,6 +57,7 @@ def simulate_command(
     blocks: BlocksName = "named",
     apart: Apart = False,
     restarts: Restarts = RESTARTS,
+    faults: FaultsFile = None,
     free_running: FreeRunning = False,
     machine: Machine = False,
     quiet: Quiet = False,
@@ -65,7 +67,13 @@ def simulate_command(
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
         simulation = simulation_of(
-            task, blocks, reporter, apart=apart, restarts=restarts, free_running=free_running
+            task,
+            blocks,
+            reporter,
+            apart=apart,
+            restarts=restarts,
+            faults=faults,
+            free_running=free_running,
         )
         folder = ResultFolder.of(task.name, out, "simulation")
         found = read_plan(task, plan or folder.plan, reporter, new_gains=gains is not None)

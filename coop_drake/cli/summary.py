@@ -91,14 +91,15 @@ def _beside_limit(speed: Mapping[str, Any]) -> str:
 def process_lines(facts: Mapping[str, Any]) -> list[str]:
     """Return a line for each process of a run apart, and one for the ages of its commands."""
     lines = [
-        f"{process['name']}: {process['state']}, {process['team_messages']} messages sent to the team"
+        f"{process['name']}: {process['state']}, {process['team_messages']} messages sent to the team, "
+        f"{process['refused']} refused"
         for process in facts.get("processes", ())
     ]
     for name, count in facts.get("restarts", {}).items():
         lines.append(f"{name}: started again {'once' if count == 1 else f'{count} times'}")
     lines += map(_stop_line, facts.get("stops", ()))
     if refused := sum(facts.get("refused", {}).values()):
-        lines.append(f"{refused} messages were refused")
+        lines.append(f"the world: {refused} messages refused")
     if ages := facts.get("command_ages"):
         times = [1e3 * ages[key] for key in ("median", "high", "largest", "allowed")]
         lines.append(

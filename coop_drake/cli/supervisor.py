@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
-from coop_drake.cli.node_options import ADDRESSES, Addresses, OwnKey, PlanFile, place_of, problem_of
-from coop_drake.cli.options import GainsName, Machine, Quiet, ScenarioPath
+from coop_drake.cli.node_options import (
+    ADDRESSES,
+    Addresses,
+    OwnKey,
+    PlanFile,
+    faults_of,
+    place_of,
+    problem_of,
+)
+from coop_drake.cli.options import FaultsFile, GainsName, Machine, Quiet, ScenarioPath
 from coop_drake.cli.reporter import ExitCode, reporting
 
 
@@ -13,6 +21,7 @@ def supervisor_command(
     key: OwnKey = None,
     plan: PlanFile = None,
     gains: GainsName = None,
+    faults: FaultsFile = None,
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
@@ -24,6 +33,6 @@ def supervisor_command(
         task, found = problem_of(scenario, gains, plan, reporter)
         book, keys = place_of(task, addresses, key, SUPERVISOR)
         reporter.say("The supervisor looks for the world and waits for all robots")
-        outcome = run_supervisor(task.scenario, found, book, keys=keys)
+        outcome = run_supervisor(task.scenario, found, book, keys=keys, faults=faults_of(task, faults))
         reporter.facts.update(outcome=outcome)
         reporter.code = ExitCode.DONE if outcome == 0 else ExitCode.FAILED_RUN

@@ -5,8 +5,17 @@ from __future__ import annotations
 from functools import partial
 
 from coop_drake.cli.live import live_page
-from coop_drake.cli.node_options import ADDRESSES, Addresses, OwnKey, PlanFile, place_of, problem_of
+from coop_drake.cli.node_options import (
+    ADDRESSES,
+    Addresses,
+    OwnKey,
+    PlanFile,
+    faults_of,
+    place_of,
+    problem_of,
+)
 from coop_drake.cli.options import (
+    FaultsFile,
     FreeRunning,
     FreshMaps,
     GainsName,
@@ -34,6 +43,7 @@ def world_command(
     plan: PlanFile = None,
     out: ResultsFolder = None,
     gains: GainsName = None,
+    faults: FaultsFile = None,
     free_running: FreeRunning = False,
     rejoin: Rejoin = REJOIN,
     fresh_maps: FreshMaps = False,
@@ -63,6 +73,7 @@ def world_command(
                 keys=keys,
                 pacing=wall_clock(task.scenario) if free_running else None,
                 rejoin=rejoin,
+                faults=faults_of(task, faults),
                 report=reporter.facts.update,
                 tell=reporter.say,
             )

@@ -147,6 +147,7 @@ class Telemetry(NamedTuple):
         time: Simulated time.
         team_messages: As in ``Effort``.
         state: As in ``Effort``.
+        refused: How many messages this process has refused.
         values: In the order of the robot's outputs for the log.
     """
 
@@ -154,6 +155,7 @@ class Telemetry(NamedTuple):
     time: Seconds
     team_messages: Number
     state: Small
+    refused: Number
     values: Values
 
 
@@ -171,6 +173,7 @@ class Status(NamedTuple):
         entry: Simulated time at which it was entered.
         arrived: Whether all robots are ready to leave the last cell.
         causes: Why the team is held, as the block ``hold_supervisor`` shows it: the order, then each robot.
+        refused: How many messages the supervisor has refused.
     """
 
     number: Number
@@ -181,6 +184,7 @@ class Status(NamedTuple):
     entry: Seconds
     arrived: Flag
     causes: Codes
+    refused: Number
 
 
 @message(48, "team", "robot")

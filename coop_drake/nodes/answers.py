@@ -1,11 +1,13 @@
-"""Whether an answer of a process, which is well formed, fits the question."""
+"""What answers of processes say: whether they fit the question, and what a run reports about each process."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from coop_drake.messages import Effort, Status, Telemetry
+import numpy as np
+
+from coop_drake.messages import SUPERVISOR, Effort, Status, Telemetry, name_of
 from coop_drake.nodes.states import STATES
 
 
@@ -24,3 +26,33 @@ def fits(sender: int, message: Any, sizes: Sequence[int], known: Mapping[tuple[i
         return len(message.efforts) == sizes[sender] and bool(message.state < len(STATES))
     before = known.get((sender, Telemetry))
     return (before is None or len(before.values) == len(message.values)) and bool(message.state < len(STATES))
+
+
+def process_facts(
+    index: int,
+    shown: Telemetry | Status | None,
+    *,
+    missing_since: float | None,
+    sent: Any,
+    state: int,
+    age: float | None,
+) -> dict[str, Any]:
+    """Return what a run reports about a process.
+
+    Args:
+        index: Its index in messages.
+        shown: What it has shown last.
+        missing_since: Since which simulated time it is missing [s].
+        sent: How many messages of its session it has sent to the team, or to each robot.
+        state: The last state of a robot.
+        age: Age of what its last command was computed from, when it came to the world [s].
+    """
+    there = "there" if index == SUPERVISOR else STATES[state]
+    return {
+        "name": name_of(index),
+        "state": there if missing_since is None else "missing",
+        "missing_since": missing_since,
+        "team_messages": int(np.sum(sent)),
+        "refused": 0 if shown is None else shown.refused,
+        "age": age,
+    }

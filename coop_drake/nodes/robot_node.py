@@ -58,7 +58,7 @@ class RobotNode:
         self.place, self.state = Place(True, 0, 0), FOLLOWS
         self._order: Begin | None = None
         self._still = Stillness(self.period)
-        self._waits = np.zeros(2), 0
+        self._waits, self._number = (np.zeros(2), 0), 0
         start = np.array(knowledge.plan.start[:3])
         self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self._state_size), start])))
         self._deployed.prepare(self._sampled.context)
@@ -86,23 +86,27 @@ class RobotNode:
         self._sampled.at(time, self._inputs(measured))
         return row_of(self._sampled, self._controller, self._logged)
 
-    def step(self, time: float, measured: FloatArray, *, stopped: bool = False) -> tuple[FloatArray, Said]:
+    def step(
+        self, time: float, measured: FloatArray, *, sample: int | None = None, stopped: bool = False
+    ) -> tuple[FloatArray, Said]:
         """Compute a sample; return the effort from now on, and what the robot tells the supervisor.
 
         Args:
             time: Time of the sample [s].
             measured: Its own state, then the object's pose, as it measures them.
+            sample: Number of the sample, that of the time by default; the robot's clock may be wrong.
             stopped: Whether the drives brake.
         """
+        self._number = period_of(time, self.period) if sample is None else sample
         if not self._follows(time, measured, stopped=stopped):
             return np.zeros(3 + self._joints), self._stand(time, measured) if self.place.known else []
         self._sampled.at(time, self._inputs(measured))
         self._sampled.update()
         position, until = self._waits
-        if period_of(time, self.period) < until:
+        if self._number < until:
             self._deployed.keep_position(self._sampled.context, position)
         self.state = HOLDS if self._held and self._hold_message[0] > 0.0 else FOLLOWS
-        return self._sampled.output("robot_effort"), self._messages(period_of(time, self.period))
+        return self._sampled.output("robot_effort"), self._messages()
 
     def hear(self, messages: Iterable[Any]) -> None:
         """Take in what the supervisor says; it counts from the next instant on."""
@@ -121,7 +125,7 @@ class RobotNode:
 
     def _follows(self, time: float, measured: FloatArray, *, stopped: bool) -> bool:
         """Whether the robot follows the plan in this sample, which it may begin anew now by an order."""
-        number, order = period_of(time, self.period), self._order
+        number, order = self._number, self._order
         if not stopped or not self.place.known:
             return self.state in (FOLLOWS, HOLDS)
         if order is not None and number >= order.sample:
@@ -165,14 +169,13 @@ class RobotNode:
         if margin < 0.0:
             self.state = OUTSIDE
             return []
-        number = period_of(time, self.period)
-        if number - told < whole_periods(AGAIN, self.period):
+        if self._number - told < whole_periods(AGAIN, self.period):
             return []
-        self._told_rest = number
+        self._told_rest = self._number
         pose = tuple(float(part) for part in measured[self._state_size :])
-        return [AtRest(number, pose)]
+        return [AtRest(self._number, pose)]
 
-    def _messages(self, number: int) -> Said:
+    def _messages(self) -> Said:
         """Return what is new: a report only where the supervisor would come to another conclusion by it.
 
         A report of the present cell that has had no effect yet is sent again, because it may be lost, or its
@@ -182,9 +185,9 @@ class RobotNode:
         index, margin = self._sampled.output("ready")
         cell = int(self._cell[0])
         ready = index == cell and margin >= 0.0
-        again = self._said.cell == cell and number - self._reported >= whole_periods(AGAIN, self.period)
+        again = self._said.cell == cell and self._number - self._reported >= whole_periods(AGAIN, self.period)
         if again or ready != (self._said == (cell, True)):
-            self._said, self._reported = Ready(cell, bool(ready)), number
+            self._said, self._reported = Ready(cell, bool(ready)), self._number
             said.append(self._said)
         if self._held:
             asks, number = self._sampled.output("hold_request")

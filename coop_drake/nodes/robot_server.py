@@ -76,17 +76,21 @@ class RobotServer(Server):
                 team.send(message)
             self._end.efforts.send(Effort(number, self._sent, node.state, tuple(effort)))
         # What the log shows comes last: then the world knows that there is no effort if none has come.
-        self._end.efforts.send(Telemetry(number, time, self._sent, node.state, shown))
+        refused = self._end.refusals.total
+        self._end.efforts.send(Telemetry(number, time, self._sent, node.state, refused, shown))
         self._end.release()
 
     def _steps(self, question: Sample, measured: FloatArray) -> tuple[FloatArray, Said]:
         """Compute a sample, and before it with the last measurements those of which nothing was heard."""
         said: Said = []
         missed = 0 if self._stepped is None or question.stopped else question.number - self._stepped - 1
-        for periods in range(missed, 0, -1):
-            said += self._node.step(question.time - periods * self._node.period, self._measured)[1]
+        for late in range(missed, 0, -1):
+            time, number = question.time - late * self._node.period, question.number - late
+            said += self._node.step(time, self._measured, sample=number)[1]
         self._stepped, self._measured = question.number, measured
-        effort, new = self._node.step(question.time, measured, stopped=question.stopped)
+        effort, new = self._node.step(
+            question.time, measured, sample=question.number, stopped=question.stopped
+        )
         return effort, said + new
 
     @property

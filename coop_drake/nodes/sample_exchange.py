@@ -21,14 +21,13 @@ from coop_drake.messages import (
     Telemetry,
     Tick,
     WorldEnd,
-    name_of,
 )
 from coop_drake.messages.outgoing import Links
-from coop_drake.nodes.answers import fits
+from coop_drake.nodes.answers import fits, process_facts
 from coop_drake.nodes.attendance import TOLERATED, Attendance
 from coop_drake.nodes.pacing import Pacing
 from coop_drake.nodes.serving import TURN
-from coop_drake.nodes.states import ASKS, FOLLOWS, HOLDS, REJOIN, STATES
+from coop_drake.nodes.states import ASKS, FOLLOWS, HOLDS, REJOIN
 from coop_drake.nodes.stillness import Stillness
 from coop_drake.tree.pose import FloatArray
 
@@ -92,7 +91,7 @@ class SampleExchange:
         self._counts = dict[int, Any]()
         self._asked: dict[int, tuple[float, float]] = {}
         self._sizes: list[int] = []
-        self._answered: dict[int, float] = {}
+        self._answered, self._ages = dict[int, float](), dict[int, float]()
         self._sampled = -1
         self._expected, self._unheard = dict[int, int](), set[int]()
 
@@ -111,17 +110,17 @@ class SampleExchange:
 
     def facts(self) -> dict[str, Any]:
         """Return what a run reports about its processes: answers, messages of the team, ages of commands."""
-        processes = []
-        for index in self._everyone:
-            state = "missing" if index in self.missing else STATES[self._states.get(index, FOLLOWS)]
-            processes.append(
-                {
-                    "name": name_of(index),
-                    "state": "there" if index == SUPERVISOR and state != "missing" else state,
-                    "missing_since": self.missing.get(index),
-                    "team_messages": int(np.sum(self._counts.get(index, 0))),
-                }
+        processes = [
+            process_facts(
+                index,
+                self._last.get((index, Status if index == SUPERVISOR else Telemetry)),
+                missing_since=self.missing.get(index),
+                sent=self._counts.get(index, 0),
+                state=self._states.get(index, FOLLOWS),
+                age=self._ages.get(index),
             )
+            for index in self._everyone
+        ]
         ages = {} if self._pacing is None else {"command_ages": asdict(self._pacing.ages())}
         refused = {why.name: n for why, n in self._end.refusals.counts.items()}
         return {"processes": processes, "refused": refused, **self.attendance.facts(), **ages}
@@ -290,7 +289,7 @@ class SampleExchange:
         if known is None or message.number >= known.number:
             self._last[sender, kind] = message
             if kind is not Telemetry:
-                self._answered[sender] = time
+                self._answered[sender], self._ages[sender] = time, age
         if was_missing and kind is not Telemetry and (self._pacing is not None or unheard):
             self._unheard.discard(sender)
             self.attendance.back(sender)

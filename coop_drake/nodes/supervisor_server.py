@@ -44,7 +44,16 @@ class SupervisorServer(Server):
                 self._end.send_to_all(message)
         sent = tuple(peer.sent if peer.session else 0 for _, peer in sorted(self._end.team.peers.items()))
         codes = tuple(int(cause) for cause in causes)
-        self._end.efforts.send(
-            Status(number, time, node.knows, sent, int(cell), float(entry), bool(arrived), codes)
+        status = Status(
+            number,
+            time,
+            node.knows,
+            sent,
+            int(cell),
+            float(entry),
+            bool(arrived),
+            codes,
+            self._end.refusals.total,
         )
+        self._end.efforts.send(status)
         self._end.release()

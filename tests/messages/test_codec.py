@@ -103,7 +103,7 @@ def test_a_changed_byte_is_refused_or_gives_another_message_of_the_schema(sent, 
         (encode(Effort(1, 0, 0, (float("nan"),)), 0, 1, 1), Reason.VALUE),
         (encode(Effort(1, 0, 0, (1.0, float("inf"))), 0, 1, 1), Reason.VALUE),
         (encode(Sample(1, float("nan"), True, False, 0, (), ()), 0, 1, 1), Reason.VALUE),
-        (encode(Status(1, 0.0, True, (), 0, 0.0, False, (0,) * (MOST_ITEMS + 1)), 0, 1, 1), Reason.LENGTH),
+        (encode(Status(1, 0.0, True, (), 0, 0.0, False, (0,) * (MOST_ITEMS + 1), 0), 0, 1, 1), Reason.LENGTH),
     ],
 )
 def test_each_departure_has_its_reason(data, reason):

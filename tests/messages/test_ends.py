@@ -97,7 +97,7 @@ def test_the_teams_channel_carries_reports_and_switches(team):
 def test_the_supervisor_has_the_worlds_channels_like_a_robot(team):
     team.world.send(SUPERVISOR, Tick(7, 0.035, True, False, (1, 1)))
     assert team.supervisor.receive(LIMIT) == (WORLD, Tick(7, 0.035, True, False, (1, 1)))
-    status = Status(7, 0.035, True, (0, 0), 2, 0.01, False, (0, 2, 3))
+    status = Status(7, 0.035, True, (0, 0), 2, 0.01, False, (0, 2, 3), 4)
     team.supervisor.efforts.send(status)
     assert team.world.receive(LIMIT) == (SUPERVISOR, status)
     team.world.send(SUPERVISOR, Goodbye(0))

@@ -65,7 +65,7 @@ def test_nothing_passes_a_gap_but_what_the_log_needs():
     looks = [sample._replace(step=False) for sample in samples]
     assert sending("sensors", faults, looks, WORLD, 0)[1] == 8
     assert sending("efforts", faults, [Effort(k, 0, 0, ()) for k in range(8)], 0, WORLD)[1] == 5
-    assert sending("efforts", faults, [Telemetry(k, 0.0, 0, 0, ()) for k in range(8)], 0, WORLD)[1] == 8
+    assert sending("efforts", faults, [Telemetry(k, 0.0, 0, 0, 0, ()) for k in range(8)], 0, WORLD)[1] == 8
     assert sending("efforts", faults, [Present()] * 8, 0, WORLD)[1] == 8
 
 

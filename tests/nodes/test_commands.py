@@ -19,6 +19,7 @@ BASE = str(Path(__file__).parents[2] / "models" / "base.scenario.yaml")
         (["robot-node", BASE, "0"], "deployment.control_rate"),
         (["supervisor", BASE], "deployment.control_rate"),
         (["run", BASE, "--free-running"], "--free-running needs --apart"),
+        (["run", BASE, "--faults", "faults.yaml"], "--faults needs --apart"),
         (["simulate", BASE, "--apart", "--blocks", "fused"], "do not go together"),
     ],
 )
@@ -29,7 +30,7 @@ def test_what_processes_cannot_do_is_bad_input(arguments, said):
 
 
 def test_the_closing_lines_tell_of_every_process_and_of_ages():
-    processes = [{"name": "robot 0", "state": "missing", "team_messages": 7}]
+    processes = [{"name": "robot 0", "state": "missing", "team_messages": 7, "refused": 2}]
     ages = {
         "median": 0.001,
         "high": 0.002,
@@ -41,8 +42,8 @@ def test_the_closing_lines_tell_of_every_process_and_of_ages():
     }
     lines = process_lines({"processes": processes, "refused": {"KIND": 2, "VALUE": 1}, "command_ages": ages})
     assert lines == [
-        "robot 0: missing, 7 messages sent to the team",
-        "3 messages were refused",
+        "robot 0: missing, 7 messages sent to the team, 2 refused",
+        "the world: 3 messages refused",
         "Ages of commands: median 1.0 ms, 99.9 % below 2.0 ms, largest 20.0 ms; "
         "allowed 10.0 ms, exceeded by 1 of 90",
         "The wall clock was 0.50 s ahead of the simulated time at the end",
