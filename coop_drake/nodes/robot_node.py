@@ -51,6 +51,8 @@ class RobotNode:
         self._state_size = 2 * (3 + self._joints)
         axes = [0, *range(1 + knowledge.joints.start, 1 + knowledge.joints.stop)]
         self._tables = [law.table for law in axis_laws(knowledge.plan, axes)]
+        # Compiled here, and not while the team waits for an answer.
+        widen_slice(self._tables[0][0], 0.0, np.empty_like(self._tables[0][0]))
         record = robot_record(self._joints, holds=self._held)
         self._logged = [name for name, size in record.items() if size]
         self._cell, self._hold_message = np.zeros(2), np.zeros(2)
