@@ -100,6 +100,9 @@ CASES: Mapping[str, Case] = {
     "viscous friction": Case({"floor": {"viscous_friction": 20.0}}, {"floor": {"viscous_friction": 300.0}}),
     "slope": Case({"floor": {"slope": 0.01745}}, {"floor": {"slope": 0.2}}),
     "push": Case(_pushed(20.0), _pushed(300.0)),
+    "start offset": Case(
+        {"start_offset": {"x": 0.005, "theta": 0.005}}, {"start_offset": {"x": 0.005, "theta": 0.1}}
+    ),
     "four at once": Case({**_measured(**_NOISE), "mass_error": -0.3, "messages": {"loss": 0.7}}),
 }
 """Every departure."""

@@ -39,7 +39,8 @@ class CompiledTransport:
         team: The robots' models of themselves, with their true masses.
         plant: The simulated team.
         nominal: The nominal motions, their flow for the scenario's control rate.
-        start: State of the team at the start, in the order of the plant.
+        start: State of the team at the plan's start, in the order of the plant.
+        order: Where (x, y, theta, q...) stand in it, shape (3 + n,).
         first_axes: Where the M axes of all robots rest at the start.
     """
 
@@ -51,6 +52,7 @@ class CompiledTransport:
     plant: LoopPlant
     nominal: LoopNominal
     start: FloatArray
+    order: IntArray
     first_axes: FloatArray
 
 
@@ -84,6 +86,7 @@ def prepare(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> Comp
         _plant(scenario, team, tree, fused),
         _nominal(plan, team, knowledge),
         team.plant_state(plan.start, np.zeros(len(plan.start))),
+        team.position_index,
         plan.start[2:][axes],
     )
 

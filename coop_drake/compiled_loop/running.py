@@ -33,6 +33,7 @@ from coop_drake.compiled_loop.watching import (
     VALUE,
     WALL,
 )
+from coop_drake.diagram.disturbances import displacement
 from coop_drake.scenario import Deployment
 from coop_drake.tree.pose import FloatArray
 
@@ -90,14 +91,15 @@ def run(
     deployment = transport.scenario.deployment if deployment is None else deployment
     deployment = deployment if seed is None else replace(deployment, seed=seed)
     departures = departures_of(transport, deployment)
-    period = float(departures.times[0])
+    period, memory = float(departures.times[0]), memory_of(transport, departures)
+    memory.state[transport.order] += displacement(deployment, len(transport.order))
     figures = run_loop(
         transport.cells,
         believed(transport.team, deployment.mass_error),
         transport.plant,
         nominal_of(transport, period),
         departures,
-        memory_of(transport, departures),
+        memory,
     )
     return _outcome(transport, figures, period)
 

@@ -10,6 +10,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import DeployedController, deploy
+from coop_drake.diagram.disturbances import displacement
 from coop_drake.diagram.fused import FusedControllers, add_fused_controllers
 from coop_drake.diagram.hold import add_supervisor
 from coop_drake.diagram.knowledge import robot_knowledge
@@ -20,6 +21,7 @@ from coop_drake.plant import TeamPlant, set_configuration
 from coop_drake.scenario import Scenario
 from coop_drake.systems import CellPlanner, HoldSupervisor
 from coop_drake.systems.block import release_all
+from coop_drake.tree.pose import FloatArray
 
 Blocks = Literal["named", "fused"]
 """How the controllers are built: a block for each law of each robot, or one block for them all."""
@@ -38,6 +40,7 @@ class ClosedLoop:
         supervisor: What holds the team, None where a scenario has no holds.
         fused: The block that drives the team in the fused mode, which has no controllers of single robots.
         plan: The plan that they follow.
+        start: Where the team stands at first, shape (3 + n,) [m, rad].
     """
 
     diagram: Diagram
@@ -48,6 +51,7 @@ class ClosedLoop:
     supervisor: HoldSupervisor | None
     fused: FusedControllers | None
     plan: Plan
+    start: FloatArray
 
     @property
     def bare_controllers(self) -> tuple[Diagram, ...]:
@@ -60,10 +64,10 @@ class ClosedLoop:
         return self.station.team
 
     def create_context(self) -> Context:
-        """Create a context at the plan's start: at rest, in the first cell, every p_G at the object."""
+        """Create a context of a team at rest, in the first cell, with every p_G at the plan's start."""
         context = self.diagram.CreateDefaultContext()
         team = self.team
-        set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.plan.start)
+        set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.start)
         if self.fused is not None and self.fused.integrator is not None:
             governor = self.fused.integrator
             governor.set_integral_value(governor.GetMyMutableContextFromRoot(context), self.plan.start[:2])
@@ -106,6 +110,7 @@ def build_closed_loop(
     station = build_station(scenario) if blocks == "named" else build_driven_station(scenario)
     team = station.team
     knowledge = robot_knowledge(scenario, plan, maps, team)
+    start = plan.start + displacement(scenario.deployment, len(plan.start))
     builder.AddNamedSystem("transport_station", station.diagram)
     planner = builder.AddNamedSystem(
         "cell_planner", CellPlanner(len(team.robots), len(plan.cells), period=scenario.deployment.period)
@@ -116,7 +121,7 @@ def build_closed_loop(
         supervisor = add_supervisor(builder, hold, planner, heard, scenario.deployment.period)
     if blocks == "fused":
         controllers = add_fused_controllers(builder, scenario, station, planner, supervisor, knowledge)
-        return ClosedLoop(builder.Build(), station, planner, (), (), supervisor, controllers, plan)
+        return ClosedLoop(builder.Build(), station, planner, (), (), supervisor, controllers, plan, start)
     built, deployed = [], []
     for k, known in enumerate(knowledge):
         controller = build_robot_controller(known, replacements)
@@ -133,7 +138,7 @@ def build_closed_loop(
             )
         built.append(controller)
     return ClosedLoop(
-        builder.Build(), station, planner, tuple(built), tuple(deployed), supervisor, None, plan
+        builder.Build(), station, planner, tuple(built), tuple(deployed), supervisor, None, plan, start
     )
 
 

@@ -251,6 +251,7 @@ def _check(scenario: Scenario, knowledge: Sequence[RobotKnowledge]) -> None:
         control_rate=deployment.control_rate,
         mass_error=deployment.mass_error,
         messages=deployment.messages,
+        start_offset=deployment.start_offset,
         budget=deployment.budget,
         seed=deployment.seed,
     )
@@ -271,6 +272,6 @@ def _check(scenario: Scenario, knowledge: Sequence[RobotKnowledge]) -> None:
             *refused,
             "an ideal plant without springs, no predictor or observer, holds only at times that the scenario "
             "states, of deployment only control_rate, "
-            "mass_error, messages and seed: "
+            "mass_error, messages, start_offset and seed: "
             "fused blocks support only these; use `--blocks named` for the rest",
         )

@@ -9,12 +9,14 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import Body, build_body
+from coop_drake.diagram.disturbances import displacement
 from coop_drake.diagram.station import TransportStation, build_station
 from coop_drake.errors import ScenarioError
 from coop_drake.plant import TeamPlant, set_configuration
 from coop_drake.scenario import Scenario
 from coop_drake.systems import Exchange, TeamLink, robot_record, supervisor_record
 from coop_drake.systems.block import release_all
+from coop_drake.tree.pose import FloatArray
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,7 @@ class World:
         link: The block that is connected to the controllers and the supervisor.
         records: Names and sizes of what each robot reports for the log, then of what the supervisor does.
         plan: The plan that they follow.
+        start: Where the team stands at first, shape (3 + n,) [m, rad].
     """
 
     diagram: Diagram
@@ -36,6 +39,7 @@ class World:
     link: TeamLink
     records: tuple[dict[str, int], ...]
     plan: Plan
+    start: FloatArray
 
     @property
     def team(self) -> TeamPlant:
@@ -43,10 +47,10 @@ class World:
         return self.station.team
 
     def create_context(self) -> Context:
-        """Create a context at the plan's start, at rest."""
+        """Create a context of a team at rest."""
         context = self.diagram.CreateDefaultContext()
         team = self.team
-        set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.plan.start)
+        set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.start)
         for body in self.bodies:
             body.prepare(context)
         return context
@@ -123,4 +127,5 @@ def build_world(scenario: Scenario, plan: Plan, exchange: Exchange) -> World:
         ):
             builder.Connect(output, receiver)
         bodies.append(body)
-    return World(builder.Build(), station, tuple(bodies), link, records, plan)
+    start = plan.start + displacement(scenario.deployment, len(plan.start))
+    return World(builder.Build(), station, tuple(bodies), link, records, plan, start)

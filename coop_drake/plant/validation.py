@@ -20,6 +20,10 @@ def check_joints(scenario: Scenario, team: TeamPlant) -> None:
     _check_section(scenario, team, "start.joints", scenario.start.joints)
     _check_section(scenario, team, "goal.joints", scenario.goal.joints)
     _check_rates(scenario, team)
+    count, given = sum(len(robot.joints) for robot in team.robots), scenario.deployment.start_offset.joints
+    if given and len(given) != count:
+        allowed = f"an empty list, or one of {count}, a number for every joint"
+        raise ScenarioError(str(scenario.path), "deployment.start_offset.joints", list(given), allowed)
     for robot in team.robots:
         if robot.joints and robot.name not in scenario.start.joints:
             allowed = f"a list of {len(robot.joints)}, the values of {', '.join(robot.joint_names)}"

@@ -11,6 +11,7 @@ from .deployment import (
     Push,
     RobotDepartures,
     Silence,
+    StartOffset,
 )
 from .gain_file import dump_gains, with_gains
 from .load import dump_scenario, load_scenario
@@ -53,6 +54,7 @@ __all__ = [
     "Silence",
     "SimulatorSettings",
     "Start",
+    "StartOffset",
     "Tolerances",
     "VisualizationSettings",
     "Wave",

@@ -93,14 +93,17 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: TeamMasses, 
     share = hypot(*masses.moved) / sum(masses.moved)  # errors of several robots rarely add up
     mean = PLANE_DEVIATIONS * share
     lost = REPORTS_LOST * deployment.period if messages.loss > 0.0 else 0.0
-    waves = wave_bounds(measured.waves, tree)
+    waves, start = wave_bounds(measured.waves, tree), deployment.start_offset
     return Budget(
         control_rate=deployment.control_rate,
         delay=measured.delay,
         lag=deployment.actuators.lag,
-        angle_noise=DEVIATIONS * measured.angle_noise + waves.angle,
+        # A team at rest that has measured with a constant error stands off by it: errors cover starts.
+        angle_noise=max(
+            DEVIATIONS * measured.angle_noise + waves.angle, *map(abs, (start.theta, *start.joints))
+        ),
         rate_noise=DEVIATIONS * measured.rate_noise + waves.rate,
-        position_noise=mean * measured.position_noise + waves.position,
+        position_noise=max(mean * measured.position_noise + waves.position, hypot(start.x, start.y)),
         velocity_noise=mean * measured.rate_noise * rate_levers(tree) + waves.velocity,
         single_noise=1.0 / share,
         model_error=abs(deployment.mass_error),

@@ -204,6 +204,23 @@ class Push:
 
 
 @dataclass(frozen=True)
+class StartOffset:
+    """How far the team stands away from the plan's start, at rest; its robots do not know.
+
+    Attributes:
+        x: Of the object, along x of W [m].
+        y: Of the object, along y of W [m].
+        theta: Of the object's angle [rad].
+        joints: Of every joint, robot by robot in their order; empty for none [rad or m].
+    """
+
+    x: float = 0.0
+    y: float = 0.0
+    theta: float = 0.0
+    joints: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
 class Deployment:
     """The team as it would be built; without this section it is ideal and controlled in continuous time.
 
@@ -221,6 +238,7 @@ class Deployment:
         robots: What is wrong with single robots, by name; ``"*"`` for all that have no entry of their own.
         floor: Friction and slope of the floor.
         pushes: Forces from outside.
+        start_offset: How far the team stands away from the plan's start.
         budget: Under which budget of these departures a plan must provably hold: ``none``, ``position`` for
             the object's position alone, ``all`` for angles and joints, too; needs a control rate.
         seed: Seed of noise and losses.
@@ -235,6 +253,7 @@ class Deployment:
     robots: dict[str, RobotDepartures] = field(default_factory=dict)
     floor: Floor = field(default_factory=Floor)
     pushes: tuple[Push, ...] = ()
+    start_offset: StartOffset = field(default_factory=StartOffset)
     budget: Literal["none", "position", "all"] = "none"
     seed: Annotated[int, Limits(at_least=0)] = 0
 

@@ -39,7 +39,7 @@ def waves_in(values):
 def test_departures_reach_the_bounds_of_the_budget_and_never_exceed_them(departures):
     bounded, tree = departures
     budget, generator = bounded.budget, np.random.default_rng(1)
-    rates, velocities = [], []
+    rates, velocities, places, axes = [], [], [], []
     for _ in range(200):
         values = bounded.values(generator.uniform(size=len(bounded.names)))
         reached = wave_bounds(waves_in(values), tree)
@@ -50,7 +50,13 @@ def test_departures_reach_the_bounds_of_the_budget_and_never_exceed_them(departu
         assert abs(values["deployment.mass_error"]) <= budget.model_error
         assert 0.0 <= values["deployment.measurements.delay"] <= budget.delay
         assert 0.0 <= values["deployment.messages.delay"] <= budget.report_age
+        start = {key.split(".")[-1]: value for key, value in values.items() if "start_offset" in key}
+        places.append(np.hypot(start["x"], start["y"]) / budget.position_noise)
+        axes.append(np.abs([start["theta"], *start["joints"]]).max() / budget.angle_noise)
+        assert len(start["joints"]) == len(tree.joints)
         assert 2.0 * budget.period <= waves_in(values).angle.period <= 4.0
+    assert max(places) == pytest.approx(1.0)
+    assert 0.9 < max(axes) <= 1.0
     assert max(rates) <= 1.0 + 1e-12
     assert max(velocities) <= 1.0 + 1e-12
     assert max(np.maximum(rates, velocities)) == pytest.approx(1.0)

@@ -102,6 +102,7 @@ def test_one_departure_acts_alone_at_its_multiple_and_all_errors_together(campai
     waves = "deployment.measurements.waves"
     angles = departures_at(budget, tree, "angles", 3.0, 1)
     assert angles[f"{waves}.angle.size"] == angles[f"{waves}.joints.size"] == pytest.approx(3.0 * 0.0015)
+    assert angles["deployment.start_offset.x"] == angles["deployment.start_offset.theta"] == 0.0
     assert angles[f"{waves}.turn_rate.size"] == angles["deployment.mass_error"] == 0.0
     assert angles["deployment.measurements.delay"] == budget.delay
     delay = departures_at(budget, tree, "delay", 2.0, 1)
@@ -112,7 +113,7 @@ def test_one_departure_acts_alone_at_its_multiple_and_all_errors_together(campai
     assert largest_multiple(budget, "model", 64.0) == pytest.approx(4.5)
     assert multiplied(budget, "all", 64.0).model_error == 0.9
     rates = [departures_at(budget, tree, "rates", 1.0, seed) for seed in range(5)]
-    assert all(np.isfinite(value) for values in rates for value in values.values())
+    assert all(np.isfinite(value).all() for values in rates for value in values.values())
     assert isfinite(largest_multiple(budget, "all", 8.0))
 
 

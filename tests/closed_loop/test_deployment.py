@@ -18,6 +18,7 @@ from coop_drake.scenario import (
     Push,
     RobotDepartures,
     Silence,
+    StartOffset,
     Wave,
     Waves,
 )
@@ -68,9 +69,11 @@ MILD = {
     "friction": at_200_hz(floor=Floor(coulomb_friction=20.0, viscous_friction=5.0)),
     "slope": at_200_hz(floor=Floor(slope=0.01)),
     "push": pushed(20.0),
+    "start": at_200_hz(start_offset=StartOffset(0.005, -0.005, 0.005, (0.005, -0.005))),
 }
 HARSH = {
     "sampling": (Deployment(control_rate=15.0), "to its funnel is"),
+    "start": (Deployment(start_offset=StartOffset(theta=0.3)), "distance of object angle to its funnel is -"),
     "saturation": (
         Deployment(actuators=ActuatorLimits(base_force=3.0)),
         "to its slice is -0.0",

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from coop_drake.compiled_loop import prepare, run, run_many
-from coop_drake.errors import ScenarioError
+from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.scenario import (
     ActuatorLimits,
     Control,
@@ -21,11 +21,13 @@ from coop_drake.scenario import (
     Push,
     RobotDepartures,
     Silence,
+    StartOffset,
     Wave,
     Waves,
 )
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification.runs import Rows, budget_share
+from coop_drake.verification.runs.ends import check_start
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.tubes import WITH_AXES, tubed_problem
 
@@ -62,6 +64,7 @@ CASES = {
     "silence from the start": of_one(silence=Silence(0.0, 1.2)),
     "held motors": of_one(silence=Silence(0.5, 0.02, motors="held")),
     "floor": at_200_hz(floor=Floor(coulomb_friction=5.0, viscous_friction=5.0, slope=0.01)),
+    "start": at_200_hz(start_offset=StartOffset(2e-3, -1e-3, 1e-3, (1e-3, -5e-4))),
     "push": at_200_hz(pushes=(Push("robot_1", (15.0, 5.0), 0.5, 0.5, torque=1.0),)),
 }
 
@@ -118,6 +121,22 @@ def test_a_plan_with_a_budget_is_followed_as_in_drake(team):
     assert_agree(outcome, log, close=5e-5)
     assert outcome.budget_share == pytest.approx(budget_share(Rows(log, plan)), rel=0.01)
     assert np.isnan(run(prepared()).budget_share)
+
+
+@pytest.mark.parametrize(("size", "accepted"), [(1.0, True), (1.1, False)])
+def test_a_start_within_the_errors_of_the_budget_is_accepted_and_no_other(size, accepted):
+    scenario, plan = tubed_problem(WITH_AXES, "base")
+    maps, place, noise = build_maps(plan), size * plan.budget.position_noise, size * plan.budget.angle_noise
+    away = StartOffset(0.6 * place, -0.8 * place, noise, (-noise, noise))
+    transport = prepare(replace(scenario, deployment=PRESET), plan, maps)
+    outcome, log = both(transport, replace(PRESET, start_offset=away), maps)
+    assert_agree(outcome, log, close=5e-5)
+    assert outcome.budget_share < 1.0
+    if accepted:
+        assert check_start(Rows(log, plan)).tightest == pytest.approx(place)
+    else:
+        with pytest.raises(RefusalError, match="object_pose"):
+            check_start(Rows(log, plan))
 
 
 def test_a_lost_run_ends_where_and_why_it_does_in_drake():

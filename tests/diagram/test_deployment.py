@@ -7,7 +7,7 @@ import pytest
 from pydrake.systems.analysis import Simulator
 
 from coop_drake.diagram import build_closed_loop
-from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages, Wave, Waves
+from coop_drake.scenario import ActuatorLimits, Deployment, Measurements, Messages, StartOffset, Wave, Waves
 from tests.support.small_loop import small_maps, small_problem
 from tests.support.system_checks import port_sizes
 
@@ -72,6 +72,19 @@ def test_a_sampled_team_keeps_its_governors_between_samples():
     for law in loop.bare_controllers:
         governor = law.GetOutputPort("governor_position").Eval(law.GetMyContextFromRoot(root))
         np.testing.assert_array_equal(governor, loop.plan.start[:2])
+
+
+def test_a_team_may_stand_off_the_start_and_its_controllers_do_not_know():
+    offset = StartOffset(0.01, -0.02, 0.03, (0.04, -0.05))
+    loop, there = loop_of(start_offset=offset), loop_of()
+    contexts = [one.create_context() for one in (loop, there)]
+    states = [
+        one.team.plant.GetPositions(one.team.plant.GetMyContextFromRoot(context))[one.team.position_index]
+        for one, context in zip((loop, there), contexts, strict=True)
+    ]
+    assert states[0] - states[1] == pytest.approx([0.01, -0.02, 0.03, 0.04, -0.05])
+    assert states[1] == pytest.approx(there.plan.start)
+    assert loop.plan.start == pytest.approx(there.plan.start)
 
 
 def test_before_the_start_everything_stood_still():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields, replace
-from math import cos, pi, sin
+from math import cos, hypot, pi, sin
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,9 @@ _ANGLES = ("position", "velocity")
 _SHARES = ("velocity", "turn_rate", "joint_rates")
 """Errors that together reach the budget's bounds of rates and of the velocity."""
 
+START = "start of "
+"""How names of numbers begin that say where the team stands at first."""
+
 _DELAYS = ("delay", "lag", "report_age")
 """Departures up to the budget's bound."""
 
@@ -40,7 +43,8 @@ class BoundedDepartures:
 
     Normal noise and losses are off, because no number bounds them. Errors of positions and angles are as
     large as they may be; those of rates share their bounds. Each is a square wave. The model's error, the
-    delay, the lag and the age of reports are constant.
+    delay, the lag and the age of reports are constant. The team stands off the plan's start by no more than
+    the errors of positions and angles: as far as one that came to rest with a constant error.
 
     Args:
         budget: The budget.
@@ -59,6 +63,8 @@ class BoundedDepartures:
         yield from (f"share of {name}" for name in _SHARES)
         yield "model_error"
         yield from _DELAYS
+        yield from (f"{START}{axis}" for axis in ("x", "y", "theta"))
+        yield from (f"{START}joint {i}" for i in range(len(self._tree.joints)))
 
     def values(self, fractions: FloatArray, factor: float = 1.0) -> dict[str, Any]:
         """Return keys of a scenario with their values.
@@ -81,7 +87,14 @@ class BoundedDepartures:
         values["deployment.measurements.delay"] = budget.delay * given["delay"]
         values["deployment.actuators.lag"] = budget.lag * (_LEAST_LAG + (1.0 - _LEAST_LAG) * given["lag"])
         values["deployment.messages.delay"] = budget.report_age * given["report_age"]
-        return values
+        return values | self._start(given, budget)
+
+    def _start(self, given: Mapping[str, float], budget: Budget) -> dict[str, Any]:
+        x, y, *axes = (2.0 * value - 1.0 for name, value in given.items() if name.startswith(START))
+        place = budget.position_noise / max(1.0, hypot(x, y))
+        away = [budget.angle_noise * axis for axis in axes]
+        offset = {"x": place * x, "y": place * y, "theta": away[0], "joints": away[1:]}
+        return {f"deployment.start_offset.{key}": value for key, value in offset.items()}
 
     def waves(self, given: Mapping[str, float], budget: Budget) -> Waves:
         """Return errors of measurements that reach a budget's bounds and do not exceed them."""

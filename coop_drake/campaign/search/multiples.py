@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from coop_drake.answers.budget import Budget
-from coop_drake.campaign.search.bounds import BoundedDepartures
+from coop_drake.campaign.search.bounds import START, BoundedDepartures
 from coop_drake.tree import ComponentTree
 
 _SIZES = ("angle_noise", "rate_noise", "velocity_noise", "position_noise", "model_error")
@@ -66,5 +66,6 @@ def departures_at(
     generator = np.random.default_rng(seed)
     drawn = dict(zip(bounded.names, generator.uniform(size=len(bounded.names)), strict=True))
     drawn["model_error"] = float(generator.integers(2))
+    drawn |= {name: 0.5 for name in drawn if name.startswith(START)}  # Errors alone are multiplied.
     drawn |= {name: 1.0 for name in drawn if name in ("delay", "lag", "report_age") or "share" in name}
     return bounded.values(np.array([drawn[name] for name in bounded.names]))

@@ -96,6 +96,7 @@ _BEYOND = {
     "deployment.actuators.lag": (60.0, "a motor does not take minutes"),
     "deployment.measurements.loss": (1.5, "it is a probability"),
     "deployment.measurements.waves.x.phase": (1.5, "it is a part of a period"),
+    "deployment.start_offset.joints": ([0.1] * 9, "the team has fewer joints"),
     "deployment.floor.slope": (30.0, "it is an angle in radians"),
     "planner.strategy": ("astar", "no strategy has this name"),
     "simulator.integration_scheme": ("runge_kutta7", "no integrator has this name"),
