@@ -11,7 +11,7 @@ CODE := coop_drake tests benchmarks notebooks docs paper
 # The kernels are small; threads of BLAS would only get into each other's way.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test lint lint-types lint-rest bench notebooks docs gallery clean
+.PHONY: demo test lint lint-types lint-rest bench campaigns notebooks docs gallery clean
 
 demo: $(READY)  ## plan, simulate and record the paper's transport
 	$(BIN)/coop-drake run models/base.scenario.yaml
@@ -33,6 +33,9 @@ lint-rest: $(READY_TO_DEVELOP)
 
 bench: $(READY_TO_DEVELOP)  ## measure speed and accuracy as ratios, into out/bench.json
 	$(BIN)/python -m benchmarks
+
+campaigns: $(READY_TO_DEVELOP)  ## make the documentation's campaigns, or the rest of them, and print their tables
+	$(BIN)/python -m benchmarks.campaigns
 
 docs: $(READY_TO_DEVELOP)  ## build the documentation into out/docs, warnings being errors
 	$(BIN)/python -m docs.generate out/docs

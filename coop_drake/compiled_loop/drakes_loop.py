@@ -19,13 +19,14 @@ from coop_drake.compiled_loop.telling import GOVERNOR, MARGIN, POSE, READY, SHOW
 from coop_drake.diagram.station import TransportStation, build_driven_station
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import TeamPlant, set_configuration
+from coop_drake.plant.configuration import displacement
 from coop_drake.progress import Progress
 from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation.logged_ports import Places, PortRow
 from coop_drake.simulation.run import run_and_release, simulate
 from coop_drake.simulation.telemetry import Sample
 from coop_drake.systems.block import release_all
-from coop_drake.tree.pose import IntArray
+from coop_drake.tree.pose import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,7 @@ class SampledLoop:
         controllers: The block.
         axis_rows: Row among the M axes of (theta, q), shape (1 + n,).
         plan: The plan that is followed.
+        start: Where the team stands at first, shape (3 + n,) [m, rad].
     """
 
     diagram: Diagram
@@ -45,6 +47,7 @@ class SampledLoop:
     controllers: SampledTeam
     axis_rows: IntArray
     plan: Plan
+    start: FloatArray
 
     @property
     def team(self) -> TeamPlant:
@@ -52,9 +55,9 @@ class SampledLoop:
         return self.station.team
 
     def create_context(self) -> Context:
-        """Create a context at the plan's start, at rest."""
+        """Create a context of a team at rest."""
         context = self.diagram.CreateDefaultContext()
-        set_configuration(self.team, self.team.plant.GetMyMutableContextFromRoot(context), self.plan.start)
+        set_configuration(self.team, self.team.plant.GetMyMutableContextFromRoot(context), self.start)
         return context
 
     def release(self) -> None:
@@ -118,7 +121,8 @@ def build_sampled_loop(transport: CompiledTransport, deployment: Deployment | No
     for k in range(len(robots)):
         builder.Connect(parts.get_output_port(k), diagram.GetInputPort(f"robot_{k}_effort"))
     rows = transport.plant.axis_rows[0]
-    return SampledLoop(builder.Build(), station, block, rows, transport.plan)
+    start = transport.plan.start + displacement(deployment, len(transport.plan.start))
+    return SampledLoop(builder.Build(), station, block, rows, transport.plan, start)
 
 
 def simulate_sampled(

@@ -33,7 +33,7 @@ from coop_drake.compiled_loop.watching import (
     VALUE,
     WALL,
 )
-from coop_drake.diagram.disturbances import displacement
+from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import Deployment
 from coop_drake.tree.pose import FloatArray
 

@@ -10,7 +10,6 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import DeployedController, deploy
-from coop_drake.diagram.disturbances import displacement
 from coop_drake.diagram.fused import FusedControllers, add_fused_controllers
 from coop_drake.diagram.hold import add_supervisor
 from coop_drake.diagram.knowledge import robot_knowledge
@@ -18,6 +17,7 @@ from coop_drake.diagram.robot_controller import Replacements, build_robot_contro
 from coop_drake.diagram.station import TransportStation, build_driven_station, build_station
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import TeamPlant, set_configuration
+from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import Scenario
 from coop_drake.systems import CellPlanner, HoldSupervisor
 from coop_drake.systems.block import release_all
@@ -72,7 +72,7 @@ class ClosedLoop:
             governor = self.fused.integrator
             governor.set_integral_value(governor.GetMyMutableContextFromRoot(context), self.plan.start[:2])
         for deployed in self.deployed:
-            deployed.prepare(context)
+            deployed.prepare(context, self.plan.start[:2])
         return context
 
     def release(self) -> None:

@@ -32,12 +32,11 @@ class DeployedController:
     delays: tuple[Holding, ...]
     heard: tuple[Holding, ...] = ()
 
-    def prepare(self, root: Context) -> None:
-        """Set p_G and held measurements to their values at the start."""
-        pose = self.diagram.GetInputPort("object_pose").Eval(self.diagram.GetMyContextFromRoot(root))
+    def prepare(self, root: Context, p_WG: FloatArray) -> None:
+        """Set p_G to the object's position at the plan's start [m], and held measurements to their values."""
         if self.controller.HasSubsystemNamed("governor_state"):
             governor = self.controller.GetSubsystemByName("governor_state")
-            governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), pose[:2])
+            governor.set_integral_value(governor.GetMyMutableContextFromRoot(root), p_WG)
         _prepare(self.delays, root)
 
     def begin(

@@ -1,4 +1,4 @@
-"""What robots do not do themselves: friction and slope of the floor, pushes, an offset of the start."""
+"""Forces on a team that are not its own: friction and slope of the floor, pushes from outside."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from pydrake.trajectories import PiecewisePolynomial
 from coop_drake.plant import TeamPlant
 from coop_drake.scenario import Deployment, Floor, Push
 from coop_drake.systems import FloorFriction
-from coop_drake.tree.pose import FloatArray
 
 _GRAVITY = 9.80665
 """Standard acceleration of gravity [m/s^2]."""
@@ -28,12 +27,6 @@ def tilt_floor(team: TeamPlant, floor: Floor) -> None:
 def downhill(slope: float) -> float:
     """Return the acceleration of gravity along a floor [m/s^2], which falls by an angle [rad]."""
     return _GRAVITY * sin(slope)
-
-
-def displacement(deployment: Deployment, axes: int) -> FloatArray:
-    """Return how far a team with so many (x, y, theta, q...) stands away from the plan's start [m, rad]."""
-    offset = deployment.start_offset
-    return np.array([offset.x, offset.y, offset.theta, *(offset.joints or (0.0,) * (axes - 3))])
 
 
 def add_disturbances(

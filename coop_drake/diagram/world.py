@@ -9,10 +9,10 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import Body, build_body
-from coop_drake.diagram.disturbances import displacement
 from coop_drake.diagram.station import TransportStation, build_station
 from coop_drake.errors import ScenarioError
 from coop_drake.plant import TeamPlant, set_configuration
+from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import Scenario
 from coop_drake.systems import Exchange, TeamLink, robot_record, supervisor_record
 from coop_drake.systems.block import release_all

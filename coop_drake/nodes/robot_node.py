@@ -63,7 +63,7 @@ class RobotNode:
         self._waits, self._number = (np.zeros(2), 0), 0
         start = np.array(knowledge.plan.start[:3])
         self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self._state_size), start])))
-        self._deployed.prepare(self._sampled.context)
+        self._deployed.prepare(self._sampled.context, start[:2])
 
     def _inputs(self, measured: FloatArray) -> dict[str, FloatArray]:
         own = {"robot_state": measured[: self._state_size], "object_pose": measured[self._state_size :]}

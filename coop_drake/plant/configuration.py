@@ -5,6 +5,7 @@ from pydrake.systems.framework import Context
 
 from coop_drake.plant.planarity import planar_pose
 from coop_drake.plant.team import TeamPlant
+from coop_drake.scenario import Deployment
 from coop_drake.tree.pose import FloatArray
 
 
@@ -27,3 +28,9 @@ def base_poses(team: TeamPlant, context: Context) -> FloatArray:
     """Read the pose (x, y, angle) of every base in W, shape (N, 3) [m, rad], angles in (-pi, pi]."""
     poses = [planar_pose(robot.base_body.EvalPoseInWorld(context)) for robot in team.robots]
     return np.array([(pose.x, pose.y, pose.angle) for pose in poses])
+
+
+def displacement(deployment: Deployment, axes: int) -> FloatArray:
+    """Return how far a team with so many (x, y, theta, q...) stands away from the plan's start [m, rad]."""
+    offset = deployment.start_offset
+    return np.array([offset.x, offset.y, offset.theta, *(offset.joints or (0.0,) * (axes - 3))])

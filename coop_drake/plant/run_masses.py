@@ -7,6 +7,7 @@ from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.plant.component_tree import read_component_tree
+from coop_drake.plant.configuration import displacement
 from coop_drake.plant.parsing import bodies_of
 from coop_drake.plant.planar_chain import bodies_inertia, rotor_inertia
 from coop_drake.plant.team import TeamPlant, build_team_plant
@@ -48,6 +49,7 @@ def run_setup(scenario: Scenario) -> RunSetup:
         bodies=tuple(team_masses(team, read_component_tree(team))),
         joint_damping=np.array([joint.GetDampingVector(context)[0] for joint in team.joints]),
         joint_inertia=joint_inertias(team),
+        displacement=displacement(deployment, 3 + len(team.joints)),
     )
 
 

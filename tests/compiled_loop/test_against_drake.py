@@ -8,6 +8,7 @@ import pytest
 
 from coop_drake.compiled_loop import prepare, run, run_many
 from coop_drake.errors import RefusalError, ScenarioError
+from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import (
     ActuatorLimits,
     Control,
@@ -132,11 +133,14 @@ def test_a_start_within_the_errors_of_the_budget_is_accepted_and_no_other(size, 
     outcome, log = both(transport, replace(PRESET, start_offset=away), maps)
     assert_agree(outcome, log, close=5e-5)
     assert outcome.budget_share < 1.0
+    stood = displacement(Deployment(start_offset=away), len(plan.start))
     if accepted:
-        assert check_start(Rows(log, plan)).tightest == pytest.approx(place)
+        assert check_start(Rows(log, plan), stood).tightest == pytest.approx(place)
     else:
-        with pytest.raises(RefusalError, match="object_pose"):
-            check_start(Rows(log, plan))
+        with pytest.raises(RefusalError, match="off the plan's start"):
+            check_start(Rows(log, plan), stood)
+    with pytest.raises(RefusalError, match="object_pose"):
+        check_start(Rows(log, plan), 0.5 * stood)
 
 
 def test_a_lost_run_ends_where_and_why_it_does_in_drake():

@@ -19,6 +19,7 @@ from coop_drake.scenario import (
     Push,
     RobotDepartures,
     Silence,
+    StartOffset,
     Wave,
     Waves,
 )
@@ -47,6 +48,7 @@ NO_DELAY = Deployment(
     control_rate=100.0,
     measurements=Measurements(1e-3, 5e-4, 1e-2, loss=0.2, late=0.2, late_by=0.012),
     robots={"robot_1": RobotDepartures(silence=Silence(0.3, 0.02, motors="limp"))},
+    start_offset=StartOffset(1e-3, -1e-3, 1e-3, (-1e-3, 1e-3)),
 )
 PRESET = Deployment(
     control_rate=200.0,

@@ -6,6 +6,7 @@ import numpy as np
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
+from coop_drake.tree.pose import FloatArray
 from coop_drake.verification.checks import Check
 from coop_drake.verification.runs.rows import Rows
 
@@ -13,30 +14,36 @@ SAME = 1e-9
 """A run may begin this far from the plan's start [m, rad, and per s]: rounding."""
 
 
-def check_start(rows: Rows) -> Check:
-    """Check that the run begins at rest at the plan's start, with p_G there.
+def check_start(rows: Rows, displacement: FloatArray) -> Check:
+    """Check that the run begins at rest where the scenario says, with p_G at the plan's start.
 
-    Under a budget the team may stand off by the largest errors of measurement, as a team does that has come
-    to rest with constant ones.
+    Under a budget the team may stand off the plan's start by the largest errors of measurement, as a team
+    does that has come to rest with constant ones.
+
+    Args:
+        rows: The log.
+        displacement: How far the team stands off the plan's start, shape (3 + n,) [m, rad].
 
     Raises:
         RefusalError: Names the entry and the value.
     """
-    start, budget = rows.plan.start, rows.plan.budget
-    place = SAME + (budget.position_noise if budget else 0.0)
-    axis = SAME + (budget.angle_noise if budget and budget.axes else 0.0)
-    for name, expected, tolerance in (
-        ("object_pose", start[:3], np.array([place, place, axis])),
-        ("joints", start[3:], axis),
-        ("object_twist", np.zeros(3), SAME),
-        ("joint_rates", np.zeros(len(start) - 3), SAME),
-        ("governor_position", start[:2], SAME),
+    plan, start = rows.plan, rows.plan.start + displacement
+    for name, expected in (
+        ("object_pose", start[:3]),
+        ("joints", start[3:]),
+        ("object_twist", np.zeros(3)),
+        ("joint_rates", np.zeros(len(start) - 3)),
+        ("governor_position", plan.start[:2]),
     ):
-        rows.require_same(name, expected[None], tolerance)
-    away = float(np.hypot(*(rows.z[0, :2] - start[:2])))
-    if not away <= place:
-        raise RefusalError("object_pose[0]", f"is {away:.6g} m from the start; {place:.6g} m are allowed")
-    return Check("the run begins at rest, at the plan's start", 1, away, "m from the plan's start")
+        rows.require_same(name, expected[None], SAME)
+    away = float(np.hypot(*displacement[:2])), float(np.abs(displacement[2:]).max())
+    if (budget := plan.budget) is not None:
+        most = budget.position_noise, budget.angle_noise if budget.axes else np.inf
+        for name, found, allowed in zip(("object_pose[0]", "joints[0]"), away, most, strict=True):
+            if not found <= allowed + SAME:
+                told = f"is off the plan's start by {found:.6g} m or rad; the budget has {allowed:.6g}"
+                raise RefusalError(name, told)
+    return Check("the run begins at rest, at the plan's start", 1, away[0], "m from the plan's start")
 
 
 def check_arrival(rows: Rows, problem: PlanningProblem) -> Check:

@@ -43,6 +43,7 @@ class RunSetup:
         bodies: Mass properties of all bodies.
         joint_damping: Of every joint, shape (n,) [N m s or N s/m].
         joint_inertia: That the joint's rotor adds, shape (n,) [kg m^2 or kg].
+        displacement: How far the team stands off the plan's start, shape (3 + n,) [m, rad].
     """
 
     scenario_digest: str
@@ -56,3 +57,4 @@ class RunSetup:
     bodies: tuple[BodyMass, ...]
     joint_damping: FloatArray
     joint_inertia: FloatArray
+    displacement: FloatArray

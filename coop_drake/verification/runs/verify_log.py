@@ -65,7 +65,7 @@ def verify_log(
     """
     rows = Rows(log, plan)
     checks = [check_belonging(rows, problem, setup), check_complete(rows), check_arrival(rows, problem)]
-    checks.append(check_start(rows))
+    checks.append(check_start(rows, setup.displacement))
     between = Between.of(rows)
     checks += [check_motion(rows, between), *check_cells(rows, between), check_stated_funnels(rows)]
     checks.append(check_clock(rows, one_hold=setup.one_hold))
