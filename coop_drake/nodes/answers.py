@@ -33,6 +33,7 @@ def process_facts(
     shown: Telemetry | Status | None,
     *,
     missing_since: float | None,
+    ended: bool,
     sent: Any,
     state: int,
     age: float | None,
@@ -43,14 +44,15 @@ def process_facts(
         index: Its index in messages.
         shown: What it has shown last.
         missing_since: Since which simulated time it is missing [s].
+        ended: Whether a process that is missing is known to have ended.
         sent: How many messages of its session it has sent to the team, or to each robot.
         state: The last state of a robot.
         age: Age of what its last command was computed from, when it came to the world [s].
     """
-    there = "there" if index == SUPERVISOR else STATES[state]
+    there, missing = "there" if index == SUPERVISOR else STATES[state], "gone" if ended else "silent"
     return {
         "name": name_of(index),
-        "state": there if missing_since is None else "missing",
+        "state": there if missing_since is None else missing,
         "missing_since": missing_since,
         "team_messages": int(np.sum(sent)),
         "refused": 0 if shown is None else shown.refused,

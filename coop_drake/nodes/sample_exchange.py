@@ -115,6 +115,7 @@ class SampleExchange:
                 index,
                 self._last.get((index, Status if index == SUPERVISOR else Telemetry)),
                 missing_since=self.missing.get(index),
+                ended=self.attendance.ended(index),
                 sent=self._counts.get(index, 0),
                 state=self._states.get(index, FOLLOWS),
                 age=self._ages.get(index),

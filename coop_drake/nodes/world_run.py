@@ -26,6 +26,9 @@ from coop_drake.simulation import Sample, run_loop
 ARRIVED, FAILED, INTERRUPTED = range(3)
 """Outcomes, see ``messages.Goodbye``."""
 
+_REPORTED = 0.1
+"""Simulated time between two reports of facts about the processes [s]: as often as people can read them."""
+
 
 def run_world(
     scenario: Scenario,
@@ -62,7 +65,7 @@ def run_world(
         revive: Starts a process again that has ended; returns whether it did.
         tell: Is told what happens to processes.
         before: Called before every sample with its number.
-        report: Called at the end with facts about the processes.
+        report: Called ten times in a simulated second, and at the end, with facts about the processes.
         progress: Called with the stage and the fraction done, if given.
         observer: Called with every accepted step.
 
@@ -72,6 +75,13 @@ def run_world(
     """
     links = Links(faults, control_period(scenario))
     end, outcome = WorldEnd(book, question_of(scenario, plan), keys, links), INTERRUPTED
+    every = max(1, round(_REPORTED / links.period))
+
+    def begin(sample: int) -> None:
+        before(sample)
+        if sample % every == 0:
+            report(exchange.facts())
+
     exchange = SampleExchange(
         end,
         len(book.robots),
@@ -81,7 +91,7 @@ def run_world(
         patience=patience,
         rejoin=rejoin,
         revive=revive,
-        before=before,
+        before=begin,
         tell=tell,
     )
     world = build_world(scenario, plan, exchange)

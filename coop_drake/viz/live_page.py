@@ -6,6 +6,7 @@ A small server of its own hands the page out; the scene itself comes from Meshca
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping, Sequence
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from threading import Lock, Thread
@@ -39,9 +40,18 @@ class LivePage:
         plan: What is executed.
         meshcat: Where it is shown; nothing has been drawn there yet.
         rate: Greatest ratio of simulated time to real time.
+        processes: Returns what is known about the processes of a run apart, see ``nodes.answers``.
     """
 
-    def __init__(self, scenario: Scenario, plan: Plan, meshcat: Meshcat, *, rate: float = 1.0) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        plan: Plan,
+        meshcat: Meshcat,
+        *,
+        rate: float = 1.0,
+        processes: Callable[[], Sequence[Mapping[str, Any]]] = tuple,
+    ) -> None:
         empty = meshcat.StaticHtml()  # Before the view draws: the page gets the scene from Meshcat's server.
         self._view = LiveView(scenario, plan, meshcat, rate=rate)
         team, of_a_metre = self._view.scene.team, self._view.scene.of_a_metre
@@ -52,7 +62,7 @@ class LivePage:
         }
         self._page = with_overlay(empty, content, "live.html").encode()
         self._news: dict[str, Any] = {"details": "the run has not begun", "verdict": "", "recording": False}
-        self._cells = len(plan.cells)
+        self._cells, self._processes = len(plan.cells), processes
         self._recording: Path | None = None
         self._asked, self._loading, self._lock = -_ABSENT, 0, Lock()
         self._server = ThreadingHTTPServer(("localhost", 0), _handler(self))
@@ -103,7 +113,8 @@ class LivePage:
             return "text/html; charset=utf-8", self._page
         if path == "/news":
             self._asked = monotonic()
-            return "application/json", json.dumps(self._news).encode()
+            rows = [process_row(process) for process in self._processes()]
+            return "application/json", json.dumps(self._news | {"processes": rows}).encode()
         if path == "/transport.html" and self._recording is not None:
             return "text/html; charset=utf-8", self._recording.read_bytes()
         return None
@@ -112,6 +123,18 @@ class LivePage:
         """Count the answers that are on their way."""
         with self._lock:
             self._loading += change
+
+
+def process_row(process: Mapping[str, Any]) -> dict[str, str]:
+    """Return a row of the table of processes: its cells by column."""
+    state, since, age = process["state"], process["missing_since"], process["age"]
+    return {
+        "process": process["name"],
+        "state": state if since is None else f"{state} since {since:.2f} s",
+        "age": "" if age is None or since is not None else f"{1e3 * age:.1f} ms",
+        "sent to the team": f"{process['team_messages']}",
+        "refused": f"{process['refused']}",
+    }
 
 
 def _handler(page: LivePage) -> type[BaseHTTPRequestHandler]:

@@ -30,7 +30,7 @@ def test_what_processes_cannot_do_is_bad_input(arguments, said):
 
 
 def test_the_closing_lines_tell_of_every_process_and_of_ages():
-    processes = [{"name": "robot 0", "state": "missing", "team_messages": 7, "refused": 2}]
+    processes = [{"name": "robot 0", "state": "gone", "team_messages": 7, "refused": 2}]
     ages = {
         "median": 0.001,
         "high": 0.002,
@@ -42,7 +42,7 @@ def test_the_closing_lines_tell_of_every_process_and_of_ages():
     }
     lines = process_lines({"processes": processes, "refused": {"KIND": 2, "VALUE": 1}, "command_ages": ages})
     assert lines == [
-        "robot 0: missing, 7 messages sent to the team, 2 refused",
+        "robot 0: gone, 7 messages sent to the team, 2 refused",
         "the world: 3 messages refused",
         "Ages of commands: median 1.0 ms, 99.9 % below 2.0 ms, largest 20.0 ms; "
         "allowed 10.0 ms, exceeded by 1 of 90",

@@ -109,5 +109,5 @@ def test_a_robot_that_is_late_for_too_long_stops_a_paced_team():
     facts = {}
     log = run_with("base", stop(1), pacing=Pacing(allowed=1.0), report=facts.update)
     assert log.violation.startswith("robot 1 has not answered since t = 0.39 s; the team rests")
-    assert facts["processes"][1]["state"] == "missing"
+    assert facts["processes"][1]["state"] == "silent"
     assert facts["processes"][1]["missing_since"] == pytest.approx(0.39)

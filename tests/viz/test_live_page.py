@@ -20,13 +20,32 @@ from coop_drake.viz import LivePage
 from tests.support.cases import case
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 
+PROCESSES = [
+    {
+        "name": "robot 0",
+        "state": "holds",
+        "missing_since": None,
+        "age": 0.0012,
+        "team_messages": 7,
+        "refused": 1,
+    },
+    {
+        "name": "the supervisor",
+        "state": "gone",
+        "missing_since": 2.5,
+        "age": 0.001,
+        "team_messages": 0,
+        "refused": 0,
+    },
+]
 SCENARIO = Path(__file__).parents[2] / "models" / "base.scenario.yaml"
 
 
 @pytest.fixture(scope="module")
 def served():
     meshcat = Meshcat()
-    with LivePage(load_scenario(SCENARIO), synthetic_plan(case("base")), meshcat, rate=inf) as page:
+    plan = synthetic_plan(case("base"))
+    with LivePage(load_scenario(SCENARIO), plan, meshcat, rate=inf, processes=lambda: PROCESSES) as page:
         yield page, meshcat
 
 
@@ -57,6 +76,10 @@ def test_it_tells_where_the_run_is_and_how_it_ended(served):
     )
     news = json.loads(got(page, "/news"))
     assert news["details"] == "1.5 s, cell 2 of 5, object at 0.50 m/s"
+    assert [[*row.values()] for row in news["processes"]] == [
+        ["robot 0", "holds", "1.2 ms", "7", "1"],
+        ["the supervisor", "gone since 2.50 s", "", "0", "0"],
+    ]
     assert not news["verdict"]
     log = synthetic_log(case("base"))
     page.show_verdict(dataclasses.replace(log, reached=False))
