@@ -33,6 +33,7 @@ from benchmarks.planner.head_to_head import Effort, head_to_head_tasks
 from benchmarks.planner.ours import compile_kernels
 from benchmarks.planner.stages import stage_tasks
 from benchmarks.planner.teams import team_tasks
+from benchmarks.rejoining import rejoining_tasks
 from benchmarks.simulating import simulating_tasks
 from benchmarks.starting import starting_tasks
 from benchmarks.table import show
@@ -121,6 +122,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *adversary_tasks(),
         *message_tasks(),
         *apart_tasks(),
+        *rejoining_tasks(),
         *campaign_tasks(),
     ]
 

@@ -169,13 +169,13 @@ def departing(team: str, deployment: Deployment, control: Control, *, known: boo
     ideal = load_scenario(team)
     scenario = replace(ideal, deployment=deployment, control=control)
     planned = scenario if known else ideal
-    return simulate(scenario, *_planned(team, planned.command_age, planned))
+    return simulate(scenario, *planned_transport(team, planned.command_age, planned))
 
 
 _PLANS: dict[tuple[str, float], tuple[Plan, Sequence[HarmonicMap]]] = {}
 
 
-def _planned(team: str, age: float, scenario: Scenario) -> tuple[Plan, Sequence[HarmonicMap]]:
+def planned_transport(team: str, age: float, scenario: Scenario) -> tuple[Plan, Sequence[HarmonicMap]]:
     """Return plan and maps; of a deployment, they depend on the age of commands alone."""
     if (team, age) not in _PLANS:
         result = plan(scenario)
