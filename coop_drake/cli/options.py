@@ -97,6 +97,15 @@ Effort = Annotated[
         "twice as much; the scenario's `planner: {effort}` by default.",
     ),
 ]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers",
+        metavar="N",
+        min=1,
+        help="Processes that plan at a time; one a core by default. The answer is the same.",
+    ),
+]
 ResultsFolder = Annotated[Path | None, out_folder("Where results go; out/<scenario> by default.")]
 PictureFolder = Annotated[Path | None, out_folder("Where the picture goes; out/<scenario> by default.")]
 Machine = Annotated[

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from coop_drake.cli.options import (
     ResultsFolder,
     ScenarioPath,
     Verbose,
+    Workers,
 )
 from coop_drake.cli.planning_process import beside, prepare_simulation
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
@@ -33,6 +35,7 @@ def plan_command(
     gains: GainsName = None,
     budget: BudgetName = None,
     effort: Effort = None,
+    workers: Workers = None,
     machine: Machine = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -41,7 +44,7 @@ def plan_command(
     with reporting(machine=machine, quiet=quiet, verbose=verbose) as reporter:
         task = read_task(scenario, gains)
         folder = ResultFolder.of(task.name, out, "plan")
-        if plan_of(task, folder, reporter, budget, effort=effort):
+        if plan_of(task, folder, reporter, budget, effort=effort, workers=workers):
             reporter.table(task.name, summary_rows(reporter.facts, verbose=reporter.verbose))
             reporter.say(f"The plan is in {escape(str(folder.plan))}")
 
@@ -53,16 +56,17 @@ def plan_of(
     budget: str | None = None,
     *,
     effort: float | None = None,
+    workers: int | None = None,
     simulated: bool = False,
 ) -> Plan | None:
     """Plan, and note the facts; without a plan say so, and set the exit code.
 
     It holds under the ``budget`` that the option of this name says, or else the scenario's ``deployment``;
-    ``effort`` takes the place of the scenario's.
+    ``effort`` takes the place of the scenario's, ``workers`` that of the number of processors.
     The plan with its table of cells, a way that limits refuse, or the proof that there is none, goes to the
     folder if one is given. If the plan will be ``simulated``, this is prepared at the same time.
     """
-    result = answer_to(task, reporter, budget, effort=effort, simulated=simulated)
+    result = answer_to(task, reporter, budget, effort=effort, workers=workers, simulated=simulated)
     return report_answer(task, result, folder, reporter)
 
 
@@ -72,6 +76,7 @@ def answer_to(
     budget: str | None = None,
     *,
     effort: float | None = None,
+    workers: int | None = None,
     simulated: bool = False,
 ) -> PlanningResult:
     """Ask the planner, and note the facts; see ``plan_of``."""
@@ -85,7 +90,15 @@ def answer_to(
         tolerated = budget_of(budget, task.scenario, task.problem)
     with reporter.stage("planning", "planning", cpu=True) as progress:
         gain_set = task.scenario.gain_sets[name]
-        work = partial(plan, task.problem, gain_set, gain_set_name=name, budget=tolerated, effort=effort)
+        work = partial(
+            plan,
+            task.problem,
+            gain_set,
+            gain_set_name=name,
+            budget=tolerated,
+            effort=effort,
+            workers=workers or os.cpu_count() or 1,
+        )
         if simulated:
             prepare = partial(prepare_simulation, task.scenario)
             result = beside(lambda advance: work(progress=advance), prepare, progress)

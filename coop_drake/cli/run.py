@@ -29,6 +29,7 @@ from coop_drake.cli.options import (
     ScenarioPath,
     Verbose,
     Wait,
+    Workers,
 )
 from coop_drake.cli.plan import plan_of
 from coop_drake.cli.reporter import ExitCode, Reporter, reporting
@@ -54,6 +55,7 @@ def run_command(
     out: ResultsFolder = None,
     gains: GainsName = None,
     effort: Effort = None,
+    workers: Workers = None,
     fresh_maps: FreshMaps = False,
     live: Live = False,
     wait: Wait = False,
@@ -81,7 +83,7 @@ def run_command(
         )
         folder = ResultFolder.of(task.name, out, "plan", "simulation")
         with DrawingProcesses(figures=not no_figures) as drawing:
-            plan = plan_of(task, folder, reporter, effort=effort, simulated=True)
+            plan = plan_of(task, folder, reporter, effort=effort, workers=workers, simulated=True)
             if plan:
                 with live_page(task, plan, reporter, live=live, wait=wait) as page:
                     reporter.code = carry_out(

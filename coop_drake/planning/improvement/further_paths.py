@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from math import ceil, inf
 
 from shapely.errors import ShapelyError
@@ -10,6 +11,7 @@ from shapely.errors import ShapelyError
 from coop_drake.answers.plan import Plan
 from coop_drake.errors import GeometryError, PatienceError, PlanError, StallError
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
+from coop_drake.planning.copies import Copies
 from coop_drake.planning.execution.estimate import plan_time
 from coop_drake.progress import Progress
 
@@ -20,6 +22,7 @@ def quicker_plans(
     make: Callable[[CoveredPath], object],
     effort: float,
     progress: Progress | None,
+    copies: int = 0,
 ) -> Iterator[Plan]:
     """Yield plans along other sampled paths, each of them quicker than all before it.
 
@@ -30,22 +33,35 @@ def quicker_plans(
         effort: As in ``PlannerSettings``; the first plan has taken 1, and every other path takes at most 1.
         progress: Called with the best estimate and the fraction of the effort that is spent. If it raises
             PatienceError, no further path is tried.
+        copies: As ``Copies`` has it.
     """
     if not isinstance(found, CoveredPath):
         return
     best = plan_time(first) if isinstance(first, Plan) else inf
-    for number in range(1, ceil(effort)):
-        if progress is not None:
-            so_far = f"; the transport takes {best:.1f} s so far" if best < inf else ""
-            try:
-                progress(f"trying another path{so_far}", number / effort)
-            except PatienceError:
-                return
-        other = found.another(number, min(1.0, effort - number))
-        try:
-            made = None if other is None else make(other)
-        except (GeometryError, PlanError, StallError, ShapelyError):
-            continue
-        if isinstance(made, Plan) and plan_time(made) < best:
-            best = plan_time(made)
-            yield made
+    shares = [min(1.0, effort - number) for number in range(1, ceil(effort))]
+    works = [partial(_tried, found, make, number, share) for number, share in enumerate(shares, start=1)]
+    with Copies(works, copies if len(works) > 1 else 0) as plans:
+        results = iter(plans)
+        for number in range(1, 1 + len(works)):
+            if progress is not None:
+                so_far = f"; the transport takes {best:.1f} s so far" if best < inf else ""
+                try:
+                    progress(f"trying another path{so_far}", number / effort)
+                except PatienceError:
+                    return
+            made = next(results)
+            if made is not None and plan_time(made) < best:
+                best = plan_time(made)
+                yield made
+
+
+def _tried(
+    found: CoveredPath, make: Callable[[CoveredPath], object], number: int, share: float
+) -> Plan | None:
+    """Return the plan along another path, None if there is none."""
+    try:
+        other = found.another(number, share)
+        made = None if other is None else make(other)
+    except (GeometryError, PlanError, StallError, ShapelyError):
+        return None
+    return made if isinstance(made, Plan) else None

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -14,8 +15,9 @@ from coop_drake.errors import GeometryError
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.planning.boxes.boxes import Regions, make_channel
-from coop_drake.planning.boxes.certify import Certifier, PathBox
+from coop_drake.planning.boxes.certify import Certifier
 from coop_drake.planning.boxes.channel import Channel, CoveredPath
+from coop_drake.planning.copies import Copies
 from coop_drake.planning.questions.margins import exact_footprint, marginal_workspace
 from coop_drake.planning.sampling.clear_paths import (
     another_candidate,
@@ -28,6 +30,7 @@ from coop_drake.planning.sampling.local_floor import object_route
 from coop_drake.planning.sampling.narrow_passages import repaired, widened_floor
 from coop_drake.planning.sampling.sampler import FEW_JOINTS, Sampler
 from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
+from coop_drake.planning.search.attempt import BoxSequence, Tried
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
@@ -56,21 +59,6 @@ MANY_SAMPLES = 32_000
 """Samples for every subsystem in later attempts: about a second each."""
 
 
-@dataclass(frozen=True)
-class BoxSequence:
-    """Boxes along a path that are proved free; a channel without its polygons.
-
-    Attributes:
-        boxes: From the start's box to the goal's box.
-        path: The path that they cover, theta unwrapped, shape (m, 3 + n) [m, rad].
-        margin: The margin that the path's positions keep in every box [m].
-    """
-
-    boxes: tuple[PathBox, ...]
-    path: FloatArray
-    margin: float
-
-
 class SampledSearch:
     """Finds a box sequence at margin zero first, then looks for a larger margin near it.
 
@@ -96,58 +84,91 @@ class SampledSearch:
         self.slices = 0
         self.object_blocked = 0
 
-    def attempt(self, progress: Callable[[float], None] | None = None) -> BoxSequence | None:
-        """Sample one path and cover it at margin zero; every call uses other samples.
+    def attempts(
+        self, number: int, copies: int = 0, progress: Callable[[float], None] | None = None
+    ) -> Copies[Tried]:
+        """Sample some paths and cover each of them at margin zero, all with other samples.
+
+        Args:
+            number: How many.
+            copies: As ``Copies`` has it; attempts in copies of this process report no progress.
+            progress: Called with the fraction of an attempt that is done.
 
         Returns:
-            The boxes, or None if no path was found or covered.
+            What comes of the attempts, each for ``taken``, which counts it.
         """
-        self._attempts += 1
-        try:
-            return self._attempt(self._attempts, progress) if self._start_inside else None
-        except (GeometryError, ShapelyError):
-            return None
+        first, report = self._attempts + 1, None if copies else progress
+        numbers = range(first, first + number)
+        return Copies([partial(self._counted, partial(self._attempt, k, report)) for k in numbers], copies)
 
-    def _attempt(self, number: int, progress: Callable[[float], None] | None) -> BoxSequence | None:
+    def taken(self, tried: Tried) -> BoxSequence | None:
+        """Count an attempt; returns its boxes, None if no path was found or covered."""
+        self._attempts += 1
+        self.slices += tried.trials
+        if tried.blocked is not None:
+            self.object_blocked = self.object_blocked + 1 if tried.blocked else 0
+        return tried.found
+
+    def _counted(self, work: Callable[[], Tried]) -> Tried:
+        """What comes of some work, with the boxes that it tried; nothing else changes here."""
+        before = self.slices
+        try:
+            tried = work()
+        except (GeometryError, ShapelyError):
+            tried = Tried(failed=True)
+        trials, self.slices = self.slices - before, before
+        return replace(tried, trials=trials)
+
+    def _attempt(self, number: int, progress: Callable[[float], None] | None) -> Tried:
+        if not self._start_inside:
+            return Tried()
         clearance = CLEARANCES[(number - 1) % len(CLEARANCES)]
         workspace = marginal_workspace(self._problem, clearance)
         sampler = Sampler(self._hierarchy, workspace, BODY_GAP, number - 1, progress)
         direct = number > 1 or len(self._problem.goal_joints) > FEW_JOINTS
         path = sampler.direct_path(_samples(number)) if direct else sampler.path(_samples(number))
-        self.object_blocked = self.object_blocked + 1 if sampler.object_blocked else 0
-        if len(path) == 0:
-            return None
-        for spacing, moves in FIRST_SMOOTHINGS:
+        found = None
+        for spacing, moves in FIRST_SMOOTHINGS if len(path) else ():
             path = smoothed(self._problem, path, clearance, 0.0, BODY_GAP, spacing, moves)
             found = self._covered(path, 0.0, longest=True)
             if found is not None:
-                return found
-        return None
+                break
+        return Tried(found, path, sampler.object_blocked)
 
-    def narrow_attempt(self, progress: Callable[[float], None] | None = None) -> BoxSequence | None:
+    def narrow_attempt(
+        self, copies: int = 0, progress: Callable[[float], None] | None = None
+    ) -> BoxSequence | None:
         """Sample paths on larger floors, repair them until they fit the floor, and cover them at margin zero.
 
-        This finds passages that are too narrow for samples.
+        This finds passages that are too narrow for samples. Arguments as in ``attempts``.
 
         Returns:
             The boxes, or None if no path was found or covered.
         """
+        ways = product(range(SEEDS_PER_GROWTH), FLOOR_GROWTHS if self._start_inside else ())
+        report = None if copies else progress
+        works = [partial(self._counted, partial(self._repaired, *way, report)) for way in ways]
+        fitting: list[FloatArray] = []
+        with Copies(works, copies) as results:
+            for tried in results:
+                self.slices += tried.trials
+                if tried.failed or tried.found is not None:
+                    return tried.found
+                if tried.path is not None:
+                    fitting.append(tried.path)
         try:
-            fitting: list[FloatArray] = []
-            for seed, growth in product(range(SEEDS_PER_GROWTH), FLOOR_GROWTHS if self._start_inside else ()):
-                larger = widened_floor(self._problem.workspace, growth)
-                path = Sampler(self._hierarchy, larger, BODY_GAP, seed, progress).path(SAMPLES)
-                fit = repaired(self._problem, path, growth) if len(path) else None
-                if fit is not None:
-                    fitting.append(fit)
-                    found = self._covered(fit, 0.0, longest=True)
-                    if found is not None:
-                        return found
             # The smallest boxes come last, because a transport through them takes long.
             covered = (self._covered(fit, 0.0, longest=True, smallest=True) for fit in fitting)
             return next((found for found in covered if found is not None), None)
         except (GeometryError, ShapelyError):
             return None
+
+    def _repaired(self, seed: int, growth: float, progress: Callable[[float], None] | None) -> Tried:
+        """Sample a path on a larger floor, repair it, and cover it."""
+        larger = widened_floor(self._problem.workspace, growth)
+        path = Sampler(self._hierarchy, larger, BODY_GAP, seed, progress).path(SAMPLES)
+        fit = repaired(self._problem, path, growth) if len(path) else None
+        return Tried() if fit is None else Tried(self._covered(fit, 0.0, longest=True), fit)
 
     def with_margin(
         self, first: BoxSequence, progress: Callable[[float, float], None], share: float = 1.0

@@ -23,14 +23,16 @@ from coop_drake.planning.boxes.boxes import explored_channel
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
 from coop_drake.planning.cells.events import Watch
 from coop_drake.planning.cells.exploration import Verdict
+from coop_drake.planning.copies import Copies
 from coop_drake.planning.proofs.blocked_goals import blocked_goal, touch_at_goal
 from coop_drake.planning.proofs.clearance_bound import clearance_bound
 from coop_drake.planning.proofs.enclosed_ends import refuted_at_an_end
 from coop_drake.planning.proofs.proof_search import Proofs
 from coop_drake.planning.questions.question_checks import check_question, goal_beyond_limits
+from coop_drake.planning.search.attempt import BoxSequence, Tried
 from coop_drake.planning.search.cell_search import search_by_cells
 from coop_drake.planning.search.rescaling import Rescaling
-from coop_drake.planning.search.sampled_search import BoxSequence, SampledSearch
+from coop_drake.planning.search.sampled_search import SampledSearch
 from coop_drake.progress import Progress
 from coop_drake.tree.usual_unit import usual_unit
 
@@ -79,6 +81,7 @@ def find_path(
     watch: Watch | None = None,
     *,
     routed: bool = False,
+    workers: int = 1,
 ) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
     """Find a path that boxes cover, or prove that there is none; then look for a larger margin.
 
@@ -90,6 +93,7 @@ def find_path(
         progress: Called with a phase and the fraction of it that is done.
         watch: Called with the events of explorations.
         routed: Whether only paths along a route for a disc are sampled, and nothing is proved.
+        workers: Processes at a time, see ``plan``.
 
     Returns:
         A sampled path, the channel of an exploration, or why there is neither, and a report.
@@ -104,9 +108,10 @@ def find_path(
         return NoChannel(True, beyond, proof), SearchReport(slices)
     unit = usual_unit(problem.tree)
     if unit == 1.0:
-        return _answered(problem, progress, watch, routed=routed)
+        return _answered(problem, progress, watch, routed=routed, workers=workers)
     scale = Rescaling(problem, unit)
-    answer, report = _answered(scale.question(), progress, scale.watched(watch), unit, routed=routed)
+    question, seen = scale.question(), scale.watched(watch)
+    answer, report = _answered(question, progress, seen, unit, routed=routed, workers=workers)
     return scale.answer(answer), report
 
 
@@ -117,10 +122,11 @@ def _answered(
     unit: float = 1.0,
     *,
     routed: bool,
+    workers: int,
 ) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
     if problem.settings.strategy != "portfolio":
         return search_by_cells(problem, progress, watch)
-    return _Search(problem, progress, watch, unit, routed=routed).run()
+    return _Search(problem, progress, watch, unit, routed=routed, workers=workers).run()
 
 
 class _Search:
@@ -132,6 +138,7 @@ class _Search:
         watch: Called with the events of explorations.
         unit: The question's unit of length, for sentences [m].
         routed: Whether only paths along a route are sampled.
+        workers: Processes at a time.
     """
 
     def __init__(
@@ -142,9 +149,11 @@ class _Search:
         unit: float,
         *,
         routed: bool,
+        workers: int,
     ) -> None:
         self._began, self._unit, self._routed = thread_time(), unit, routed
         self._first_plan: float | None = None
+        self._workers = workers
         self._problem, self._progress, self._watch = problem, progress, watch
         self._samples = SampledSearch(problem, routed=routed)
         self._proofs = Proofs(problem, watch)
@@ -186,14 +195,15 @@ class _Search:
         if found is None and object_blocked and self._proofs.refutation is None:
             self._explored(budget // OBJECT_BUDGET_DIVISOR, robots=0)
         while found is None:
-            verdict = self._explored(each)
-            refutation = self._proofs.refutation
-            if refutation is not None:
-                return NoChannel(True, refutation.reason, refutation.proof)
-            if verdict is Verdict.FOUND:
-                self._first_plan = thread_time() - self._began
-                return explored_channel(self._problem, self._proofs.boxes())
-            found = self._sampled(ATTEMPTS_PER_ROUND)
+            with self._attempts(ATTEMPTS_PER_ROUND, self._workers - 1) as attempts:
+                verdict = self._explored(each)
+                refutation = self._proofs.refutation
+                if refutation is not None:
+                    return NoChannel(True, refutation.reason, refutation.proof)
+                if verdict is Verdict.FOUND:
+                    self._first_plan = thread_time() - self._began
+                    return explored_channel(self._problem, self._proofs.boxes())
+                found = self._first_of(attempts)
             if found is None and (verdict is Verdict.RESOLUTION or self._proofs.slices >= budget):
                 return self._undecided(verdict)
             each = min(2 * each, budget)
@@ -201,10 +211,22 @@ class _Search:
 
     def _sampled(self, attempts: int) -> BoxSequence | None:
         """Sample paths and cover them with boxes; fewer times if the object alone seems blocked."""
-        report = self._phase("sampling paths")
-        report(0.0)
-        for _ in range(attempts):
-            found = self._samples.attempt(report)
+        with self._attempts(attempts, self._copies if attempts > 1 else 0) as results:
+            return self._first_of(results)
+
+    @property
+    def _copies(self) -> int:
+        """Copies of this process that work while it waits."""
+        return self._workers if self._workers > 1 else 0
+
+    def _attempts(self, number: int, copies: int) -> Copies[Tried]:
+        return self._samples.attempts(number, copies, self._phase("sampling paths"))
+
+    def _first_of(self, attempts: Copies[Tried]) -> BoxSequence | None:
+        """The first boxes of some attempts; attempts end where the object alone seems blocked."""
+        self._phase("sampling paths")(0.0)
+        for tried in attempts:
+            found = self._samples.taken(tried)
             if found is not None:
                 self._first_plan = thread_time() - self._began
                 return found
@@ -218,7 +240,7 @@ class _Search:
         verdict = self._explored(slices, robots, untested=object_blocked)
         if verdict in (Verdict.INFEASIBLE, Verdict.FOUND):
             return None
-        found = self._samples.narrow_attempt(self._phase("sampling narrow passages"))
+        found = self._samples.narrow_attempt(self._copies, self._phase("sampling narrow passages"))
         if found is not None:
             self._first_plan = thread_time() - self._began
         return found
