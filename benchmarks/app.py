@@ -29,6 +29,7 @@ from benchmarks.planner.budgeted import budget_tasks
 from benchmarks.planner.contradiction import contradiction_tasks
 from benchmarks.planner.critical_width import critical_width_tasks
 from benchmarks.planner.growth import growth_tasks
+from benchmarks.planner.hard_questions import hard_question_tasks
 from benchmarks.planner.head_to_head import Effort, head_to_head_tasks
 from benchmarks.planner.ours import compile_kernels
 from benchmarks.planner.stages import stage_tasks
@@ -109,6 +110,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *budget_tasks(effort.limit),
         *growth_tasks(effort.limit),
         *team_tasks(effort.limit),
+        *hard_question_tasks(effort.limit),
         *contradiction_tasks(),
         *critical_width_tasks(),
         *starting_tasks(),

@@ -13,18 +13,18 @@ from coop_drake.answers import PlanningProblem
 __all__ = ["CRITICAL", "team_tasks"]
 
 CRITICAL: dict[str, tuple[float, Callable[[float], PlanningProblem]]] = {
-    "five": (1.5, lambda width: crowd_problem(5, width, width)),
-    "six": (1.7, lambda width: crowd_problem(6, width, width)),
-    "three joints": (0.95, lambda width: corridor_problem(width, width, 3, 3)),
+    "five": (1.45, lambda width: crowd_problem(5, width, width)),
+    "six": (1.55, lambda width: crowd_problem(6, width, width)),
+    "three joints": (1.0, lambda width: corridor_problem(width, width, 3, 3)),
 }
-"""Questions by the width of corridor and door, and the critical width [m]: there the planner still finds a
-plan, with corridor and door narrower by 0.05 m not within a minute of processor time."""
+"""Questions by the width of corridor and door, and the smallest width for which the planner has found a plan
+within ten seconds of processor time [m]: an upper bound of the critical width."""
 
 FACTORS = (1.3, 1.15, 1.0)
 """Widths over the critical one [-]."""
 
 FIRST_PLAN = 2.0
-"""Time within which there is a first certified plan at 1.3 times the critical width [CPU s]."""
+"""Time within which there shall be a first certified plan at the largest of these widths [CPU s]."""
 
 MEMORY = 500.0
 """Memory that a plan may take [MB]."""
