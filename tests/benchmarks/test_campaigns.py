@@ -1,0 +1,46 @@
+"""The command that makes the documentation's campaigns, and its tables."""
+
+from pathlib import Path
+
+import pytest
+import typer
+
+from benchmarks.campaigns import __main__ as campaigns
+from coop_drake.campaign import load_campaign
+from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.running.command import batches_of
+from coop_drake.campaign.search import BreakingPoint
+
+FILES = sorted(Path(campaigns.__file__).parent.glob("*.campaign.yaml"))
+
+
+def test_every_campaign_of_the_folder_is_made_and_can_be_read():
+    assert sorted(campaigns.NAMES) == [load_campaign(file).name for file in FILES]
+
+
+def test_what_is_there_is_shown_as_a_table(tmp_path, capsys):
+    campaign = load_campaign(next(file for file in FILES if file.name.startswith("breaking")))
+    folder = CampaignFolder(tmp_path / "breaking")
+    batches = batches_of(campaign, folder)
+    for batch, kept, lost in ((batches[0], 2.0, 2.25), (batches[8], 64.0, float("inf"))):
+        point = BreakingPoint(
+            ["base", "warehouse"][batch.scenario], "compiled", "delay", 0.01, kept, lost, 4, ""
+        )
+        folder.write(batch, [point])
+    with pytest.raises(typer.Exit) as ended:
+        campaigns.main(["breaking"], tmp_path, None, tables=True)
+    assert ended.value.exit_code == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "## breaking: 2 of 40 batches" in lines
+    assert lines[-4:-1] == [
+        "| largest multiple of what is certified without a loss | base | warehouse |",
+        "| --- | --- | --- |",
+        "| delay | 2 | ≥ 64 |",
+    ]
+
+
+def test_a_campaign_that_there_is_not_is_refused(capsys):
+    with pytest.raises(typer.Exit) as ended:
+        campaigns.main(["runs"])
+    assert ended.value.exit_code == 2
+    assert "allowed is any of breaking, searches" in capsys.readouterr().err
