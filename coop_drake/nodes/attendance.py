@@ -68,6 +68,7 @@ class Attendance:
         self.trouble, self.revived = "", list[int]()
         self._rejoin, self._gone, self._revive, self._tell = rejoin, gone, revive, tell
         self._deadline: float | None = None
+        self._rests: float | None = None
 
     def ended(self, index: int) -> bool:
         """Whether a process is known to have ended."""
@@ -99,11 +100,13 @@ class Attendance:
             names = ", ".join(name_of(k) for k in sorted(late or waiting))
             self.stopped = True
             self.stops.append(Stop(names, time))
+        self._rests = (time if self._rests is None else self._rests) if rests else None
         if self.stopped and rests and self.stops[-1].rested is None:
             self.stops[-1].rested = time
         if self._stranded(time, states):
-            names = ", ".join(name_of(k) for k, state in states.items() if state == OUTSIDE)
-            self.trouble = f"{names} cannot begin cell anew from rest"
+            outside = sorted(k for k, state in states.items() if state == OUTSIDE)
+            names = " and ".join(name_of(k) for k in outside)
+            self._end(f"{names} cannot begin the current cell anew from there")
         if not (self.missing and rests):
             self._deadline = None
         elif self.in_vain():
@@ -123,7 +126,12 @@ class Attendance:
 
     def give_up(self) -> None:
         """End the run without who is missing."""
-        self.trouble = "; ".join(self._missing_words(index) for index in sorted(self.missing))
+        self._end("; ".join(self._missing_words(index) for index in sorted(self.missing)))
+
+    def _end(self, why: str) -> None:
+        self.trouble = why
+        if self._rests is not None:
+            self.trouble += f"; the team rests since t = {self._rests:.6g} s"
 
     def facts(self) -> dict[str, Any]:
         """Return all stops, and how often each process was started again."""

@@ -232,8 +232,8 @@ class SampleExchange:
         self._lose(quiet)
 
     def _limit(self) -> float:
-        """How long answers are waited for [s]; while the drives brake nothing depends on them."""
-        if self._pacing is None:
+        """How long answers are waited for [s]: long before anything moves, longer while the drives brake."""
+        if self._pacing is None or self.sample == 0:
             return self._patience
         return max(self._pacing.allowed, TOLERATED if self.attendance.stopped else 0.0)
 

@@ -78,7 +78,7 @@ class Watch:
         if not min(margins.workspace_clearance, margins.body_clearance) > 0.0:
             self.violation = f"{trouble or 'while the drives braked'}; {margins.violation}"
         elif trouble:
-            self.violation = f"{trouble}; the team rests since t = {sample.time:.6g} s, without contact"
+            self.violation = f"{trouble}, without contact"
 
     def _still_returns(self, margins: Margins) -> bool:
         """Whether a team that has begun its cell anew has touched nothing and is not in its slices again."""
