@@ -1,0 +1,84 @@
+"""Who is missing, when the drives brake, and when a team at rest has waited in vain."""
+
+import pytest
+
+from coop_drake.messages import SUPERVISOR
+from coop_drake.nodes.attendance import Attendance
+from coop_drake.nodes.states import FOLLOWS, OUTSIDE, STANDS
+
+
+class Book:
+    """An attendance, with who has ended, what was revived and what was told."""
+
+    def __init__(self, *, rejoin=60.0, restarts=0):
+        self.ended, self.told, self.restarts = set(), [], restarts
+        self.attendance = Attendance(
+            rejoin=rejoin, gone=lambda: self.ended, revive=self.revive, tell=self.told.append
+        )
+
+    def revive(self, index):
+        if not self.restarts:
+            return False
+        self.restarts -= 1
+        self.ended.discard(index)
+        return True
+
+
+def test_the_drives_brake_once_a_robot_is_missing_for_longer_than_is_tolerated():
+    book = Book()
+    book.attendance.lose({1: 0.39})
+    book.attendance.see(0.40, {0: FOLLOWS}, rests=False)
+    assert not book.attendance.stopped
+    book.attendance.see(0.42, {0: FOLLOWS}, rests=False)
+    assert book.attendance.stopped
+    assert book.told == ["robot 1 has not answered since t = 0.39 s"]
+    book.attendance.back(1)
+    book.attendance.see(0.9, {0: STANDS, 1: STANDS}, rests=True)
+    book.attendance.close_line(1.1)
+    assert book.attendance.facts()["stops"] == [
+        {"cause": "robot 1", "since": 0.42, "rested": 0.9, "resumed": 1.1}
+    ]
+    assert book.told[1:] == ["robot 1 is there again", "the team goes on at t = 1.1 s"]
+
+
+def test_without_the_supervisor_the_drives_do_not_brake():
+    book = Book()
+    book.attendance.lose({SUPERVISOR: 0.3})
+    book.attendance.see(5.0, {0: FOLLOWS, 1: FOLLOWS}, rests=True)
+    assert not book.attendance.stopped
+    assert not book.attendance.trouble
+
+
+@pytest.mark.parametrize(("rejoin", "ended"), [(0.0, set()), (60.0, {1})])
+def test_a_team_at_rest_waits_neither_for_ever_nor_for_who_does_not_come_back(rejoin, ended):
+    book = Book(rejoin=rejoin)
+    book.ended = ended
+    book.attendance.lose({1: 0.39})
+    book.attendance.see(0.5, {}, rests=False)
+    assert not book.attendance.trouble
+    book.attendance.see(1.0, {}, rests=True)
+    assert (
+        book.attendance.trouble == "robot 1 has not answered since t = 0.39 s; the team rests since t = 1 s"
+    )
+
+
+def test_who_has_ended_is_started_again_as_often_as_allowed():
+    book = Book(restarts=2)
+    book.ended = {1}
+    book.attendance.lose({1: 0.39})
+    assert book.told == ["robot 1 has not answered since t = 0.39 s; it is started again"]
+    for time, trouble in ((1.0, False), (1.1, True)):
+        book.ended = {1}
+        book.attendance.see(time, {}, rests=True)
+        assert bool(book.attendance.trouble) == trouble
+    assert book.attendance.facts()["restarts"] == {"robot 1": 2}
+
+
+def test_a_team_that_rests_outside_its_cell_ends_the_run():
+    book = Book()
+    book.attendance.see(0.4, {0: STANDS, 1: STANDS}, rests=False)
+    for time, trouble in ((0.8, ""), (1.2, ""), (1.4, "robot 1 cannot begin")):
+        book.attendance.see(time, {0: STANDS, 1: OUTSIDE}, rests=True)
+        assert book.attendance.trouble.startswith(trouble)
+        assert bool(book.attendance.trouble) == bool(trouble)
+    assert book.attendance.trouble.endswith("the team rests since t = 0.8 s")
