@@ -14,7 +14,7 @@ from coop_drake.laws.beginning import POSITION_WAITS, widen_slice
 from coop_drake.laws.sampling import period_of, whole_periods
 from coop_drake.messages import AtRest, Begin, Hold, HoldRequest, Place, Ready, Switch
 from coop_drake.nodes.sampled import SampledDiagram, row_of
-from coop_drake.nodes.states import AGAIN, ASKS, FOLLOWS, HOLDS, OUTSIDE, STANDS
+from coop_drake.nodes.states import AGAIN, ASKS, FOLLOWS, HOLDS, OUTSIDE, REPORT_AGAIN, STANDS
 from coop_drake.nodes.stillness import Stillness
 from coop_drake.scenario import Deployment
 from coop_drake.systems import axis_laws, robot_record
@@ -187,7 +187,9 @@ class RobotNode:
         index, margin = self._sampled.output("ready")
         cell = int(self._cell[0])
         ready = index == cell and margin >= 0.0
-        again = self._said.cell == cell and self._number - self._reported >= whole_periods(AGAIN, self.period)
+        again = self._said.cell == cell and self._number - self._reported >= whole_periods(
+            REPORT_AGAIN, self.period
+        )
         if again or ready != (self._said == (cell, True)):
             self._said, self._reported = Ready(cell, bool(ready)), self._number
             said.append(self._said)

@@ -18,6 +18,10 @@ AGAIN = 0.1
 """Time after which a message that has had no effect yet is sent again [s]: long for a message and its answer,
 short beside the time in which a team comes to rest."""
 
+REPORT_AGAIN = 0.01
+"""Time after which a report that has had no effect yet is sent again [s]. A robot that has not heard of a new
+cell answers with one of the cell before; in shipped transports funnels bear this delay more than once."""
+
 AHEAD = 0.1
 """Time between the order to begin and the sample at which all robots begin [s]: every robot must have heard
 it by then. While one has not, the drives brake on, and the order is given again."""
