@@ -60,6 +60,7 @@ class RobotNode:
         self.place, self.state = Place(True, 0, 0), FOLLOWS
         self._order: Begin | None = None
         self._still = Stillness(self.period)
+        self._patience = max(2, whole_periods(REPORT_AGAIN, self.period))  # An answer takes two samples.
         self._waits, self._number = (np.zeros(2), 0), 0
         start = np.array(knowledge.plan.start[:3])
         self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self._state_size), start])))
@@ -187,9 +188,7 @@ class RobotNode:
         index, margin = self._sampled.output("ready")
         cell = int(self._cell[0])
         ready = index == cell and margin >= 0.0
-        again = self._said.cell == cell and self._number - self._reported >= whole_periods(
-            REPORT_AGAIN, self.period
-        )
+        again = self._said.cell == cell and self._number - self._reported >= self._patience
         if again or ready != (self._said == (cell, True)):
             self._said, self._reported = Ready(cell, bool(ready)), self._number
             said.append(self._said)
