@@ -47,7 +47,8 @@ def simulate(
         maps: The harmonic map of every transition.
         blocks: ``named`` for the law as blocks of every robot; ``fused`` is several times quicker and equal
             to 1e-12: one block drives the team. It is for many runs; that robots need nothing of each other
-            but reports is what named blocks show.
+            but reports is what named blocks show. For sampled teams with departures or budgets see
+            :func:`coop_drake.compiled_loop.simulate_fused`.
         replacements: Blocks of a user's own in every robot's controller, by the name of the block that they
             replace, such as ``axis_ppc``; with named blocks only.
         progress: Called with the stage and the fraction done, if given.
