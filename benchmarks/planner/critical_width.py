@@ -118,8 +118,7 @@ def critical_width_rows(name: str, corridor: Corridor, limit: float) -> Rows:
 
     found = critical_interval(corridor, answer)
     return [
-        Row(f"{name}/no_way_m", found.no_way, "m, proved"),
-        Row(f"{name}/way_m", found.way, "m, certified"),
+        Row(f"{name}/answer", 1.0, f"{found.no_way:.5f} m to {found.way:.5f} m"),
         Row(f"{name}/apart_mm", 1e3 * (found.way - found.no_way), "mm"),
         Row(f"{name}/undecided", len(found.undecided), f"of {len(found.seconds)} widths"),
         Row(f"{name}/slowest_cpu_seconds", max(found.seconds), "s"),

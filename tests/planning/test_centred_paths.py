@@ -17,9 +17,6 @@ from tests.planning.test_search import rod_problem
 from tests.support.cases import case
 from tests.support.trees import body_footprints
 
-LEAST = 0.002
-"""Walls are moved in by this with no easing [m]."""
-
 
 def poses_near_walls(problem, count=40):
     """Free configurations of a team that are up to 0.1 m from a wall."""
@@ -61,14 +58,11 @@ def test_the_nearest_contact_of_bodies_is_their_distance():
         assert found.distances[found.rows == k].min() == pytest.approx(apart, abs=2e-3)  # Discs are polygons.
 
 
-@pytest.mark.parametrize("corridor", [0.202, 0.199])
+@pytest.mark.parametrize("corridor", [0.2016, 0.199])
 def test_a_path_is_moved_to_the_middle_of_its_passage(corridor):
     problem = rod_problem(corridor)
-
-    def eased(amount):
-        return replace(problem, workspace=problem.workspace.buffer(amount - LEAST, join_style="mitre"))
-
-    path, needed = centred(eased, tilted(0.002), LEAST + 0.002)
-    assert needed - LEAST == pytest.approx(0.5 * (0.2 - corridor), abs=1e-5)
-    assert are_free(eased(needed), path).all()
+    path, short = centred(problem, tilted(0.002), 0.002)
+    assert short == pytest.approx(0.5 * (0.2 - corridor), abs=1e-5)
+    easier = problem.workspace.buffer(short + 1e-9, join_style="mitre")
+    assert are_free(replace(problem, workspace=easier), path).all()
     assert np.array_equal(path[[0, -1]], tilted()[[0, -1]])

@@ -50,10 +50,9 @@ def test_the_amount_that_a_path_needs_is_what_its_tightest_sample_sticks_out():
 @pytest.mark.parametrize(("corridor", "fits"), [(0.21, True), (0.19, False)])
 def test_a_path_is_repaired_only_where_it_fits(corridor, fits):
     problem = rod_problem(corridor)
-    path = repaired(problem, tilted(), 0.06)
-    assert (path is not None) == fits
-    if path is not None:
-        assert are_free(problem, path).all()
+    path, short = repaired(problem, tilted(), 0.06)
+    assert (short <= 0.0) == fits
+    assert are_free(problem, path).all() == fits
 
 
 def test_a_wider_floor_holds_the_floor():

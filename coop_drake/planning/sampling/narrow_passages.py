@@ -47,9 +47,6 @@ REPAIRS = 3
 LEAST_CLEARANCE = 0.001
 """Walls are moved in by this, so that boxes around the repaired path have a width [m]."""
 
-NEARLY_FREE = 0.005
-"""Paths that need the walls this far back are moved to the middle of their passages [m]."""
-
 MITRE_LIMIT = 5.0
 """Corners of a widened floor are cut at this many times the widening [-]."""
 
@@ -167,7 +164,7 @@ def widened_floor(workspace: Polygon, amount: float) -> MultiPolygon:
     return MultiPolygon(parts_of(grown))
 
 
-def repaired(problem: PlanningProblem, path: FloatArray, growth: float) -> FloatArray | None:
+def repaired(problem: PlanningProblem, path: FloatArray, growth: float) -> tuple[FloatArray, float]:
     """Move a path for a larger floor until all its samples are free on the original floor.
 
     Args:
@@ -176,36 +173,30 @@ def repaired(problem: PlanningProblem, path: FloatArray, growth: float) -> Float
         growth: How far walls were moved back for it [m].
 
     Returns:
-        The path, None if that fails. Samples prove nothing: boxes have to cover it.
+        The path, and how far walls have to be moved back for all its samples, zero or less where they need
+        not [m]. Samples prove nothing: boxes have to cover it.
     """
-
-    def eased(amount: float) -> PlanningProblem:
-        floor = problem.workspace.buffer(amount - LEAST_CLEARANCE, join_style="mitre")
-        return replace(problem, workspace=floor)
-
-    needed = growth + LEAST_CLEARANCE
+    eased, needed = _eased(problem), growth + LEAST_CLEARANCE
     for _ in range(REPAIRS):
         before = needed
         path, needed = ease_less(eased, path, needed, enough=SOLVED_FRACTION * LEAST_CLEARANCE)
         if needed <= SOLVED_FRACTION * LEAST_CLEARANCE or needed > PROGRESS_FRACTION * before:
             break
-    if SOLVED_FRACTION * LEAST_CLEARANCE < needed < NEARLY_FREE:
-        path, needed = centred(eased, path, needed)
-    return path if needed <= LEAST_CLEARANCE else None
+    return path, needed - LEAST_CLEARANCE
 
 
-def centred(eased: Eased, path: FloatArray, amount: float) -> tuple[FloatArray, float]:
+def centred(problem: PlanningProblem, path: FloatArray, short: float) -> tuple[FloatArray, float]:
     """Move a path to the middle of its narrowest passages by linear programs.
 
     Args:
-        eased: The question with walls moved back by an amount, 0 being the least that is of use [m].
-        path: A path that is free with ``amount``, theta unwrapped, shape (m, 3 + n).
-        amount: The amount [m].
+        problem: The question.
+        path: A path that is free with walls moved back by ``short``, theta unwrapped, shape (m, 3 + n).
+        short: That distance; negative where they are moved in, by up to ``LEAST_CLEARANCE`` [m].
 
     Returns:
-        The path with samples added, and the amount with which all of them are free.
+        The path with samples added, and the distance with which all of them are free.
     """
-    scale = configuration_scale(eased(amount).tree)
+    eased, scale, amount = _eased(problem), configuration_scale(problem.tree), short + LEAST_CLEARANCE
     for spacing in FINE_SPACINGS:
         path = densified(path, scale, spacing)
         amount, _ = amount_needed(eased, path, amount + CHORD)
@@ -217,4 +208,16 @@ def centred(eased: Eased, path: FloatArray, amount: float) -> tuple[FloatArray, 
                 path, amount = moved, less
             else:
                 move *= SHORTER
-    return path, amount
+        if amount > LEAST_CLEARANCE + CHORD:
+            break
+    return path, amount - LEAST_CLEARANCE
+
+
+def _eased(problem: PlanningProblem) -> Eased:
+    """The question with walls moved back by an amount less ``LEAST_CLEARANCE``."""
+
+    def eased(amount: float) -> PlanningProblem:
+        floor = problem.workspace.buffer(amount - LEAST_CLEARANCE, join_style="mitre")
+        return replace(problem, workspace=floor)
+
+    return eased

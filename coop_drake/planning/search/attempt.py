@@ -33,6 +33,7 @@ class Tried:
         blocked: Whether no path was found even for the object alone; None if that is unknown.
         failed: Whether geometry failed.
         trials: Boxes tried.
+        short: How far walls have to be moved back for the path; zero or less if it fits the floor [m].
     """
 
     found: BoxSequence | None = None
@@ -40,3 +41,4 @@ class Tried:
     blocked: bool | None = None
     failed: bool = False
     trials: int = 0
+    short: float = 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -27,7 +27,7 @@ from coop_drake.planning.sampling.clear_paths import (
 )
 from coop_drake.planning.sampling.elastic_band import smoothed
 from coop_drake.planning.sampling.local_floor import object_route
-from coop_drake.planning.sampling.narrow_passages import repaired, widened_floor
+from coop_drake.planning.sampling.narrow_passages import centred, repaired, widened_floor
 from coop_drake.planning.sampling.sampler import FEW_JOINTS, Sampler
 from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
 from coop_drake.planning.search.attempt import BoxSequence, Tried
@@ -47,6 +47,13 @@ BODY_GAP = 0.01
 FLOOR_GROWTHS, SEEDS_PER_GROWTH = (0.1, 0.06, 0.03), 2
 """Amounts by which walls are moved back for paths through narrow passages [m], largest first because these
 are the easiest to sample, and random seeds for each of them."""
+
+NARROW_SAMPLES = 16_000
+"""Samples for every subsystem on these floors: fewer often find no path near the critical width."""
+
+CENTRED_PATHS, CENTRED_SHORT = 3, 0.005
+"""So many of these paths, those that fit the floor best, are moved to the middle of their passages; those
+that still need the walls this far back are left out [m]."""
 
 FIRST_SMOOTHINGS = (0.05, 600), (0.05, 3_000)
 """Spacing of samples [m] and number of moves with which a new path is smoothed; the longer smoothing follows
@@ -148,27 +155,42 @@ class SampledSearch:
         ways = product(range(SEEDS_PER_GROWTH), FLOOR_GROWTHS if self._start_inside else ())
         report = None if copies else progress
         works = [partial(self._counted, partial(self._repaired, *way, report)) for way in ways]
-        fitting: list[FloatArray] = []
+        paths: list[Tried] = []
         with Copies(works, copies) as results:
             for tried in results:
                 self.slices += tried.trials
                 if tried.failed or tried.found is not None:
                     return tried.found
                 if tried.path is not None:
-                    fitting.append(tried.path)
+                    paths.append(tried)
         try:
-            # The smallest boxes come last, because a transport through them takes long.
-            covered = (self._covered(fit, 0.0, longest=True, smallest=True) for fit in fitting)
-            return next((found for found in covered if found is not None), None)
+            return self._through_middle(sorted(paths, key=lambda tried: tried.short))
         except (GeometryError, ShapelyError):
             return None
 
     def _repaired(self, seed: int, growth: float, progress: Callable[[float], None] | None) -> Tried:
-        """Sample a path on a larger floor, repair it, and cover it."""
+        """Sample a path on a larger floor, repair it, and cover it if it fits."""
         larger = widened_floor(self._problem.workspace, growth)
-        path = Sampler(self._hierarchy, larger, BODY_GAP, seed, progress).path(SAMPLES)
-        fit = repaired(self._problem, path, growth) if len(path) else None
-        return Tried() if fit is None else Tried(self._covered(fit, 0.0, longest=True), fit)
+        path = Sampler(self._hierarchy, larger, BODY_GAP, seed, progress).path(NARROW_SAMPLES)
+        if not len(path):
+            return Tried()
+        path, short = repaired(self._problem, path, growth)
+        found = self._covered(path, 0.0, longest=True) if short <= 0.0 else None
+        return Tried(found, path, short=short)
+
+    def _through_middle(self, paths: Sequence[Tried]) -> BoxSequence | None:
+        """Cover one of some paths, those that fit best first, with boxes in the middle of its passages.
+
+        The boxes are the smallest ones, so a transport through them takes long.
+        """
+        for tried in paths[:CENTRED_PATHS]:
+            if tried.path is not None and tried.short < CENTRED_SHORT:
+                path, short = centred(self._problem, tried.path, tried.short)
+                if short <= 0.0:
+                    found = self._covered(path, 0.0, longest=True, smallest=True)
+                    if found is not None:
+                        return found
+        return None
 
     def with_margin(
         self, first: BoxSequence, progress: Callable[[float, float], None], share: float = 1.0

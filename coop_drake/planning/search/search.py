@@ -48,8 +48,8 @@ ENOUGH_BLOCKED_ATTEMPTS = 2
 OBJECT_BUDGET_DIVISOR = 2
 """An exploration of an object that seems blocked may make this fraction of all slices, one half."""
 
-SHORT_EXPLORATION = 120
-"""Slices of an exploration that is interposed because sampling failed: a tenth of a second of work."""
+SHORT_EXPLORATION = 400
+"""Slices of an exploration of the object that is interposed because sampling failed: half a second."""
 
 FIRST_EXPLORATION = 250
 """Slices of each exploration in the first round; every further round doubles it."""
