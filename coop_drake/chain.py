@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +27,12 @@ _SCHEDULED = "scheduled"
 
 
 def plan(
-    question: Scenario | PlanningProblem, gains: str | None = None, *, progress: Progress | None = None
+    question: Scenario | PlanningProblem,
+    gains: str | None = None,
+    *,
+    effort: float | None = None,
+    workers: int = 1,
+    progress: Progress | None = None,
 ) -> PlanningResult:
     """Find a plan for a scenario or a planning problem, or prove that none exists.
 
@@ -36,6 +42,8 @@ def plan(
         question: A scenario, or a planning problem, which is planned with scheduled gains.
         gains: Name of one of the scenario's gain sets, or a file that holds one; None for the one that the
             scenario selects.
+        effort: Work spent on a quicker transport, as a share of the default; None for the question's own.
+        workers: Processes that plan at a time; the answer is the same with any number.
         progress: Called with a stage and the fraction of it that is done.
 
     Returns:
@@ -44,11 +52,13 @@ def plan(
 
     Raises:
         ScenarioError: The scenario's models make no team, or there is no gain set of that name.
+        ValueError: The effort is negative or no number.
     """
     from coop_drake.planning.planner import plan as plan_problem
 
+    ask = partial(plan_problem, effort=effort, workers=workers, progress=progress)
     if isinstance(question, PlanningProblem):
-        return plan_problem(question, ScheduledGains(), gain_set_name=_SCHEDULED, progress=progress)
+        return ask(question, ScheduledGains(), gain_set_name=_SCHEDULED)
     from coop_drake.plant import planning_problem
     from coop_drake.plant.budgets import budget_of
     from coop_drake.scenario import with_gains
@@ -57,9 +67,7 @@ def plan(
     name = scenario.selected_gains
     problem = planning_problem(scenario)
     budget = budget_of(None, scenario, problem)
-    return plan_problem(
-        problem, scenario.gain_sets[name], gain_set_name=name, budget=budget, progress=progress
-    )
+    return ask(problem, scenario.gain_sets[name], gain_set_name=name, budget=budget)
 
 
 def verify(
