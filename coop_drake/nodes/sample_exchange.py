@@ -65,6 +65,7 @@ class SampleExchange:
     Attributes:
         sample: Number of the present sample.
         attendance: Who is missing, and whether the drives brake.
+        damping: With which the drives of each robot brake, see ``laws.braking``.
     """
 
     def __init__(
@@ -85,6 +86,7 @@ class SampleExchange:
         self._everyone, self._period = [*range(robots), SUPERVISOR], links.period
         self._clock = links.faults.clock
         self.attendance = Attendance(rejoin=rejoin, gone=gone, revive=revive, tell=tell)
+        self.damping: Sequence[FloatArray] = ()
         self.sample, self._still = 0, Stillness(links.period)
         self._last: dict[tuple[int, type], Any] = {}
         self._states = dict[int, int]()
@@ -172,9 +174,8 @@ class SampleExchange:
 
     def _effort(self, robot: int, measured: FloatArray) -> FloatArray:
         """Return what the drives of a robot do."""
-        known = self._last.get((robot, Effort))
-        if self.attendance.stopped or known is None:
-            return braking_effort(measured[:-3])
+        if self.attendance.stopped or (known := self._last.get((robot, Effort))) is None:
+            return braking_effort(measured[:-3], self.damping[robot])
         return np.array(known.efforts)
 
     def _await(self, time: float, measured: Sequence[FloatArray]) -> None:

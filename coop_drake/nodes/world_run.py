@@ -11,6 +11,7 @@ from coop_drake.answers.plan import Plan
 from coop_drake.diagram import build_world, control_period
 from coop_drake.errors import MessagingError
 from coop_drake.fields import HarmonicMap
+from coop_drake.laws.braking import braking_damping
 from coop_drake.messages import AddressBook, Goodbye, KeyPair, WorldEnd, local_book, name_of
 from coop_drake.messages.faults import NO_FAULTS, Faults
 from coop_drake.messages.outgoing import Links
@@ -19,6 +20,7 @@ from coop_drake.nodes.processes import LocalTeam, question_of, robots_of
 from coop_drake.nodes.sample_exchange import PATIENCE, SampleExchange
 from coop_drake.nodes.serving import TURN
 from coop_drake.nodes.states import REJOIN, RESTARTS
+from coop_drake.plant.team import base_inertia
 from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
 from coop_drake.simulation import Sample, run_loop
@@ -95,6 +97,9 @@ def run_world(
         tell=tell,
     )
     world = build_world(scenario, plan, exchange)
+    exchange.damping = [
+        braking_damping(*base_inertia(robot), len(robot.joints)) for robot in world.team.robots
+    ]
     try:
         _open(end, opening, gone)
         log = run_loop(world, scenario, progress=progress, observer=observer)

@@ -77,6 +77,12 @@ class RobotModel:
     q_slice: slice
 
 
+def base_inertia(robot: RobotModel) -> tuple[float, float]:
+    """Return the mass of a robot's base [kg], and its inertia about the vertical axis through Bk [kg m^2]."""
+    inertia = robot.base_body.default_spatial_inertia()
+    return float(inertia.get_mass()), float(inertia.CalcRotationalInertia().get_moments()[2])
+
+
 @dataclass(frozen=True)
 class TeamPlant:
     """The team's plant, its tree rooted at the object; z = (x, y, theta, q...).
