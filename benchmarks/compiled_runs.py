@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from hashlib import sha256
+from io import BytesIO
 from math import isfinite
 from time import process_time
 from typing import Any
+
+import numpy as np
 
 from benchmarks.departures import deployment_of
 from benchmarks.deployed import TEAMS
 from benchmarks.rows import Row
 from benchmarks.tasks import Task
-from coop_drake import Found, build_maps, load_scenario, plan, simulate
+from coop_drake import Found, build_maps, load_scenario, plan
 from coop_drake.campaign.measuring import record_of_log
+from coop_drake.campaign.records import RunRecord, table_of
 from coop_drake.campaign.variation import Run
-from coop_drake.compiled_loop import prepare, run
+from coop_drake.compiled_loop import CompiledTransport, prepare, run, simulate_sampled
 from coop_drake.errors import PlanError
+from coop_drake.kernel_times import KERNEL_TIMES
 
 DEPLOYMENTS: dict[str, dict[str, Any]] = {
     "sampled": {"control_rate": 200.0},
@@ -26,8 +33,14 @@ DEPLOYMENTS: dict[str, dict[str, Any]] = {
 }
 """Sections ``deployment`` of the pairs of runs."""
 
-SEEDS = (0,)
-"""Seeds of the pairs of runs."""
+RUNS = 20
+"""Compiled runs of each team and deployment of which the processor time is taken, by seeds from 0 on."""
+
+PAIRS = 1
+"""How many of them Drake's loop repeats; one takes as long as some hundred compiled ones."""
+
+BATCH = 500
+"""Runs in the file of which the size is measured, as many as in the campaigns of a million runs."""
 
 _COLUMNS = {
     "time": "s",
@@ -42,37 +55,64 @@ _COLUMNS = {
 
 
 def compiled_tasks() -> list[Task]:
-    """Every shipped transport with each of the deployments."""
-    return [
+    """Every shipped transport with each of the deployments, and the size of a file of runs."""
+    pairs = [
         Task(f"compiled/{team}/{label}", partial(_rows, team, label), alone=True)
         for team in TEAMS
         for label in DEPLOYMENTS
     ]
+    return [*pairs, Task("compiled/records", _sizes, alone=True)]
 
 
-def _rows(team: str, label: str, _: Sequence[Row]) -> list[Row]:
-    """Return runs a second of processor time beside Drake's loop, and the largest differences of pairs."""
-    name, deployment = f"compiled/{team}/{label}", deployment_of(DEPLOYMENTS[label])
-    scenario = replace(load_scenario(team), deployment=deployment)
+def _transport(team: str, label: str) -> CompiledTransport:
+    """Return a shipped transport along its plan; what it compiles is compiled."""
+    scenario = replace(load_scenario(team), deployment=deployment_of(DEPLOYMENTS[label]))
     result = plan(scenario)
     if not isinstance(result, Found):
         raise PlanError(f"{scenario.path}: no plan to measure runs of: {result.reason}")
-    maps = build_maps(result.plan)
-    transport = prepare(scenario, result.plan, maps)
-    run(transport)  # compiles
-    differences, seconds, drakes = dict.fromkeys(_COLUMNS, 0.0), 0.0, 0.0
-    for seed in SEEDS:
-        begun = process_time()
-        outcome = run(transport, seed=seed)
-        ended = process_time()
-        log = simulate(replace(scenario, deployment=replace(deployment, seed=seed)), result.plan, maps)
-        seconds, drakes = seconds + ended - begun, drakes + process_time() - ended
-        record = record_of_log(Run(0, 0, seed, {}), team, log, result.plan, "", "named")
+    transport = prepare(scenario, result.plan, build_maps(result.plan))
+    run(transport)
+    return transport
+
+
+def _rows(team: str, label: str, _: Sequence[Row]) -> list[Row]:
+    """Return runs a second of processor time beside Drake's loop, and the largest differences of pairs.
+
+    Drake's loop has one block in place of all controllers, which is its quickest way.
+    """
+    name, transport = f"compiled/{team}/{label}", _transport(team, label)
+    begun = process_time()
+    outcomes = [run(transport, seed=seed) for seed in range(RUNS)]
+    seconds = (process_time() - begun) / RUNS
+    differences, drakes = dict.fromkeys(_COLUMNS, 0.0), 0.0
+    for seed, outcome in enumerate(outcomes[:PAIRS]):
+        begun, compiling = process_time(), KERNEL_TIMES.cpu_seconds
+        log = simulate_sampled(transport, replace(transport.scenario.deployment, seed=seed))
+        drakes += (process_time() - begun - KERNEL_TIMES.cpu_seconds + compiling) / PAIRS
+        record = record_of_log(Run(0, 0, seed, {}), team, log, transport.plan, "", "fused")
         for column in _COLUMNS:
             difference = abs(getattr(outcome, column) - getattr(record, column))
             if isfinite(difference):
                 differences[column] = max(differences[column], difference)
     return [
-        Row(f"{name}/rate", len(SEEDS) / seconds, "runs a second", "Drake's loop", len(SEEDS) / drakes),
+        Row(f"{name}/rate", 1.0 / seconds, "runs a second", "Drake's loop", 1.0 / drakes),
+        Row(f"{name}/million", 1e6 * seconds / 3600.0, "core hours"),
         *(Row(f"{name}/{column}", differences[column], unit) for column, unit in _COLUMNS.items()),
     ]
+
+
+def _sizes(_: Sequence[Row]) -> list[Row]:
+    """Return the bytes of a run in the file of a batch."""
+    from pyarrow import parquet
+
+    transport, varied = _transport("base", "budget"), np.random.default_rng(0).uniform(-0.2, 0.2, BATCH)
+    records = []
+    for index, error in enumerate(varied.tolist()):
+        deployment = replace(transport.scenario.deployment, mass_error=error, seed=index)
+        begun = RunRecord(index, "base", "compiled", index, json.dumps({"mass_error": error}), arrived=False)
+        digest = sha256(str(index).encode()).hexdigest()
+        records.append(replace(begun, digest=digest, **vars(run(transport, deployment))))
+    with BytesIO() as file:
+        parquet.write_table(table_of(records, RunRecord), file)
+        size = file.tell() / BATCH
+    return [Row("compiled/records/bytes", size, "bytes a run")]

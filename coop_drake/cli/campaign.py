@@ -127,7 +127,10 @@ def replay_command(
     machine: Machine = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make one run again by Drake's loop, with recording and figures, and compare it with the counted one."""
+    """Make one run again by Drake's loop, with recording and figures, and compare it with the counted one.
+
+    A run of the compiled tier is made again by the compiled loop, too.
+    """
     with reporting(machine=machine, quiet=quiet) as reporter:
         from coop_drake.cli.campaign_replay import replay
 

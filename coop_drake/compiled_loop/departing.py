@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from math import inf
 
 import numpy as np
@@ -125,9 +126,14 @@ def nominal_of(transport: CompiledTransport, period: float) -> LoopNominal:
         return nominal
     speed, _, radius = nominal.position
     periods = report_periods(budget.report_age, period)
-    return nominal._replace(
-        flow=nominal_flow(gains.stiffness, gains.damping, period), position=np.array([speed, periods, radius])
-    )
+    flow = _flow(gains.stiffness, gains.damping, period).copy()
+    return nominal._replace(flow=flow, position=np.array([speed, periods, radius]))
+
+
+@lru_cache(maxsize=32)
+def _flow(stiffness: float, damping: float, period: float) -> FloatArray:
+    """Return ``nominal_flow``; the threads of BLAS that it wakes would cost as much as half a run."""
+    return nominal_flow(stiffness, damping, period)
 
 
 def memory_of(transport: CompiledTransport, departures: LoopDepartures) -> LoopMemory:

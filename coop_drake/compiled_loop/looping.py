@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal, LoopPlant
-from coop_drake.compiled_loop.motion import advance
-from coop_drake.compiled_loop.robots import TOLD, follow_axes, heard_cell, lead, remember_switch, report
+from coop_drake.compiled_loop.motion import advance, motion_room
+from coop_drake.compiled_loop.robots import (
+    RobotRoom,
+    follow_axes,
+    heard_cell,
+    lead,
+    remember_switch,
+    report,
+    robot_room,
+)
 from coop_drake.compiled_loop.sensing import measure, receive
-from coop_drake.compiled_loop.watching import ENDED, RUNS, begin_figures, left_by_all, watch
+from coop_drake.compiled_loop.watching import ENDED, RUNS, begin_figures, left_by_all, watch, watch_room
 from coop_drake.laws.channels import carry_reports
 from coop_drake.laws.nominal_axes import carry_axes
 from coop_drake.laws.random_draws import uniform_pair
@@ -37,52 +43,47 @@ def run_loop(
         departures: What departs from the ideal team.
         memory: The state at the start; it is changed.
     """
-    figures, measured = begin_figures(), np.full(memory.state.size // 2 + 2, np.nan)
-    sample = 0
-    watch(sample, cells, team, plant, nominal, departures, memory, measured, figures)
+    figures, seen = begin_figures(), watch_room(plant)
+    room, motion, sample = robot_room(memory), motion_room(team.yaws.size, plant), 0
+    watch(sample, cells, team, plant, nominal, departures, memory, seen, figures)
     while figures[ENDED] == RUNS:
-        update(cells, team, nominal, departures, memory, sample)
-        advance(sample, team, plant, departures, memory)
+        update(cells, team, nominal, departures, room, memory, sample)
+        advance(sample, team, plant, departures, memory, motion)
         sample += 1
-        watch(sample, cells, team, plant, nominal, departures, memory, measured, figures)
+        watch(sample, cells, team, plant, nominal, departures, memory, seen, figures)
     return figures
 
 
 @compiled
 def update(
-    cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory,
-    sample: int,
+    cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom,
+    memory: LoopMemory, sample: int,
 ) -> None:  # fmt: skip
     """Do what happens at a sample: all read what was before, as in Drake."""
-    robots, law = team.yaws.size, np.empty(memory.jumps.size)
-    now, told = sample * departures.times[0], np.empty(TOLD)
-    measure(sample, sample, team, departures, memory)
-    held = memory.efforts[0].copy()
-    for k in range(robots):
-        begin = k + team.first[2, k]
-        end = begin + 1 + team.first[2, k + 1] - team.first[2, k]
-        compute(
-            k, sample, sample, now, False, begin, cells, team, nominal, departures, memory, law[begin:end],
-            told,
-        )  # fmt: skip
-        _fail(k, sample, held, team, departures, memory)
-    for i in range(held.size):
+    measure(sample, sample, team, departures, memory, room.errors)
+    for i in range(room.held.size):
+        room.held[i] = memory.efforts[0, i]
+    for k in range(team.yaws.size):
+        time = sample * departures.times[0]
+        compute(k, sample, sample, time, False, cells, team, nominal, departures, room, memory)
+        _fail(k, sample, room.held, team, departures, memory)
+    for i in range(room.held.size):
         limit = departures.limits[i]
         memory.efforts[0, i] = min(max(memory.efforts[0, i], -limit), limit)
     now = sample % memory.current.shape[0]
     cell = int(memory.current[now, 0])
-    _lead_on(sample, cell, law, cells, nominal, departures, memory)
+    _lead_on(sample, cell, room.law, cells, nominal, departures, memory)
     following = memory.current[(sample + 1) % memory.current.shape[0]]
     following[0], following[1] = memory.current[now, 0], memory.current[now, 1]
     if cell + 1 < cells.rows.shape[0] and left_by_all(cell, memory):
         following[0], following[1] = cell + 1, sample * departures.times[0]
-    _send(sample, departures, memory)
+    _send(sample, departures, memory, room.arrivals)
 
 
 @compiled
 def compute(
-    k: int, sample: int, number: int, now: float, whole: bool, begin: int, cells: LoopCells, team: FusedTeam,
-    nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory, law: FloatArray, told: FloatArray,
+    k: int, sample: int, number: int, now: float, whole: bool, cells: LoopCells, team: FusedTeam,
+    nominal: LoopNominal, departures: LoopDepartures, room: RobotRoom, memory: LoopMemory,
 ) -> None:  # fmt: skip
     """Do what robot k computes at a sample: its effort, its report, its own p_G, and the law of its axes.
 
@@ -92,25 +93,20 @@ def compute(
         number: Number of the control period whose noise and losses there are now.
         now: Time of the run [s].
         whole: As in ``report``.
-        begin: First row of the robot among all axes.
         cells: The plan's cells.
         team: The robots' models.
         nominal: The nominal motions.
         departures: What departs.
+        room: Receives the accelerations of the law of its axes, and what the robot tells the log.
         memory: What changes.
-        law: Receives the accelerations of the law of its axes, shape (1 + n_k,).
-        told: Receives what the robot tells the log, see ``TOLD``.
     """
-    seen = np.empty(6)
+    seen, governed, begin = room.seen[0], room.governed, k + team.first[2, k]
     pose, robot = receive(k, sample, number, team, departures, memory)
     chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
     estimate_object(chain, team.loads[k, :2], robot, pose, seen)
     cell, time = heard_cell(k, sample, now, departures, memory)
-    governed = lead(k, sample, cell, time, cells, team, nominal, departures, memory, seen, told)
-    led, led_robot = follow_axes(
-        k, sample, cell, time, governed[2:], seen, robot, cells, team, nominal, departures, memory, law,
-        told,
-    )  # fmt: skip
+    lead(k, sample, cell, time, cells, team, nominal, departures, memory, room)
+    led, led_robot = follow_axes(k, sample, cell, time, robot, cells, team, nominal, departures, memory, room)
     judged, judged_robot = led, led_robot
     if departures.periods[3] > 0 and cell + 1 == cells.rows.shape[0]:
         judged, judged_robot = _averaged(sample, 3 * begin - 2 * team.first[2, k], led, led_robot, memory)
@@ -148,9 +144,11 @@ def _fail(
     period, begin = departures.times[0], departures.silences[0, k]
     early = EARLY * period
     if not begin - early <= sample * period < departures.silences[1, k] - early:
-        memory.reports[1, k] = memory.reports[0, k]
+        for i in range(memory.reports.shape[2]):
+            memory.reports[1, k, i] = memory.reports[0, k, i]
         return
-    memory.reports[0, k] = memory.reports[1, k]
+    for i in range(memory.reports.shape[2]):
+        memory.reports[0, k, i] = memory.reports[1, k, i]
     own, motors = 3 * k + team.first[2, k], departures.silences[2, k]
     for i in range(own, own + 3 + team.first[2, k + 1] - team.first[2, k]):
         if motors > 0.0:
@@ -180,10 +178,9 @@ def _lead_on(
 
 
 @compiled
-def _send(sample: int, departures: LoopDepartures, memory: LoopMemory) -> None:
-    """Carry every robot's channel of reports over a period."""
+def _send(sample: int, departures: LoopDepartures, memory: LoopMemory, arrivals: FloatArray) -> None:
+    """Carry every robot's channel of reports over a period; ``arrivals`` is room for one."""
     loss, repeat = departures.probabilities[2], departures.probabilities[3]
-    arrivals = np.empty(memory.channels[0].shape)
     for k in range(memory.channels.shape[0]):
         arrives, repeated = True, False
         if loss > 0.0 or repeat > 0.0:
@@ -191,4 +188,6 @@ def _send(sample: int, departures: LoopDepartures, memory: LoopMemory) -> None:
             arrives, repeated = chances[0] >= loss, chances[1] < repeat
         kept = memory.channels[k]
         carry_reports(kept, memory.reports[0, k], arrives, repeated, departures.periods[2], arrivals)
-        kept[:] = arrivals
+        for i in range(kept.shape[0]):
+            for j in range(kept.shape[1]):
+                kept[i, j] = arrivals[i, j]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from coop_drake.compiled import compiled
@@ -22,6 +24,48 @@ the object's desired acceleration [m/s^2, rad/s^2], then what ``end_effector_com
 
 ON_TIME = np.array([0.0, 1.0, 0.0])
 """A clock that never stood still: lag [s], pace [-] and the derivative of the pace [1/s]."""
+
+
+class RobotRoom(NamedTuple):
+    """Room for what one robot computes at a sample, given so that it need not be made every time.
+
+    Attributes:
+        seen: The object's state as the robot knows it, then on the nominal axes of now, and of when efforts
+            act, shape (3, 6).
+        robots: The robot's own state on the latter two, shape (2, 2 (3 + n)).
+        governed: What ``lead`` writes, shape (4,) [m/s, m/s^2].
+        told: What the robot tells the log, see ``TOLD``.
+        law: What the law of all axes asks for, shape (M,).
+        pulled: That of the robot's with the pull to the nominal motion, shape (M,).
+        later: Nominal axes when efforts act, shape (3, M).
+        none: Jumps that are zero, shape (M,).
+        held: Efforts before the sample, shape (3 N + n,) [N, N m].
+        errors: Of one measurement, shape (2 (3 + n),).
+        arrivals: What a channel of reports holds next, of its shape.
+    """
+
+    seen: FloatArray
+    robots: FloatArray
+    governed: FloatArray
+    told: FloatArray
+    law: FloatArray
+    pulled: FloatArray
+    later: FloatArray
+    none: FloatArray
+    held: FloatArray
+    errors: FloatArray
+    arrivals: FloatArray
+
+
+@compiled
+def robot_room(memory: LoopMemory) -> RobotRoom:
+    """Return room for a team."""
+    axes, state, channel = memory.jumps.size, memory.state.size, memory.channels.shape
+    seen, robots, later = np.empty((3, 6)), np.empty((2, state)), np.empty((3, axes))
+    return RobotRoom(
+        seen, robots, np.empty(4), np.empty(TOLD), np.empty(axes), np.empty(axes), later, np.zeros(axes),
+        np.empty(memory.efforts.shape[1]), np.empty(state), np.empty((channel[1], channel[2])),
+    )  # fmt: skip
 
 
 @compiled
@@ -47,9 +91,9 @@ def heard_cell(
 @compiled
 def lead(
     k: int, sample: int, cell: int, time: float, cells: LoopCells, team: FusedTeam, nominal: LoopNominal,
-    departures: LoopDepartures, memory: LoopMemory, seen: FloatArray, told: FloatArray,
-) -> FloatArray:  # fmt: skip
-    """Return p_G' as robot k moves its own p_G, and the desired acceleration of the object's origin.
+    departures: LoopDepartures, memory: LoopMemory, room: RobotRoom,
+) -> None:  # fmt: skip
+    """Write p_G' as robot k moves its own p_G, and the desired acceleration of the object's origin.
 
     Args:
         k: The robot.
@@ -61,14 +105,12 @@ def lead(
         nominal: The nominal motions.
         departures: What departs.
         memory: What changes.
-        seen: The object's state as the robot knows it, shape (6,).
-        told: Receives Delta E, unless a nominal motion leads.
-
-    Returns:
-        Both, shape (4,) [m/s, m/s^2]; p_G' is zero where a nominal motion leads.
+        room: Holds the object's state as the robot knows it; receives both, p_G' being zero where a nominal
+            motion leads, and otherwise Delta E.
     """
-    governed = np.zeros(4)
+    seen, governed = room.seen[0], room.governed
     if nominal.flow.size:
+        governed[0], governed[1] = 0.0, 0.0
         ring = memory.nominal.shape[0]
         now, then = memory.nominal[sample % ring], max(sample - departures.periods[0], 0) % ring
         accelerate_along(team.tracking, seen, now[4:6], now, memory.nominal[then], governed[2:])
@@ -77,14 +119,13 @@ def lead(
         edges = cells.governed[first[0, cell] : first[0, cell + 1]]
         flat = cells.flats[first[2, cell] : first[2, cell + 1]]
         field = cells.fields[first[3, cell] : first[3, cell + 1]]
-        told[ENERGY] = govern(cells.rows[cell], edges, flat, field, time, seen, p_G, governed)
-    return governed
+        room.told[ENERGY] = govern(cells.rows[cell], edges, flat, field, time, seen, p_G, governed)
 
 
 @compiled
 def command(
     k: int, linear: FloatArray, axes: FloatArray, seen: FloatArray, robot: FloatArray, team: FusedTeam,
-    memory: LoopMemory, told: FloatArray,
+    efforts: FloatArray, told: FloatArray,
 ) -> None:  # fmt: skip
     """Write the effort that gives end effector and joints of robot k the desired accelerations.
 
@@ -95,21 +136,20 @@ def command(
         seen: The object's state with which they become efforts, shape (6,).
         robot: The robot's own, shape (2 (3 + n_k),).
         team: The robots' models.
-        memory: Receives the effort.
+        efforts: Those of all robots; receives the effort.
         told: Receives the object's desired acceleration and the command of the end effector, see ``TOLD``.
     """
     wanted, own = told[COMMAND:], 3 * k + team.first[2, k]
     told[ACCELERATION], told[ACCELERATION + 1], told[ACCELERATION + 2] = linear[0], linear[1], axes[0]
     chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
     end_effector_command(team.loads[k], seen, linear, axes, wanted)
-    robot_effort(chain, robot, wanted, axes, memory.efforts[0, own : own + 2 + axes.size])
+    robot_effort(chain, robot, wanted, axes, efforts[own : own + 2 + axes.size])
 
 
 @compiled
 def follow_axes(
-    k: int, sample: int, cell: int, time: float, linear: FloatArray, seen: FloatArray, robot: FloatArray,
-    cells: LoopCells, team: FusedTeam, nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory,
-    law: FloatArray, told: FloatArray,
+    k: int, sample: int, cell: int, time: float, robot: FloatArray, cells: LoopCells, team: FusedTeam,
+    nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory, room: RobotRoom,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
     """Write the effort of robot k and what the law of its axes asks for.
 
@@ -118,50 +158,58 @@ def follow_axes(
         sample: Number of the sample.
         cell: The cell.
         time: Time since its entry [s].
-        linear: Desired acceleration of the object's origin, shape (2,) [m/s^2].
-        seen: The object's state as the robot knows it, shape (6,).
         robot: Its own state as measured, shape (2 (3 + n_k),).
         cells: This and the next four arguments are those of ``lead``.
         team: The robots' models.
         nominal: The nominal motions.
         departures: What departs.
         memory: What changes.
-        law: Receives the accelerations of the law, shape (1 + n_k,).
-        told: As in ``command``.
+        room: Holds the object's state as the robot knows it, and the desired acceleration of the object's
+            origin; receives the accelerations of the law, and what ``command`` tells.
 
     Returns:
         The states of object and robot on which the law acts, and by which the robot is ready.
     """
-    begin = k + team.first[2, k]
-    rows = cells.tables[cell, begin : begin + law.size]
-    jumps = memory.jumps[begin : begin + law.size] if memory.jumped[k] == cell else np.zeros(law.size)
+    begin, end = k + team.first[2, k], k + 1 + team.first[2, k + 1]
+    rows, law, seen, linear = (
+        cells.tables[cell, begin:end],
+        room.law[begin:end],
+        room.seen[0],
+        room.governed[2:],
+    )
+    jumps = memory.jumps[begin:end] if memory.jumped[k] == cell else room.none[begin:end]
     if not nominal.axis_gains.size:
         track_axes(rows, time, ON_TIME, jumps, seen, robot, law)
-        command(k, linear, law, seen, robot, team, memory, told)
+        command(k, linear, law, seen, robot, team, memory.efforts[0], room.told)
         return seen, robot
-    ring, mounting = memory.axes.shape[0], nominal.mountings[begin : begin + law.size]
-    now = memory.axes[sample % ring, :, begin : begin + law.size]
-    then = memory.axes[max(sample - departures.periods[0], 0) % ring, :2, begin : begin + law.size]
-    led, led_robot = _placed(now, mounting, seen, robot)
+    ring, mounting = memory.axes.shape[0], nominal.mountings[begin:end]
+    now = memory.axes[sample % ring, :, begin:end]
+    then = memory.axes[max(sample - departures.periods[0], 0) % ring, :2, begin:end]
+    led, led_robot = room.seen[1], room.robots[0, : robot.size]
+    _place(now, mounting, seen, robot, led, led_robot)
     track_axes(rows, time, ON_TIME, jumps, led, led_robot, law)
-    pulled, later = np.empty(law.size), np.empty((3, law.size))
+    pulled, later = room.pulled[begin:end], room.later[:, begin:end]
     gains, lag = nominal.axis_gains, nominal.axis_gains[2]
     pull_axes(law, seen, robot, then, (gains[0], gains[1]), pulled)
     carry_axes(now, law, 0.5 * departures.times[0] + lag, lag, later)
-    ahead, robot_ahead = _placed(later, mounting, seen, robot)
-    command(k, linear, pulled, ahead, robot_ahead, team, memory, told)
+    ahead, robot_ahead = room.seen[2], room.robots[1, : robot.size]
+    _place(later, mounting, seen, robot, ahead, robot_ahead)
+    command(k, linear, pulled, ahead, robot_ahead, team, memory.efforts[0], room.told)
     return led, led_robot
 
 
 @compiled
-def _placed(
-    axes: FloatArray, mounting: FloatArray, seen: FloatArray, robot: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the states of object and robot with the angles and rates of their nominal axes."""
-    led, led_robot = seen.copy(), robot.copy()
+def _place(
+    axes: FloatArray, mounting: FloatArray, seen: FloatArray, robot: FloatArray, led: FloatArray,
+    led_robot: FloatArray,
+) -> None:  # fmt: skip
+    """Write the states of object and robot with the angles and rates of their nominal axes."""
+    for i in range(6):
+        led[i] = seen[i]
+    for i in range(robot.size):
+        led_robot[i] = robot[i]
     led[2], led[5] = axes[0, 0], axes[1, 0]
     place_on_axes(axes, mounting, led_robot)
-    return led, led_robot
 
 
 @compiled

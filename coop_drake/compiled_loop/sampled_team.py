@@ -8,6 +8,7 @@ from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 from coop_drake.compiled import prepared
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal
 from coop_drake.compiled_loop.looping import update
+from coop_drake.compiled_loop.robots import robot_room
 from coop_drake.compiled_loop.telling import SHOWN, tell
 from coop_drake.laws.actuators import lag_behind
 from coop_drake.laws.sampling import period_of
@@ -64,7 +65,7 @@ class SampledTeam(Block):
         self._efforts = self._parts["efforts"][0]
         shown, bounds = np.empty((self._robots, SHOWN)), np.empty((2, self._axes))
         self._tell = prepared(tell, known, memory, 0, 0, NUMBER, VECTOR, shown, bounds)
-        self._update = prepared(update, known, memory, 0)
+        self._update = prepared(update, (*known, robot_room(memory)), memory, 0)
         self._follow = prepared(lag_behind, [lag], NUMBER, VECTOR, VECTOR, VECTOR)
         self._state = self.DeclareVectorInputPort("team_state", memory.state.size)
         start = np.concatenate([[0.0, 0.0], *(part.ravel() for part in kept.values())])

@@ -18,8 +18,9 @@ LOST_POSE, POSE_NOISE, STATE_NOISE = 1, 5, 6
 
 @compiled
 def measure(
-    sample: int, number: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory
-) -> None:
+    sample: int, number: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory,
+    room: FloatArray,
+) -> None:  # fmt: skip
     """Write what every robot's sensors measure at a sample, before delay and losses.
 
     Args:
@@ -28,6 +29,7 @@ def measure(
         team: The robots' models.
         departures: What departs.
         memory: What changes.
+        room: Room for the errors of a robot's state.
     """
     now = sample % memory.poses.shape[0]
     for k in range(team.yaws.size):
@@ -39,16 +41,20 @@ def measure(
         read_own(k, team.places, team.first, team.base_chains, team.yaws, memory.state, robot)
         for i in range(size, size + 3):
             robot[i] *= departures.odometry[k]
-        _err(departures.seeds[k, POSE_NOISE], number, departures.errors[:3], pose)
+        _err(departures.seeds[k, POSE_NOISE], number, departures.errors[:3], pose, room)
         begin = 3 + 2 * own
-        _err(departures.seeds[k, STATE_NOISE], number, departures.errors[begin : begin + robot.size], robot)
+        sizes = departures.errors[begin : begin + robot.size]
+        _err(departures.seeds[k, STATE_NOISE], number, sizes, robot, room)
 
 
 @compiled
-def _err(seed: int, sample: int, sizes: FloatArray, values: FloatArray) -> None:
+def _err(seed: int, sample: int, sizes: FloatArray, values: FloatArray, room: FloatArray) -> None:
     """Add the errors of a measurement, unless there are none."""
-    if sizes[:, :2].max() > 0.0:
-        errors = np.empty(values.size)
+    largest = 0.0
+    for i in range(values.size):
+        largest = max(largest, sizes[i, 0], sizes[i, 1])
+    if largest > 0.0:
+        errors = room[: values.size]
         write_errors(seed, sizes[:, 0], sizes[:, 1:], sample, errors)
         for i in range(values.size):
             values[i] += errors[i]
@@ -70,20 +76,32 @@ def receive(
         pose, robot = pose.copy(), robot.copy()
         for kind, values in ((0, pose), (1, robot)):
             if sample == 0:
-                for row in memory.lines[k, kind]:
-                    row[0], row[1 : 1 + values.size] = NOTHING, values
+                _fill(memory.lines[k, kind], values)
             _pass(departures.seeds[k, LOST_POSE + kind], number, departures, memory.lines[k, kind], values)
     return pose, robot
+
+
+@compiled
+def _fill(line: FloatArray, values: FloatArray) -> None:
+    """Let a line hold the first values that are measured."""
+    for row in range(line.shape[0]):
+        line[row, 0] = NOTHING
+        for i in range(values.size):
+            line[row, 1 + i] = values[i]
 
 
 @compiled
 def _pass(seed: int, number: int, departures: LoopDepartures, line: FloatArray, values: FloatArray) -> None:
     """Replace measured values by those that have arrived, and carry the line over a period."""
     measured, following = np.zeros(line.shape[1] - 1), np.empty(line.shape)
-    measured[: values.size] = values
+    for i in range(values.size):
+        measured[i] = values[i]
     chances = uniform_pair(seed, number)
     lost, late = chances[0] < departures.probabilities[0], chances[1] < departures.probabilities[1]
     if lost or late:
-        values[:] = line[0, 1 : 1 + values.size]
+        for i in range(values.size):
+            values[i] = line[0, 1 + i]
     carry_measurements(line, number, measured, lost, late, following)
-    line[:] = following
+    for row in range(line.shape[0]):
+        for i in range(line.shape[1]):
+            line[row, i] = following[row, i]

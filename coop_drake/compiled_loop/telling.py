@@ -7,7 +7,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal
 from coop_drake.compiled_loop.looping import compute
-from coop_drake.compiled_loop.robots import ACCELERATION, COMMAND, ENERGY, TOLD, heard_cell
+from coop_drake.compiled_loop.robots import ACCELERATION, COMMAND, ENERGY, heard_cell, robot_room
 from coop_drake.compiled_loop.sensing import measure
 from coop_drake.compiled_loop.watching import left_by_all
 from coop_drake.laws.axis_table import write_bounds
@@ -47,8 +47,9 @@ def tell(
     cell = int(current[0])
     arrived = cell + 1 == cells.rows.shape[0] and left_by_all(cell, memory)
     instant[0], instant[1], instant[2] = current[0], current[1], 1.0 if arrived else 0.0
-    measure(sample, number, team, departures, memory)
-    law, told, robot = np.empty(memory.jumps.size), np.empty(TOLD), np.empty(memory.state.size)
+    room, robot = robot_room(memory), np.empty(memory.state.size)
+    told = room.told
+    measure(sample, number, team, departures, memory, room.errors)
     led = memory.nominal[sample % memory.nominal.shape[0]]
     for k in range(robots):
         row, begin = shown[k], k + team.first[2, k]
@@ -57,10 +58,7 @@ def tell(
         read_own(k, team.places, team.first, team.base_chains, team.yaws, memory.state, robot)
         row[POSE : POSE + 3] = robot[:3]
         row[GOVERNOR : GOVERNOR + 2] = led[4:6] if nominal.flow.size else memory.governors[k]
-        compute(
-            k, sample, number, now, True, begin, cells, team, nominal, departures, memory, law[begin:end],
-            told,
-        )  # fmt: skip
+        compute(k, sample, number, now, True, cells, team, nominal, departures, room, memory)
         row[MARGIN] = told[ENERGY]
         if nominal.flow.size:
             edges = cells.governed[cells.first[0, heard] : cells.first[0, heard + 1]]

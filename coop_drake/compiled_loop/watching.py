@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from math import hypot, inf, isnan
+from typing import NamedTuple
 
 import numpy as np
 
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal, LoopPlant
+from coop_drake.compiled_loop.clearances import (
+    ROUNDING,
+    Clearances,
+    clearance_room,
+    smallest_apart,
+    smallest_to_walls,
+    travel,
+)
 from coop_drake.compiled_loop.robots import heard_cell
 from coop_drake.geometry.boundary import signed_distance
 from coop_drake.laws.axis_table import GOAL_LOWER, GOAL_UPPER, bounds_of
 from coop_drake.laws.readiness import interval_margin, position_arrival
-from coop_drake.simulation.step_kernels import team_distances
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
 
@@ -42,6 +50,30 @@ RUNS, ARRIVED, STALLED, LATE, OUT_OF_FUNNEL, OUT_OF_SLICE, OUT_OF_REGION, AT_WAL
 """How a run may have ended."""
 
 
+class WatchRoom(NamedTuple):
+    """What is remembered of a run to measure no distance in vain.
+
+    Attributes:
+        z: The configuration of now, shape (3 + n,) [m, rad].
+        region: The cell, the distance of the position to its boundary when that was measured last, and the
+            position then, shape (4,) [m].
+        clearances: Those of all bodies.
+    """
+
+    z: FloatArray
+    region: FloatArray
+    clearances: Clearances
+
+
+@compiled
+def watch_room(plant: LoopPlant) -> WatchRoom:
+    """Return room for a run that has not begun."""
+    region, n = np.empty(4), plant.tree.shape[0] + 2
+    for i in range(4):
+        region[i] = np.nan
+    return WatchRoom(np.empty(n), region, clearance_room(n, plant.shapes))
+
+
 @compiled
 def begin_figures() -> FloatArray:
     """Return the figures of a run that has not begun, shape (``FIGURES``,)."""
@@ -62,7 +94,7 @@ def end(figures: FloatArray, how: int, value: float, place: int = -1) -> None:
 @compiled
 def watch(
     sample: int, cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal,
-    departures: LoopDepartures, memory: LoopMemory, measured: FloatArray, figures: FloatArray,
+    departures: LoopDepartures, memory: LoopMemory, room: WatchRoom, figures: FloatArray,
 ) -> None:  # fmt: skip
     """Measure every margin before the updates of a sample, and end the run where there is a reason.
 
@@ -74,16 +106,16 @@ def watch(
         nominal: The nominal motions.
         departures: What departs.
         memory: What changes.
-        measured: What ``watch_distances`` remembers, shape (5 + n,).
+        room: What was measured last.
         figures: Receives the figures of the run.
     """
-    z, now = np.empty(memory.state.size // 2), sample % memory.current.shape[0]
+    z, now = room.z, sample % memory.current.shape[0]
     for i in range(z.size):
         z[i] = memory.state[team.places[0, i]]
     cell, time = int(memory.current[now, 0]), sample * departures.times[0] - memory.current[now, 1]
     figures[SAMPLES], figures[CELL] = sample, cell
-    _watch_cell(sample, cell, z, cells, plant, nominal, departures, memory, figures)
-    watch_distances(z, plant, measured, figures)
+    _watch_cell(sample, cell, cells, plant, nominal, departures, memory, room, figures)
+    watch_distances(z, plant, room.clearances, figures)
     if nominal.flow.size:
         led = memory.nominal[sample % memory.nominal.shape[0]]
         _use(hypot(z[0] - led[0], z[1] - led[1]) / nominal.position[2], figures)
@@ -98,13 +130,14 @@ def watch(
 
 @compiled
 def _watch_cell(
-    sample: int, cell: int, z: FloatArray, cells: LoopCells, plant: LoopPlant,
-    nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory, figures: FloatArray,
+    sample: int, cell: int, cells: LoopCells, plant: LoopPlant, nominal: LoopNominal,
+    departures: LoopDepartures, memory: LoopMemory, room: WatchRoom, figures: FloatArray,
 ) -> None:  # fmt: skip
     """Measure distances to funnels, slices and the cell's boundary, and end the run where one is negative.
 
     An axis uses the least distance to its funnel's bounds that the budget states over the one that it keeps.
     """
+    z = room.z
     for i in range(z.size - 2):
         now = sample * departures.times[0]
         heard, time = heard_cell(plant.axis_rows[1, i], sample, now, departures, memory)
@@ -120,40 +153,37 @@ def _watch_cell(
         margin = min(z[2 + i] - lower, upper - z[2 + i])
         if not margin > 0.0:
             end(figures, OUT_OF_SLICE, margin, i)
+    _watch_region(cell, z[0], z[1], cells, room.region, figures)
+
+
+@compiled
+def _watch_region(
+    cell: int, x: float, y: float, cells: LoopCells, last: FloatArray, figures: FloatArray
+) -> None:
+    """Measure the distance to the cell's boundary, unless the way since the last time is too short.
+
+    It then cannot have become the smallest one. ``last`` is the ``region`` of a ``WatchRoom``.
+    """
+    if last[0] == cell and last[1] - hypot(x - last[2], y - last[3]) > figures[REGION] + ROUNDING:
+        return
     edges = cells.regions[cells.first[1, cell] : cells.first[1, cell + 1]]
-    inside = signed_distance(edges, z[0], z[1])
+    inside = signed_distance(edges, x, y)
+    last[0], last[1], last[2], last[3] = cell, inside, x, y
     figures[REGION] = min(figures[REGION], inside)
     if not inside > 0.0:
         end(figures, OUT_OF_REGION, inside)
 
 
 @compiled
-def watch_distances(z: FloatArray, plant: LoopPlant, measured: FloatArray, figures: FloatArray) -> None:
-    """Measure clearances, unless the team has moved too little since the last time to be nearer than before.
-
-    No point of a body moves further than the position, plus what every angle and joint moves it at most.
-    Of two bodies, the motion of the object does not change the distance.
-
-    Args:
-        z: (x, y, theta, q), shape (3 + n,) [m, rad].
-        plant: The simulated team.
-        measured: Distances to walls and between bodies, then z, when they were measured last, shape (5 + n,);
-            the first one is NaN before.
-        figures: Receives the smallest distances.
-    """
-    between = 0.0
-    for i in range(1, plant.reach.size):
-        between += plant.reach[i] * abs(z[2 + i] - measured[4 + i])
-    moved = hypot(z[0] - measured[2], z[1] - measured[3]) + plant.reach[0] * abs(z[2] - measured[4]) + between
-    if measured[0] - moved > figures[WALL] and measured[1] - 2.0 * between > figures[BODY]:
-        return
-    wall, _, body, _ = team_distances(plant.shapes, plant.walls, z)
-    measured[0], measured[1], measured[2:] = wall, body, z
-    figures[WALL], figures[BODY] = min(figures[WALL], wall), min(figures[BODY], body)
-    if not wall > 0.0:
-        end(figures, AT_WALL, wall)
-    if not body > 0.0:
-        end(figures, AT_BODY, body)
+def watch_distances(z: FloatArray, plant: LoopPlant, last: Clearances, figures: FloatArray) -> None:
+    """Measure clearances, and end the run where one is not positive."""
+    travel(z, plant.reach, last)
+    figures[WALL] = smallest_to_walls(z, plant.shapes, plant.walls, last, figures[WALL])
+    figures[BODY] = smallest_apart(z, plant.shapes, last, figures[BODY])
+    if not figures[WALL] > 0.0:
+        end(figures, AT_WALL, figures[WALL])
+    if not figures[BODY] > 0.0:
+        end(figures, AT_BODY, figures[BODY])
 
 
 @compiled
@@ -168,8 +198,9 @@ def _watch_efforts(team: FusedTeam, memory: LoopMemory, figures: FloatArray) -> 
     """Measure the largest force of a base and the largest effort of a joint."""
     for k in range(team.yaws.size):
         own = 3 * k + team.first[2, k]
-        force = hypot(memory.efforts[1, own], memory.efforts[1, own + 1])
-        figures[FORCE] = max(figures[FORCE], force)
+        x, y = memory.efforts[1, own], memory.efforts[1, own + 1]
+        if abs(x) + abs(y) > figures[FORCE]:  # It is at least the force, and quicker to compute.
+            figures[FORCE] = max(figures[FORCE], hypot(x, y))
         for i in range(team.first[2, k + 1] - team.first[2, k]):
             figures[EFFORT] = max(figures[EFFORT], abs(memory.efforts[1, own + 3 + i]))
 

@@ -39,6 +39,13 @@ def move_chain(chain: FloatArray, state: FloatArray) -> FloatArray:
         row's joint slides, shape (links + 1, 12) [m, m/s, rad/s].
     """
     motion = np.empty((chain.shape[0], MOTION_COLUMNS))
+    write_motion(chain, state, motion)
+    return motion
+
+
+@compiled
+def write_motion(chain: FloatArray, state: FloatArray, motion: FloatArray) -> None:
+    """Write what ``move_chain`` returns, given the same arguments."""
     yaw = state[int(chain[0, POSITION]) + 2]
     motion[0, COS], motion[0, SIN] = np.cos(yaw), np.sin(yaw)
     motion[0, PX], motion[0, PY], motion[0, VX], motion[0, VY] = 0.0, 0.0, 0.0, 0.0
@@ -60,7 +67,6 @@ def move_chain(chain: FloatArray, state: FloatArray) -> FloatArray:
         else:
             motion[i, COS], motion[i, SIN] = rotated(c, s, np.cos(turn * q), np.sin(turn * q))
             motion[i, W] = w + turn * rate
-    return motion
 
 
 @compiled

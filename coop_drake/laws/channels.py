@@ -68,11 +68,21 @@ def carry_measurements(
     """
     rows = kept.shape[0]
     for i in range(rows - 1):
-        following[i] = kept[i + 1]
-    following[rows - 1] = NOTHING
+        _copy(kept[i + 1], following[i])
+    for i in range(following.shape[1]):
+        following[rows - 1, i] = NOTHING
     if late and not lost:
-        following[rows - 1, 0], following[rows - 1, 1:] = number, measured
+        following[rows - 1, 0] = number
+        _copy(measured, following[rows - 1, 1:])
     if following[0, 0] <= kept[0, 0]:
-        following[0] = kept[0]
+        _copy(kept[0], following[0])
     if not (lost or late) and number > following[0, 0]:
-        following[0, 0], following[0, 1:] = number, measured
+        following[0, 0] = number
+        _copy(measured, following[0, 1:])
+
+
+@compiled
+def _copy(values: FloatArray, place: FloatArray) -> None:
+    """Write values at a place; numba's own way also compiles a message for other shapes, which takes long."""
+    for i in range(place.size):
+        place[i] = values[i]

@@ -38,5 +38,6 @@ def write_errors(
     """
     write_normals(seed, number, errors)
     for i in range(errors.size):
-        wave = square_wave(number, waves[i, 0], waves[i, 1], waves[i, 2])
-        errors[i] = deviations[i] * errors[i] + wave
+        errors[i] *= deviations[i]
+        if waves[i, 0] != 0.0:
+            errors[i] += square_wave(number, waves[i, 0], waves[i, 1], waves[i, 2])

@@ -68,7 +68,8 @@ def write_normals(seed: int, number: int, normals: FloatArray) -> None:
         for k in range(2):
             length = sqrt(-2.0 * log(_UNIT * (words[2 * k] + 0.5)))
             angle = 2.0 * pi * _UNIT * words[2 * k + 1]
-            if i + 2 * k < normals.size:
-                normals[i + 2 * k] = length * cos(angle)
-            if i + 2 * k + 1 < normals.size:
-                normals[i + 2 * k + 1] = length * sin(angle)
+            first = i + 2 * k
+            if first + 1 < normals.size:  # Both, so that one function of the C library makes both.
+                normals[first], normals[first + 1] = length * cos(angle), length * sin(angle)
+            elif first < normals.size:
+                normals[first] = length * cos(angle)

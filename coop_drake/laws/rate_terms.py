@@ -92,7 +92,7 @@ def _write_coefficients(chain: FloatArray, joints: FloatArray, coefficients: Flo
     axes = joints.shape[1] + 1
     n = axes + 2
     state, efforts, own = np.zeros(2 * n), np.zeros(n), np.empty((axes, n))
-    both, work = np.empty(n), team_work(chain.shape[0])
+    both, work = np.empty(n), team_work(chain)
     for c in range(joints.shape[0]):
         state[3:n] = joints[c]
         for j in range(axes):

@@ -8,7 +8,6 @@ computes it.
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +22,7 @@ from coop_drake.laws.chain_motion import (
     DAMPING,
     INERTIA,
     MASS,
+    MOTION_COLUMNS,
     PARENT,
     PX,
     PY,
@@ -36,7 +36,7 @@ from coop_drake.laws.chain_motion import (
     X,
     Y,
     accelerate_chain,
-    move_chain,
+    write_motion,
 )
 from coop_drake.laws.load_sharing import rotated
 from coop_drake.tree.pose import FloatArray, IntArray
@@ -46,6 +46,9 @@ class TeamWork(NamedTuple):
     """Room for what ``team_accelerations`` computes on the way, given so that it need not be made each time.
 
     Attributes:
+        parents: For each of the 3 + n coordinates the one that moves it next before, -1 for the first. Rows
+            and columns of the mass matrix that have no such chain between them are zero, shape (3 + n,).
+        motion: Motion of every link, shape (1 + n, ``MOTION_COLUMNS``).
         inertias: Mass, first moments and inertia of every link and what it carries, shape (1 + n, 4).
         forces: What these need while no coordinate accelerates, shape (1 + n, 3).
         matrix: The mass matrix, shape (3 + n, 3 + n).
@@ -53,6 +56,8 @@ class TeamWork(NamedTuple):
         still: Accelerations of joints that are zero, shape (1 + n,).
     """
 
+    parents: IntArray
+    motion: FloatArray
     inertias: FloatArray
     forces: FloatArray
     matrix: FloatArray
@@ -61,11 +66,16 @@ class TeamWork(NamedTuple):
 
 
 @compiled
-def team_work(links: int) -> TeamWork:
-    """Return room for a tree of so many links, the object included."""
+def team_work(tree: FloatArray) -> TeamWork:
+    """Return room for a tree of the form that ``team_accelerations`` takes."""
+    links = tree.shape[0]
     size = links + 2
+    parents = np.arange(-1, size - 1)
+    for i in range(1, links):
+        parents[2 + i] = 2 + int(tree[i, PARENT])
+    motion, inertias, forces = np.empty((links, MOTION_COLUMNS)), np.empty((links, 4)), np.empty((links, 3))
     return TeamWork(
-        np.empty((links, 4)), np.empty((links, 3)), np.empty((size, size)), np.empty(size), np.zeros(links)
+        parents, motion, inertias, forces, np.empty((size, size)), np.empty(size), np.zeros(links)
     )
 
 
@@ -97,16 +107,10 @@ def team_accelerations(
         accelerations: Receives x'', y'', theta'' and those of the joints, each at the place of its rate,
             shape (3 + n,) [m/s^2 or rad/s^2].
     """
-    size, wanted, inertias, forces, matrix = (
-        tree.shape[0] + 2,
-        work.wanted,
-        work.inertias,
-        work.forces,
-        work.matrix,
-    )
-    motion = move_chain(tree, state)
+    size, wanted, motion, matrix = tree.shape[0] + 2, work.wanted, work.motion, work.matrix
+    inertias, forces = work.inertias, work.forces
+    write_motion(tree, state, motion)
     accelerate_chain(tree, state, work.still, motion)
-    matrix[:] = 0.0
     for i in range(tree.shape[0]):
         _write_inertia(tree[i], motion[i], gravity, inertias[i], forces[i])
     for k in range(pushed.size):
@@ -119,18 +123,21 @@ def team_accelerations(
         forces[pushed[k], 2] -= wrenches[k, 2] + rx * wrenches[k, 1] - ry * wrenches[k, 0]
     for i in range(tree.shape[0] - 1, 0, -1):
         p = int(tree[i, PARENT])
-        inertias[p] += inertias[i]
-        forces[p] += forces[i]
+        for j in range(4):
+            inertias[p, j] += inertias[i, j]
+        for j in range(3):
+            forces[p, j] += forces[i, j]
         sx, sy, w = _direction(tree[i], motion[i])
         at = int(tree[i, RATE])
         along = sx * forces[i, 0] + sy * forces[i, 1] + w * forces[i, 2]
         wanted[2 + i] = efforts[at - size] - tree[i, DAMPING] * state[at] - along
         _write_row(tree, motion, inertias[i], i, matrix)
-    m, mx, my, turning = inertias[0]
-    matrix[0, 0], matrix[1, 1], matrix[2, 0], matrix[2, 1], matrix[2, 2] = m, m, -my, mx, turning
+    m, mx, my, turning = inertias[0, 0], inertias[0, 1], inertias[0, 2], inertias[0, 3]
+    matrix[0, 0], matrix[1, 0], matrix[1, 1] = m, 0.0, m
+    matrix[2, 0], matrix[2, 1], matrix[2, 2] = -my, mx, turning
     for i in range(3):
         wanted[i] = -forces[0, i]
-    solve_symmetric(matrix, wanted)
+    solve_tree(work.parents, matrix, wanted)
     for i in range(3):
         accelerations[int(tree[0, RATE]) - size + i] = wanted[i]
     for i in range(1, tree.shape[0]):
@@ -176,24 +183,32 @@ def _write_row(tree: FloatArray, motion: FloatArray, inertia: FloatArray, i: int
 
 
 @compiled
-def solve_symmetric(matrix: FloatArray, vector: FloatArray) -> None:
-    """Replace a vector b by the solution x of A x = b, by Cholesky's factors of A.
+def solve_tree(parents: IntArray, matrix: FloatArray, vector: FloatArray) -> None:
+    """Replace a vector b by the solution x of A x = b, A being the mass matrix of a tree.
+
+    A = L^T D L with the unit lower triangular L and the diagonal D. L is zero where A is, so that only the
+    chain of coordinates before each one counts (Featherstone, 2008, "Rigid Body Dynamics Algorithms", 6.4).
 
     Args:
-        matrix: A, positive definite, of which the part above the diagonal is not read; overwritten, (n, n).
+        parents: See ``TeamWork``, shape (n,).
+        matrix: A, positive definite; only entries in a row of its coordinate's chain are read, and
+            overwritten, shape (n, n).
         vector: b, shape (n,); receives x.
     """
-    n = vector.size
-    for i in range(n):
-        for j in range(i + 1):
-            rest = matrix[i, j]
-            for k in range(j):
-                rest -= matrix[i, k] * matrix[j, k]
-            matrix[i, j] = sqrt(rest) if i == j else rest / matrix[j, j]
-        for k in range(i):
-            vector[i] -= matrix[i, k] * vector[k]
-        vector[i] /= matrix[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            vector[i] -= matrix[k, i] * vector[k]
-        vector[i] /= matrix[i, i]
+    for k in range(vector.size - 1, -1, -1):
+        inverse = 1.0 / matrix[k, k]
+        i = parents[k]
+        while i >= 0:
+            factor, j = matrix[k, i] * inverse, i
+            while j >= 0:
+                matrix[i, j] -= factor * matrix[k, j]
+                j = parents[j]
+            matrix[k, i] = factor
+            vector[i] -= factor * vector[k]
+            i = parents[i]
+        vector[k] *= inverse
+    for k in range(vector.size):
+        i = parents[k]
+        while i >= 0:
+            vector[k] -= matrix[k, i] * vector[i]
+            i = parents[i]

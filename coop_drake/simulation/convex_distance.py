@@ -28,24 +28,34 @@ def nearest_to_walls(
     """
     nearest, which = inf, 0
     for i in range(len(team.pieces)):
-        x, y, reach, radius = discs[i, 0], discs[i, 1], discs[i, 2], team.radii[i]
-        first, last = team.pieces[i, 1], team.pieces[i, 2]
-        middle = signed_distance(walls, x, y)
-        if middle - reach >= nearest:
-            continue
-        # A piece that meets no wall is on the same side of all walls as the middle of its disc.
-        squared, outside = inf, middle < 0.0
-        for w in range(len(walls)):
-            x0, y0, x1, y1 = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
-            if squared_distance(x, y, x0, y0, x1, y1) <= (reach + sqrt(squared)) ** 2:
-                outside = outside or meets_ring(vertices, first, last, x0, y0, x1, y1)
-                squared = squared_ring_distance(vertices, first, last, x0, y0, x1, y1, squared)
-        distance = sqrt(squared)
-        if outside:
-            distance = -_depth_beyond(vertices, first, last, walls)
-        if distance - radius < nearest:
-            nearest, which = distance - radius, i
+        distance = piece_to_walls(team, vertices, discs, walls, i, nearest)
+        if distance < nearest:
+            nearest, which = distance, i
     return nearest, which
+
+
+@compiled
+def piece_to_walls(
+    team: TeamArrays, vertices: FloatArray, discs: FloatArray, walls: FloatArray, i: int, bound: float
+) -> float:
+    """Return the signed distance of piece i to the walls, or less if that is not below a bound [m].
+
+    The other arguments are those of ``nearest_to_walls``.
+    """
+    x, y, reach = discs[i, 0], discs[i, 1], discs[i, 2]
+    first, last = team.pieces[i, 1], team.pieces[i, 2]
+    middle = signed_distance(walls, x, y)
+    if middle - reach >= bound:
+        return middle - reach
+    # A piece that meets no wall is on the same side of all walls as the middle of its disc.
+    squared, outside = inf, middle < 0.0
+    for w in range(len(walls)):
+        x0, y0, x1, y1 = walls[w, 0], walls[w, 1], walls[w, 2], walls[w, 3]
+        if squared_distance(x, y, x0, y0, x1, y1) <= (reach + sqrt(squared)) ** 2:
+            outside = outside or meets_ring(vertices, first, last, x0, y0, x1, y1)
+            squared = squared_ring_distance(vertices, first, last, x0, y0, x1, y1, squared)
+    distance = -_depth_beyond(vertices, first, last, walls) if outside else sqrt(squared)
+    return distance - team.radii[i]
 
 
 @compiled
@@ -69,14 +79,20 @@ def nearest_pair(team: TeamArrays, vertices: FloatArray, discs: FloatArray) -> t
     """
     nearest, which = inf, 0
     for k in range(len(team.pairs)):
-        i, j = team.pairs[k, 0], team.pairs[k, 1]
-        apart = hypot(discs[i, 0] - discs[j, 0], discs[i, 1] - discs[j, 1]) - discs[i, 2] - discs[j, 2]
-        if apart >= nearest:
-            continue
-        distance = _between(vertices, team.pieces[i], team.pieces[j]) - team.radii[i] - team.radii[j]
+        distance = pair_apart(team, vertices, discs, k, nearest)
         if distance < nearest:
             nearest, which = distance, k
     return nearest, which
+
+
+@compiled
+def pair_apart(team: TeamArrays, vertices: FloatArray, discs: FloatArray, k: int, bound: float) -> float:
+    """Return the signed distance of pair k, or less if that is not below a bound [m]."""
+    i, j = team.pairs[k, 0], team.pairs[k, 1]
+    apart = hypot(discs[i, 0] - discs[j, 0], discs[i, 1] - discs[j, 1]) - discs[i, 2] - discs[j, 2]
+    if apart >= bound:
+        return apart
+    return _between(vertices, team.pieces[i], team.pieces[j]) - team.radii[i] - team.radii[j]
 
 
 @compiled

@@ -22,8 +22,17 @@ def team_distances(team: TeamArrays, walls: FloatArray, z: FloatArray) -> tuple[
         walls: Edges (x0, y0, x1, y1) of the floor's rings, shape (E, 4) [m].
         z: (x, y, theta, q...), shape (3 + n,) [m, rad].
     """
-    poses = place(team, z)
     vertices, discs = np.empty(team.vertices.shape), np.empty(team.discs.shape)
+    place_pieces(team, z, vertices, discs)
+    wall, piece = nearest_to_walls(team, vertices, discs, walls)
+    between, pair = nearest_pair(team, vertices, discs)
+    return wall, piece, between, pair
+
+
+@compiled
+def place_pieces(team: TeamArrays, z: FloatArray, vertices: FloatArray, discs: FloatArray) -> None:
+    """Write where vertices and discs of all pieces are in W, as ``nearest_to_walls`` takes them."""
+    poses = place(team, z)
     for i in range(len(team.pieces)):
         c = team.pieces[i, 0]
         x, y, cosine, sine = poses[c, 0], poses[c, 1], poses[c, 2], poses[c, 3]
@@ -32,9 +41,6 @@ def team_distances(team: TeamArrays, walls: FloatArray, z: FloatArray) -> tuple[
         for k in range(team.pieces[i, 1], team.pieces[i, 2]):
             u, v = team.vertices[k, 0], team.vertices[k, 1]
             vertices[k, 0], vertices[k, 1] = moved(x, y, cosine, sine, u, v)
-    wall, piece = nearest_to_walls(team, vertices, discs, walls)
-    between, pair = nearest_pair(team, vertices, discs)
-    return wall, piece, between, pair
 
 
 @compiled

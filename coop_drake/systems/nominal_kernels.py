@@ -33,8 +33,13 @@ def nominal_room(edges: FloatArray, stiffness: float, nominal: FloatArray, gover
         nominal: p^ and p^', shape (4,) or longer.
         governor: p_G, shape (2,) [m].
     """
+    return _room_at(signed_distance(edges, governor[0], governor[1]), stiffness, nominal, governor)
+
+
+@compiled
+def _room_at(distance: float, stiffness: float, nominal: FloatArray, governor: FloatArray) -> float:
+    """Return ``nominal_room`` where the distance of p_G to the region's boundary is known."""
     x, y = nominal[0] - governor[0], nominal[1] - governor[1]
-    distance = signed_distance(edges, governor[0], governor[1])
     return distance - excursion(x, y, nominal[2], nominal[3], stiffness)
 
 
@@ -47,8 +52,14 @@ def nominal_margin(edges: FloatArray, stiffness: float, state: FloatArray) -> fl
         stiffness: K [1/s^2].
         state: p^, p^' and p_G, shape (6,).
     """
+    return _margin_at(signed_distance(edges, state[4], state[5]), stiffness, state)
+
+
+@compiled
+def _margin_at(distance: float, stiffness: float, state: FloatArray) -> float:
+    """Return ``nominal_margin`` where the distance of p_G to the region's boundary is known."""
     energy = tracking_energy(state[0] - state[4], state[1] - state[5], state[2], state[3], stiffness)
-    return energy_margin(energy, signed_distance(edges, state[4], state[5]), stiffness)
+    return energy_margin(energy, distance, stiffness)
 
 
 @compiled
@@ -75,11 +86,12 @@ def step_nominal(
         following[i] = governor + flow[0, 0] * off + flow[0, 1] * rate
         following[2 + i] = flow[1, 0] * off + flow[1, 1] * rate
         following[4 + i] = governor
-    room = nominal_room(edges, row[STIFFNESS], state, state[4:])
+    stiffness, distance = row[STIFFNESS], signed_distance(edges, state[4], state[5])
+    room = _room_at(distance, stiffness, state, state[4:])
     if room > 0.0:
         vx, vy = velocity_in_field(flat, field, state[4], state[5])
-        margin = nominal_margin(edges, row[STIFFNESS], state)
-        vx, vy = governor_velocity(vx, vy, margin, row[STIFFNESS], row[GOVERNOR_GAIN], row[SMOOTHING])
+        margin = _margin_at(distance, stiffness, state)
+        vx, vy = governor_velocity(vx, vy, margin, stiffness, row[GOVERNOR_GAIN], row[SMOOTHING])
         dx, dy = limited_step(pace * vx, pace * vy, period, speed, room)
         following[4] += dx
         following[5] += dy
@@ -128,7 +140,8 @@ def show_nominal(
         state: p^, p^' and p_G, shape (6,).
         shown: Receives the numbers, shape (6,).
     """
-    shown[:4] = state[:4]
+    for i in range(4):
+        shown[i] = state[i]
     shown[4] = nominal_margin(edges, stiffness, state)
     distance = np.hypot(state[4] - target[0], state[5] - target[1])
     shown[5] = reach_of(distance, period, periods, speed)

@@ -1,14 +1,18 @@
 """A campaign whose runs are made by both loops."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import pytest
 
 from coop_drake.campaign.plans import Plans
+from coop_drake.campaign.records import RunRecord
 from coop_drake.campaign.running.making import RunMaker
 from coop_drake.campaign.settings import load_campaign
 from coop_drake.campaign.variation import Variation
+from coop_drake.cli.campaign_replay import _compare, _show_both
+from coop_drake.cli.reporter import Reporter
 from coop_drake.compiled_loop import preparing
+from coop_drake.errors import ProcessError
 
 FILE = """
 runs:
@@ -59,3 +63,15 @@ def test_fused_blocks_leave_the_same_record_where_they_know_the_run(tmp_path):
     assert named["arrived"]
     assert held["arrived"]
     assert [fused[name] for name in names] == pytest.approx([named[name] for name in names], abs=1e-9)
+
+
+def test_a_replay_shows_both_tiers_and_refuses_another_run():
+    counted = RunRecord(3, "warehouse", "compiled", 7, "{}", arrived=True, time=10.0, steps=2000)
+    drake, reporter = replace(counted, tier="drake", time=10.005), Reporter(machine=True, quiet=True)
+    _show_both(drake, counted, reporter)
+    assert reporter.facts["tiers"]["time"] == [10.005, 10.0]
+    assert reporter.facts["tiers"]["budget_share"] == [None, None]
+    _compare(counted, asdict(counted), reporter)
+    assert reporter.facts["counted"]
+    with pytest.raises(ProcessError, match=r"run 3 of the compiled loop differs .* in steps"):
+        _compare(replace(counted, steps=1999), asdict(counted), reporter)

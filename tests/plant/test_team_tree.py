@@ -7,7 +7,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.laws.chain_motion import DAMPING
-from coop_drake.laws.team_dynamics import solve_symmetric, team_accelerations, team_work
+from coop_drake.laws.team_dynamics import solve_tree, team_accelerations, team_work
 from coop_drake.plant import build_team_plant, read_component_tree, read_team_tree
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
 
@@ -38,7 +38,7 @@ def test_the_team_accelerates_as_in_drake(tmp_path):
     tree.tree[1:, DAMPING] = 0.7
     for joint in team.joints:
         joint.SetDampingVector(context, [0.7])
-    size, work = plant.num_velocities(), team_work(len(tree.tree))
+    size, work = plant.num_velocities(), team_work(tree.tree)
     for _ in range(20):
         state, wrenches = generator.normal(size=2 * size), generator.normal(size=(len(ARMS) + 1, 3))
         state[team.position_index[3:]] *= 0.1  # nothing touches, and no joint is at its limit
@@ -54,11 +54,15 @@ def test_the_team_accelerates_as_in_drake(tmp_path):
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("size", [1, 2, 7])
-def test_positive_definite_systems_are_solved(size):
-    generator = np.random.default_rng(size)
-    root, right = generator.normal(size=(size, size)), generator.normal(size=size)
-    matrix = root @ root.T + 0.1 * np.eye(size)
-    solution, lower = right.copy(), np.tril(matrix)
-    solve_symmetric(lower, solution)
+@pytest.mark.parametrize("parents", [[-1], [-1, 0], [-1, 0, 1, 2, 3, 2, 5], [-1, 0, 0, 1, 1, 3]])
+def test_positive_definite_systems_of_trees_are_solved(parents):
+    generator, size = np.random.default_rng(len(parents)), len(parents)
+    lower, right = np.diag(generator.uniform(0.5, 2.0, size)), generator.normal(size=size)
+    for k in range(size):
+        i = parents[k]
+        while i >= 0:
+            lower[k, i], i = generator.normal(), parents[i]
+    matrix, solution = lower.T @ lower, right.copy()
+    read = np.where(np.tril(matrix) == 0.0, np.nan, np.tril(matrix))  # What is zero is not read.
+    solve_tree(np.array(parents), read, solution)
     np.testing.assert_allclose(matrix @ solution, right, atol=1e-9)
