@@ -28,7 +28,7 @@ _REASSOCIATED = {"contract", "reassoc"}
 """LLVM's flags for sums in any order: vector units are used; NaN and infinity keep their meaning."""
 
 
-_MAKERS = "compiled", "kernel_compiler", "kernel_kinds", "kernel_libraries", "machine_code"
+_MAKERS = "compiled", "kernel_compiler", "kernel_kinds", "machine_code"
 """Files of this package on whose text all machine code depends."""
 
 

@@ -18,8 +18,6 @@ from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
 from numba.core.typed_passes import NativeLowering
 
-from coop_drake.kernel_libraries import parts, whole_library
-
 _VIEWS = "getattr", "getitem", "static_getitem"
 """Operations of numba's intermediate code that give a part or a view of an array or a tuple."""
 
@@ -28,7 +26,7 @@ class NumbaFunction:
     """A function as numba knows it: one version for Python, one for compiled functions.
 
     Most functions are called from compiled ones only. Then the wrapper that unpacks Python's arguments, a
-    sixth of the time to compile, is left out, and no machine code is made of the function alone.
+    sixth of the time to compile, is left out.
 
     Args:
         function: The function.
@@ -50,7 +48,6 @@ class NumbaFunction:
 
     def call(self, arguments: Sequence[object]) -> object:
         """Call it with arguments of any types that numba knows."""
-        self._compile(arguments)
         return self._outer(*arguments)
 
     def entry(
@@ -65,17 +62,10 @@ class NumbaFunction:
         Returns:
             The function for just these types; and what numba keeps of it, None if it keeps nothing.
         """
-        with event.install_listener("numba:compile", _Announcer(compiling)):
-            signature = self._compile(arguments)
-        return self._outer.overloads[signature].entry_point, self._outer._cache.kept
-
-    def _compile(self, arguments: Sequence[object]) -> tuple[types.Type, ...]:
-        """Compile it for the types of some arguments unless that was done, and return them."""
         signature = tuple(map(self._outer.typeof_pyval, arguments))
-        if signature not in self._outer.overloads:
-            with parts():
-                self._outer.compile(signature)
-        return signature
+        with event.install_listener("numba:compile", _Announcer(compiling)):
+            self._outer.compile(signature)
+        return self._outer.overloads[signature].entry_point, self._outer._cache.kept
 
 
 class _Compiler(CompilerBase):  # type: ignore[misc]
@@ -120,12 +110,6 @@ class _Lower(Lower):  # type: ignore[misc]
 class _Lowering(NativeLowering):  # type: ignore[misc]
     _name = "lowering_without_counts_of_arguments"
     lowering_class = _Lower
-
-    def run_pass(self, state: Any) -> bool:
-        if not state.flags.no_cpython_wrapper:  # Python calls it.
-            state.library = whole_library(state.targetctx.codegen(), state.func_id.func_qualname)
-        done: bool = super().run_pass(state)
-        return done
 
 
 def _held_by_caller(function: Any, kinds: Mapping[str, types.Type]) -> set[str]:
