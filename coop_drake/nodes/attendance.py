@@ -11,8 +11,11 @@ from coop_drake.messages import SUPERVISOR, name_of
 from coop_drake.nodes.states import ASKS, OUTSIDE, STANDS
 
 TOLERATED = 0.02
-"""How long drives hold the last effort of a robot that gives no other [s]: shipped transports lose nothing
-by it."""
+"""How long drives hold the last effort of a robot that gives no other, where the plan has no budget [s]:
+shipped transports lose nothing by it."""
+
+_ROUNDING = 1e-6
+"""Differences of times that are no difference [s]."""
 
 PATIENT_AT_REST = 0.5
 """A robot that rests where it cannot begin its cell anew says so for this long before the run ends [s]:
@@ -39,11 +42,12 @@ class Stop:
 class Attendance:
     """Keeps who is missing, since when, and whether the drives brake.
 
-    The drives of a robot without answers hold its last effort for ``TOLERATED``. Then they open the line of
-    the emergency stop, which is common to all drives, and all robots brake. The line is closed at a sample in
-    which all robots follow the plan again.
+    The drives of a robot without answers hold its last effort for as long as is tolerated. Then they open the
+    line of the emergency stop, which is common to all drives, and all robots brake. The line is closed at a
+    sample in which all robots follow the plan again.
 
     Args:
+        tolerated: How long that is [s].
         rejoin: How long a team at rest waits for who is missing [s], by the wall clock.
         gone: Returns the processes that are known to have ended.
         revive: Starts a process again that has ended; returns whether it did.
@@ -59,6 +63,7 @@ class Attendance:
     def __init__(
         self,
         *,
+        tolerated: float = TOLERATED,
         rejoin: float,
         gone: Callable[[], Collection[int]],
         revive: Callable[[int], bool],
@@ -66,6 +71,7 @@ class Attendance:
     ) -> None:
         self.missing, self.stops, self.stopped = dict[int, float](), list[Stop](), False
         self.trouble, self.revived = "", list[int]()
+        self.tolerated = tolerated
         self._rejoin, self._gone, self._revive, self._tell = rejoin, gone, revive, tell
         self._deadline: float | None = None
         self._rests: float | None = None
@@ -73,6 +79,10 @@ class Attendance:
     def ended(self, index: int) -> bool:
         """Whether a process is known to have ended."""
         return index in self._gone()
+
+    def too_long(self, since: float, time: float) -> bool:
+        """Whether an effort was held from one time to another for longer than is tolerated [s]."""
+        return time - since > self.tolerated + _ROUNDING
 
     def lose(self, since: Mapping[int, float]) -> None:
         """Go on without processes from the last instants that they have answered [s]."""
@@ -94,7 +104,7 @@ class Attendance:
             states: States of the robots that have answered, see ``messages.Effort``.
             rests: Whether the team rests.
         """
-        late = [k for k, since in self.missing.items() if k != SUPERVISOR and time - since > TOLERATED]
+        late = [k for k, since in self.missing.items() if k != SUPERVISOR and self.too_long(since, time)]
         waiting = [k for k, state in states.items() if state in (STANDS, ASKS)]
         if not self.stopped and (late or waiting):
             names = ", ".join(name_of(k) for k in sorted(late or waiting))

@@ -55,6 +55,7 @@ class SampleExchange:
         robots: Number of robots N.
         links: Period of the samples, and faults of the robots' clocks.
         pacing: Keeps the pace of the wall clock; None for lock-step, in which every sample waits.
+        tolerated: How long drives hold the last effort of a robot that gives no other [s].
         gone: Returns the processes that are known to have ended.
         revive: Starts a process again that has ended; returns whether it did.
         patience: How long a process may take for an answer in lock-step [s].
@@ -75,6 +76,7 @@ class SampleExchange:
         links: Links,
         *,
         pacing: Pacing | None = None,
+        tolerated: float = TOLERATED,
         gone: Callable[[], Collection[int]] = tuple,
         revive: Callable[[int], bool] = lambda index: False,
         patience: float = PATIENCE,
@@ -85,7 +87,7 @@ class SampleExchange:
         self._end, self._patience, self._before, self._pacing = end, patience, before, pacing
         self._everyone, self._period = [*range(robots), SUPERVISOR], links.period
         self._clock = links.faults.clock
-        self.attendance = Attendance(rejoin=rejoin, gone=gone, revive=revive, tell=tell)
+        self.attendance = Attendance(tolerated=tolerated, rejoin=rejoin, gone=gone, revive=revive, tell=tell)
         self.damping: Sequence[FloatArray] = ()
         self.sample, self._still = 0, Stillness(links.period)
         self._last: dict[tuple[int, type], Any] = {}
@@ -94,8 +96,7 @@ class SampleExchange:
         self._asked: dict[int, tuple[float, float]] = {}
         self._sizes: list[int] = []
         self._answered, self._ages = dict[int, float](), dict[int, float]()
-        self._sampled = -1
-        self._expected, self._unheard = dict[int, int](), set[int]()
+        self._sampled, self._expected, self._unheard = -1, dict[int, int](), set[int]()
 
     @property
     def missing(self) -> dict[int, float]:
@@ -220,17 +221,16 @@ class SampleExchange:
                 waiting = {(index, wanted) for index, wanted in waiting if index not in gone}
         late = {index for index, _ in waiting}
         if not waits_for_all:
-            bound = TOLERATED if self._pacing else -1.0
-            self._lose(k for k in late if k not in self.missing and time - self._since(k, time) > bound)
+            self._lose(self._quiet(late, time) if self._pacing else late - self.missing.keys())
             if step:
-                self._miss(time, {*asked} - late)
+                self._unheard |= (quiet := self._quiet({*asked} - late, time))  # Who is there, but not heard.
+                self._lose(quiet)
         return late
 
-    def _miss(self, time: float, indices: Collection[int]) -> None:
-        """Go on without processes that are there, but of which nothing has come for too long."""
-        quiet = {k for k in indices if k not in self.missing and time - self._since(k, time) > TOLERATED}
-        self._unheard |= quiet
-        self._lose(quiet)
+    def _quiet(self, indices: set[int], time: float) -> set[int]:
+        """Return those that are not missing yet, and whose last efforts were held for too long."""
+        late = self.attendance.too_long
+        return {k for k in indices - self.missing.keys() if late(self._since(k, time), time)}
 
     def _limit(self) -> float:
         """How long answers are waited for [s]: long before anything moves, longer while the drives brake."""

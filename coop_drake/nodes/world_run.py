@@ -6,6 +6,7 @@ import time as clocks
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
+from coop_drake.answers.budget import Budget
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram import build_world, control_period
@@ -15,6 +16,7 @@ from coop_drake.laws.braking import braking_damping
 from coop_drake.messages import AddressBook, Goodbye, KeyPair, WorldEnd, local_book, name_of
 from coop_drake.messages.faults import NO_FAULTS, Faults
 from coop_drake.messages.outgoing import Links
+from coop_drake.nodes.attendance import TOLERATED
 from coop_drake.nodes.pacing import Pacing
 from coop_drake.nodes.processes import LocalTeam, question_of, robots_of
 from coop_drake.nodes.sample_exchange import PATIENCE, SampleExchange
@@ -22,7 +24,7 @@ from coop_drake.nodes.serving import TURN
 from coop_drake.nodes.states import REJOIN, RESTARTS
 from coop_drake.plant.team import base_inertia
 from coop_drake.progress import Progress
-from coop_drake.scenario import Scenario
+from coop_drake.scenario import Deployment, Scenario
 from coop_drake.simulation import Sample, run_loop
 
 ARRIVED, FAILED, INTERRUPTED = range(3)
@@ -89,6 +91,7 @@ def run_world(
         len(book.robots),
         links,
         pacing=pacing,
+        tolerated=tolerated_age(scenario.deployment, plan.budget),
         gone=gone,
         patience=patience,
         rejoin=rejoin,
@@ -174,3 +177,12 @@ def wall_clock(scenario: Scenario) -> Pacing:
     these have no delay, one control period old.
     """
     return Pacing(max(scenario.deployment.whole_delay, control_period(scenario)))
+
+
+def tolerated_age(deployment: Deployment, budget: Budget | None) -> float:
+    """Return how long drives hold the last effort of a robot that gives no other, before all brake [s].
+
+    Under a budget this is what its delay leaves beside that of measurements: a plan promises nothing where
+    efforts rest on older ones.
+    """
+    return TOLERATED if budget is None else max(0.0, budget.delay - deployment.whole_delay)

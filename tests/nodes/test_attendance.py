@@ -2,18 +2,22 @@
 
 import pytest
 
+from coop_drake.answers.budget import Budget
 from coop_drake.messages import SUPERVISOR
 from coop_drake.nodes.attendance import Attendance
 from coop_drake.nodes.states import FOLLOWS, OUTSIDE, STANDS
+from coop_drake.nodes.world_run import tolerated_age
+from coop_drake.scenario import Deployment
+from coop_drake.scenario.deployment import Measurements
 
 
 class Book:
     """An attendance, with who has ended, what was revived and what was told."""
 
-    def __init__(self, *, rejoin=60.0, restarts=0):
+    def __init__(self, *, restarts=0, rejoin=60.0, **options):
         self.ended, self.told, self.restarts = set(), [], restarts
         self.attendance = Attendance(
-            rejoin=rejoin, gone=lambda: self.ended, revive=self.revive, tell=self.told.append
+            rejoin=rejoin, **options, gone=lambda: self.ended, revive=self.revive, tell=self.told.append
         )
 
     def revive(self, index):
@@ -39,6 +43,21 @@ def test_the_drives_brake_once_a_robot_is_missing_for_longer_than_is_tolerated()
         {"cause": "robot 1", "since": 0.42, "rested": 0.9, "resumed": 1.1}
     ]
     assert book.told[1:] == ["robot 1 is there again", "the team goes on at t = 1.1 s"]
+
+
+def test_where_nothing_is_tolerated_the_drives_brake_at_the_first_sample_without_an_answer():
+    book = Book(tolerated=0.0)
+    assert not book.attendance.too_long(0.3, 0.1 + 0.2)
+    book.attendance.lose({1: 0.395})
+    book.attendance.see(0.4, {0: FOLLOWS}, rests=False)
+    assert book.attendance.stopped
+
+
+@pytest.mark.parametrize(("planned", "tolerated"), [(None, 0.02), (0.01, 0.0), (0.025, 0.015), (0.005, 0.0)])
+def test_a_budget_tolerates_what_its_delay_leaves_beside_that_of_measurements(planned, tolerated):
+    deployment = Deployment(control_rate=200.0, measurements=Measurements(delay=0.01))
+    found = tolerated_age(deployment, None if planned is None else Budget(delay=planned))
+    assert found == pytest.approx(tolerated)
 
 
 def test_without_the_supervisor_the_drives_do_not_brake():
