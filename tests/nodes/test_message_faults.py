@@ -17,7 +17,7 @@ BAD = ChannelFaults(loss=0.2, repeat=0.2, late=0.2, late_by=0.03)
 POOR = ChannelFaults(loss=0.02, repeat=0.05, late=0.03, late_by=0.02)
 CASES = {
     "the team's messages": ("three", Faults(seed=1, team=BAD), 0),
-    "measurements and efforts": ("base", Faults(seed=4, sensors=POOR, efforts=POOR), 2),
+    "measurements and efforts": ("base", Faults(seed=4, sensors=POOR, efforts=POOR), 0),
     "no messages of the team for a while": ("base", Faults(team=ChannelFaults(gaps=(AWAY,))), 0),
     "the world's stream is interrupted": ("base", Faults(sensors=ChannelFaults(gaps=(AWAY,))), 1),
     "one robot's efforts are interrupted": (

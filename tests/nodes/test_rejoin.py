@@ -67,7 +67,7 @@ def test_a_robot_that_is_killed_and_started_again_rejoins_and_the_team_arrives()
     assert nothing_touched(log)
     assert facts["restarts"] == {"robot 1": 1}
     (stop,) = facts["stops"]
-    assert (stop["cause"], stop["since"]) == ("robot 1", pytest.approx(0.41))
+    assert (stop["cause"], stop["since"]) == ("robot 1", pytest.approx(0.42))
     assert stop["since"] < stop["rested"] < stop["resumed"] < log.times[-1]
     assert told[0] == "robot 1 has not answered since t = 0.39 s; it is started again"
     waits = (log.times > stop["rested"]) & (log.times < stop["resumed"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapely import Polygon, box, union_all
 
-from coop_drake.answers.plan import Undecided
+from coop_drake.answers.plan import BeyondLimits
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
 from coop_drake.laws import ScheduledGains
 from coop_drake.planning.boxes.channel import Channel
@@ -14,7 +14,7 @@ from coop_drake.planning.planner import plan
 from coop_drake.planning.search.search import find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import PlanarPose
-from coop_drake.verification import verify_proof
+from coop_drake.verification import verify_plan, verify_proof
 from tests.support.cases import disc, rectangle
 from tests.support.soundness import assert_channel_is_sound
 
@@ -106,13 +106,16 @@ def test_an_odd_floor_without_a_way_is_refuted(name: str) -> None:
 
 
 def test_a_corridor_a_millimetre_wider_than_a_disc_is_called_too_narrow() -> None:
-    """The centre of the disc may pass, but a governor would need hours."""
+    """The centre of the disc may pass, but a governor would need half an hour for the corridor."""
     rooms = [box(0, 0, 2, 2), box(1.9, 0.7, 4.1, 1.301), box(4, 0, 6, 2)]
     problem = question(union_all(rooms), (1.0, 1.0, 0.0), (5.0, 1.0, 0.5), alone(disc(0.3)))
     answer = plan(problem, ScheduledGains(), gain_set_name="scheduled")
-    assert isinstance(answer, Undecided)
-    assert "a free path exists, but a plan along it cannot be executed" in answer.reason
-    assert "expected at least 2 mm" in answer.reason
+    assert isinstance(answer, BeyondLimits)
+    narrow, slow = answer.plan.refused_by
+    assert (narrow.limit, slow.limit) == ("planner.min_clearance", "planner.max_transition_time")
+    assert narrow.value < 0.0006  # There is half a millimetre on either side.
+    assert slow.value > 600.0
+    verify_plan(answer.plan, problem, {"scheduled": ScheduledGains()})
 
 
 def test_a_floor_that_crosses_itself_is_left_undecided() -> None:

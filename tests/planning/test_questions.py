@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shapely import box
 
-from coop_drake.answers.plan import Found, Undecided
+from coop_drake.answers.plan import BeyondLimits, Found
 from coop_drake.answers.problem import LIMIT_ROOM, PlanningProblem
 from coop_drake.errors import PlanError
 from coop_drake.laws import ScheduledGains
@@ -135,12 +135,15 @@ def test_a_transport_is_planned_and_verified_in_any_unit(scale: float) -> None:
     verify_plan(found.plan, problem, {"scheduled": ScheduledGains()})
 
 
-def test_a_stall_in_another_unit_says_so() -> None:
+def test_a_limit_refuses_a_plan_at_another_scale_too() -> None:
     problem = Similarity(scale=64.0).question(reaching(0.3, (-0.5, 0.5)))
     hurried = replace(problem.settings, max_transition_time=1.0)
     answer = plan(replace(problem, settings=hurried), ScheduledGains(), gain_set_name="scheduled")
-    assert isinstance(answer, Undecided)
-    assert answer.reason.endswith("at most 1 s (these lengths are to be multiplied by 64)")
+    assert isinstance(answer, BeyondLimits)
+    (refusal,) = answer.plan.refused_by
+    assert (refusal.limit, refusal.allowed) == ("planner.max_transition_time", 1.0)
+    assert refusal.value == pytest.approx(max(t.estimated_time for t in answer.plan.transitions))
+    assert 1.0 < refusal.value < 10.0
 
 
 @pytest.mark.parametrize("scale", [0.1, 1000.0])
