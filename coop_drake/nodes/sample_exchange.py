@@ -279,6 +279,8 @@ class SampleExchange:
         asked, time = self._asked[message.number]
         present = message.number >= self._expected.get(sender, self.sample)
         age = clocks.monotonic() - asked
+        if isinstance(message, Effort) and self._pacing is not None:
+            self._pacing.note(age)
         if was_missing and not present and not (self._pacing and age <= self._pacing.allowed):
             return nothing
         self._counts[sender] = message.team_messages
@@ -295,6 +297,4 @@ class SampleExchange:
         if was_missing and kind is not Telemetry and (self._pacing is not None or unheard):
             self._unheard.discard(sender)
             self.attendance.back(sender)
-        elif isinstance(message, Effort) and self._pacing is not None:
-            self._pacing.note(age)
         return (sender, kind) if present else nothing
