@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -26,7 +27,7 @@ from coop_drake.errors import ProcessError
 from tests.support.processes import kill, processes, waited_for
 from tests.support.scenarios import write_scenario
 
-RUNS, BATCH = 12, 2
+RUNS, BATCH, SEARCHED = 8, 2, 2
 FILE = f"""
 runs:
   scenarios: [room.scenario.yaml]
@@ -35,9 +36,6 @@ runs:
   blocks: fused
   vary:
     deployment.mass_error: !Uniform {{min: -0.1, max: 0.1}}
-"""
-SEARCHED = 2
-SEARCHES = f"""
 searches:
   scenarios: [room.scenario.yaml]
   set: {{deployment.preset: mobile_base}}
@@ -60,30 +58,42 @@ main()
 
 
 class Undisturbed:
-    """A campaign whose runs were made one after another in this process, and where it may be made again."""
+    """A campaign whose runs and searches were made one after another in this process, and its files."""
 
     def __init__(self, folder: Path) -> None:
         write_scenario(folder / "room.scenario.yaml")
         self.file = folder / "room.campaign.yaml"
         self.file.write_text(FILE)
-        self.variation = Variation(load_campaign(self.file))
+        campaign = load_campaign(self.file)
+        self.variation = Variation(campaign)
         self.folder = CampaignFolder(folder / "undisturbed")
         self.plans = Plans(self.variation, self.folder.plans)
-        self.batches = tuple(Batching(self.variation, self.plans).batches())
         maker = RunMaker(self.variation, self.plans, "drake", folder / "logs")
+        searching = Searching(campaign, self.folder, "search", 0)
+        self.batches = *Batching(self.variation, self.plans).batches(), *searching.batches()
         for batch in self.batches:
-            runs = map(self.variation.run, range(batch.first, batch.stop))
-            self.folder.write(batch, map(maker.record, runs))
+            indices = range(batch.first, batch.stop)
+            if batch.tier == "search":
+                self.folder.write(batch, map(searching.record, indices))
+            else:
+                self.folder.write(batch, map(maker.record, map(self.variation.run, indices)))
 
     def files(self, folder: CampaignFolder) -> dict[str, bytes]:
-        return {path.name: path.read_bytes() for path in (folder.path / "runs").glob("*")}
+        """What a folder holds of runs and searches."""
+        paths = (path for kind in ("runs", "searches", "found") for path in folder.path.glob(f"{kind}/*"))
+        return {path.name: path.read_bytes() for path in paths}
+
+    def missing(self, folder: CampaignFolder) -> bool:
+        """Whether batches are to be made yet; those that are there are as they should be."""
+        assert self.files(folder).items() <= self.files(self.folder).items()
+        return len(folder.missing(self.batches)) > 0
 
     def order(self, folder: Path, index: int = 0, time_limit: float = 60.0) -> Order:
         """An order for one of the batches, in a folder of its own."""
         made = CampaignFolder(folder)
         folder.mkdir(exist_ok=True)
         made.campaign.write_bytes(self.file.read_bytes())
-        Plans(self.variation, made.plans).with_maps(self.variation.run(0))
+        shutil.copytree(self.folder.plans, made.plans)
         return Order(str(self.file), str(folder), self.batches[index], time_limit)
 
 
@@ -120,11 +130,19 @@ def child_of(folder, *, but=(), making=""):
     return waited_for(lambda: [p for p in processes(CHILD, str(folder), making) if p.pid not in but])[0]
 
 
-def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undisturbed, begun, tmp_path):
-    folder = CampaignFolder(tmp_path / "disturbed")
+def ended(command, folder, number):
+    """End a command by a signal, and wait for all of its processes."""
+    command.send_signal(number)
+    _, said = command.communicate(timeout=PATIENCE)
+    assert (command.returncode, "leaked" in said) == (128 + number, False), said
+    waited_for(lambda: not processes(str(folder.path)))
+
+
+def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undisturbed, begun):
+    folder = CampaignFolder(undisturbed.folder.path.with_name("disturbed"))  # searches write relative paths
+    undisturbed.order(folder.path)  # The plans are there: they would not fit where a disk is full.
 
     small = {"preexec_fn": lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (5000, resource.RLIM_INFINITY))}
-    undisturbed.order(folder.path)  # The plan is there: it would not fit either.
     full = begun(folder.path, "--workers", 1, **small)
     _, said = full.communicate(timeout=PATIENCE)
     assert full.returncode == 2, said
@@ -138,12 +156,8 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     kill(child.parent)  # the worker, with which its process ends
     waited_for(lambda: child.pid not in {p.pid for p in processes(CHILD)})
     child_of(folder.path, but=[child.pid])
-    first.send_signal(signal.SIGINT)
-    _, said = first.communicate(timeout=PATIENCE)
-    assert first.returncode == 130, said
-    assert "leaked" not in said
-    waited_for(lambda: not processes(str(folder.path)))
-    assert len(undisturbed.files(folder)) < len(undisturbed.batches)
+    ended(first, folder, signal.SIGINT)
+    assert undisturbed.missing(folder)
 
     second = begun(folder.path, "--workers", 1)
     child_of(folder.path)
@@ -151,12 +165,19 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     _, said = beside.communicate(timeout=PATIENCE)
     assert beside.returncode == 2
     assert "a folder in which no other command works" in said
-    kill(second.pid)
-    second.communicate()
-    waited_for(lambda: not processes(str(folder.path)))
-    assert len(undisturbed.files(folder)) < len(undisturbed.batches)
+    ended(second, folder, signal.SIGTERM)
+    assert undisturbed.missing(folder)
 
-    quick = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "15s"}
+    third = begun(folder.path, "--workers", 1)
+    child = child_of(folder.path, making='"search"')
+    kill(child.pid)
+    child_of(folder.path, but=[child.pid], making='"search"')
+    kill(third.pid)
+    third.communicate()
+    waited_for(lambda: not processes(str(folder.path)))
+    assert undisturbed.missing(folder)
+
+    quick = {**os.environ, "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "5s"}
     last = begun(folder.path, "--json", "--workers", 2, env=quick)
     hanging = child_of(folder.path).parent  # a worker again
     kill(hanging, signal.SIGSTOP)
@@ -166,45 +187,12 @@ def test_a_campaign_that_is_disturbed_in_every_way_ends_as_one_that_is_not(undis
     facts = json.loads(said)
     assert (facts["done"], facts["lost"]) == (RUNS, 0)
     assert undisturbed.files(folder) == undisturbed.files(undisturbed.folder)
+    assert len(undisturbed.files(folder)) == RUNS // BATCH + 2 * SEARCHED
     assert sorted_bytes(folder, undisturbed) == sorted_bytes(undisturbed.folder, undisturbed)
 
 
-def test_searches_that_are_disturbed_find_what_others_find(undisturbed, begun, tmp_path):
-    file = undisturbed.file.with_name("searched.campaign.yaml")
-    file.write_text(SEARCHES)
-    expected = CampaignFolder(tmp_path / "expected")
-    searching = Searching(load_campaign(file), expected, "search", 0)
-    for batch in searching.batches():
-        expected.write(batch, map(searching.record, range(batch.first, batch.stop)))
-
-    def found(folder):
-        paths = [*folder.path.glob("searches/*"), *folder.path.glob("found/*")]
-        return {path.name: path.read_bytes() for path in paths}
-
-    folder = CampaignFolder(tmp_path / "searched")
-    first = begun(folder.path, "--workers", 1, file=file)
-    child = child_of(folder.path, making='"search"')
-    kill(child.pid)
-    child_of(folder.path, but=[child.pid], making='"search"')
-    first.terminate()
-    _, said = first.communicate(timeout=PATIENCE)
-    assert (first.returncode, "leaked" in said) == (128 + signal.SIGTERM, False), said
-    waited_for(lambda: not processes(str(folder.path)))
-    assert found(folder).items() < found(expected).items()
-    second = begun(folder.path, "--workers", 2, file=file)
-    child_of(folder.path, making='"search"')
-    kill(second.pid)
-    second.communicate()
-    waited_for(lambda: not processes(str(folder.path)))
-    last = begun(folder.path, "--workers", 2, file=file)
-    last.communicate(timeout=PATIENCE)
-    assert last.returncode == 0
-    assert found(folder) == found(expected)
-    assert len(found(folder)) == 2 * SEARCHED
-
-
 def test_a_scheduler_of_the_users_own_may_be_killed(undisturbed, begun, tmp_path):
-    folder = CampaignFolder(tmp_path / "elsewhere")
+    folder = CampaignFolder(undisturbed.folder.path.with_name("elsewhere"))
     place = tmp_path / "scheduler.json"
     own = {"stderr": subprocess.DEVNULL, "env": {**os.environ, "DASK_TEMPORARY_DIRECTORY": str(tmp_path)}}
     dask = [sys.executable, "-m", "distributed.cli.dask_"]
@@ -226,14 +214,14 @@ def test_a_scheduler_of_the_users_own_may_be_killed(undisturbed, begun, tmp_path
             kill(process.pid)
             process.wait()
     waited_for(lambda: not processes(str(folder.path)))
-    there = undisturbed.files(folder)
-    assert there.items() <= undisturbed.files(undisturbed.folder).items()
-    assert len(there) < len(undisturbed.batches)
+    assert undisturbed.missing(folder)
 
 
 def test_a_process_that_hangs_is_ended_and_another_goes_on(undisturbed, tmp_path, monkeypatch):
-    monkeypatch.setattr(supervising, "_START", 20.0)
-    order = undisturbed.order(tmp_path / "hanging", time_limit=10.0)
+    timely, limits = supervising._timely, iter([2.0])
+    monkeypatch.setattr(supervising, "_START", 0.0)
+    monkeypatch.setattr(supervising, "_timely", lambda stream, limit: timely(stream, next(limits, limit)))
+    order = undisturbed.order(tmp_path / "hanging", time_limit=PATIENCE)  # of all processes but the first
     stopping = threading.Thread(target=lambda: kill(child_of(order.folder).pid, signal.SIGSTOP))
     stopping.start()
     assert make_batch(order)
