@@ -5,8 +5,9 @@ has the fields in their order, a list as its number of items (2 bytes). The leng
 these say.
 
 The header of the messages that open a session says which version of the schema and which process speaks.
-In the session both are known, so that all other messages have its random number, and their own one in as few
-bytes as it needs.
+In the session both are known, so that all other messages have its number, and their own one in as few bytes
+as it needs. A session belongs to one connection, which is what an intruder does not have; its number tells it
+from the sessions before.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from coop_drake.messages.wire import KINDS, MESSAGES, MOST_ITEMS, Wire
 MAGIC = 0xCD0D
 """Stands in every message that opens a session."""
 
-VERSION = 2
+VERSION = 3
 """Version of the schema; grows when a message of the same bytes would mean something else."""
 
 OPENING = frozenset(KINDS[cls].code for cls in (Hello, Welcome, TurnedAway))
@@ -33,7 +34,7 @@ OPENING = frozenset(KINDS[cls].code for cls in (Hello, Welcome, TurnedAway))
 OPENING_HEADER = struct.Struct("<BHBB")
 """Kind, magic, version, sender: the header of a message that opens a session."""
 
-SESSION_HEADER = struct.Struct("<BI")
+SESSION_HEADER = struct.Struct("<BB")
 """Kind and session: the header of all other messages, then their number, see :func:`_number_bytes`."""
 
 _MOST_NUMBER_BYTES = 5

@@ -12,6 +12,9 @@ from coop_drake.messages.outgoing import Outgoing
 SILENCE = 0.5
 """A name is free for another process when the one that has it has not been heard for so long [s]."""
 
+_SESSIONS = range(1, 256)
+"""Numbers of sessions: one byte in every header; 0 is no session."""
+
 _MOST_OFFERS = 8
 """Sessions that may be offered under one name at a time; the oldest offer lapses."""
 
@@ -25,6 +28,7 @@ class Peer:
         key: Its public key, None where there are no keys.
         rate: Largest rate of its messages in the long run [1/s].
         session: That of its present session, 0 for none.
+        last: That of its last session, 0 before the first.
         route: Its connection, None for none.
         incoming: What came in this session.
         outgoing: What is sent to it in this session.
@@ -38,6 +42,7 @@ class Peer:
     key: str | None = None
     rate: float = RATE
     session: int = 0
+    last: int = 0
     route: bytes | None = None
     incoming: Incoming = field(default_factory=Incoming)
     outgoing: Outgoing = field(default_factory=Outgoing)
@@ -63,12 +68,13 @@ class Peer:
             return self.offers[route]
         while len(self.offers) >= _MOST_OFFERS:
             del self.offers[next(iter(self.offers))]
-        self.offers[route] = 1 + secrets.randbelow(2**32 - 1)
+        self.offers[route] = secrets.choice([number for number in _SESSIONS if number != self.last])
         return self.offers[route]
 
     def begin(self, route: bytes) -> None:
         """Begin the session that was offered to a connection; the one before is over."""
-        self.session, self.route = self.offers.pop(route), route
+        self.session = self.last = self.offers.pop(route)
+        self.route = route
         self.incoming, self.sessions = Incoming(self.rate), self.sessions + 1
         self.outgoing.restart()
 

@@ -35,15 +35,15 @@ class Hello(NamedTuple):
 
 @message(2, "any", "server")
 class Welcome(NamedTuple):
-    """The answer: all further messages carry this random session in their header, in both directions.
+    """The answer: all further messages of this connection carry the session, in both directions.
 
     Attributes:
         nonce: That of the ``Hello``.
-        session: Random, new for every ``Welcome``.
+        session: Random from 1 to 255, another one than that of the session before.
     """
 
     nonce: Number
-    session: Number
+    session: Small
 
 
 @message(3, "any", "server")

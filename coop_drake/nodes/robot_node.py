@@ -14,7 +14,16 @@ from coop_drake.laws.beginning import POSITION_WAITS, widen_slice
 from coop_drake.laws.sampling import period_of, whole_periods
 from coop_drake.messages import AtRest, Begin, Hold, HoldRequest, Place, Ready, Switch
 from coop_drake.nodes.sampled import SampledDiagram, row_of
-from coop_drake.nodes.states import AGAIN, ASKS, FOLLOWS, HOLDS, OUTSIDE, REPORT_AGAIN, STANDS
+from coop_drake.nodes.states import (
+    AGAIN,
+    ASKS,
+    FOLLOWS,
+    HOLDS,
+    LOSSY_REPORT_TIMEOUT,
+    OUTSIDE,
+    REPORT_TIMEOUT,
+    STANDS,
+)
 from coop_drake.nodes.stillness import Stillness
 from coop_drake.scenario import Deployment
 from coop_drake.systems import axis_laws, robot_record
@@ -60,7 +69,7 @@ class RobotNode:
         self.place, self.state = Place(True, 0, 0), FOLLOWS
         self._order: Begin | None = None
         self._still = Stillness(self.period)
-        self._patience = max(2, whole_periods(REPORT_AGAIN, self.period))  # An answer takes two samples.
+        self._timeout = self._samples_of(REPORT_TIMEOUT)
         self._waits, self._number = (np.zeros(2), 0), 0
         start = np.array(knowledge.plan.start[:3])
         self._sampled.at(0.0, self._inputs(np.concatenate([np.zeros(self._state_size), start])))
@@ -115,11 +124,18 @@ class RobotNode:
         """Take in what the supervisor says; it counts from the next instant on."""
         for message in messages:
             if isinstance(message, Switch):
-                self._enter(message.cell, message.sample)
+                if self.place.known and message.cell > self.place.cell and self._number - message.sample > 1:
+                    self._timeout = self._samples_of(LOSSY_REPORT_TIMEOUT)
+                if not self.place.known or message.sample > self.place.sample:
+                    self._enter(message.cell, message.sample)
             elif isinstance(message, Hold):
                 self._hold_message = np.array(message, dtype=float)
             elif isinstance(message, Begin) and len(message.object_pose) == 3:
                 self._order = message if message.cell < len(self._tables) else None
+
+    def _samples_of(self, timeout: float) -> int:
+        """Return the number of samples of a timeout [s]; an answer takes two of them."""
+        return max(2, whole_periods(timeout, self.period))
 
     def _enter(self, cell: int, sample: int) -> None:
         if self.state == ASKS:
@@ -181,14 +197,14 @@ class RobotNode:
     def _messages(self) -> Said:
         """Return what is new: a report only where the supervisor would come to another conclusion by it.
 
-        A report of the present cell that has had no effect yet is sent again, because it may be lost, or its
-        answer.
+        A report of the present cell is retransmitted after a time without a new cell: it may be lost, or the
+        message of the new cell.
         """
         said: Said = []
         index, margin = self._sampled.output("ready")
         cell = int(self._cell[0])
         ready = index == cell and margin >= 0.0
-        again = self._said.cell == cell and self._number - self._reported >= self._patience
+        again = self._said.cell == cell and self._number - self._reported >= self._timeout
         if again or ready != (self._said == (cell, True)):
             self._said, self._reported = Ready(cell, bool(ready)), self._number
             said.append(self._said)

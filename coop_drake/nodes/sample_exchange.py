@@ -24,7 +24,7 @@ from coop_drake.messages import (
 )
 from coop_drake.messages.outgoing import Links
 from coop_drake.nodes.answers import fits, process_facts
-from coop_drake.nodes.attendance import TOLERATED, Attendance
+from coop_drake.nodes.membership import TOLERATED, Membership
 from coop_drake.nodes.pacing import Pacing
 from coop_drake.nodes.serving import TURN
 from coop_drake.nodes.states import ASKS, FOLLOWS, HOLDS, REJOIN
@@ -42,7 +42,7 @@ class SampleExchange:
     channel is another one than that of the world, every answer says how many messages its sender has sent,
     and the next question says how many its receiver must have received.
 
-    A process that is gone, or gives no answer for too long, is missing, see ``Attendance``, until it answers
+    A process that is gone, or gives no answer for too long, is missing, see ``Membership``, until it answers
     again. In lock-step nobody who is missing is asked before the team rests. Then the simulated time waits.
     Who is there, but is not heard of because messages are lost, is asked on at every sample: the last message
     of an answer, which no fault touches, says that there is no other.
@@ -65,7 +65,7 @@ class SampleExchange:
 
     Attributes:
         sample: Number of the present sample.
-        attendance: Who is missing, and whether the drives brake.
+        membership: Who is missing, and whether the drives brake.
         damping: With which the drives of each robot brake, see ``laws.braking``.
     """
 
@@ -87,7 +87,7 @@ class SampleExchange:
         self._end, self._patience, self._before, self._pacing = end, patience, before, pacing
         self._everyone, self._period = [*range(robots), SUPERVISOR], links.period
         self._clock = links.faults.clock
-        self.attendance = Attendance(tolerated=tolerated, rejoin=rejoin, gone=gone, revive=revive, tell=tell)
+        self.membership = Membership(tolerated=tolerated, rejoin=rejoin, gone=gone, revive=revive, tell=tell)
         self.damping: Sequence[FloatArray] = ()
         self.sample, self._still = 0, Stillness(links.period)
         self._last: dict[tuple[int, type], Any] = {}
@@ -101,15 +101,15 @@ class SampleExchange:
     @property
     def missing(self) -> dict[int, float]:
         """Since which simulated time each missing process is missing [s]."""
-        return self.attendance.missing
+        return self.membership.missing
 
     def trouble(self) -> str:
         """See ``Exchange``."""
-        return self.attendance.trouble
+        return self.membership.trouble
 
     def stopped(self) -> bool:
         """See ``Exchange``."""
-        return self.attendance.stopped
+        return self.membership.stopped
 
     def facts(self) -> dict[str, Any]:
         """Return what a run reports about its processes: answers, messages of the team, ages of commands."""
@@ -118,7 +118,7 @@ class SampleExchange:
                 index,
                 self._last.get((index, Status if index == SUPERVISOR else Telemetry)),
                 missing_since=self.missing.get(index),
-                ended=self.attendance.ended(index),
+                ended=self.membership.ended(index),
                 sent=self._counts.get(index, 0),
                 state=self._states.get(index, FOLLOWS),
                 age=self._ages.get(index),
@@ -127,7 +127,7 @@ class SampleExchange:
         ]
         ages = {} if self._pacing is None else {"command_ages": asdict(self._pacing.ages())}
         refused = {why.name: n for why, n in self._end.refusals.counts.items()}
-        return {"processes": processes, "refused": refused, **self.attendance.facts(), **ages}
+        return {"processes": processes, "refused": refused, **self.membership.facts(), **ages}
 
     def step(self, time: float, measured: Sequence[FloatArray]) -> list[FloatArray]:
         """See ``Exchange``."""
@@ -144,7 +144,7 @@ class SampleExchange:
             self._ask(time, measured, step=False)
         needed = {(SUPERVISOR, Status), *((k, Telemetry) for k in self._everyone[:-1])}
         if not needed <= self._last.keys():
-            self.attendance.give_up()
+            self.membership.give_up()
             raise MessagingError(self.trouble())
         status = self._last[SUPERVISOR, Status]
         shown = [self._last[k, Telemetry].values for k in self._everyone[:-1]]
@@ -155,14 +155,14 @@ class SampleExchange:
         self._before(self.sample)
         if self._pacing is not None:
             self._pacing.wait(time)
-        self._sampled, attendance = self.sample, self.attendance
+        self._sampled, membership = self.sample, self.membership
         rests = self._still.sees_rest(np.concatenate([own[(len(own) - 3) // 2 : -3] for own in measured]))
-        attendance.see(time, self._states, rests=rests)
+        membership.see(time, self._states, rests=rests)
         robots = self.missing.keys() - {SUPERVISOR}
         away = self.missing.keys() - self._unheard
-        if self._pacing is None and away and rests and (attendance.stopped or not robots):
+        if self._pacing is None and away and rests and (membership.stopped or not robots):
             self._await(time, measured)
-        if not attendance.trouble:
+        if not membership.trouble:
             self._ask(time, measured, step=True)
             self._close_line(time)
 
@@ -170,23 +170,23 @@ class SampleExchange:
         """Let the drives go on where all robots have begun their cell at the present sample."""
         efforts = [self._last.get((k, Effort)) for k in self._everyone[:-1]]
         begun = all(e and e.number == self.sample and e.state in (FOLLOWS, HOLDS) for e in efforts)
-        if self.attendance.stopped and begun and not self.missing:
-            self.attendance.close_line(time)
+        if self.membership.stopped and begun and not self.missing:
+            self.membership.close_line(time)
 
     def _effort(self, robot: int, measured: FloatArray) -> FloatArray:
         """Return what the drives of a robot do."""
-        if self.attendance.stopped or (known := self._last.get((robot, Effort))) is None:
+        if self.membership.stopped or (known := self._last.get((robot, Effort))) is None:
             return braking_effort(measured[:-3], self.damping[robot])
         return np.array(known.efforts)
 
     def _await(self, time: float, measured: Sequence[FloatArray]) -> None:
-        """Wait with the simulated time at rest until all are there and know the current cell, or in vain."""
-        while not self.attendance.in_vain():
+        """Wait with the simulated time at rest until all are there and know the current cell, or time out."""
+        while not self.membership.timed_out():
             if not self._ask(time, measured, step=False, waits_for_all=True):
                 for index in self.missing.keys() - self._unheard:
-                    self.attendance.back(index)
+                    self.membership.back(index)
                 return
-        self.attendance.give_up()
+        self.membership.give_up()
 
     def _ask(
         self, time: float, measured: Sequence[FloatArray], *, step: bool, waits_for_all: bool = False
@@ -229,31 +229,31 @@ class SampleExchange:
 
     def _quiet(self, indices: set[int], time: float) -> set[int]:
         """Return those that are not missing yet, and whose last efforts were held for too long."""
-        late = self.attendance.too_long
+        late = self.membership.too_long
         return {k for k in indices - self.missing.keys() if late(self._since(k, time), time)}
 
     def _limit(self) -> float:
         """How long answers are waited for [s]: long before anything moves, longer while the drives brake."""
         if self._pacing is None or self.sample == 0:
             return self._patience
-        return max(self._pacing.allowed, TOLERATED if self.attendance.stopped else 0.0)
+        return max(self._pacing.allowed, TOLERATED if self.membership.stopped else 0.0)
 
     def _since(self, index: int, time: float) -> float:
         return self._answered.get(index, time if self._pacing else 0.0)
 
     def _has_gone(self, index: int) -> bool:
         """Whether a process has ended, or its connection is closed, which a sign of life shows."""
-        return self.attendance.ended(index) or not self._end.send(index, Present())
+        return self.membership.ended(index) or not self._end.send(index, Present())
 
     def _lose(self, indices: Any) -> None:
         """Go on without processes; what they have sent to the team need not be waited for."""
         lost = set(indices)
         for index in lost:
             self._counts.pop(index, None)
-        self.attendance.lose({index: self._since(index, 0.0) for index in lost})
+        self.membership.lose({index: self._since(index, 0.0) for index in lost})
 
     def _question(self, index: int, time: float, measured: Sequence[FloatArray], *, step: bool) -> Any:
-        stopped, robots = self.attendance.stopped, self._everyone[:-1]
+        stopped, robots = self.membership.stopped, self._everyone[:-1]
         if index == SUPERVISOR:
             sent = tuple(self._counts.get(k, 0) for k in robots)
             return Tick(self.sample, time, step, stopped, sent)
@@ -296,5 +296,5 @@ class SampleExchange:
                 self._answered[sender], self._ages[sender] = time, age
         if was_missing and kind is not Telemetry and (self._pacing is not None or unheard):
             self._unheard.discard(sender)
-            self.attendance.back(sender)
+            self.membership.back(sender)
         return (sender, kind) if present else nothing

@@ -18,9 +18,17 @@ AGAIN = 0.1
 """Time after which a message that has had no effect yet is sent again [s]: long for a message and its answer,
 short beside the time in which a team comes to rest."""
 
-REPORT_AGAIN = 0.01
-"""Time after which a report that has had no effect yet is sent again [s]. A robot that has not heard of a new
-cell answers with one of the cell before; in shipped transports funnels bear this delay more than once."""
+REPORT_TIMEOUT = 0.025
+"""Time after which a robot retransmits a report to which no new cell has come [s]: robots of the shipped
+``base`` become ready to leave a cell within 20 ms, in one cell within 35 ms, so that a channel without losses
+carries each report once. The funnels of shipped transports bear this delay of one robot."""
+
+LOSSY_REPORT_TIMEOUT = 0.01
+"""The same once a new cell has come late, because its message or a report was lost [s]."""
+
+LOSSY_COPIES = 3
+"""In so many further samples the supervisor sends a new cell, after a robot has missed one [-]: with
+a fifth of all messages lost, a robot then misses all of them less than twice in a thousand cells."""
 
 AHEAD = 0.1
 """Time between the order to begin and the sample at which all robots begin [s]: every robot must have heard

@@ -12,7 +12,7 @@ from coop_drake.diagram.hold import add_supervisor
 from coop_drake.laws.sampling import period_of, whole_periods
 from coop_drake.messages import AtRest, Begin, Hold, HoldRequest, Place, Ready, Switch
 from coop_drake.nodes.sampled import SampledDiagram
-from coop_drake.nodes.states import AHEAD
+from coop_drake.nodes.states import AHEAD, LOSSY_COPIES
 from coop_drake.scenario import Hold as HoldSettings
 from coop_drake.systems import CellPlanner
 from coop_drake.tree.pose import FloatArray
@@ -55,7 +55,7 @@ class SupervisorNode:
         self._planner, self._place = planner, Place(True, 0, 0)
         self._places, self._resting = dict[int, Place](), dict[int, AtRest]()
         self._order: Begin | None = None
-        self._stopped, self._since = False, 0
+        self._stopped, self._lossy, self._since, self._number = False, False, 0, 0
 
     @property
     def knows(self) -> bool:
@@ -102,6 +102,7 @@ class SupervisorNode:
             stopped: Whether the drives brake.
         """
         number, order = period_of(time, self._period), self._order
+        self._number = number
         if stopped and not self._stopped:
             self._since = number
         self._stopped = stopped
@@ -116,6 +117,8 @@ class SupervisorNode:
         cell, entry = self._sampled.output("current_cell")
         if int(cell) != self._place.cell:
             self._place = Place(True, int(cell), round(entry / self._period))
+            said.append(Switch(*self._place[1:]))
+        elif self._lossy and 0 < number - self._place.sample <= LOSSY_COPIES:
             said.append(Switch(*self._place[1:]))
         if self._held:
             held, number = self._sampled.output("hold_message")
@@ -137,7 +140,10 @@ class SupervisorNode:
         for message in messages:
             if isinstance(message, Ready):
                 self._heard[f"robot_{robot}_ready"] = np.array([message.cell, 0.0 if message.ready else -1.0])
-                if self.knows and message.cell < self._place.cell:  # It has not heard of the present cell.
+                # In the first sample of a cell, reports of the cell before are still under way.
+                missed = message.cell < self._place.cell and self._number - self._place.sample > 1
+                if self.knows and missed:
+                    self._lossy = True
                     self._places[robot] = Place(True, message.cell, 0)
             elif isinstance(message, HoldRequest):
                 self._heard[f"robot_{robot}_request"] = np.array(message, dtype=float)

@@ -16,7 +16,7 @@ from coop_drake.laws.braking import braking_damping
 from coop_drake.messages import AddressBook, Goodbye, KeyPair, WorldEnd, local_book, name_of
 from coop_drake.messages.faults import NO_FAULTS, Faults
 from coop_drake.messages.outgoing import Links
-from coop_drake.nodes.attendance import TOLERATED
+from coop_drake.nodes.membership import TOLERATED
 from coop_drake.nodes.pacing import Pacing
 from coop_drake.nodes.processes import LocalTeam, question_of, robots_of
 from coop_drake.nodes.sample_exchange import PATIENCE, SampleExchange

@@ -76,8 +76,8 @@ with {_LEAST} to {_LEAST + 4} bytes.
 | byte | bytes | field | meaning |
 |---|---|---|---|
 | 0 | 1 | kind | which message follows |
-| 1 | 4 | session | what the server drew in `Welcome`, the same in both directions |
-| 5 | 1 to 5 | number | of the message in its session and direction, from 1 on |
+| 1 | 1 | session | what the server drew in `Welcome`, for this connection alone, in both directions |
+| 2 | 1 to 5 | number | of the message in its session and direction, from 1 on |
 
 The number stands in seven bits a byte, the lowest first; all bytes but the last have their eighth bit set.
 

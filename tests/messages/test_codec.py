@@ -47,7 +47,7 @@ def read(data):
     return decode(data, header_of(data), MESSAGES)
 
 
-@given(messages(), st.integers(0, 255), st.integers(0, 2**32 - 1), st.integers(0, 2**32 - 1))
+@given(messages(), st.integers(0, 255), st.integers(0, 255), st.integers(0, 2**32 - 1))
 def test_every_message_comes_back_as_it_was(sent, sender, session, sequence):
     data = encode(sent, sender, session, sequence)
     kind = KINDS[type(sent)].code
@@ -97,8 +97,8 @@ def test_a_changed_byte_is_refused_or_gives_another_message_of_the_schema(sent, 
         (OPENING_HEADER.pack(1, MAGIC, VERSION + 1, 0), Reason.VERSION),
         (b"\xc8" * 20, Reason.KIND),
         (b"\4" + b"\0" * LONGEST, Reason.LENGTH),
-        (b"\4\1\0\0\0\x81\0", Reason.LENGTH),
-        (b"\4\1\0\0\0\xff\xff\xff\xff\x7f", Reason.LENGTH),
+        (b"\4\1\x81\0", Reason.LENGTH),
+        (b"\4\1\xff\xff\xff\xff\x7f", Reason.LENGTH),
         (encode(Ready(1, True), 0, 1, 1)[:-1] + b"\2", Reason.VALUE),
         (encode(Effort(1, 0, 0, (float("nan"),)), 0, 1, 1), Reason.VALUE),
         (encode(Effort(1, 0, 0, (1.0, float("inf"))), 0, 1, 1), Reason.VALUE),

@@ -107,7 +107,7 @@ def test_the_supervisor_orders_once_all_have_said_that_they_rest_since_the_drive
         assert supervisor.step(k * PERIOD, stopped=True) == []
     assert supervisor.step(29 * PERIOD, stopped=True) == []
     assert supervisor.look(29 * PERIOD)[:2] == pytest.approx([0.0, 0.29])
-    supervisor.step(30 * PERIOD, stopped=True)  # Somebody has not begun: all say again that they rest.
+    supervisor.step(30 * PERIOD, stopped=True)  # Somebody has not begun: all report rest once more.
     supervisor.hear(0, [AtRest(40, (1.2, 2.2, 0.7))])
     supervisor.hear(1, [AtRest(40, (1.2, 2.2, 0.7))])
     assert supervisor.step(41 * PERIOD, stopped=True) == [Begin(0, 52, (1.2, 2.2, 0.7))]
@@ -134,3 +134,24 @@ def test_what_does_not_fit_is_left_aside(supervisor, robots):
     robots[0].hear([Begin(9, 12, (0.0, 0.0, 0.0)), Begin(0, 12, (0.0,))])
     stand(robots[0], at_start(), 20)
     assert robots[0].state == STANDS
+
+
+def test_a_new_cell_is_sent_in_further_samples_once_a_robot_has_missed_one(supervisor):
+    def switched(cell, at):
+        for k in range(2):
+            supervisor.hear(k, [Ready(cell, True)])
+        return [supervisor.step((at + k) * PERIOD) for k in range(5)]
+
+    first, second = Switch(1, 10), Switch(2, 20)
+    assert switched(0, 10) == [[first], [], [], [], []]
+    supervisor.hear(0, [Ready(0, True)])
+    assert supervisor.answers() == [(0, first)]
+    assert switched(1, 20) == [[second], [second], [second], [second], []]
+
+
+def test_a_report_that_crosses_a_new_cell_is_not_answered(supervisor):
+    for k in range(2):
+        supervisor.hear(k, [Ready(0, True)])
+    assert supervisor.step(10 * PERIOD) == [Switch(1, 10)]
+    supervisor.hear(0, [Ready(0, False)])
+    assert supervisor.answers() == []

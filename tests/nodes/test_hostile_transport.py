@@ -31,7 +31,7 @@ class Hostile:
 
     def act(self, sample):
         """Send twenty messages of all kinds on each connection that takes them."""
-        session, number = self._dice.getrandbits(32), sample + 2
+        session, number = self._dice.getrandbits(8), sample + 2
         forged = [
             encode(Effort(sample, 9, 0, (1e6,) * 5), 0, session, number),
             encode(Ready(0, True), 1, session, number),

@@ -39,7 +39,7 @@ class Stop:
     resumed: float | None = None
 
 
-class Attendance:
+class Membership:
     """Keeps who is missing, since when, and whether the drives brake.
 
     The drives of a robot without answers hold its last effort for as long as is tolerated. Then they open the
@@ -97,7 +97,7 @@ class Attendance:
             self._tell(f"{name_of(index)} is there again")
 
     def see(self, time: float, states: Mapping[int, int], *, rests: bool) -> None:
-        """Open the line where it must be open; end the run where a team at rest waits in vain.
+        """Open the line where it must be open; end the run where a team at rest times out waiting.
 
         Args:
             time: Simulated time [s].
@@ -119,7 +119,7 @@ class Attendance:
             self._end(f"{names} cannot begin the current cell anew from there")
         if not (self.missing and rests):
             self._deadline = None
-        elif self.in_vain():
+        elif self.timed_out():
             self.give_up()
 
     def close_line(self, time: float) -> None:
@@ -127,7 +127,7 @@ class Attendance:
         self.stopped, self.stops[-1].resumed = False, time
         self._tell(f"the team goes on at t = {time:.6g} s")
 
-    def in_vain(self) -> bool:
+    def timed_out(self) -> bool:
         """Whether a team at rest has waited long enough, or waits for processes that do not come back."""
         if self._deadline is None:
             self._deadline = clocks.monotonic() + self._rejoin

@@ -1,10 +1,10 @@
-"""Who is missing, when the drives brake, and when a team at rest has waited in vain."""
+"""Who is missing, when the drives brake, and when a team at rest times out waiting."""
 
 import pytest
 
 from coop_drake.answers.budget import Budget
 from coop_drake.messages import SUPERVISOR
-from coop_drake.nodes.attendance import Attendance
+from coop_drake.nodes.membership import Membership
 from coop_drake.nodes.states import FOLLOWS, OUTSIDE, STANDS
 from coop_drake.nodes.world_run import tolerated_age
 from coop_drake.scenario import Deployment
@@ -12,11 +12,11 @@ from coop_drake.scenario.deployment import Measurements
 
 
 class Book:
-    """An attendance, with who has ended, what was revived and what was told."""
+    """A membership, with who has ended, what was revived and what was told."""
 
     def __init__(self, *, restarts=0, rejoin=60.0, **options):
         self.ended, self.told, self.restarts = set(), [], restarts
-        self.attendance = Attendance(
+        self.membership = Membership(
             rejoin=rejoin, **options, gone=lambda: self.ended, revive=self.revive, tell=self.told.append
         )
 
@@ -30,16 +30,16 @@ class Book:
 
 def test_the_drives_brake_once_a_robot_is_missing_for_longer_than_is_tolerated():
     book = Book()
-    book.attendance.lose({1: 0.39})
-    book.attendance.see(0.40, {0: FOLLOWS}, rests=False)
-    assert not book.attendance.stopped
-    book.attendance.see(0.42, {0: FOLLOWS}, rests=False)
-    assert book.attendance.stopped
+    book.membership.lose({1: 0.39})
+    book.membership.see(0.40, {0: FOLLOWS}, rests=False)
+    assert not book.membership.stopped
+    book.membership.see(0.42, {0: FOLLOWS}, rests=False)
+    assert book.membership.stopped
     assert book.told == ["robot 1 has not answered since t = 0.39 s"]
-    book.attendance.back(1)
-    book.attendance.see(0.9, {0: STANDS, 1: STANDS}, rests=True)
-    book.attendance.close_line(1.1)
-    assert book.attendance.facts()["stops"] == [
+    book.membership.back(1)
+    book.membership.see(0.9, {0: STANDS, 1: STANDS}, rests=True)
+    book.membership.close_line(1.1)
+    assert book.membership.facts()["stops"] == [
         {"cause": "robot 1", "since": 0.42, "rested": 0.9, "resumed": 1.1}
     ]
     assert book.told[1:] == ["robot 1 is there again", "the team goes on at t = 1.1 s"]
@@ -47,10 +47,10 @@ def test_the_drives_brake_once_a_robot_is_missing_for_longer_than_is_tolerated()
 
 def test_where_nothing_is_tolerated_the_drives_brake_at_the_first_sample_without_an_answer():
     book = Book(tolerated=0.0)
-    assert not book.attendance.too_long(0.3, 0.1 + 0.2)
-    book.attendance.lose({1: 0.395})
-    book.attendance.see(0.4, {0: FOLLOWS}, rests=False)
-    assert book.attendance.stopped
+    assert not book.membership.too_long(0.3, 0.1 + 0.2)
+    book.membership.lose({1: 0.395})
+    book.membership.see(0.4, {0: FOLLOWS}, rests=False)
+    assert book.membership.stopped
 
 
 @pytest.mark.parametrize(("planned", "tolerated"), [(None, 0.02), (0.01, 0.0), (0.025, 0.015), (0.005, 0.0)])
@@ -62,42 +62,42 @@ def test_a_budget_tolerates_what_its_delay_leaves_beside_that_of_measurements(pl
 
 def test_without_the_supervisor_the_drives_do_not_brake():
     book = Book()
-    book.attendance.lose({SUPERVISOR: 0.3})
-    book.attendance.see(5.0, {0: FOLLOWS, 1: FOLLOWS}, rests=True)
-    assert not book.attendance.stopped
-    assert not book.attendance.trouble
+    book.membership.lose({SUPERVISOR: 0.3})
+    book.membership.see(5.0, {0: FOLLOWS, 1: FOLLOWS}, rests=True)
+    assert not book.membership.stopped
+    assert not book.membership.trouble
 
 
 @pytest.mark.parametrize(("rejoin", "ended"), [(0.0, set()), (60.0, {1})])
 def test_a_team_at_rest_waits_neither_for_ever_nor_for_who_does_not_come_back(rejoin, ended):
     book = Book(rejoin=rejoin)
     book.ended = ended
-    book.attendance.lose({1: 0.39})
-    book.attendance.see(0.5, {}, rests=False)
-    assert not book.attendance.trouble
-    book.attendance.see(1.0, {}, rests=True)
+    book.membership.lose({1: 0.39})
+    book.membership.see(0.5, {}, rests=False)
+    assert not book.membership.trouble
+    book.membership.see(1.0, {}, rests=True)
     assert (
-        book.attendance.trouble == "robot 1 has not answered since t = 0.39 s; the team rests since t = 1 s"
+        book.membership.trouble == "robot 1 has not answered since t = 0.39 s; the team rests since t = 1 s"
     )
 
 
 def test_who_has_ended_is_started_again_as_often_as_allowed():
     book = Book(restarts=2)
     book.ended = {1}
-    book.attendance.lose({1: 0.39})
+    book.membership.lose({1: 0.39})
     assert book.told == ["robot 1 has not answered since t = 0.39 s; it is started again"]
     for time, trouble in ((1.0, False), (1.1, True)):
         book.ended = {1}
-        book.attendance.see(time, {}, rests=True)
-        assert bool(book.attendance.trouble) == trouble
-    assert book.attendance.facts()["restarts"] == {"robot 1": 2}
+        book.membership.see(time, {}, rests=True)
+        assert bool(book.membership.trouble) == trouble
+    assert book.membership.facts()["restarts"] == {"robot 1": 2}
 
 
 def test_a_team_that_rests_outside_its_cell_ends_the_run():
     book = Book()
-    book.attendance.see(0.4, {0: STANDS, 1: STANDS}, rests=False)
+    book.membership.see(0.4, {0: STANDS, 1: STANDS}, rests=False)
     for time, trouble in ((0.8, ""), (1.2, ""), (1.4, "robot 1 cannot begin")):
-        book.attendance.see(time, {0: STANDS, 1: OUTSIDE}, rests=True)
-        assert book.attendance.trouble.startswith(trouble)
-        assert bool(book.attendance.trouble) == bool(trouble)
-    assert book.attendance.trouble.endswith("the team rests since t = 0.8 s")
+        book.membership.see(time, {0: STANDS, 1: OUTSIDE}, rests=True)
+        assert book.membership.trouble.startswith(trouble)
+        assert bool(book.membership.trouble) == bool(trouble)
+    assert book.membership.trouble.endswith("the team rests since t = 0.8 s")
