@@ -12,7 +12,7 @@ _Exact = Annotated[NotNegative, EXACT]
 
 SCALED = (
     "delay", "lag", "angle_noise", "rate_noise", "position_noise", "velocity_noise", "model_error",
-    "acceleration_error", "report_age",
+    "acceleration_error", "axis_error", "report_age",
 )  # fmt: skip
 """Departures that a budget of the same control rate has more or less of."""
 
@@ -36,8 +36,10 @@ class Budget:
         velocity_noise: Largest error of its measured velocity, as such a mean [m/s].
         single_noise: Largest of these errors of one robot over the mean's [-].
         model_error: Largest error of an acceleration over its command, as a wrong mass causes [-].
-        acceleration_error: Largest error of the acceleration of an axis or of the object's origin besides:
-            what robots that disagree, friction, and the coupling of axes leave [rad/s^2 or m/s^2].
+        acceleration_error: Largest error of the acceleration of the object's origin besides: what robots that
+            disagree and friction leave [m/s^2].
+        axis_error: Largest such error of the acceleration of an axis, where the coupling of axes counts, too;
+            null for the number of ``acceleration_error`` [rad/s^2 or m/s^2].
         report_age: How long a report of readiness may be used after it was made [s].
         base_force: Largest force of a base with which the object's position is moved; null for no limit [N].
         moved_mass: Largest mass that one robot moves, its own and its share of the object's; needed where
@@ -45,7 +47,7 @@ class Budget:
         axes: Whether angles and joints are part of the budget; false for the position alone.
         bodies: The team's bodies, from which follows how much the rates of the axes accelerate them, each as
             [component in the tree, mass [kg], centre of mass x, y [m], inertia [kg m^2]]; empty where
-            ``acceleration_error`` counts what the model's error leaves of this.
+            ``axis_error`` counts what the model's error leaves of this.
         rotors: Inertia that its rotor adds to every joint, empty or of shape (n,) [kg m^2 or kg].
     """
 
@@ -59,6 +61,7 @@ class Budget:
     single_noise: Annotated[float, Limits(at_least=1.0)] = 1.0
     model_error: Annotated[float, Limits(at_least=0.0, below=1.0)] = 0.0
     acceleration_error: NotNegative = 0.0
+    axis_error: NotNegative | None = None
     report_age: NotNegative = 0.0
     base_force: Positive | None = None
     moved_mass: Positive | None = None
@@ -80,9 +83,15 @@ class Budget:
         """Control period [s]."""
         return 1.0 / self.control_rate
 
+    @property
+    def axis_acceleration_error(self) -> float:
+        """Largest error of the acceleration of an axis besides that of the model [rad/s^2 or m/s^2]."""
+        return self.acceleration_error if self.axis_error is None else self.axis_error
+
     def scaled(self, factor: float) -> Budget:
         """Return the budget with every departure this many times as large, at the same control rate."""
-        return replace(self, **{name: factor * getattr(self, name) for name in SCALED})
+        sizes = {name: getattr(self, name) for name in SCALED}
+        return replace(self, **{name: factor * size for name, size in sizes.items() if size is not None})
 
     def describe(self) -> str:
         """All bounds in a line."""

@@ -7,26 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.chain_motion import (
-    COLUMNS,
-    COM_X,
-    COM_Y,
-    INERTIA,
-    MASS,
-    PARENT,
-    POSITION,
-    RATE,
-    ROTOR,
-    SLIDE_X,
-    SLIDE_Y,
-    TURN,
-    X,
-    Y,
-)
+from coop_drake.laws.team_chain import team_chain
 from coop_drake.laws.team_dynamics import TeamWork, team_accelerations, team_work
 from coop_drake.tree.bodies import Bodies
 from coop_drake.tree.component_tree import ComponentTree
-from coop_drake.tree.pose import FloatArray, PlanarPose
+from coop_drake.tree.pose import FloatArray
 
 
 def rate_terms(
@@ -46,44 +31,10 @@ def rate_terms(
     Returns:
         Sizes of the coefficients, [..., i, j, k], zero for k > j, shape (configurations, axes, axes, axes).
     """
-    chain, axes = _chain_of(tree, bodies), 1 + joints.shape[1]
-    for row, component in zip(chain[1:], tree.components[1:], strict=True):
-        if len(rotors) and component.joint is not None:
-            row[ROTOR] = rotors[component.joint.index]
+    chain, axes = team_chain(tree, bodies, rotors), 1 + joints.shape[1]
     coefficients = np.zeros((len(joints), axes, axes, axes))
     _write_coefficients(chain, np.ascontiguousarray(joints), coefficients)
     return coefficients
-
-
-def _chain_of(tree: ComponentTree, bodies: Bodies) -> FloatArray:
-    """Return the team as a chain of ``laws/chain_motion.py``; its state is (x, y, theta, q...) and rates."""
-    chain, size = np.zeros((len(tree.components), COLUMNS)), 3 + len(tree.joints)
-    frames = [PlanarPose()]
-    chain[0, RATE] = size
-    for row, component in zip(chain[1:], tree.components[1:], strict=True):
-        joint, parent = component.joint, component.parent
-        assert joint is not None
-        assert parent is not None
-        frame = frames[parent] @ joint.X_PJ
-        frames.append(frame)
-        row[[PARENT, X, Y]] = parent, frame.x, frame.y
-        row[[POSITION, RATE]] = 3 + joint.index, size + 3 + joint.index
-        if joint.kind == "revolute":
-            row[TURN] = joint.sign
-        else:
-            row[[SLIDE_X, SLIDE_Y]] = PlanarPose(angle=frame.angle).apply(np.array(joint.axis))
-    for body in bodies:
-        _add_body(chain[int(body[0])], frames[int(body[0])].apply(np.array(body[2:4])), body[1], body[4])
-    return chain
-
-
-def _add_body(row: FloatArray, centre: FloatArray, mass: float, inertia: float) -> None:
-    """Add a body to a link: the centre of mass of both, and their inertia about it."""
-    both = row[MASS] + mass
-    away = centre - row[[COM_X, COM_Y]]
-    row[INERTIA] += inertia + row[MASS] * mass / both * (away @ away)
-    row[[COM_X, COM_Y]] += mass / both * away
-    row[MASS] = both
 
 
 @compiled

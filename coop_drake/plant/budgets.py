@@ -9,6 +9,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import ScenarioError
 from coop_drake.laws import ScheduledGains
 from coop_drake.plant.component_tree import read_component_tree
+from coop_drake.plant.disagreement import largest_disagreement
 from coop_drake.plant.run_masses import bodies_of_team, joint_inertias, moved_masses
 from coop_drake.plant.team import build_team_plant
 from coop_drake.scenario import Scenario
@@ -38,5 +39,5 @@ def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) 
 
 def _of_models(scenario: Scenario) -> TeamMasses:
     team = build_team_plant(scenario, DiagramBuilder())
-    bodies = bodies_of_team(team, read_component_tree(team))
-    return TeamMasses(moved_masses(scenario, team), bodies, tuple(joint_inertias(team).tolist()))
+    bodies, rotors = bodies_of_team(team, read_component_tree(team)), tuple(joint_inertias(team).tolist())
+    return TeamMasses(moved_masses(scenario, team), bodies, rotors, largest_disagreement(scenario, team))

@@ -32,10 +32,14 @@ DEVIATIONS = 3.0
 REPORTS_LOST = 5
 """Reports lost in a row for which a budget provides [-]: one in 3000 times where a fifth of them is lost."""
 
-DISAGREEMENT = 0.2
-"""Error of accelerations that a budget from a deployment provides for beside that of the model: for robots
-that measure differently, and efforts for another configuration than the team's [rad/s^2 or m/s^2]. It is an
-assumption, which the log of a run can be compared with."""
+ACCELERATION_ERROR = 0.2
+"""Error of accelerations that a budget from a deployment provides for beside that of the model: for friction,
+and efforts for another configuration than the team's [rad/s^2 or m/s^2]. It is an assumption."""
+
+DISAGREEMENT = 0.13
+"""By how much the accelerations that robots command for the object's origin differ from those of all, for
+longer than the memory of the loops, because they measure differently [m/s^2]. It is an assumption: random
+errors of 0.7 m/s^2 in every period are left by a sixth by loops that remember forty periods."""
 
 
 class TeamMasses(NamedTuple):
@@ -45,11 +49,14 @@ class TeamMasses(NamedTuple):
         moved: The mass that each robot moves, itself and its share of the object [kg].
         bodies: As the field of ``Budget``.
         rotors: As the field of ``Budget``.
+        disagreement: Largest acceleration of an axis over that by which the robots' commands for the object's
+            origin differ, see ``laws/disagreement.py`` [rad/m or -].
     """
 
     moved: Sequence[float]
     bodies: Bodies
     rotors: tuple[float, ...]
+    disagreement: float
 
 
 def read_budget(
@@ -107,7 +114,8 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: TeamMasses, 
         velocity_noise=mean * measured.rate_noise * rate_levers(tree) + waves.velocity,
         single_noise=1.0 / share,
         model_error=abs(deployment.mass_error),
-        acceleration_error=DISAGREEMENT,
+        acceleration_error=ACCELERATION_ERROR,
+        axis_error=max(ACCELERATION_ERROR, DISAGREEMENT * masses.disagreement),
         report_age=messages.delay + lost,
         base_force=deployment.actuators.base_force,
         moved_mass=max(masses.moved),

@@ -71,7 +71,7 @@ def test_the_law_is_written_twice_and_is_the_same():
 
 DEPARTURES = {
     "delay": 0.03, "lag": 0.02, "angle_noise": 0.004, "rate_noise": 0.05, "model_error": 0.4,
-    "acceleration_error": 1.0, "control_rate": 60.0,
+    "acceleration_error": 1.0, "axis_error": 1.0, "control_rate": 60.0,
 }  # fmt: skip
 
 

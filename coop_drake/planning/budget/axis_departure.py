@@ -108,7 +108,7 @@ class AxisLoop:
 
     def typical(self) -> tuple[float, float]:
         """Return the largest departures of a typical axis [rad or m] and of its rate [rad/s or m/s]."""
-        pushes, error = self.sums[:, :, ACCELERATION], self.budget.acceleration_error
+        pushes, error = self.sums[:, :, ACCELERATION], self.budget.axis_acceleration_error
         steady = error + self.errors * TYPICAL_ACCELERATION
         pull = (self.noises[:, Q] + steady * pushes[:, Q]) / (1.0 - self.rest * pushes[:, Q])
         found = self.noises[:, :Q] + (steady + self.rest * pull)[:, None] * pushes[:, :Q]

@@ -3,11 +3,11 @@
 The departure e = x - x^ of an axis is the sum of its loop's responses to what enters it, see
 ``axis_departure.py``. In one period this is at most
 
-    d = |epsilon| (|a^| + c(w^)) + c(w^ + e'_1) - c(w^) + acceleration_error + (1 + epsilon - f) q,
+    d = |epsilon| (|a^| + c(w^)) + c(w^ + e'_1) - c(w^) + axis_error + (1 + epsilon - f) q,
 
 with the nominal rates w^ of all axes, and c the largest acceleration that rates alone cause where nothing is
 commanded: robots command what balances it at the nominal rates, with masses that are wrong by epsilon. e'_1
-is what the first term and ``acceleration_error`` alone cause: what noise adds is small and of any sign. All
+is what the first term and ``axis_error`` alone cause: what noise adds is small and of any sign. All
 of this is known from the periods before, so that one pass forward in time bounds the departures of all axes.
 """
 
@@ -64,7 +64,7 @@ class _Scales(NamedTuple):
     Attributes:
         period: T [s].
         model: Largest |epsilon| [-].
-        error: ``acceleration_error`` [rad/s^2 or m/s^2].
+        error: ``axis_error`` [rad/s^2 or m/s^2].
         rest: Half the width of a part of the model's range [-].
         left: What the lag leaves of a difference after a period [-].
     """
@@ -79,7 +79,7 @@ class _Scales(NamedTuple):
 def at_rest(loop: AxisLoop, axes: int) -> Inflow:
     """Return what entered before the start, where all axes rest."""
     parts, _, memory = loop.kicks.shape
-    error = np.full((2, parts, axes), loop.budget.acceleration_error)
+    error = np.full((2, parts, axes), loop.budget.axis_acceleration_error)
     return Inflow(np.repeat(error[..., None], memory, axis=3), np.stack([error[0], 0.0 * error[0]]))
 
 
@@ -102,7 +102,7 @@ def departing(
     entered[..., :memory] = before.past
     found, state = np.empty((3, samples + 1, axes)), np.concatenate([before.state, before.state[1:]])
     left = lag_factors(budget.period, budget.lag)[0]
-    scales = _Scales(budget.period, budget.model_error, budget.acceleration_error, loop.rest, left)
+    scales = _Scales(budget.period, budget.model_error, budget.axis_acceleration_error, loop.rest, left)
     responses = loop.kicks, loop.sums[:, :, LATE].copy(), loop.noises, loop.errors
     _carry(responses, leaving, scales, coupling, moving, entered, state, found)
     highest = np.maximum.accumulate(entered[..., ::-1], axis=3)[..., ::-1]

@@ -22,7 +22,7 @@ from coop_drake.planning.budget.transitions import (
 from coop_drake.planning.execution.transitions import share_speeds, with_gains
 from coop_drake.tree.pose import FloatArray
 
-AGE_FACTORS = (1.0, 1.25, 1.6, 2.0)
+AGE_FACTORS = (1.0, 1.25, 1.6, 2.0, 2.3, 2.6, 3.0)
 """Gains are tried for so many times the age of what a nominal motion's commands rest on [-]: slow motions
 take smaller accelerations and rates, in which the error of the model has its share."""
 

@@ -111,7 +111,7 @@ def loop_of(tracking: AxisTracking, budget: Budget) -> Loop:
 def resting(loop: Loop, axes: int) -> Entered:
     """Return what entered the loops of axes that rest at the plan's start."""
     parts, memory, _ = loop.recent.shape
-    error = np.full((2, parts, axes, memory), loop.budget.acceleration_error)
+    error = np.full((2, parts, axes, memory), loop.budget.axis_acceleration_error)
     return Entered(error, error[0, :, :, 0], 0.0 * error[0, :, :, 0])
 
 
@@ -179,7 +179,7 @@ def _period(
     """Return |e|, |e'| and |e''| in one period, (3, axes), and what enters in it, (2, p, axes)."""
     T, (fastest, rates) = loop.budget.period, moving
     terms = _terms(coupling, rates)
-    own = loop.errors * (fastest + terms) + loop.budget.acceleration_error
+    own = loop.errors * (fastest + terms) + loop.budget.axis_acceleration_error
     more = _terms(coupling, rates + (state[3] + T * own).max(axis=0)) - terms
     push = (1.0 + loop.budget.model_error) * state[2] + own + more
     found = np.stack([state[0] + T * T / 8.0 * push, state[1] + T * push, push]).max(axis=1)

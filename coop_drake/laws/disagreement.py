@@ -1,0 +1,80 @@
+"""How much robots that disagree about the acceleration of the object accelerate the axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from coop_drake.compiled import compiled
+from coop_drake.laws.team_chain import frames_of, team_chain
+from coop_drake.laws.team_dynamics import team_accelerations, team_work
+from coop_drake.tree.bodies import Bodies
+from coop_drake.tree.component_tree import ComponentTree
+from coop_drake.tree.pose import FloatArray, IntArray
+
+
+def disagreement_coupling(
+    tree: ComponentTree, moved: Sequence[Bodies], rotors: Sequence[float], joints: FloatArray
+) -> FloatArray:
+    """Return by how much the axes (theta, q...) are accelerated because robots push with other accelerations.
+
+    Robot k presses all that it moves with its mass times the acceleration of the object's origin that it
+    commands. Where all command the same, the axes do not move: W_k, the acceleration of an axis for a unit
+    of robot k's command alone, has the sum zero over all robots. Errors of several robots rarely add up, so
+    that the result is the root of the sum of the squares of all W_k, along x and y.
+
+    Args:
+        tree: The team.
+        moved: The bodies that every robot moves, the object's with the robot's share of their masses.
+        rotors: Inertia that its rotor adds to every joint, shape (n,), or empty for none [kg m^2 or kg].
+        joints: Configurations of the joints, shape (configurations, n) [rad or m].
+
+    Returns:
+        The acceleration of each axis over that by which each robot's command departs from that of all, shape
+        (configurations, 1 + n) [rad/m, or - for a joint that slides].
+    """
+    frames, every = frames_of(tree), tuple(body for bodies in moved for body in bodies)
+    chain = team_chain(tree, every, rotors)
+    owners = np.repeat(np.arange(len(moved)), [len(bodies) for bodies in moved])
+    links = np.array([int(body[0]) for body in every])
+    places = np.array([frames[int(body[0])].apply(np.array(body[2:4])) for body in every])
+    masses = np.array([body[1] for body in every])
+    squares = np.zeros((len(joints), 1 + joints.shape[1]))
+    _add_squares(chain, (owners, links), places, masses, np.ascontiguousarray(joints), squares)
+    coupling: FloatArray = np.sqrt(squares)
+    return coupling
+
+
+@compiled
+def _add_squares(
+    chain: FloatArray,
+    of_bodies: tuple[IntArray, IntArray],
+    places: FloatArray,
+    masses: FloatArray,
+    joints: FloatArray,
+    squares: FloatArray,
+) -> None:
+    """Add the squares of W_k along x and y for all robots k.
+
+    Args:
+        chain: The team.
+        of_bodies: The robot and the link of every body.
+        places: Their centres of mass, in the plane of the object's frame with all joints at zero [m].
+        masses: Their masses [kg].
+        joints: Configurations.
+        squares: Receives the sums.
+    """
+    owners, links = of_bodies
+    n = joints.shape[1] + 3
+    state, efforts, work = np.zeros(2 * n), np.zeros(n), team_work(chain)
+    found, wrenches = np.empty(n), np.zeros((masses.size, 3))
+    for c in range(joints.shape[0]):
+        state[3:n] = joints[c]
+        for robot in range(owners[-1] + 1):
+            for direction in range(2):
+                for b in range(masses.size):
+                    wrenches[b] = 0.0
+                    wrenches[b, direction] = masses[b] if owners[b] == robot else 0.0
+                team_accelerations(chain, links, places, wrenches, efforts, 0.0, state, work, found)
+                squares[c] += found[2:] ** 2
