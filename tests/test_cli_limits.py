@@ -49,7 +49,15 @@ def test_the_way_is_verified_and_not_simulated(refused, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("key", "value"), [("value", 1.5), ("allowed", 0.5), ("cell", 7), ("limit", "planner.margin")]
+    ("key", "value"),
+    [
+        ("value", 1.5),
+        ("allowed", 0.5),
+        ("cell", 7),
+        ("limit", "planner.margin"),
+        ("unit", "s"),
+        ("joint", "robot_0::elbow"),
+    ],
 )
 def test_a_refusal_that_is_not_so_is_refused(refused, tmp_path, key, value):
     scenario, out, _ = refused

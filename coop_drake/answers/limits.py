@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
 
 from coop_drake.tree.pose import FloatArray
 from coop_drake.typed_data import EXACT, Bounds, Limits, NotNegative, Positive
+
+Unit = Literal["m", "s", "rad/s^2", "m/s^2"]
+"""Units of the limits that can refuse a plan."""
 
 
 def _none() -> FloatArray:
@@ -72,20 +75,25 @@ class Refusal:
     Attributes:
         limit: Key of the limit in the scenario, such as ``planner.min_clearance``.
         cell: Index of the cell in which the plan breaks it most.
-        value: What the plan has there, or needs [m, s, rad/s^2 or m/s^2].
-        allowed: The limit [m, s, rad/s^2 or m/s^2].
+        value: What the plan has there, or needs, in ``unit``.
+        allowed: The limit, in ``unit``.
+        unit: Unit of both.
+        joint: Name of the joint whose limit it is; empty for limits that concern no joint.
     """
 
     limit: str
     cell: Annotated[int, Limits(at_least=0), EXACT]
     value: Annotated[NotNegative, EXACT]
     allowed: Annotated[Positive, EXACT]
+    unit: Unit
+    joint: str = ""
 
     def describe(self) -> str:
         """Say which limit is broken where, and by how much."""
-        what, unit, scale = {
-            "planner.min_clearance": ("the object's path or its target has a clearance of", "mm", 1e3),
-            "planner.max_transition_time": ("the transition takes about", "s", 1.0),
-        }.get(self.limit, ("a joint is accelerated by", "rad/s^2 or m/s^2", 1.0))
+        what = {
+            "planner.min_clearance": "the object's path or its target has a clearance of",
+            "planner.max_transition_time": "the transition takes about",
+        }.get(self.limit, f"{self.joint} is accelerated by")
+        unit, scale = ("mm", 1e3) if self.unit == "m" else (self.unit, 1.0)
         value, allowed = f"{scale * self.value:.3g} {unit}", f"{scale * self.allowed:.3g} {unit}"
         return f"{self.limit}: in cell {self.cell} {what} {value}; the limit is {allowed}"

@@ -16,21 +16,25 @@ def check_refusals(plan: Plan, problem: PlanningProblem) -> Check:
         RefusalError: Names the entry, and what it should be.
     """
     settings, least = problem.settings, 1.0
-    accelerations = {float(limit) for limit in problem.limits.joint_accelerations}
+    clearance = usual_unit(problem.tree) * settings.min_clearance
+    accelerations = {
+        joint.name: (float(limit), "m/s^2" if joint.kind == "prismatic" else "rad/s^2", joint.name)
+        for joint, limit in zip(problem.tree.joints, problem.limits.joint_accelerations, strict=False)
+    }  # empty where no limit is known
     for k, refusal in enumerate(plan.refused_by):
         where = f"refused_by[{k}]"
         if refusal.cell >= len(plan.transitions):
             raise RefusalError(f"{where}.cell", f"{refusal.cell} is none of {len(plan.transitions)} cells")
         transition = plan.transitions[refusal.cell]
-        values, allowed = {
-            "planner.min_clearance": (
-                {transition.neck, transition.inradius},
-                {usual_unit(problem.tree) * settings.min_clearance},
+        values, stated = {
+            "planner.min_clearance": ({transition.neck, transition.inradius}, (clearance, "m", "")),
+            "planner.max_transition_time": (
+                {transition.estimated_time},
+                (settings.max_transition_time, "s", ""),
             ),
-            "planner.max_transition_time": ({transition.estimated_time}, {settings.max_transition_time}),
-            "limits.joint_accelerations": ({refusal.value}, accelerations),
-        }.get(refusal.limit, (set(), set()))
-        if refusal.value not in values or refusal.allowed not in allowed:
+            "limits.joint_accelerations": ({refusal.value}, accelerations.get(refusal.joint)),
+        }.get(refusal.limit, (set(), None))
+        if refusal.value not in values or (refusal.allowed, refusal.unit, refusal.joint) != stated:
             raise RefusalError(where, f"{refusal.describe()}: these are not the plan's and the scenario's")
         room = (refusal.value - refusal.allowed) / refusal.allowed
         room = -room if refusal.limit == "planner.min_clearance" else room

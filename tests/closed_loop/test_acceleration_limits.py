@@ -19,6 +19,7 @@ from coop_drake.plant import planning_problem, run_setup
 from coop_drake.scenario.limits import RobotLimits
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification import verify_file
+from coop_drake.verification.refusals import check_refusals
 from coop_drake.verification.runs import verify_log
 from coop_drake.verification.runs.rows import Rows
 from coop_drake.verification.runs.speeds import check_run_efforts
@@ -78,6 +79,13 @@ def test_a_limit_that_no_gains_keep_is_named():
     (limit,) = refused.plan.refused_by
     assert (limit.limit, limit.allowed) == ("limits.joint_accelerations", 0.2)
     assert limit.value > 10.0 * limit.allowed
+    assert (limit.unit, limit.joint) in {("rad/s^2", joint.name) for joint in problem.tree.joints}
+    assert f"{limit.joint} is accelerated by" in refused.reason
+    assert check_refusals(refused.plan, problem).count == 1
+    for change in ({"unit": "m/s^2"}, {"joint": "object::lid"}, {"allowed": 0.1}):
+        altered = replace(refused.plan, refused_by=(replace(limit, **change),))
+        with pytest.raises(RefusalError, match="these are not the plan's"):
+            check_refusals(altered, problem)
 
 
 def test_altered_limits_are_refused(run, tmp_path):

@@ -78,7 +78,7 @@ def test_channels_that_all_stall_are_a_way_with_the_limit_named(asked):
     assert isinstance(result, BeyondLimits)
     assert len(questions) == 3
     assert result.plan.refused_by[0] == Refusal(
-        "planner.min_clearance", 2, pytest.approx(5e-5, rel=0.1), 1e-3
+        "planner.min_clearance", 2, pytest.approx(5e-5, rel=0.1), 1e-3, "m"
     )
     assert (
         "planner.min_clearance: in cell 2 the object's path or its target has a clearance of 0.0"

@@ -8,7 +8,7 @@ from math import inf
 
 import numpy as np
 
-from coop_drake.answers.limits import Refusal
+from coop_drake.answers.limits import Refusal, Unit
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.execution.acceleration_limits import planned_accelerations
@@ -42,19 +42,23 @@ def _refusals(problem: PlanningProblem, plan: Plan) -> Iterator[Refusal]:
     clear = [min(transition.neck, transition.inradius) for transition in transitions]
     if transitions[-1].inradius >= min(least, GOAL_REGION_FRACTION * problem.position_tolerance):
         clear[-1] = transitions[-1].neck
-    yield from _broken("planner.min_clearance", clear, least, -1)
+    yield from _broken(clear, -1, "planner.min_clearance", least, "m")
     times = [transition.estimated_time for transition in transitions]
-    yield from _broken("planner.max_transition_time", times, settings.max_transition_time, 1)
+    yield from _broken(times, 1, "planner.max_transition_time", settings.max_transition_time, "s")
     most = planned_accelerations(problem.limits)
     if most is not None:
         shares = estimated(plan)[2] / most
         axis = int(np.argmax(shares.max(axis=0)))
         limit = float(problem.limits.joint_accelerations[axis - 1])  # Of it, a share is planned with.
-        yield from _broken("limits.joint_accelerations", (limit * shares[:, axis]).tolist(), limit, 1)
+        values, joint = (limit * shares[:, axis]).tolist(), problem.tree.joints[axis - 1]
+        unit: Unit = "rad/s^2" if joint.kind == "revolute" else "m/s^2"
+        yield from _broken(values, 1, "limits.joint_accelerations", limit, unit, joint.name)
 
 
-def _broken(limit: str, values: Sequence[float], allowed: float, sign: int) -> Iterator[Refusal]:
+def _broken(
+    values: Sequence[float], sign: int, limit: str, allowed: float, unit: Unit, joint: str = ""
+) -> Iterator[Refusal]:
     """The cell that breaks a limit most: from above with sign 1, from below with -1."""
     cell = max(range(len(values)), key=lambda k: sign * values[k])
     if sign * values[cell] > sign * allowed:
-        yield Refusal(limit, cell, values[cell], allowed)
+        yield Refusal(limit, cell, values[cell], allowed, unit, joint)
