@@ -13,17 +13,17 @@ from math import inf
 import numpy as np
 import pytest
 import typer
-from typer.testing import CliRunner
 
 from coop_drake import simulation
 from coop_drake.answers import load_plan
 from coop_drake.answers.log import SimulationLog
-from coop_drake.cli import app, run, simulate
+from coop_drake.cli import run, simulate
 from coop_drake.cli.reporter import Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.task import read_task
 from coop_drake.errors import PlanError
 from coop_drake.viz import LivePage
+from tests.support.cli import invoke
 from tests.support.no_drawings import NoDrawings
 from tests.support.scenarios import MODELS, ROOM, write_scenario
 
@@ -61,10 +61,6 @@ RESULTS = [
     "table_1.md",
     "transport.html",
 ]
-
-
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

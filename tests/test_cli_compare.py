@@ -5,17 +5,12 @@ from __future__ import annotations
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from coop_drake.cli import app
+from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 
 NEAR = {"object": {"x": 2.6, "y": 2.0, "theta": 0.05}}
 STEPS = {"time_step": 0.005}
-
-
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

@@ -3,17 +3,12 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from coop_drake.cli import app
 from tests.support.certificates import write
+from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 
 LIMITS = {"min_clearance": 2.0, "max_transition_time": 0.1}
-
-
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

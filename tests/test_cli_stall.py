@@ -7,18 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from coop_drake.answers import load_plan, save_plan
 from coop_drake.answers.log import SimulationLog
-from coop_drake.cli import app, simulate
+from coop_drake.cli import simulate
 from coop_drake.simulation import stall
+from tests.support.cli import invoke
 from tests.support.no_drawings import NoDrawings
 from tests.support.scenarios import write_scenario
-
-
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,6 @@ import numpy as np
 import pytest
 import typer
 from PIL import Image
-from typer.testing import CliRunner
 
 import coop_drake
 from coop_drake.answers import save_plan
@@ -29,6 +28,7 @@ from coop_drake.scenario import dump_scenario, load_scenario
 from coop_drake.scenario.document import parse
 from coop_drake.scenario.json_schema import scenario_schema
 from tests.support.cases import case
+from tests.support.cli import invoke
 from tests.support.mutants.mutant import sampled
 from tests.support.mutants.schema import schema_mutants
 from tests.support.small_plan import GOAL_POSE, ROOM, START_POSE, small_plan
@@ -39,10 +39,6 @@ TYPED = [Path("models") / path.name for path in SCENARIOS]
 COMMAND = typer.main.get_command(app)
 BLIND = {"no number", "an infinity", "a negative infinity"}
 """What JSON has no words for; loading refuses it all the same."""
-
-
-def invoke(*arguments, **environment):
-    return CliRunner(env=environment).invoke(app, [str(argument) for argument in arguments])
 
 
 def test_every_command_has_examples_and_its_help_shows_them():

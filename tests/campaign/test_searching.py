@@ -1,5 +1,6 @@
 """Searches and bisections of a campaign file, and that what they find can be made again."""
 
+import json
 from dataclasses import replace
 from math import inf, isfinite
 
@@ -17,6 +18,7 @@ from coop_drake.campaign.search.multiples import departures_at, largest_multiple
 from coop_drake.campaign.search.searching import Searching, search_batches
 from coop_drake.campaign.variation import Variation
 from coop_drake.errors import ScenarioError
+from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 
 ASKED = {"set": {"deployment.preset": "mobile_base"}, "budget": "all", "scenarios": ["room.scenario.yaml"]}
@@ -62,6 +64,18 @@ def test_the_worst_run_is_found_again_to_the_last_bit(searched):
     assert record.funnel_margin == finding.worst
     assert record.arrived
     assert len(list((folder / "plans").iterdir())) == 1  # it follows the plan of the search
+
+
+def test_what_a_search_finds_by_the_compiled_loop_is_replayed_by_both_loops(campaign, tmp_path):
+    asked = replace(campaign, searches=replace(campaign.searches, tier="compiled"), breaking=None)
+    finding = Searching(asked, CampaignFolder(tmp_path), "search", 0).record(0)
+    file = tmp_path / finding.file
+    assert load_campaign(file).runs.tier == "compiled"
+    result = invoke("campaign", "replay", file, 0, "--out", tmp_path, "--no-figures", "--json")
+    assert result.exit_code == 0, result.stderr
+    drake, compiled = json.loads(result.stdout)["tiers"]["funnel_margin"]
+    assert compiled == finding.worst
+    assert drake == pytest.approx(compiled, abs=5e-4)
 
 
 def test_a_breaking_point_is_where_the_first_run_is_lost(campaign, searched, monkeypatch):

@@ -3,15 +3,10 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from coop_drake.cli import app
 from coop_drake.cli.results import ResultFolder
+from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
-
-
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def told_by(path, folder):

@@ -3,9 +3,7 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from coop_drake.cli.app import app
 from coop_drake.errors import ScenarioError
 from coop_drake.messages import (
     SUPERVISOR,
@@ -21,12 +19,9 @@ from coop_drake.messages import (
     save_keys,
 )
 from coop_drake.scenario.document import parse, write
+from tests.support.cli import invoke
 
 TEAM = (0, 1, SUPERVISOR, WORLD)
-
-
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def test_a_book_comes_back_as_it_was(tmp_path):

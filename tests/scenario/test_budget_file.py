@@ -5,17 +5,16 @@ from math import sqrt
 
 import pytest
 from pydrake.systems.framework import DiagramBuilder
-from typer.testing import CliRunner
 
 import coop_drake
 from coop_drake.answers import Found, Undecided, load_plan
-from coop_drake.cli import app
 from coop_drake.errors import ScenarioError
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.plant.budgets import budget_of
 from coop_drake.plant.run_masses import moved_masses
 from coop_drake.scenario import Deployment, Measurements
 from coop_drake.tree.levers import axis_levers
+from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 
 PRESET = {"preset": "mobile_base"}
@@ -23,10 +22,6 @@ PRESET = {"preset": "mobile_base"}
 
 def scenario(folder, **deployment):
     return write_scenario(folder / "room.scenario.yaml", deployment={**PRESET, **deployment})
-
-
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 def test_the_budget_of_a_preset(tmp_path):

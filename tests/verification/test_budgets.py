@@ -4,15 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
 from coop_drake.answers import load_plan, save_plan
-from coop_drake.cli import app
 from coop_drake.errors import RefusalError
 from coop_drake.laws.axis_table import bounds_of, track_row
 from coop_drake.verification.budgets import check_budget
 from coop_drake.verification.budgets.axis_law import Axes, fit
 from tests.planning.test_axis_tube import axis
+from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 
 BUDGET = """
@@ -25,10 +24,6 @@ model_error: 0.06
 acceleration_error: 0.05
 report_age: 0.01
 """
-
-
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

@@ -3,17 +3,12 @@
 import json
 
 import pytest
-from typer.testing import CliRunner
 
-from coop_drake.cli import app
 from tests.support.certificates import changed, write
+from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 
 GAP = [[0, 0], [4, 0], [4, 1.8], [5, 1.8], [5, 0], [9, 0], [9, 4], [5, 4], [5, 2.2], [4, 2.2], [4, 4], [0, 4]]
-
-
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

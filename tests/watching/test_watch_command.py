@@ -5,17 +5,12 @@ from __future__ import annotations
 import json
 
 import pytest
-from typer.testing import CliRunner
 
 from coop_drake import watching
-from coop_drake.cli import app
 from coop_drake.cli.results import ResultFolder
 from coop_drake.files import write_atomically
+from tests.support.cli import invoke
 from tests.support.scenarios import ROOM, write_scenario
-
-
-def invoke(*arguments):
-    return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
 @pytest.fixture(scope="module")

@@ -103,6 +103,7 @@ class Trials:
             "count": 1,
             "set": dict(self._section.set),
             "budget": self._section.budget,
+            "tier": self._section.tier,
             "grid": {key: [value] for key, value in {**values, "deployment.seed": seed}.items()},
         }
         text = yaml.safe_dump({"runs": section}, sort_keys=False, allow_unicode=True)
