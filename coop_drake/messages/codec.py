@@ -88,6 +88,12 @@ def layout_of(cls: Hashable) -> Layout:
     return Layout(fixed, wires, lists, any(wire.code in "d?" for wire in wires.values()))
 
 
+def prepare_layouts() -> None:
+    """Read the layouts of all messages, which takes a millisecond for each, before a run needs them."""
+    for cls in KINDS:
+        layout_of(cls)
+
+
 def encode(message: Any, sender: int, session: int, sequence: int) -> bytes:
     """Return a message as bytes.
 

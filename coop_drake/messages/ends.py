@@ -14,6 +14,7 @@ from coop_drake.errors import MessagingError
 from coop_drake.messages.address_book import AddressBook
 from coop_drake.messages.agreement import ANY_QUESTION, Question, Tap
 from coop_drake.messages.client import MessageClient
+from coop_drake.messages.codec import prepare_layouts
 from coop_drake.messages.keys import KeyPair
 from coop_drake.messages.outgoing import SOUND, Links
 from coop_drake.messages.refusals import Refusals
@@ -35,6 +36,7 @@ class _End:
     """
 
     def __init__(self, servers: list[MessageServer], clients: list[MessageClient]) -> None:
+        prepare_layouts()
         self.servers, self.clients = servers, clients
         self._all: tuple[MessageServer | MessageClient, ...] = (*servers, *clients)
         self._arrived: deque[tuple[int, Any]] = deque()

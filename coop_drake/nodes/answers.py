@@ -1,4 +1,4 @@
-"""What answers of processes say: whether they fit the question, and what a run reports about each process."""
+"""Questions to processes, whether answers fit them, and what a run reports about each process."""
 
 from __future__ import annotations
 
@@ -7,8 +7,37 @@ from typing import Any
 
 import numpy as np
 
-from coop_drake.messages import SUPERVISOR, Effort, Status, Telemetry, name_of
+from coop_drake.messages import SUPERVISOR, Effort, Sample, Status, Telemetry, Tick, name_of
 from coop_drake.nodes.states import STATES
+from coop_drake.tree.pose import FloatArray
+
+
+def question(
+    index: int,
+    sample: int,
+    time: float,
+    measured: Sequence[FloatArray],
+    counts: Mapping[int, Any],
+    *,
+    step: bool,
+    stopped: bool,
+) -> Sample | Tick:
+    """Return what a process is asked at an instant.
+
+    Args:
+        index: Its index in messages.
+        sample: Number of the sample.
+        time: What its clock shows [s].
+        measured: What every robot measures: its own state, then the object's pose.
+        counts: How many messages each process has sent to the team, or the supervisor to each robot.
+        step: Whether it updates its state.
+        stopped: Whether the drives brake.
+    """
+    if index == SUPERVISOR:
+        sent = tuple(counts.get(k, 0) for k in range(len(measured)))
+        return Tick(sample, time, step, stopped, sent)
+    told, own = counts.get(SUPERVISOR), measured[index]
+    return Sample(sample, time, step, stopped, told[index] if told else 0, tuple(own[-3:]), tuple(own[:-3]))
 
 
 def fits(sender: int, message: Any, sizes: Sequence[int], known: Mapping[tuple[int, type], Any]) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time as clocks
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import asdict
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -16,14 +17,12 @@ from coop_drake.messages import (
     Effort,
     Present,
     Reason,
-    Sample,
     Status,
     Telemetry,
-    Tick,
     WorldEnd,
 )
 from coop_drake.messages.outgoing import Links
-from coop_drake.nodes.answers import fits, process_facts
+from coop_drake.nodes.answers import fits, process_facts, question
 from coop_drake.nodes.membership import TOLERATED, Membership
 from coop_drake.nodes.pacing import Pacing
 from coop_drake.nodes.serving import TURN
@@ -33,6 +32,10 @@ from coop_drake.tree.pose import FloatArray
 
 PATIENCE = 5.0
 """How long a process may take for an answer in lock-step before the run goes on without it [s]."""
+
+_REHEARSALS = 20
+"""How often everybody is asked what it would log before the first sample by the wall clock [-]: the first
+answers of a process take several times as long as the later ones."""
 
 
 class SampleExchange:
@@ -96,7 +99,7 @@ class SampleExchange:
         self._asked: dict[int, tuple[float, float]] = {}
         self._sizes: list[int] = []
         self._answered, self._ages = dict[int, float](), dict[int, float]()
-        self._sampled, self._expected, self._unheard = -1, dict[int, int](), set[int]()
+        self._sampled, self._expected, self._unheard = -1, dict[int, tuple[int, float]](), set[int]()
 
     @property
     def missing(self) -> dict[int, float]:
@@ -154,6 +157,8 @@ class SampleExchange:
         """Let everybody compute once, which shows before the update what it would log."""
         self._before(self.sample)
         if self._pacing is not None:
+            for _ in range(0 if self.sample else _REHEARSALS):
+                self._ask(time, measured, step=False)
             self._pacing.wait(time)
         self._sampled, membership = self.sample, self.membership
         rests = self._still.sees_rest(np.concatenate([own[(len(own) - 3) // 2 : -3] for own in measured]))
@@ -201,11 +206,14 @@ class SampleExchange:
         self._sizes = [(len(own) - 3) // 2 for own in measured]  # As many efforts as own coordinates.
         self._asked[self.sample] = clocks.monotonic(), time
         self._end.begin(self.sample)
-        questions = {index: self._question(index, time, measured, step=step) for index in asked}
-        self._expected = {k: self.sample for k, question in questions.items() if self._end.send(k, question)}
+        flags = {"step": step, "stopped": self.membership.stopped}
+        asking = {
+            k: question(k, self.sample, self._clock(k, time), measured, self._counts, **flags) for k in asked
+        }
+        self._expected = {k: (q.number, q.time) for k, q in asking.items() if self._end.send(k, q)}
         for index, late_ones in self._end.release().items():
             if late_ones:
-                self._expected.setdefault(index, max(question.number for question in late_ones))
+                self._expected.setdefault(index, max((late.number, late.time) for late in late_ones))
         reached = self._expected.keys() | ({*asked} - self._end.present())
         waiting = {
             (index, Status if index == SUPERVISOR else Telemetry)
@@ -220,7 +228,7 @@ class SampleExchange:
                 self._lose(gone)
                 waiting = {(index, wanted) for index, wanted in waiting if index not in gone}
         late = {index for index, _ in waiting}
-        if not waits_for_all:
+        if not waits_for_all and (step or not self._pacing):  # Between samples nothing moves by an answer.
             self._lose(self._quiet(late, time) if self._pacing else late - self.missing.keys())
             if step:
                 self._unheard |= (quiet := self._quiet({*asked} - late, time))  # Who is there, but not heard.
@@ -252,15 +260,6 @@ class SampleExchange:
             self._counts.pop(index, None)
         self.membership.lose({index: self._since(index, 0.0) for index in lost})
 
-    def _question(self, index: int, time: float, measured: Sequence[FloatArray], *, step: bool) -> Any:
-        stopped, robots = self.membership.stopped, self._everyone[:-1]
-        if index == SUPERVISOR:
-            sent = tuple(self._counts.get(k, 0) for k in robots)
-            return Tick(self.sample, time, step, stopped, sent)
-        told, own = self._counts.get(SUPERVISOR), measured[index]
-        shown, said = self._clock(index, time), told[index] if told else 0
-        return Sample(self.sample, shown, step, stopped, said, tuple(own[-3:]), tuple(own[:-3]))
-
     def _keep(self, sender: int, message: Any, *, admits: bool) -> tuple[int, type]:
         """Keep an answer that is newer than the last; return who answered the present question, and how.
 
@@ -277,7 +276,8 @@ class SampleExchange:
             self._end.efforts.refusals.add(Reason.VALUE)
             return nothing
         asked, time = self._asked[message.number]
-        present = message.number >= self._expected.get(sender, self.sample)
+        expected = self._expected.get(sender, (self.sample, -inf))
+        present = (message.number, getattr(message, "time", inf)) >= expected
         age = clocks.monotonic() - asked
         if isinstance(message, Effort) and self._pacing is not None:
             self._pacing.note(age)

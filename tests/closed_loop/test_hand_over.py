@@ -15,7 +15,7 @@ from tests.support.small_scenario import in_open_room
 
 
 @pytest.mark.parametrize("seed", range(2))
-def test_no_switch_breaks_anything_and_none_is_waited_for_timed_out(seed, tmp_path):
+def test_no_switch_breaks_anything_and_none_is_waited_for_in_vain(seed, tmp_path):
     rng = np.random.default_rng(seed)
     arms = [tuple((REVOLUTE, PRISMATIC)[i] for i in rng.integers(0, 2, rng.integers(0, 3))) for _ in range(3)]
     scenario = in_open_room(ring_team(tmp_path, arms, seed, mass=rng.uniform(1.0, 30.0)))
