@@ -1,5 +1,7 @@
 """Samples around a guide: component by component they are free far more often, and stay within the region."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -49,3 +51,19 @@ def test_the_path_for_the_whole_team_at_once_is_free_and_repeats(problem):
     assert np.array_equal(found[-1, :2], problem.goal_pose[:2])
     assert are_free(problem, found).all()
     assert np.array_equal(found, path())
+
+
+def test_a_path_begins_where_bodies_are_nearer_to_each_other_than_paths_keep(problem):
+    team, workspace = team_arrays(problem.tree), marginal_workspace(problem, 0.015)
+    grid, random = grid_for_team(workspace, team), np.random.default_rng(5)
+    lower, upper = problem.tree.joint_lower, problem.tree.joint_upper
+    drawn = (np.array([*problem.start[:3], *random.uniform(lower, upper)]) for _ in range(10_000))
+    near = next(z for z in drawn if is_free(team, grid, z, 0.002) and not is_free(team, grid, z, 0.009))
+    close = replace(problem, start=near)
+    hierarchy = SubsystemHierarchy(close)
+    assert 0.001 < hierarchy.gap_at_ends(0.01) < 0.01 == SubsystemHierarchy(problem).gap_at_ends(0.01)
+    found = Sampler(hierarchy, workspace, 0.01, 0).direct_path(4_000)
+    assert np.array_equal(found[0], near)
+    assert are_free(close, found).all()
+    given = replace(close, start=problem.start, goal_joints=tuple(near[3:]))
+    assert SubsystemHierarchy(given).gap_at_ends(0.01) == hierarchy.gap_at_ends(0.01)

@@ -31,8 +31,8 @@ GOAL_SAMPLES = 40 * GOALS
 SHORTCUTS = 60
 """Shortcuts that are tried on a new path."""
 
-DISC_SAMPLES_FACTOR = 2
-"""The disc gets this many times the samples of the others, because it has no guide path."""
+DISC_SAMPLES_FACTOR = UNGUIDED_SAMPLES_FACTOR = 2
+"""The disc, and the team where it has no guide path, get this many times the samples of the others [-]."""
 
 FEW_JOINTS = 3
 """Teams with more joints than this [-] are sampled as a whole at once, because samples of robot after robot
@@ -77,7 +77,7 @@ class Sampler:
     Args:
         hierarchy: The subsystems of the question.
         workspace: Floor with the wanted clearance taken off [m].
-        gap: Distance that pairs of bodies keep [m].
+        gap: Distance that pairs of bodies keep, where they also keep it at the start and goal [m].
         seed: Seed of the samples.
         progress: Called with the fraction of the subsystems that are done.
 
@@ -93,7 +93,7 @@ class Sampler:
         seed: int,
         progress: Callable[[float], None] | None = None,
     ) -> None:
-        self._hierarchy, self._gap = hierarchy, gap
+        self._hierarchy, self._gap = hierarchy, hierarchy.gap_at_ends(gap)
         self._grid: ObstacleGrid = grid_for_team(workspace, hierarchy.subsystem(hierarchy.robots).team)
         self._bounds = workspace.bounds
         self._random = np.random.default_rng(seed)
@@ -145,7 +145,8 @@ class Sampler:
     def direct_path(self, samples: int) -> FloatArray:
         """Find a path for the whole team at once, around the disc's path, else around one of the object.
 
-        Samples are free component by component, and lie where the trees have come furthest.
+        Samples are free component by component, and lie where the trees have come furthest. If neither guide
+        helps, because the team has to take another way than the disc and the object, samples lie anywhere.
 
         Args:
             samples: Samples drawn at most for each subsystem.
@@ -162,6 +163,9 @@ class Sampler:
             self.object_blocked = alone is None
             if alone is not None:
                 whole, _ = self._guide(subsystem(robots), alone, samples, WHERE_TREES_END)
+        if whole is None:
+            whole, _ = self._guide(subsystem(robots), None, UNGUIDED_SAMPLES_FACTOR * samples)
+            self.object_blocked &= whole is None
         return _NO_PATH if whole is None else whole.path
 
     def _disc_path(self, samples: int) -> GuidePath | None:

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import shapely
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.questions.relaxation import inscribed_disc, relaxed
+from coop_drake.planning.sampling.collision_kernels import bodies_apart
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays, team_arrays
+from coop_drake.tree.team_arrays import TeamArrays, place, team_arrays
 
 DISC_TOLERANCE, DISC_SHRINKAGE = 1e-3, 0.98
 """Accuracy of a guiding disc over its piece's perimeter, and the factor by which it is smaller than the
 largest one, so that it also passes where the piece does within that accuracy [-]."""
+
+LEAST_GAP = 1e-6
+"""Bodies that are nearer to each other than this at the start or goal count as touching [m]."""
 
 
 class Subsystem:
@@ -58,6 +63,24 @@ class SubsystemHierarchy:
         if robots not in self._subsystems:
             self._subsystems[robots] = Subsystem(*relaxed(self._problem, robots))
         return self._subsystems[robots]
+
+    def gap_at_ends(self, most: float) -> float:
+        """A distance that bodies keep at the start, and at the goal where its joints are given.
+
+        Paths that keep more begin or end nowhere. A distance that is too large is halved until it is kept.
+
+        Args:
+            most: The distance that is returned where they keep it [m].
+        """
+        ends = [(self.subsystem(self.robots).team, self._problem.start)]
+        goals = zip(self._problem.tree.joints, self._problem.goal_joints, strict=True)
+        free = {joint.robot for joint, goal in goals if goal is None}
+        held = self.subsystem(tuple(robot for robot in self.robots if robot not in free))
+        goal = np.array([*held.question.goal_pose, *held.question.goal_joints], dtype=float)
+        ends.append((held.team, goal))
+        while most > LEAST_GAP and not all(bodies_apart(team, place(team, z), most) for team, z in ends):
+            most *= 0.5
+        return most
 
 
 def disc_question(question: PlanningProblem) -> PlanningProblem:

@@ -34,15 +34,15 @@ from coop_drake.planning.search.attempt import BoxSequence, Tried
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
-CLEARANCES = (0.015, 0.002)
-"""Clearances from the walls with which paths are sampled, in turns [m]: the larger one leaves space for long
-boxes, the smaller one lets narrow passages through."""
+CLEARANCES = (0.015, 0.01), (0.002, 0.002)
+"""Clearances from the walls, and distances between bodies of the team, with which paths are sampled, in turns
+[m]: the larger ones leave space for long boxes, the smaller ones let narrow passages through."""
 
 SAMPLES = 4_000
 """Samples for every subsystem in the first attempt; enough for most floors, at a tenth of a second."""
 
 BODY_GAP = 0.01
-"""Distance that sampled paths keep between bodies of the team [m], so that boxes around them have a width."""
+"""Distance that other paths keep between bodies of the team [m], so that boxes around them have a width."""
 
 FLOOR_GROWTHS, SEEDS_PER_GROWTH = (0.1, 0.06, 0.03), 2
 """Amounts by which walls are moved back for paths through narrow passages [m], largest first because these
@@ -129,14 +129,14 @@ class SampledSearch:
     def _attempt(self, number: int, progress: Callable[[float], None] | None) -> Tried:
         if not self._start_inside:
             return Tried()
-        clearance = CLEARANCES[(number - 1) % len(CLEARANCES)]
+        clearance, gap = CLEARANCES[(number - 1) % len(CLEARANCES)]
         workspace = marginal_workspace(self._problem, clearance)
-        sampler = Sampler(self._hierarchy, workspace, BODY_GAP, number - 1, progress)
+        sampler = Sampler(self._hierarchy, workspace, gap, number - 1, progress)
         direct = number > 1 or len(self._problem.goal_joints) > FEW_JOINTS
         path = sampler.direct_path(_samples(number)) if direct else sampler.path(_samples(number))
         found = None
         for spacing, moves in FIRST_SMOOTHINGS if len(path) else ():
-            path = smoothed(self._problem, path, clearance, 0.0, BODY_GAP, spacing, moves)
+            path = smoothed(self._problem, path, clearance, 0.0, gap, spacing, moves)
             found = self._covered(path, 0.0, longest=True)
             if found is not None:
                 break
