@@ -1,4 +1,4 @@
-"""Independent pieces of work in copies of this process; their results come in the order of the pieces."""
+"""Work in copies of this process: one that reports on the way, or several independent pieces."""
 
 from __future__ import annotations
 
@@ -10,18 +10,64 @@ from contextlib import suppress
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection, wait
 from threading import Thread
-from typing import Generic, NoReturn, TypeVar, cast
+from typing import Any, Generic, NoReturn, TypeVar
 
 from coop_drake.errors import ProcessError, transferable
 from coop_drake.interrupts import uninterrupted
 from coop_drake.kernel_times import KERNEL_TIMES
 
-__all__ = ["Copies"]
+__all__ = ["FORKS", "Copies", "Copy", "Send"]
 
 R = TypeVar("R")
 
-_FORKS = sys.platform == "linux"
+Send = Callable[..., None]
+"""Sends a message to the process that was copied: its kind, and what belongs to it."""
+
+FORKS = sys.platform == "linux"
 """Whether a copy of this process can work: libraries of macOS may not be used in one."""
+
+
+class Copy:
+    """A copy of this process that does some work and ends; it also ends when this process does.
+
+    Its last message is of the kind ``result`` with what the work returned, or ``error`` with what it raised.
+
+    Args:
+        work: Called in the copy with what sends further messages. It shall show nothing; what it changes in
+            the copy is lost.
+
+    Attributes:
+        connection: Where messages come in.
+        pid: Number of the process.
+    """
+
+    def __init__(self, work: Callable[[Send], object]) -> None:
+        self.connection, theirs = Pipe()
+        with uninterrupted():
+            self.pid = os.fork()
+            if self.pid == 0:  # Ctrl-C stays blocked here: the process that was copied is told.
+                self.connection.close()
+                _work(work, theirs)
+        theirs.close()
+
+    def receive(self) -> tuple[Any, ...]:
+        """Wait for the next message, and return its kind and what belongs to it.
+
+        Raises:
+            ProcessError: The copy was ended.
+        """
+        try:
+            message: tuple[Any, ...] = self.connection.recv()
+        except (EOFError, ConnectionError):
+            raise ProcessError("the process that plans was ended") from None
+        return message
+
+    def end(self) -> None:
+        """End the copy, if it has not ended."""
+        self.connection.close()
+        with suppress(ProcessLookupError):
+            os.kill(self.pid, signal.SIGKILL)
+        os.waitpid(self.pid, 0)
 
 
 class Copies(Generic[R]):
@@ -36,27 +82,19 @@ class Copies(Generic[R]):
     """
 
     def __init__(self, works: Sequence[Callable[[], R]], count: int) -> None:
-        self._works, self._count = works, count if _FORKS else 0
+        self._works, self._count = works, count if FORKS else 0
         self._begun = 0
-        self._alive: tuple[int, int] | None = None
-        self._running: dict[Connection, tuple[int, int]] = {}
-        self._done: dict[int, tuple[R, Exception | None]] = {}
+        self._running: dict[Connection, tuple[int, Copy]] = {}
+        self._done: dict[int, tuple[Any, ...]] = {}
 
     def __enter__(self) -> Copies[R]:
-        if self._count:
-            self._alive = os.pipe()
-            self._begin()
+        self._begin()
         return self
 
     def __exit__(self, *_: object) -> None:
-        for connection, (_index, copy) in self._running.items():
-            connection.close()
-            with suppress(ProcessLookupError):
-                os.kill(copy, signal.SIGKILL)
-            os.waitpid(copy, 0)
+        for _index, copy in self._running.values():
+            copy.end()
         self._running.clear()
-        for end in self._alive or ():
-            os.close(end)
 
     def __iter__(self) -> Iterator[R]:
         """Yield the results in the order of the pieces.
@@ -72,23 +110,17 @@ class Copies(Generic[R]):
             while index not in self._done:
                 self._collect()
                 self._begin()
-            result, error = self._done.pop(index)
-            if error is not None:
-                raise error
-            yield result
+            kind, content = self._done.pop(index)
+            if kind == "error":
+                raise content
+            yield content
 
     def _begin(self) -> None:
         """Start copies until there are enough."""
         while len(self._running) < self._count and self._begun < len(self._works):
-            reading, writing = Pipe(duplex=False)
-            with uninterrupted():
-                copy = os.fork()
-                if copy == 0:  # Ctrl-C stays blocked here: the process that was copied is told.
-                    assert self._alive is not None
-                    os.close(self._alive[1])
-                    _work(self._works[self._begun], writing, self._alive[0])
-            writing.close()
-            self._running[reading] = self._begun, copy
+            work = self._works[self._begun]
+            copy = Copy(lambda send, work=work: work())  # type: ignore[misc]
+            self._running[copy.connection] = self._begun, copy
             self._begun += 1
 
     def _collect(self) -> None:
@@ -97,30 +129,30 @@ class Copies(Generic[R]):
         for connection in [one for one in self._running if one in ready]:
             index, copy = self._running.pop(connection)
             try:
-                self._done[index] = connection.recv()
-            except EOFError:
-                self._done[index] = cast(R, None), ProcessError("a process that planned was ended")
-            connection.close()
-            os.waitpid(copy, 0)
+                self._done[index] = copy.receive()
+            except ProcessError as error:
+                self._done[index] = "error", error
+            copy.end()
 
 
-def _work(work: Callable[[], object], writing: Connection, alive: int) -> NoReturn:
-    """Do a piece of work, send what comes of it, and end; end before if the other process does."""
+def _work(work: Callable[[Send], object], connection: Connection) -> NoReturn:
+    """Do the work, send what comes of it, and end; end before if the other process does."""
 
     def watch() -> None:
-        os.read(alive, 1)
+        with suppress(EOFError, OSError):
+            connection.recv()
         os._exit(1)
+
+    def send(*message: object) -> None:
+        connection.send(message)
 
     KERNEL_TIMES.compiling = None  # Another thread may have held a lock that showing needs.
     Thread(target=watch, daemon=True).start()
-    result: object = None
-    failure: Exception | None = None
     try:
         try:
-            result = work()
+            send("result", work(send))
         except Exception as error:
-            failure = transferable(error)
-        with suppress(BrokenPipeError):
-            writing.send((result, failure))
+            with suppress(ConnectionError):
+                send("error", transferable(error))
     finally:  # Never goes back into what the other process does.
         os._exit(0)

@@ -46,7 +46,7 @@ def test_an_error_is_raised_when_its_turn_comes_and_other_copies_end():
     with Copies([lambda: 1, wrong, endless], 3) as copies:
         results = iter(copies)
         assert next(results) == 1
-        children = [copy for _, copy in copies._running.values()]
+        children = [copy.pid for _, copy in copies._running.values()]
         with pytest.raises(PlanError, match="nothing free"):
             next(results)
     for child in children:
