@@ -6,17 +6,22 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 READY_TO_DEVELOP := $(VENV)/.ready-to-develop
+WARM := $(VENV)/.warm
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 CODE := coop_drake tests benchmarks notebooks docs paper
 # The kernels are small; threads of BLAS would only get into each other's way.
 export OMP_NUM_THREADS ?= 1
 
-.PHONY: demo test lint lint-types lint-rest bench campaigns notebooks docs gallery clean
+.PHONY: environment warm demo test lint lint-types lint-rest bench campaigns notebooks docs gallery clean
 
-demo: $(READY)  ## plan, simulate and record the paper's transport
+environment: $(READY_TO_DEVELOP)  ## set up what developing takes
+
+warm: $(WARM)  ## compile what commands call first
+
+demo: $(WARM)  ## plan, simulate and record the paper's transport
 	$(BIN)/coop-drake run models/base.scenario.yaml
 
-test: $(READY_TO_DEVELOP)  ## run every test, and show which lines none of them runs
+test: $(READY_TO_DEVELOP) $(WARM)  ## run every test, and show which lines none of them runs
 	$(BIN)/python -m pytest -n 2 --dist worksteal --cov --cov-report=term-missing
 
 lint: $(READY_TO_DEVELOP)  ## formatting, lint, types, direction of imports, documentation; two of them at a time
@@ -51,6 +56,9 @@ $(READY): pyproject.toml constraints.txt
 	@test -n "$(PYTHON)" || { echo "coop_drake needs Python 3.11 or newer; name one with make PYTHON=..." >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 	$(PIP) -e .
+	touch $@
+
+$(WARM): $(READY)
 	-$(BIN)/coop-drake warm models/base.scenario.yaml
 	touch $@
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import shapely
 from shapely import affinity, box, union_all
 
@@ -23,6 +24,7 @@ def behind_a_corridor(width: float) -> PlanningProblem:
     return replace(shelves, workspace=floor.simplify(0.0), goal_pose=corridor_problem().goal_pose + off)
 
 
+@pytest.mark.no_cover
 def test_a_bend_that_is_too_narrow_is_proved_from_the_walls_near_it() -> None:
     question = behind_a_corridor(0.76)
     result = plan(question, ScheduledGains(), gain_set_name="scheduled")

@@ -71,6 +71,7 @@ def test_a_rod_passes_a_corridor_wider_than_itself_only(corridor: float, found: 
         assert channel.proved
 
 
+@pytest.mark.no_cover
 def test_a_spent_budget_is_no_proof() -> None:
     problem = rod_problem(0.2002, PlannerSettings(max_slices=8))
     channel, _ = find_channel(problem)

@@ -84,6 +84,7 @@ def test_attempts_that_fail_at_first_are_the_same_with_any_number_of_workers():
     assert isinstance(answers.pop()[0], bytes)
 
 
+@pytest.mark.no_cover
 @pytest.mark.parametrize(("corridor", "proved"), [(0.197, True), (0.2002, False)])
 def test_narrow_passages_and_proofs_are_the_same_with_any_number_of_workers(corridor, proved, monkeypatch):
     monkeypatch.setattr(search, "FIRST_EXPLORATION", 8)
