@@ -33,7 +33,7 @@ def apart_tasks() -> list[Task]:
 
 
 def _task(robots: int) -> Task:
-    return Task(f"apart/{robots}_robots", lambda rows: costs(robots, _SIMULATED), alone=True)
+    return Task(f"apart/cost/{robots}_robots", lambda rows: costs(robots, _SIMULATED), alone=True)
 
 
 def costs(robots: int, simulated: float) -> list[Row]:
@@ -51,7 +51,7 @@ def costs(robots: int, simulated: float) -> list[Row]:
         )
         together = _measured(lambda observer: simulate(brief, plan, maps, observer=observer))
         apart = _measured(lambda observer: simulate_in_processes(brief, plan, maps, observer=observer))
-    name = f"apart/{robots}_robots"
+    name = f"apart/cost/{robots}_robots"
     return [
         Row(f"{name}/times_real_time", apart[0], "", "one process", together[0]),
         Row(f"{name}/cpu", apart[1], "s", "one process", together[1]),

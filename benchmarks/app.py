@@ -22,6 +22,7 @@ from benchmarks.departures import departure_tasks
 from benchmarks.deployed import deployed_tasks
 from benchmarks.isolated import WorkerError, in_own_process
 from benchmarks.ledger import Ledger, LedgerError
+from benchmarks.limp import limp_tasks
 from benchmarks.mapping import mapping_tasks
 from benchmarks.messages import message_tasks
 from benchmarks.planner.ablation import ablation_tasks
@@ -125,6 +126,7 @@ def _tasks(effort: Effort) -> list[Task]:
         *message_tasks(),
         *apart_tasks(),
         *rejoining_tasks(),
+        *limp_tasks(),
         *campaign_tasks(),
     ]
 

@@ -45,7 +45,7 @@ _EFFORT = Effort(1, 0, 0, (1.0, 2.0, 3.0, 4.0, 5.0))
 
 def message_tasks() -> list[Task]:
     """All at once: the figures stand beside each other."""
-    return [Task("apart/messages", lambda rows: _rows(), alone=True)]
+    return [Task("apart/cost/messages", lambda rows: _rows(), alone=True)]
 
 
 def _rows() -> list[Row]:
@@ -54,8 +54,8 @@ def _rows() -> list[Row]:
     for name in ("open", "encrypted"):
         wall, processor = round_trip(_TRIPS, encrypted=name == "encrypted")
         rows += [
-            Row(f"apart/messages/{name}/round_trip", 1e6 * wall, "us", "pipe", 1e6 * piped[0]),
-            Row(f"apart/messages/{name}/cpu", 1e6 * processor, "us", "pipe", 1e6 * piped[1]),
+            Row(f"apart/cost/messages/{name}/round_trip", 1e6 * wall, "us", "pipe", 1e6 * piped[0]),
+            Row(f"apart/cost/messages/{name}/cpu", 1e6 * processor, "us", "pipe", 1e6 * piped[1]),
         ]
     data = encode(_SAMPLE, WORLD, 1, 1)
     allowed = (header_of(data).kind,)
@@ -64,8 +64,8 @@ def _rows() -> list[Row]:
         ("encode", lambda: encode(_SAMPLE, WORLD, 1, 1), lambda: pickle.dumps(_SAMPLE)),
         ("decode", lambda: decode(data, header_of(data), allowed), lambda: pickle.loads(pickled)),
     ):
-        rows.append(Row(f"apart/messages/bytes/{name}", _each(work), "us", "pickle", _each(peer)))
-    rows.append(Row("apart/messages/bytes/size", len(data), "bytes", "pickle", len(pickled)))
+        rows.append(Row(f"apart/cost/messages/bytes/{name}", _each(work), "us", "pickle", _each(peer)))
+    rows.append(Row("apart/cost/messages/bytes/size", len(data), "bytes", "pickle", len(pickled)))
     return rows
 
 

@@ -19,7 +19,7 @@ from coop_drake.messages import SUPERVISOR, local_book, name_of
 from coop_drake.nodes import LocalTeam, robots_of, run_world
 from coop_drake.scenario import Scenario
 
-__all__ = ["killed", "rejoining_tasks"]
+__all__ = ["killed", "label_of", "rejoining_tasks"]
 
 KILLED: dict[str, tuple[tuple[int, float], ...]] = {
     "base": ((1, 1.5), (0, 3.0), (1, 5.0), (SUPERVISOR, 3.0)),
@@ -38,13 +38,14 @@ _PATIENCE = 30.0
 def rejoining_tasks() -> list[Task]:
     """One kill after the other, with the machine to itself."""
     return [
-        Task(f"apart/{team}_{_label(index, at)}", partial(_rows, team, index, at), alone=True)
+        Task(f"apart/kills/{team}_{label_of(index, at)}", partial(_rows, team, index, at), alone=True)
         for team, faults in KILLED.items()
         for index, at in faults
     ]
 
 
-def _label(index: int, at: float) -> str:
+def label_of(index: int, at: float) -> str:
+    """Return what rows are called in which a process fails at a time [s]."""
     return f"{name_of(index).removeprefix('the ').replace(' ', '_')}_at_{at:g}_s"
 
 
@@ -54,7 +55,7 @@ def _rows(team: str, index: int, at: float, _: Sequence[Row]) -> list[Row]:
     deployment = deployment_of({"preset": "mobile_base"})
     scenario = replace(ideal, deployment=deployment, simulator=simulator)
     plan, maps = planned_transport(team, scenario.command_age, scenario)
-    return killed(f"apart/{team}_{_label(index, at)}", scenario, plan, maps, index, at)
+    return killed(f"apart/kills/{team}_{label_of(index, at)}", scenario, plan, maps, index, at)
 
 
 def killed(

@@ -13,4 +13,4 @@ def test_a_team_of_two_is_measured_both_ways():
 
 
 def test_the_tasks_name_their_teams():
-    assert [task.name for task in apart_tasks()] == [f"apart/{robots}_robots" for robots in (2, 4, 8)]
+    assert [task.name for task in apart_tasks()] == [f"apart/cost/{robots}_robots" for robots in (2, 4, 8)]

@@ -13,4 +13,4 @@ def test_every_round_trip_takes_time(encrypted):
 
 
 def test_the_task_names_its_topic():
-    assert [task.name for task in message_tasks()] == ["apart/messages"]
+    assert [task.name for task in message_tasks()] == ["apart/cost/messages"]

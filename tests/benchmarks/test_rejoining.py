@@ -20,5 +20,5 @@ def test_a_kill_is_measured_from_the_fault_to_the_time_when_the_team_goes_on():
 
 def test_the_tasks_say_who_is_killed_and_when():
     names = [task.name for task in rejoining_tasks()]
-    assert "apart/base_supervisor_at_3_s" in names
-    assert "apart/three_robot_2_at_4_s" in names
+    assert "apart/kills/base_supervisor_at_3_s" in names
+    assert "apart/kills/three_robot_2_at_4_s" in names
