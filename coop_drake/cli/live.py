@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from coop_drake.cli.reporter import Reporter
 from coop_drake.cli.task import Task
@@ -33,10 +33,7 @@ def live_page(
     from coop_drake.viz import LivePage
     from coop_drake.viz.server import silent_meshcat
 
-    def processes() -> Any:
-        return reporter.facts.get("processes", ())
-
-    with LivePage(task.scenario, plan, silent_meshcat(), processes=processes) as page:
+    with LivePage(task.scenario, plan, silent_meshcat(), facts=lambda: reporter.facts) as page:
         reporter.facts["live_url"] = page.url
         reporter.say(f"[bold]Live view: open {page.url} in a browser[/]")
         if wait or sys.stdout.isatty():

@@ -167,7 +167,7 @@ Rejoin = Annotated[
         "--rejoin",
         metavar="SECONDS",
         min=0.0,
-        help="How long a team at rest waits for a process that is missing.",
+        help="How long a team of processes rests and waits for one without answers before the run ends.",
     ),
 ]
 BlocksName = Annotated[

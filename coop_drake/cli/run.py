@@ -24,6 +24,7 @@ from coop_drake.cli.options import (
     Machine,
     NoFigures,
     Quiet,
+    Rejoin,
     Restarts,
     ResultsFolder,
     ScenarioPath,
@@ -36,7 +37,7 @@ from coop_drake.cli.reporter import ExitCode, Reporter, reporting
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.summary import process_lines, simulation_facts, summary_rows
 from coop_drake.cli.task import Task, read_task
-from coop_drake.nodes.states import RESTARTS
+from coop_drake.nodes.states import REJOIN, RESTARTS
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
@@ -63,6 +64,7 @@ def run_command(
     blocks: BlocksName = "named",
     apart: Apart = False,
     restarts: Restarts = RESTARTS,
+    rejoin: Rejoin = REJOIN,
     faults: FaultsFile = None,
     free_running: FreeRunning = False,
     machine: Machine = False,
@@ -78,6 +80,7 @@ def run_command(
             reporter,
             apart=apart,
             restarts=restarts,
+            rejoin=rejoin,
             faults=faults,
             free_running=free_running,
         )
@@ -98,6 +101,7 @@ def simulation_of(
     *,
     apart: bool = False,
     restarts: int = 0,
+    rejoin: float = 0.0,
     faults: Path | None = None,
     free_running: bool = False,
 ) -> Simulation:
@@ -124,6 +128,7 @@ def simulation_of(
     return partial(
         simulate_in_processes,
         restarts=restarts,
+        rejoin=rejoin,
         faults=wrong,
         pacing=pacing,
         report=reporter.facts.update,

@@ -19,6 +19,7 @@ from coop_drake.cli.options import (
     Machine,
     NoFigures,
     Quiet,
+    Rejoin,
     Restarts,
     ResultsFolder,
     ScenarioPath,
@@ -30,7 +31,7 @@ from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.run import carry_out, simulation_of
 from coop_drake.cli.summary import plan_facts
 from coop_drake.cli.task import Task, read_task
-from coop_drake.nodes.states import RESTARTS
+from coop_drake.nodes.states import REJOIN, RESTARTS
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ def simulate_command(
     blocks: BlocksName = "named",
     apart: Apart = False,
     restarts: Restarts = RESTARTS,
+    rejoin: Rejoin = REJOIN,
     faults: FaultsFile = None,
     free_running: FreeRunning = False,
     machine: Machine = False,
@@ -72,6 +74,7 @@ def simulate_command(
             reporter,
             apart=apart,
             restarts=restarts,
+            rejoin=rejoin,
             faults=faults,
             free_running=free_running,
         )

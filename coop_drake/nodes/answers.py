@@ -63,7 +63,6 @@ def process_facts(
     *,
     missing_since: float | None,
     ended: bool,
-    sent: Any,
     state: int,
     age: float | None,
 ) -> dict[str, Any]:
@@ -74,7 +73,6 @@ def process_facts(
         shown: What it has shown last.
         missing_since: Since which simulated time it is missing [s].
         ended: Whether a process that is missing is known to have ended.
-        sent: How many messages of its session it has sent to the team, or to each robot.
         state: The last state of a robot.
         age: Age of what its last command was computed from, when it came to the world [s].
     """
@@ -83,7 +81,7 @@ def process_facts(
         "name": name_of(index),
         "state": there if missing_since is None else missing,
         "missing_since": missing_since,
-        "team_messages": int(np.sum(sent)),
+        "team_messages": 0 if shown is None else int(np.sum(shown.team_messages)),
         "refused": 0 if shown is None else shown.refused,
         "age": age,
     }

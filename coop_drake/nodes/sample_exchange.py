@@ -122,7 +122,6 @@ class SampleExchange:
                 self._last.get((index, Status if index == SUPERVISOR else Telemetry)),
                 missing_since=self.missing.get(index),
                 ended=self.membership.ended(index),
-                sent=self._counts.get(index, 0),
                 state=self._states.get(index, FOLLOWS),
                 age=self._ages.get(index),
             )

@@ -17,6 +17,7 @@ from pydrake.geometry import Meshcat
 
 from coop_drake.scenario import load_scenario
 from coop_drake.viz import LivePage
+from coop_drake.viz.live_page import stop_words
 from tests.support.cases import case
 from tests.support.synthetic_log import synthetic_log, synthetic_plan
 
@@ -38,6 +39,8 @@ PROCESSES = [
         "refused": 0,
     },
 ]
+STOP = {"cause": "robot 1", "since": 2.5, "rested": None, "resumed": None}
+FACTS = {"processes": PROCESSES, "stops": [STOP | {"resumed": 3.0}, STOP]}
 SCENARIO = Path(__file__).parents[2] / "models" / "base.scenario.yaml"
 
 
@@ -45,7 +48,7 @@ SCENARIO = Path(__file__).parents[2] / "models" / "base.scenario.yaml"
 def served():
     meshcat = Meshcat()
     plan = synthetic_plan(case("base"))
-    with LivePage(load_scenario(SCENARIO), plan, meshcat, rate=inf, processes=lambda: PROCESSES) as page:
+    with LivePage(load_scenario(SCENARIO), plan, meshcat, rate=inf, facts=lambda: FACTS) as page:
         yield page, meshcat
 
 
@@ -80,6 +83,9 @@ def test_it_tells_where_the_run_is_and_how_it_ended(served):
         ["robot 0", "holds", "1.2 ms", "7", "1"],
         ["the supervisor", "gone since 2.50 s", "", "0", "0"],
     ]
+    assert news["stop"] == "All drives brake since 2.50 s because of robot 1"
+    assert stop_words([STOP | {"rested": 3.1}]).endswith("because of robot 1; the team rests since 3.10 s")
+    assert stop_words(FACTS["stops"][:1]) == stop_words(()) == ""
     assert not news["verdict"]
     log = synthetic_log(case("base"))
     page.show_verdict(dataclasses.replace(log, reached=False))
