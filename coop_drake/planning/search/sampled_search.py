@@ -143,20 +143,26 @@ class SampledSearch:
         return Tried(found, path, sampler.object_blocked)
 
     def narrow_attempt(
-        self, copies: int = 0, progress: Callable[[float], None] | None = None
+        self, number: int, copies: int = 0, progress: Callable[[float], None] | None = None
     ) -> BoxSequence | None:
         """Sample paths on larger floors, repair them until they fit the floor, and cover them at margin zero.
 
-        This finds passages that are too narrow for samples. Arguments as in ``attempts``.
+        This finds passages that are too narrow for samples. Later attempts sample all robots at once: one
+        after the other they go where the object alone goes most easily.
+
+        Args:
+            number: How many such attempts there were before.
+            copies: Copies of this process that work.
+            progress: Called with the fraction of an attempt that is done.
 
         Returns:
             The boxes, or None if no path was found or covered.
         """
-        ways = product(range(SEEDS_PER_GROWTH), FLOOR_GROWTHS if self._start_inside else ())
-        report = None if copies else progress
-        works = [partial(self._counted, partial(self._repaired, *way, report)) for way in ways]
+        first, report = SEEDS_PER_GROWTH * max(0, number - 1), None if copies else progress
+        ways = product((number > 0,), range(first, first + SEEDS_PER_GROWTH), FLOOR_GROWTHS)
+        tries = [partial(self._repaired, *way, report) for way in ways if self._start_inside]
         paths: list[Tried] = []
-        with Copies(works, copies) as results:
+        with Copies([partial(self._counted, one) for one in tries], copies) as results:
             for tried in results:
                 self.slices += tried.trials
                 if tried.failed or tried.found is not None:
@@ -168,14 +174,17 @@ class SampledSearch:
         except (GeometryError, ShapelyError):
             return None
 
-    def _repaired(self, seed: int, growth: float, progress: Callable[[float], None] | None) -> Tried:
+    def _repaired(
+        self, direct: bool, seed: int, growth: float, progress: Callable[[float], None] | None
+    ) -> Tried:
         """Sample a path on a larger floor, repair it, and cover it if it fits."""
-        larger = widened_floor(self._problem.workspace, growth)
-        path = Sampler(self._hierarchy, larger, BODY_GAP, seed, progress).path(NARROW_SAMPLES)
+        floor = widened_floor(self._problem.workspace, growth)
+        sampler = Sampler(self._hierarchy, floor, BODY_GAP, seed, progress)
+        path = (sampler.direct_path if direct else sampler.path)(NARROW_SAMPLES)
         if not len(path):
             return Tried()
         path, short = repaired(self._problem, path, growth)
-        found = self._covered(path, 0.0, longest=True) if short <= 0.0 else None
+        found = None if short > 0.0 else self._covered(path, 0.0, longest=True)
         return Tried(found, path, short=short)
 
     def _through_middle(self, paths: Sequence[Tried]) -> BoxSequence | None:
@@ -272,8 +281,7 @@ class SampledSearch:
         regions = Regions(self._problem, self._swept, self._pairs, found.margin)
         boxes = [regions.around(box) for box in found.boxes]
         made = [box for box in boxes if box is not None]
-        complete = len(made) == len(boxes)
-        if not complete:
+        if len(made) < len(boxes):
             return None
         ends = np.array([box.positions[-1] for box in found.boxes])
         return replace(make_channel(self._problem, made, found.margin, found.path), ends=ends)

@@ -57,6 +57,10 @@ FIRST_EXPLORATION = 250
 FEW_ROBOTS = 1
 """Robots that are kept in explorations before paths through narrow passages are sampled."""
 
+NARROW_ATTEMPTS = 3
+"""Attempts to find paths through narrow passages, one in each round at first: a new one of three robots takes
+four seconds, and a round of explorations ten or more."""
+
 
 def find_channel(
     problem: PlanningProblem, progress: Progress | None = None, watch: Watch | None = None
@@ -157,7 +161,7 @@ class _Search:
         self._problem, self._progress, self._watch = problem, progress, watch
         self._samples = SampledSearch(problem, routed=routed)
         self._proofs = Proofs(problem, watch)
-        self._other_slices = 0
+        self._other_slices = self._narrow_attempts = 0
 
     def run(self) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
         """Sample, then prove and sample in turns."""
@@ -204,6 +208,8 @@ class _Search:
                     self._first_plan = thread_time() - self._began
                     return explored_channel(self._problem, self._proofs.boxes())
                 found = self._first_of(attempts)
+            if found is None and 0 < self._narrow_attempts < NARROW_ATTEMPTS:
+                found = self._narrow_sampled()
             if found is None and (verdict is Verdict.RESOLUTION or self._proofs.slices >= budget):
                 return self._undecided(verdict)
             each = min(2 * each, budget)
@@ -240,7 +246,13 @@ class _Search:
         verdict = self._explored(slices, robots, untested=object_blocked)
         if verdict in (Verdict.INFEASIBLE, Verdict.FOUND):
             return None
-        found = self._samples.narrow_attempt(self._copies, self._phase("sampling narrow passages"))
+        return self._narrow_sampled()
+
+    def _narrow_sampled(self) -> BoxSequence | None:
+        """Sample paths through narrow passages, other ones each time."""
+        phase = self._phase("sampling narrow passages")
+        found = self._samples.narrow_attempt(self._narrow_attempts, self._copies, phase)
+        self._narrow_attempts += 1
         if found is not None:
             self._first_plan = thread_time() - self._began
         return found
