@@ -112,6 +112,7 @@ def verify_run(
     plan: Plan | Path | str,
     scenario: Scenario,
     *,
+    braked: bool = False,
     progress: Progress | None = None,
 ) -> Verified:
     """Check a plan, and then by the log of a run that it was followed and nothing touched.
@@ -120,6 +121,7 @@ def verify_run(
         log: What `simulate` returned, or the file of a log.
         plan: The plan that was followed, or its file.
         scenario: The scenario that was simulated.
+        braked: Whether all drives braked in the run: it is then not checked that the plan was followed.
         progress: Called with a stage and the fraction of it that is done.
 
     Returns:
@@ -139,7 +141,7 @@ def verify_run(
     plan = plan if isinstance(plan, Plan) else load_plan(plan)
     problem = planning_problem(scenario)
     of_plan = verify_plan(plan, problem, scenario.gain_sets, progress)
-    verified = verify_log(log, plan, problem, run_setup(scenario), progress)
+    verified = verify_log(log, plan, problem, run_setup(scenario), progress, braked=braked)
     return replace(verified, checks=(*of_plan.checks, *verified.checks))
 
 

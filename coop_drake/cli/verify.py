@@ -30,6 +30,14 @@ def verify_command(
         Path | None,
         typer.Option(help="The plan that a log belongs to; plan.json beside the log if not given."),
     ] = None,
+    braked: Annotated[
+        bool,
+        typer.Option(
+            "--braked",
+            help="Check motion, mechanics, limits and clearances of a run in which all drives braked, and "
+            "not that the team followed the plan.",
+        ),
+    ] = False,
     question: Annotated[
         Path | None,
         typer.Option(
@@ -46,10 +54,14 @@ def verify_command(
             from coop_drake.verification.question import save_question
 
             save_question(task.problem, question)
-        reporter.code = _verify(certificate, plan, task, reporter)
+        reporter.code = _verify(certificate, plan, task, reporter, braked=braked)
 
 
-def _verify(certificate: Path, plan: Path | None, task: Task, reporter: Reporter) -> ExitCode:
+def _verify(
+    certificate: Path, plan: Path | None, task: Task, reporter: Reporter, *, braked: bool
+) -> ExitCode:
+    if braked and certificate.suffix != ".npz":
+        raise typer.BadParameter("--braked is about the log of a run, log.npz.")
     begun = process_time()
     try:
         with reporter.stage("verifying") as progress:
@@ -57,7 +69,9 @@ def _verify(certificate: Path, plan: Path | None, task: Task, reporter: Reporter
                 from coop_drake.chain import verify_run
 
                 beside = certificate.with_name("plan.json")
-                verified = verify_run(certificate, plan or beside, task.scenario, progress=progress)
+                verified = verify_run(
+                    certificate, plan or beside, task.scenario, braked=braked, progress=progress
+                )
             else:
                 from coop_drake.verification import verify_file
 

@@ -21,6 +21,7 @@ BASE = str(Path(__file__).parents[2] / "models" / "base.scenario.yaml")
         (["run", BASE, "--free-running"], "--free-running needs --apart"),
         (["run", BASE, "--faults", "faults.yaml"], "--faults needs --apart"),
         (["simulate", BASE, "--apart", "--blocks", "fused"], "do not go together"),
+        (["verify", "plan.json", BASE, "--braked"], "--braked is about the log of a run"),
     ],
 )
 def test_what_processes_cannot_do_is_bad_input(arguments, said):

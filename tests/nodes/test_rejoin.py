@@ -2,14 +2,18 @@
 
 import os
 import signal
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from coop_drake.errors import RefusalError
 from coop_drake.messages import SUPERVISOR, local_book
 from coop_drake.nodes import LocalTeam, run_world
 from coop_drake.nodes.pacing import Pacing
+from coop_drake.plant import planning_problem, run_setup
 from coop_drake.simulation import simulate
+from coop_drake.verification.runs import verify_log
 from tests.support.sampled_team import sampled
 from tests.support.small_loop import small_maps
 
@@ -76,6 +80,16 @@ def test_a_robot_that_is_killed_and_started_again_rejoins_and_the_team_arrives()
     assert min(log.slice_margin[after].min(), log.funnel_margin[after].min()) > 0.0
     assert log.cell_clearance.min() > 0.0
     assert log.governor_spread[after].max() < 1e-9
+    scenario, plan = sampled("base")
+    against = plan, planning_problem(scenario), run_setup(scenario)
+    verified = verify_log(log, *against, braked=True)
+    assert verified.proved == "in this run nothing touched, between the rows, too"
+    assert verified.not_proved.startswith("that the team followed the plan")
+    with pytest.raises(RefusalError, match=r"cell|slice|funnel|interval"):
+        verify_log(log, *against)
+    moved = log.object_pose + [0.01, 0.0, 0.0] * (log.times > 1.0)[:, None]
+    with pytest.raises(RefusalError, match=r"object_pose|object_twist|base_poses"):
+        verify_log(replace(log, object_pose=moved), *against, braked=True)
 
 
 def test_a_supervisor_that_is_killed_and_started_again_learns_the_cell_and_nothing_else_changes():

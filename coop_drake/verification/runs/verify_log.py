@@ -14,6 +14,8 @@ the array, the index and the time:
 8. Bases and joints kept their limits: ``speeds.check_run_speeds``, ``speeds.check_run_efforts``.
 9. Nothing touched: ``clearances.check_clearances``.
 10. Where the plan has a budget, no more of it was used than there is: ``tube.check_budget_used``.
+
+Of a run in which all drives braked, statements 5, 6 and 10 are left aside: they are about the plan's laws.
 """
 
 from __future__ import annotations
@@ -40,6 +42,8 @@ from coop_drake.verification.runs.setup import RunSetup
 from coop_drake.verification.runs.speeds import check_run_efforts, check_run_speeds
 from coop_drake.verification.runs.tube import check_budget_used
 
+_FORCES = "the equations of motion, for more than actuators, damping and rigid grasps acts on the bodies"
+
 
 def verify_log(
     log: SimulationLog,
@@ -47,6 +51,8 @@ def verify_log(
     problem: PlanningProblem,
     setup: RunSetup,
     progress: Progress | None = None,
+    *,
+    braked: bool = False,
 ) -> Verified:
     """Check everything that a log states about a run that arrived.
 
@@ -56,6 +62,7 @@ def verify_log(
         problem: The problem that the plan solves.
         setup: What the scenario says besides.
         progress: Called with a phase and the fraction of it that is done.
+        braked: Whether all drives braked in the run, so that the team did not follow the plan all the time.
 
     Returns:
         What was checked.
@@ -67,13 +74,9 @@ def verify_log(
     checks = [check_belonging(rows, problem, setup), check_complete(rows), check_arrival(rows, problem)]
     checks.append(check_start(rows, setup.displacement))
     between = Between.of(rows)
-    checks += [check_motion(rows, between), *check_cells(rows, between), check_stated_funnels(rows)]
-    checks.append(check_clock(rows, one_hold=setup.one_hold))
-    if setup.one_clock:
-        checks += check_funnels(rows, between)
-    if setup.exact:
-        checks += [check_energy_margin(rows), check_reports(rows, problem)]
-    checks += check_handovers(rows, exact=setup.exact)
+    checks.append(check_motion(rows, between))
+    if not braked:
+        checks += _check_laws(rows, between, problem, setup)
     checks += [check_grasps(rows, problem, setup), check_wrenches(rows, setup)]
     if setup.mechanics:
         checks.append(check_mechanics(rows, problem, setup))
@@ -81,28 +84,42 @@ def verify_log(
     checks += [] if kept is None else [kept]
     checks += check_run_efforts(rows, problem)
     checks += check_clearances(rows, between, problem, progress)
-    checks += check_budget_used(rows)
+    checks += [] if braked else check_budget_used(rows)
+    stayed = "" if braked else ", and the team stayed in cells and funnels"
     return Verified(
         "arrived",
         f"run of {log.times[-1]:.2f} s in {len(log.times)} rows",
         tuple(checks),
-        "in this run nothing touched, and the team stayed in cells and funnels, between the rows, too",
-        "; ".join([*_left_aside(setup), "other runs; that the robots are as in their models"]),
+        f"in this run nothing touched{stayed}, between the rows, too",
+        "; ".join([*_left_aside(setup, braked=braked), "other runs; that the robots are as in their models"]),
     )
 
 
-def _left_aside(setup: RunSetup) -> list[str]:
+def _check_laws(rows: Rows, between: Between, problem: PlanningProblem, setup: RunSetup) -> list[Check]:
+    """Check what a run states about the plan's laws: cells, funnels, reports and entries into cells."""
+    checks = [*check_cells(rows, between), check_stated_funnels(rows)]
+    checks.append(check_clock(rows, one_hold=setup.one_hold))
+    if setup.one_clock:
+        checks += check_funnels(rows, between)
+    if setup.exact:
+        checks += [check_energy_margin(rows), check_reports(rows, problem)]
+    return [*checks, *check_handovers(rows, exact=setup.exact)]
+
+
+def _left_aside(setup: RunSetup, *, braked: bool) -> list[str]:
     """What is not checked of a team that departs from the ideal one."""
+    if braked:
+        laws = (
+            "that the team followed the plan: its cells, funnels, reports and budget, for the drives braked"
+        )
+        return [laws] if setup.mechanics else [laws, _FORCES]
     departures = (
         (setup.exact, "energy margins and reports as the robots computed them, with delays and noise"),
         (
             setup.one_clock,
             "that the stated funnels follow from the plan, for every robot has a clock of its own",
         ),
-        (
-            setup.mechanics,
-            "the equations of motion, for more than actuators, damping and rigid grasps acts on the bodies",
-        ),
+        (setup.mechanics, _FORCES),
     )
     return [aside for checked, aside in departures if not checked]
 
