@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +20,8 @@ from benchmarks.rows import Row
 from benchmarks.tasks import Task
 from benchmarks.transport import base_transport
 from coop_drake.answers import Plan
+from coop_drake.answers.log import SimulationLog
+from coop_drake.compiled_loop import build_fused_loop, simulate_fused
 from coop_drake.diagram import Blocks, build_closed_loop
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import build_team_plant, set_configuration
@@ -36,6 +38,8 @@ _REPEATS = 5
 _RUNS = 100
 _SHORT = 0.05
 _LIMIT = 300.0
+
+_SIMULATING: dict[Blocks, Callable[..., SimulationLog]] = {"named": simulate, "fused": simulate_fused}
 
 Transport = tuple[Scenario, Plan, Sequence[HarmonicMap]]
 
@@ -74,7 +78,7 @@ def loop_cost(transport: Transport, blocks: Blocks, horizon: float) -> LoopCost:
         horizon: Simulated time [s].
     """
     scenario, plan, _ = transport
-    loop = build_closed_loop(*transport, blocks=blocks)
+    loop = (build_fused_loop if blocks == "fused" else build_closed_loop)(*transport)
     try:
         simulator = Simulator(loop.diagram, loop.create_context())
         configure_simulator(simulator, scenario)
@@ -118,7 +122,7 @@ def _mode_rows(name: str, transport: Transport, blocks: Blocks) -> list[Row]:
     cost = min(costs, key=lambda cost: cost.seconds)
     bare = min(costs, key=lambda cost: cost.bare_seconds)
     start = process_time()
-    log = simulate(*transport, blocks=blocks)
+    log = _SIMULATING[blocks](*transport)
     seconds, simulated = process_time() - start, float(log.times[-1])
     each, bare_each = cost.seconds / cost.evaluations, bare.bare_seconds / bare.bare_evaluations
     return [
@@ -172,11 +176,11 @@ def memory_growth(blocks: Blocks) -> tuple[float, float]:
     brief = replace(scenario, simulator=replace(scenario.simulator, max_time=_SHORT))
     with _collected():
         for _ in range(5):
-            simulate(brief, plan, maps, blocks=blocks)
+            _SIMULATING[blocks](brief, plan, maps)
     first = _resident_kb()
     with _collected():
         for _ in range(_RUNS):
-            simulate(brief, plan, maps, blocks=blocks)
+            _SIMULATING[blocks](brief, plan, maps)
     return first, (_resident_kb() - first) / _RUNS
 
 

@@ -31,6 +31,7 @@ def warm_command(scenario: ScenarioPath, quiet: Quiet = False) -> None:
 
 def _compile(task: Task, progress: Progress) -> None:
     from coop_drake.answers import Found
+    from coop_drake.compiled_loop import simulate_fused
     from coop_drake.planning.planner import plan
     from coop_drake.simulation import build_maps, simulate
 
@@ -44,7 +45,7 @@ def _compile(task: Task, progress: Progress) -> None:
         short = replace(task.scenario.simulator, max_time=_SIMULATED_SECONDS)
         brief, maps = replace(task.scenario, simulator=short), build_maps(result.plan)
         simulate(brief, result.plan, maps)
-        simulate(brief, result.plan, maps, blocks="fused")
+        simulate_fused(brief, result.plan, maps)
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from coop_drake.compiled_loop.drakes_loop import (
     SampledLoop,
+    build_fused_loop,
     build_sampled_loop,
     simulate_fused,
     simulate_sampled,
@@ -13,6 +14,7 @@ __all__ = [
     "CompiledTransport",
     "RunOutcome",
     "SampledLoop",
+    "build_fused_loop",
     "build_sampled_loop",
     "prepare",
     "run",

@@ -68,7 +68,7 @@ class ClosedLoop:
         context = self.diagram.CreateDefaultContext()
         team = self.team
         set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.start)
-        if self.fused is not None and self.fused.integrator is not None:
+        if self.fused is not None:
             governor = self.fused.integrator
             governor.set_integral_value(governor.GetMyMutableContextFromRoot(context), self.plan.start[:2])
         for deployed in self.deployed:
@@ -95,7 +95,8 @@ def build_closed_loop(
         plan: A plan for it.
         maps: The harmonic map of every transition.
         blocks: ``named`` for the law as blocks of every robot; ``fused`` for speed alone: one block drives
-            the team, and nothing shows any more that robots need no state of each other.
+            the team in continuous time, and nothing shows any more that robots need no state of each other.
+            One block for a sampled team is that of :mod:`coop_drake.compiled_loop`.
         replacements: Blocks of a user's own in every robot's controller, see `build_robot_controller`; with
             named blocks only.
 

@@ -155,22 +155,17 @@ def _fused_places(loop: ClosedLoop, ports: PortRow) -> Places:
         part.astype(np.intp) for part in telemetry_parts(added, robots)
     )
     clock = [] if fused.clock is None else ports.add(fused.clock, "clock")
-    governor = fused.governor_position
-    wrenches, torques = efforts[: 3 * robots].reshape(robots, 3), efforts[3 * robots :]
-    if fused.efforts:
-        held = [ports.add(port.get_system(), port.get_name()) for port in fused.efforts]
-        wrenches = np.array([effort[:3] for effort in held])
-        torques = np.concatenate([effort[3:] for effort in held])
+    governor = fused.integrator.get_output_port().get_name()
     return Places(
         instant=_instant(loop, ports),
         base_poses=bases,
-        governors=ports.add(governor.get_system(), governor.get_name())[None],
+        governors=ports.add(fused.integrator, governor)[None],
         funnel_lower=bounds[: len(bounds) // 2],
         funnel_upper=bounds[len(bounds) // 2 :],
         energy_margins=margin,
         commanded_wrenches=commands[:, 3:],
-        base_wrenches=wrenches,
-        joint_torques=torques,
+        base_wrenches=efforts[: 3 * robots].reshape(robots, 3),
+        joint_torques=efforts[3 * robots :],
         accelerations=acceleration[None],
         realised=_realised(loop, ports),
         ready_margins=ports.add(fused.driver, "ready")[1::2],

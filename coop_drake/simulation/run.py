@@ -12,7 +12,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from coop_drake.answers.log import SimulationLog
 from coop_drake.answers.plan import Plan
 from coop_drake.answers.plan_file import plan_digest
-from coop_drake.diagram import Blocks, Replacements, build_closed_loop
+from coop_drake.diagram import Replacements, build_closed_loop
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import read_component_tree
 from coop_drake.progress import Progress
@@ -31,7 +31,6 @@ def simulate(
     plan: Plan,
     maps: Sequence[HarmonicMap],
     *,
-    blocks: Blocks = "named",
     replacements: Replacements | None = None,
     progress: Progress | None = None,
     observer: Callable[[Sample], None] | None = None,
@@ -39,26 +38,24 @@ def simulate(
     """Run the closed loop from the plan's start until the object rests at the goal, or the run fails.
 
     Every accepted step is checked against the invariants and logged. A broken invariant ends the run, as do
-    a stall and the scenario's ``max_time``; the log says why.
+    a stall and the scenario's ``max_time``; the log says why. Many runs are made several times quicker by
+    :func:`coop_drake.compiled_loop.simulate_fused`; that robots need nothing of each other but reports is
+    what the blocks here show.
 
     Args:
         scenario: The scenario.
         plan: A plan for it.
         maps: The harmonic map of every transition.
-        blocks: ``named`` for the law as blocks of every robot; ``fused`` is several times quicker and equal
-            to 1e-12: one block drives the team. It is for many runs; that robots need nothing of each other
-            but reports is what named blocks show. For sampled teams with departures or budgets see
-            :func:`coop_drake.compiled_loop.simulate_fused`.
         replacements: Blocks of a user's own in every robot's controller, by the name of the block that they
-            replace, such as ``axis_ppc``; with named blocks only.
+            replace, such as ``axis_ppc``.
         progress: Called with the stage and the fraction done, if given.
         observer: Called with every accepted step, for example a live view; it changes nothing about the run.
 
     Raises:
         PlanError: The plan belongs to another team, or the number of maps is not the number of cells.
-        ScenarioError: The models do not make a team, or fused blocks do not know what the scenario wants.
+        ScenarioError: The models do not make a team.
     """
-    build = partial(build_closed_loop, scenario, plan, maps, blocks=blocks, replacements=replacements)
+    build = partial(build_closed_loop, scenario, plan, maps, replacements=replacements)
     return run_and_release(build, scenario, progress=progress, observer=observer)
 
 

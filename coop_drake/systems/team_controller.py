@@ -13,7 +13,6 @@ from coop_drake.systems.block import NUMBER, VECTOR, Block
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE, index_of
 from coop_drake.systems.funnel_clock import CLOCK_SIZE, clock_of
 from coop_drake.systems.jump_memory import JumpMemory
-from coop_drake.systems.nominal_kernels import NOMINAL_SIZE, NOTHING
 from coop_drake.systems.ready_kernels import ready_conditions
 from coop_drake.systems.team_kernels import (
     FusedCell,
@@ -27,7 +26,7 @@ from coop_drake.tree.pose import FloatArray
 
 
 class TeamController(Block):
-    """Computes what the controllers of all robots compute, from the plant's state, in one call.
+    """Computes in continuous time what the controllers of all robots compute, from the plant's state.
 
     It exists for speed alone, and calls for every robot the functions that the robot's own blocks call. Here
     one block sees everything, with one p_G where the robots keep copies that are equal to the last bit.
@@ -37,9 +36,8 @@ class TeamController(Block):
     input   ``governor_position``  2             p_G [m]                                                W
     input   ``current_cell``       2             index of the current cell, time of its entry [-, s]
     input   ``clock``              3             as that of ``AxisPpc``; only where ``paced``
-    input   ``nominal``            6             that of ``NominalGovernor``; only where ``team`` tracks it
-    output  ``team_command``       3 N + n + 2   wrench on every base at Bk [N, N m], all joint torques W, or
-                                                 [N m or N], p_G' [m/s]                                 Bk
+    output  ``team_command``       3 N + n + 2   wrench on every base at Bk [N, N m], all joint torques Bk
+                                                 [N m or N], p_G' [m/s]                                 W
     output  ``telemetry``          6 + 12 N + 3n what the robots' blocks show to the log, see           W
                                                  ``telemetry_parts``
     output  ``ready``              2 N           for each robot: index of the current cell, margin [-]
@@ -54,8 +52,6 @@ class TeamController(Block):
         goal_position: Goal position of the object, shape (2,) [m].
         position_tolerance: Largest distance to it that counts as arrived [m].
         start: Where the axes of every robot, (theta, q_k), rest at the beginning, shape (N + n,).
-        period: Time between updates of the state [s], None for every step.
-        on_bases: Whether base wrenches are given in the axes of the bases, not of W.
         paced: Whether funnels and p_G move by a clock that may slow down.
 
     Raises:
@@ -71,22 +67,18 @@ class TeamController(Block):
         position_tolerance: float,
         *,
         start: FloatArray,
-        period: float | None,
-        on_bases: bool,
         paced: bool = False,
     ) -> None:
         super().__init__()
         if not cells or len(cells) != len(inradii):
             found = f"{len(inradii)} for {len(cells)}"
             raise ValueError(f"TeamController needs one inradius for each cell, not {found}")
-        ports = VECTOR, VECTOR, VECTOR, VECTOR, VECTOR
-        driving = NUMBER, *ports, on_bases, VECTOR, VECTOR
-        self._on_bases = on_bases
-        self._laws = [prepared(drive_team, (*cell, *team), *driving) for cell in cells]
+        ports = VECTOR, VECTOR, VECTOR, VECTOR, VECTOR, VECTOR
+        self._laws = [prepared(drive_team, (*cell, *team[:-1]), NUMBER, *ports) for cell in cells]
         self._tables, edges, rows = zip(*((cell.table, cell.edges, cell.row) for cell in cells), strict=True)
         conditions = ready_conditions(self._tables, edges, rows, inradii, goal_position, position_tolerance)
         reading = team.places, team.first, team.base_chains, team.yaws
-        told = 0, NUMBER, VECTOR, VECTOR, VECTOR, VECTOR
+        told = 0, NUMBER, VECTOR, VECTOR, VECTOR
         self._report = [prepared(report_readiness, (*each, *reading), *told) for each in conditions]
         self._reading = reading
         self._memory, self._nothing = JumpMemory(self._tables), EventStatus.DidNothing()
@@ -95,8 +87,6 @@ class TeamController(Block):
         self._governor = self.DeclareVectorInputPort("governor_position", 2)
         self._cell = self.DeclareVectorInputPort("current_cell", CURRENT_CELL_SIZE)
         self._clock = self.DeclareVectorInputPort("clock", CLOCK_SIZE) if paced else None
-        nominal = team.tracking.size > 0
-        self._nominal = self.DeclareVectorInputPort("nominal", NOMINAL_SIZE) if nominal else None
         sizes = 3 * robots + joints + 2, telemetry_size(robots, joints)
         self._unread = tuple(map(np.empty, sizes))
         self.DeclareVectorOutputPort("team_command", sizes[0], self._write_command)
@@ -104,7 +94,7 @@ class TeamController(Block):
         self._ready = self.DeclareVectorOutputPort("ready", READY_SIZE * robots, self._write_ready)
         self.DeclareDiscreteState([0.0, *first_jumps(cells[0].table, start)])
         if len(cells) > 1:
-            self.declare_update(self._remember, period)
+            self.declare_update(self._remember, None)
 
     def _write_command(self, context: Context, output: BasicVector) -> None:
         self._drive(context, output.get_mutable_value(), self._unread[1])
@@ -116,18 +106,14 @@ class TeamController(Block):
         cell = self._cell.Eval(context)
         index, time = index_of(cell, len(self._laws)), context.get_time() - cell[1]
         clock, jumps = clock_of(self._clock, context), self._memory.jumps(context, index, time)
-        state, led = self._state.Eval(context), self._led(context)
-        self._laws[index](time, clock, jumps, state, *led, self._on_bases, command, telemetry)
+        state, governor = self._state.Eval(context), self._governor.Eval(context)
+        self._laws[index](time, clock, jumps, state, governor, command, telemetry)
 
     def _write_ready(self, context: Context, output: BasicVector) -> None:
         cell = self._cell.Eval(context)
         index = index_of(cell, len(self._report))
-        state, led = self._state.Eval(context), self._led(context)
-        self._report[index](index, context.get_time() - cell[1], state, *led, output.get_mutable_value())
-
-    def _led(self, context: Context) -> tuple[FloatArray, FloatArray]:
-        """Return p_G and what the nominal governor shows, nothing without one."""
-        return self._governor.Eval(context), NOTHING if self._nominal is None else self._nominal.Eval(context)
+        state, governor = self._state.Eval(context), self._governor.Eval(context)
+        self._report[index](index, context.get_time() - cell[1], state, governor, output.get_mutable_value())
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> EventStatus:
         reports = self._ready.Eval(context)

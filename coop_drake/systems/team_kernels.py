@@ -11,8 +11,7 @@ from coop_drake.laws.axis_table import track_axes, write_bounds, write_jumps
 from coop_drake.laws.load_sharing import end_effector_command, rotated
 from coop_drake.laws.robot_dynamics import read_robot, robot_effort
 from coop_drake.systems.governor_kernels import govern
-from coop_drake.systems.nominal_kernels import accelerate_along
-from coop_drake.systems.ready_kernels import robot_ready, robot_ready_along
+from coop_drake.systems.ready_kernels import robot_ready
 from coop_drake.tree.pose import FloatArray, IntArray
 
 __all__ = [
@@ -104,9 +103,8 @@ def telemetry_parts(
 def drive_team(
     row: FloatArray, edges: FloatArray, flat: FloatArray, field: FloatArray, table: FloatArray,
     places: IntArray, first: IntArray, chains: FloatArray, base_chains: FloatArray, yaws: FloatArray,
-    loads: FloatArray, tracking: FloatArray, time: float, clock: FloatArray, jumps: FloatArray,
-    state: FloatArray, governor_position: FloatArray, nominal: FloatArray, on_bases: bool,
-    command: FloatArray, telemetry: FloatArray,
+    loads: FloatArray, time: float, clock: FloatArray, jumps: FloatArray, state: FloatArray,
+    governor_position: FloatArray, command: FloatArray, telemetry: FloatArray,
 ) -> None:  # fmt: skip
     """Write what drives the team, and what the robots' blocks would show to the log.
 
@@ -116,31 +114,25 @@ def drive_team(
         flat: The map.
         field: The velocity field.
         table: The axes of all robots.
-        places: This and the next six arguments are the fields of ``FusedTeam``; see there.
+        places: This and the next five arguments are the fields of ``FusedTeam``; see there.
         first: First rows.
         chains: From bases to end effectors.
         base_chains: From the object to bases.
         yaws: Angles of the bases.
         loads: Shares of the load.
-        tracking: Gains of the position's loop.
         time: Time since the cell was entered [s].
         clock: The funnels' clock: its lag [s], its pace [-] and the derivative of the pace [1/s], shape (3,).
         jumps: Of all axes of ``table``, what ``write_jumps`` gave at the switch, shape (N + n,).
         state: State of the plant.
         governor_position: p_G, shape (2,) [m].
-        nominal: What ``NominalGovernor`` shows, shape (6,); not read where nothing is tracked.
-        on_bases: Whether base wrenches are given in the axes of the bases, not in those of W.
-        command: Receives wrenches on all bases, all joint torques and p_G', shape (3 N + n + 2,).
+        command: Receives wrenches on all bases in their own axes, all joint torques and p_G', shape
+            (3 N + n + 2,).
         telemetry: Receives what ``telemetry_parts`` lists.
     """
     robots, n = yaws.size, places.shape[1] - 3
     acceleration, commands, bases, efforts, bounds, margin = telemetry_parts(telemetry, robots)
     object_state, robot, governed = state_of_object(places, state), np.empty(6 + 2 * n), np.empty(4)
-    if tracking.size:
-        margin[0], governed[0], governed[1] = nominal[4], 0.0, 0.0
-        accelerate_along(tracking, object_state, governor_position, nominal, nominal, governed[2:])
-    else:
-        margin[0] = govern(row, edges, flat, field, time, object_state, governor_position, governed)
+    margin[0] = govern(row, edges, flat, field, time, object_state, governor_position, governed)
     acceleration[0], acceleration[1] = governed[2], governed[3]
     axes, effort, own_bounds = np.empty(1 + n), np.empty(3 + n), np.empty(2 + 2 * n)
     for k in range(robots):
@@ -159,10 +151,9 @@ def drive_team(
             efforts[3 * robots + start + i] = effort[3 + i]
             bounds[1 + start + i], bounds[2 + n + start + i] = own_bounds[1 + i], own_bounds[m + 1 + i]
     command[: efforts.size], command[efforts.size :] = efforts, clock[1] * governed[:2]
-    if on_bases:
-        for k in range(robots):
-            c, s, at = np.cos(bases[k, 2]), np.sin(bases[k, 2]), 3 * k
-            command[at], command[at + 1] = rotated(c, -s, efforts[at], efforts[at + 1])
+    for k in range(robots):
+        c, s, at = np.cos(bases[k, 2]), np.sin(bases[k, 2]), 3 * k
+        command[at], command[at + 1] = rotated(c, -s, efforts[at], efforts[at + 1])
 
 
 @compiled
@@ -170,7 +161,7 @@ def report_readiness(
     table: FloatArray, next_table: FloatArray, next_edges: FloatArray, next_stiffness: float,
     inradius: float, goal: FloatArray, tolerance: float, last: bool, places: IntArray, first: IntArray,
     base_chains: FloatArray, yaws: FloatArray, index: int, time: float, state: FloatArray,
-    governor_position: FloatArray, nominal: FloatArray, reports: FloatArray,
+    governor_position: FloatArray, reports: FloatArray,
 ) -> None:  # fmt: skip
     """Write for each robot the index of the current cell and the margin of ``robot_ready``, shape (2 N,).
 
@@ -192,7 +183,6 @@ def report_readiness(
         time: Time since it was entered [s].
         state: State of the plant.
         governor_position: p_G, shape (2,) [m].
-        nominal: What ``NominalGovernor`` shows, of shape (0,) where p_G follows the measured position.
         reports: Receives the reports.
     """
     object_state, robot = state_of_object(places, state), np.empty(2 * places.shape[1])
@@ -200,17 +190,10 @@ def report_readiness(
         start, stop = first[2, k] + k, first[2, k + 1] + k + 1
         read_own(k, places, first, base_chains, yaws, state, robot)
         reports[2 * k] = index
-        own, following = table[start:stop], next_table[start:stop]
-        if nominal.size:
-            reports[2 * k + 1] = robot_ready_along(
-                own, following, next_edges, next_stiffness, inradius, goal, tolerance, last, time,
-                object_state, robot, governor_position, nominal,
-            )  # fmt: skip
-        else:
-            reports[2 * k + 1] = robot_ready(
-                own, following, next_edges, next_stiffness, inradius, goal, tolerance, last, time,
-                object_state, robot, governor_position,
-            )  # fmt: skip
+        reports[2 * k + 1] = robot_ready(
+            table[start:stop], next_table[start:stop], next_edges, next_stiffness, inradius, goal, tolerance,
+            last, time, object_state, robot, governor_position,
+        )  # fmt: skip
 
 
 @compiled

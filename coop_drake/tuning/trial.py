@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from coop_drake.answers import Found, Plan, PlanningProblem
 from coop_drake.answers.log import SimulationLog
-from coop_drake.diagram import Blocks, build_closed_loop
+from coop_drake.compiled_loop import build_fused_loop, simulate_fused
+from coop_drake.diagram import Blocks
 from coop_drake.errors import ScenarioError
 from coop_drake.fields import HarmonicMap
 from coop_drake.laws import GainSet
@@ -51,7 +52,7 @@ class GainTrial:
 def fastest_blocks(scenario: Scenario, plan: Plan, maps: Sequence[HarmonicMap]) -> Blocks:
     """Return ``fused`` if the fused block can do all that the scenario asks for, else ``named``."""
     try:
-        build_closed_loop(scenario, plan, maps, blocks="fused").release()
+        build_fused_loop(scenario, plan, maps).release()
     except ScenarioError:
         return "named"
     return "fused"
@@ -99,7 +100,8 @@ class TrialRunner:
     def run(self, gains: GainSet) -> SimulationLog:
         """Simulate the plan with other gains, and return the log of the run."""
         made = reschedule(self.plan, gains, "trial")
-        return simulate(self._scenario, made, self.maps, blocks=self._blocks)
+        run = simulate_fused if self._blocks == "fused" else simulate
+        return run(self._scenario, made, self.maps)
 
 
 def outcome_of(log: SimulationLog, cells: int) -> RunOutcome:

@@ -48,7 +48,7 @@ def run():
     gains = ScheduledGains().for_age(deployment.command_age)
     scenario = replace(scenario, gains=replace(scenario.gains, sets={"scheduled": gains}))
     plan = make(planning_problem(scenario), gains, gain_set_name="scheduled", budget=BUDGET).plan
-    return scenario, plan, simulate(scenario, plan, build_maps(plan), blocks="named")
+    return scenario, plan, simulate(scenario, plan, build_maps(plan))
 
 
 def test_the_run_arrives_and_is_accepted_within_its_budget():

@@ -7,6 +7,7 @@ import pytest
 from pydrake.systems.analysis import ExtractSimulatorConfig, Simulator
 from pydrake.systems.primitives import ConstantVectorSource
 
+from coop_drake.compiled_loop import simulate_fused
 from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.scenario import (
     ActuatorLimits,
@@ -158,7 +159,7 @@ def test_a_mild_departure_is_survived(name):
 def test_a_thousand_samples_a_second_are_survived_too():
     scenario, plan = small_problem("base")
     fast = replace(scenario, deployment=Deployment(control_rate=1000.0))
-    log = simulate(fast, plan, small_maps(), blocks="fused")
+    log = simulate_fused(fast, plan, small_maps())
     assert log.reached
     assert log.violation == ""
     assert min(log.funnel_margin.min(), log.slice_margin.min(), log.cell_clearance.min()) > 0.0

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 
+from coop_drake.compiled_loop import simulate_fused
 from coop_drake.diagram import build_closed_loop
 from coop_drake.errors import ScenarioError
 from coop_drake.planning.planner import plan as plan_problem
@@ -107,11 +108,11 @@ def held_scenario(hold, deployment=None):
     return replace(scenario, control=Control(hold=hold), deployment=deployment or Deployment()), plan
 
 
-@pytest.mark.parametrize("blocks", ["named", "fused"])
-def test_a_scheduled_hold_costs_its_time_and_no_more(blocks):
+@pytest.mark.parametrize("run", [simulate, simulate_fused], ids=["named", "fused"])
+def test_a_scheduled_hold_costs_its_time_and_no_more(run):
     scenario, plan = held_scenario(Hold(at=(0.2, 0.9), duration=1.5))
-    log = simulate(scenario, plan, small_maps(), blocks=blocks)
-    free = simulate(replace(scenario, control=Control()), plan, small_maps(), blocks="fused")
+    log = run(scenario, plan, small_maps())
+    free = simulate_fused(replace(scenario, control=Control()), plan, small_maps())
     assert (log.reached, log.violation) == (True, "")
     told = 2.2  # from 0.2 s to 2.4 s: the second begins in the first
     assert told <= log.times[-1] - free.times[-1] <= told + 2.0
@@ -194,8 +195,10 @@ def test_a_hold_after_silence_needs_a_control_rate():
         validate(scenario)
 
 
-@pytest.mark.parametrize("hold", [Hold(energy=2.0), Hold(silence=0.1)])
-def test_fused_blocks_hear_no_robot(hold):
-    scenario, plan = held_scenario(hold, Deployment(control_rate=200.0))
+@pytest.mark.parametrize(
+    ("hold", "rate"), [(Hold(energy=2.0), None), (Hold(silence=0.1), 200.0), (Hold(at=(1.0,)), 200.0)]
+)
+def test_one_block_is_held_at_stated_times_in_continuous_time_alone(hold, rate):
+    scenario, plan = held_scenario(hold, Deployment(control_rate=rate))
     with pytest.raises(ScenarioError, match=r"control\.hold"):
-        build_closed_loop(scenario, plan, small_maps(), blocks="fused")
+        simulate_fused(scenario, plan, small_maps())

@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from coop_drake.compiled_loop import simulate_fused
 from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.scenario import ActuatorLimits, Deployment, Hold, Measurements, Messages
 from coop_drake.scenario.control import Control
@@ -13,7 +14,7 @@ from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification.runs.rows import Rows
 from coop_drake.verification.runs.tube import check_budget_used
 from tests.support.run_checks import verified_run
-from tests.support.tubes import BUDGET, WITH_AXES, tubed_problem
+from tests.support.tubes import BUDGET, tubed_problem
 
 FUSED = replace(BUDGET, delay=0.0, lag=0.0, position_noise=0.0, velocity_noise=0.0)
 
@@ -53,7 +54,7 @@ def test_a_noisy_late_and_wrong_team_stays_in_the_tube():
 def test_fused_and_named_blocks_lead_alike(mass_error):
     scenario, plan, maps = problem(FUSED)
     scenario = replace(scenario, deployment=Deployment(control_rate=200.0, mass_error=mass_error))
-    fused = simulate(scenario, plan, maps, blocks="fused")
+    fused = simulate_fused(scenario, plan, maps)
     (used,) = check_budget_used(Rows(fused, plan))
     assert fused.reached
     assert used.tightest < 0.8
@@ -64,16 +65,10 @@ def test_fused_and_named_blocks_lead_alike(mass_error):
             np.testing.assert_allclose(getattr(named, name), getattr(fused, name), atol=1e-9)
 
 
-def test_fused_blocks_refuse_a_budget_for_the_axes():
-    scenario, plan, maps = problem(WITH_AXES)
-    with pytest.raises(ScenarioError, match="named, for a plan with a budget for angles and joints"):
-        simulate(scenario, plan, maps, blocks="fused")
-
-
 def test_a_held_team_keeps_its_tube():
     scenario, plan, maps = problem(FUSED)
     scenario = replace(scenario, control=Control(hold=Hold(at=(0.4,), duration=1.0)))
-    log = simulate(scenario, plan, maps, blocks="fused")
+    log = simulate(scenario, plan, maps)
     (used,) = check_budget_used(Rows(log, plan))
     assert log.reached
     assert used.tightest < 0.8

@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from coop_drake.compiled_loop import simulate_fused
 from coop_drake.diagram import build_closed_loop
 from coop_drake.errors import ScenarioError
 from coop_drake.plant import set_configuration
-from coop_drake.scenario import ActuatorLimits, Control, Deployment, Measurements, Messages
+from coop_drake.scenario import ActuatorLimits, Control, Deployment, Measurements
 from coop_drake.simulation import simulate
 from coop_drake.simulation.telemetry import Telemetry
 from tests.support.ring_team import PRISMATIC, REVOLUTE, ring_team
@@ -118,7 +119,7 @@ def test_along_a_run_they_stay_alike(problem, run):
 
 
 def test_a_fused_run_is_the_named_one(problem, run):
-    fused = simulate(*problem, small_maps(), blocks="fused")
+    fused = simulate_fused(*problem, small_maps())
     assert fused.reached
     assert fused.violation == ""
     np.testing.assert_array_equal(fused.cell_index, run.cell_index)
@@ -139,30 +140,18 @@ def test_a_fused_run_is_the_named_one(problem, run):
     assert fused.acceleration_error.max() <= 1e-12 * max(1.0, np.abs(run.object_wrench).max())
 
 
-def test_a_sampled_fused_run_is_the_sampled_named_one():
-    scenario, plan = small_problem("base")
-    deployment = Deployment(
-        control_rate=200.0, mass_error=0.1, messages=Messages(loss=0.3, repeat=0.2, delay=0.01), seed=2
-    )
-    brief = replace(scenario.simulator, max_time=0.6)
-    deployed = replace(scenario, deployment=deployment, simulator=brief)
-    named, fused = (simulate(deployed, plan, small_maps(), blocks=blocks) for blocks in ("named", "fused"))
-    np.testing.assert_allclose(fused.times, named.times, rtol=0.0, atol=1e-9)
-    for name in ("object_pose", "joints", "governor_position", "base_wrenches", "joint_torques"):
-        np.testing.assert_allclose(
-            getattr(fused, name), getattr(named, name), rtol=0.0, atol=1e-7, err_msg=name
-        )
-
-
 @pytest.mark.parametrize(
     "wanted",
     [
         {"deployment": Deployment(control_rate=100.0, measurements=Measurements(position_noise=0.01))},
+        {"deployment": Deployment(control_rate=100.0)},
         {"deployment": Deployment(actuators=ActuatorLimits(base_force=50.0))},
         {"control": Control(observer=True)},
     ],
 )
 def test_what_only_named_blocks_do_is_refused(wanted):
     scenario, plan = small_problem("base")
-    with pytest.raises(ScenarioError, match=rf"{next(iter(wanted))}: .* fused blocks support only these"):
+    with pytest.raises(
+        ScenarioError, match=rf"{next(iter(wanted))}: .* in continuous time support only these"
+    ):
         build_closed_loop(replace(scenario, **wanted), plan, small_maps(), blocks="fused")

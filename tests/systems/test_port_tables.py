@@ -61,7 +61,7 @@ def blocks():
     found = {}
     for (scenario, plan, maps), blocks, changes in (
         (tubed, "named", {"control": hold}),
-        (tubed, "fused", {"control": hold}),
+        ((*own, small_maps()), "fused", {"control": hold}),
         ((*axes, build_maps(axes[1])), "named", {"control": hold}),
         ((*own, small_maps()), "named", everything),
         ((*own, small_maps()), "named", separate),

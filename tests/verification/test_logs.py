@@ -5,9 +5,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
+from coop_drake.compiled_loop import simulate_fused
 from coop_drake.errors import RefusalError
 from coop_drake.plant import planning_problem, run_setup
-from coop_drake.simulation import simulate
 from coop_drake.verification.runs import verify_log
 from tests.support.run_oracle import RunOracle
 from tests.support.small_loop import small_maps, small_problem
@@ -23,7 +23,7 @@ ALTERATIONS = 6
 def case():
     """A short run of an ideal team, and all that it is checked against."""
     scenario, plan = small_problem("base")
-    log = simulate(scenario, plan, small_maps(), blocks="fused")
+    log = simulate_fused(scenario, plan, small_maps())
     return log, (plan, planning_problem(scenario), run_setup(scenario)), RunOracle(scenario, plan)
 
 
