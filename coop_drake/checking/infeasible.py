@@ -38,11 +38,8 @@ def check_proof(question: Question, answer: Any, progress: plane.Progress) -> li
             clear = free([point], 0, steps, box, wrong, lambda cell, *at: cell.side(*at) < 0)
             demand(clear, where, f"cells may hold the {name} and have reached: {label}")
         forbidden = _forbidden(question, [Step(0, -1, offset=point), *chain], wide, value["witnesses"], where)
-        edges += (
-            0
-            if forbidden is None
-            else _check_cover([cell for _, cell in cells[k]], forbidden, outside, where)
-        )
+        if forbidden is not None:
+            edges += _check_cover([cell for _, cell in cells[k]], forbidden, outside, where)
         progress("checking slices", (k + 1) / len(slices))
     return [
         ("slices tile a turn and the limits of the joints", len(slices)),
@@ -154,9 +151,8 @@ def _check_cover(cells: list[Region], polygons: list[list[Point]], outside: Regi
         for edge in edges:
             count, near, (x, y) = count + 1, sets.near(edge), edge[0]
             chosen = _chosen(sets, [k for k in near if k in taken], edge) or _chosen(sets, near, edge)
-            demand(
-                len(chosen) > 0, where, f"no cell covers ({x / ONE:.6f}, {y / ONE:.6f}), which may be free"
-            )
+            place = f"({x / ONE:.6f}, {y / ONE:.6f})"
+            demand(len(chosen) > 0, where, f"no cell covers {place}, which may be free")
             left += [sets.edges(k) for k in sorted(chosen - taken)]
             taken |= chosen
     return count

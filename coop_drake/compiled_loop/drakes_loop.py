@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Demultiplexer
 
 from coop_drake.answers.log import SimulationLog
@@ -17,53 +17,28 @@ from coop_drake.compiled_loop.preparing import CompiledTransport, prepare
 from coop_drake.compiled_loop.sampled_team import SampledTeam
 from coop_drake.compiled_loop.telling import GOVERNOR, MARGIN, POSE, READY, SHOWN, WANTED
 from coop_drake.diagram.closed_loop import ClosedLoop, build_closed_loop
-from coop_drake.diagram.station import TransportStation, build_driven_station
+from coop_drake.diagram.station import build_driven_station
 from coop_drake.fields import HarmonicMap
-from coop_drake.plant import TeamPlant, set_configuration
 from coop_drake.plant.configuration import displacement
 from coop_drake.progress import Progress
 from coop_drake.scenario import Deployment, Scenario
-from coop_drake.simulation.logged_ports import Places, PortRow
+from coop_drake.simulation.logged_ports import Places, PortRow, ReportingLoop
 from coop_drake.simulation.run import run_and_release
 from coop_drake.simulation.telemetry import Sample
-from coop_drake.systems.block import release_all
-from coop_drake.tree.pose import FloatArray, IntArray
+from coop_drake.tree.pose import IntArray
 
 
 @dataclass(frozen=True)
-class SampledLoop:
+class SampledLoop(ReportingLoop):
     """Drake's plant, and one block that computes what a sampled team computes.
 
     Attributes:
-        diagram: The Diagram of the whole loop.
-        station: The simulated team.
         controllers: The block.
         axis_rows: Row among the M axes of (theta, q), shape (1 + n,).
-        plan: The plan that is followed.
-        start: Where the team stands at first, shape (3 + n,) [m, rad].
     """
 
-    diagram: Diagram
-    station: TransportStation
     controllers: SampledTeam
     axis_rows: IntArray
-    plan: Plan
-    start: FloatArray
-
-    @property
-    def team(self) -> TeamPlant:
-        """The simulated team."""
-        return self.station.team
-
-    def create_context(self) -> Context:
-        """Create a context of a team at rest."""
-        context = self.diagram.CreateDefaultContext()
-        set_configuration(self.team, self.team.plant.GetMyMutableContextFromRoot(context), self.start)
-        return context
-
-    def release(self) -> None:
-        """Free all memory after the last context is gone; no part of the loop may be used any more."""
-        release_all(self.diagram)
 
     def places(self, ports: PortRow) -> Places:
         """Add all outputs that are logged, and return where they stand."""
@@ -123,7 +98,7 @@ def build_sampled_loop(transport: CompiledTransport, deployment: Deployment | No
         builder.Connect(parts.get_output_port(k), diagram.GetInputPort(f"robot_{k}_effort"))
     rows = transport.plant.axis_rows[0]
     start = transport.plan.start + displacement(deployment, len(transport.plan.start))
-    return SampledLoop(builder.Build(), station, block, rows, transport.plan, start)
+    return SampledLoop(builder.Build(), station, transport.plan, start, block, rows)
 
 
 def simulate_sampled(

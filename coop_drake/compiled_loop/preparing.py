@@ -106,7 +106,10 @@ def _check(scenario: Scenario) -> None:
 
 def _refusal(scenario: Scenario, key: str, found: object, allowed: str) -> ScenarioError:
     return ScenarioError(
-        str(scenario.path), key, found, f"{allowed}, because the compiled loop knows no other"
+        str(scenario.path),
+        key,
+        found,
+        f"{allowed}: the compiled loop, and one block for a sampled team, know no other",
     )
 
 

@@ -1,6 +1,7 @@
 """Wiring: one robot's controller, the transport station, the closed loop."""
 
 from coop_drake.diagram.closed_loop import Blocks, ClosedLoop, build_closed_loop
+from coop_drake.diagram.loop import Loop
 from coop_drake.diagram.robot_controller import (
     TELEMETRY,
     Replacements,
@@ -14,6 +15,7 @@ __all__ = [
     "TELEMETRY",
     "Blocks",
     "ClosedLoop",
+    "Loop",
     "Replacements",
     "RobotKnowledge",
     "TransportStation",

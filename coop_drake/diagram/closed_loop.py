@@ -13,71 +13,50 @@ from coop_drake.diagram.deployment import DeployedController, deploy
 from coop_drake.diagram.fused import FusedControllers, add_fused_controllers
 from coop_drake.diagram.hold import add_supervisor
 from coop_drake.diagram.knowledge import robot_knowledge
+from coop_drake.diagram.loop import Loop
 from coop_drake.diagram.robot_controller import Replacements, build_robot_controller
-from coop_drake.diagram.station import TransportStation, build_driven_station, build_station
+from coop_drake.diagram.station import build_driven_station, build_station
 from coop_drake.fields import HarmonicMap
-from coop_drake.plant import TeamPlant, set_configuration
 from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import Scenario
 from coop_drake.systems import CellPlanner, HoldSupervisor
-from coop_drake.systems.block import release_all
-from coop_drake.tree.pose import FloatArray
 
 Blocks = Literal["named", "fused"]
 """How the controllers are built: a block for each law of each robot, or one block for them all."""
 
 
 @dataclass(frozen=True)
-class ClosedLoop:
+class ClosedLoop(Loop):
     """The closed loop and its parts.
 
     Attributes:
-        diagram: The Diagram of the whole loop.
-        station: The simulated team.
         cell_planner: The supervisor.
         controllers: One sub-Diagram for each robot, as the others see it.
         deployed: Controllers with sensors, actuators and radio, empty where the team is ideal.
         supervisor: What holds the team, None where a scenario has no holds.
         fused: The block that drives the team in the fused mode, which has no controllers of single robots.
-        plan: The plan that they follow.
-        start: Where the team stands at first, shape (3 + n,) [m, rad].
     """
 
-    diagram: Diagram
-    station: TransportStation
     cell_planner: CellPlanner
     controllers: tuple[Diagram, ...]
     deployed: tuple[DeployedController, ...]
     supervisor: HoldSupervisor | None
     fused: FusedControllers | None
-    plan: Plan
-    start: FloatArray
 
     @property
     def bare_controllers(self) -> tuple[Diagram, ...]:
         """The controllers alone, without the sensors, actuators and radio of a deployment."""
         return tuple(deployed.controller for deployed in self.deployed) or self.controllers
 
-    @property
-    def team(self) -> TeamPlant:
-        """The simulated team."""
-        return self.station.team
-
     def create_context(self) -> Context:
         """Create a context of a team at rest, in the first cell, with every p_G at the plan's start."""
-        context = self.diagram.CreateDefaultContext()
-        team = self.team
-        set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.start)
+        context = super().create_context()
         if self.fused is not None:
             governor = self.fused.integrator
             governor.set_integral_value(governor.GetMyMutableContextFromRoot(context), self.plan.start[:2])
         for deployed in self.deployed:
             deployed.prepare(context, self.plan.start[:2])
         return context
-
-    def release(self) -> None:
-        """Free all memory after the last context is gone; no part of the loop may be used any more."""
-        release_all(self.diagram)
 
 
 def build_closed_loop(
@@ -122,7 +101,7 @@ def build_closed_loop(
         supervisor = add_supervisor(builder, hold, planner, heard, scenario.deployment.period)
     if blocks == "fused":
         controllers = add_fused_controllers(builder, scenario, station, planner, supervisor, knowledge)
-        return ClosedLoop(builder.Build(), station, planner, (), (), supervisor, controllers, plan, start)
+        return ClosedLoop(builder.Build(), station, plan, start, planner, (), (), supervisor, controllers)
     built, deployed = [], []
     for k, known in enumerate(knowledge):
         controller = build_robot_controller(known, replacements)
@@ -139,7 +118,7 @@ def build_closed_loop(
             )
         built.append(controller)
     return ClosedLoop(
-        builder.Build(), station, planner, tuple(built), tuple(deployed), supervisor, None, plan, start
+        builder.Build(), station, plan, start, planner, tuple(built), tuple(deployed), supervisor, None
     )
 
 

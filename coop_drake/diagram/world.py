@@ -5,59 +5,38 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder
 
 from coop_drake.answers.plan import Plan
 from coop_drake.diagram.deployment import Body, build_body
-from coop_drake.diagram.station import TransportStation, build_station
+from coop_drake.diagram.loop import Loop
+from coop_drake.diagram.station import build_station
 from coop_drake.errors import ScenarioError
-from coop_drake.plant import TeamPlant, set_configuration
 from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import Scenario
 from coop_drake.systems import Exchange, TeamLink, robot_record, supervisor_record
-from coop_drake.systems.block import release_all
-from coop_drake.tree.pose import FloatArray
 
 
 @dataclass(frozen=True)
-class World:
+class World(Loop):
     """A team whose controllers and supervisor run elsewhere.
 
     Attributes:
-        diagram: The Diagram of the world.
-        station: The simulated team.
         bodies: Sensors and actuators of every robot.
         link: The block that is connected to the controllers and the supervisor.
         records: Names and sizes of what each robot reports for the log, then of what the supervisor does.
-        plan: The plan that they follow.
-        start: Where the team stands at first, shape (3 + n,) [m, rad].
     """
 
-    diagram: Diagram
-    station: TransportStation
     bodies: tuple[Body, ...]
     link: TeamLink
     records: tuple[dict[str, int], ...]
-    plan: Plan
-    start: FloatArray
-
-    @property
-    def team(self) -> TeamPlant:
-        """The simulated team."""
-        return self.station.team
 
     def create_context(self) -> Context:
         """Create a context of a team at rest."""
-        context = self.diagram.CreateDefaultContext()
-        team = self.team
-        set_configuration(team, team.plant.GetMyMutableContextFromRoot(context), self.start)
+        context = super().create_context()
         for body in self.bodies:
             body.prepare(context)
         return context
-
-    def release(self) -> None:
-        """Free all memory after the last context is gone; no part of the world may be used any more."""
-        release_all(self.diagram)
 
 
 def control_period(scenario: Scenario) -> float:
@@ -128,4 +107,4 @@ def build_world(scenario: Scenario, plan: Plan, exchange: Exchange) -> World:
             builder.Connect(output, receiver)
         bodies.append(body)
     start = plan.start + displacement(scenario.deployment, len(plan.start))
-    return World(builder.Build(), station, tuple(bodies), link, records, plan, start)
+    return World(builder.Build(), station, plan, start, tuple(bodies), link, records)

@@ -2,49 +2,25 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
-from pydrake.systems.framework import Context, Diagram, System
+from pydrake.systems.framework import Context, System
 
-from coop_drake.answers.plan import Plan
-from coop_drake.diagram import TELEMETRY, ClosedLoop, World
-from coop_drake.plant import TeamPlant
+from coop_drake.diagram import TELEMETRY, ClosedLoop, Loop, World
 from coop_drake.systems.team_kernels import telemetry_parts
 from coop_drake.tree.pose import FloatArray
 
 
-class ReportingLoop(Protocol):
+class ReportingLoop(Loop, ABC):
     """A loop that says itself which of its ports are logged."""
 
-    @property
-    def diagram(self) -> Diagram:
-        """The Diagram of the whole loop."""
-        ...
-
-    @property
-    def team(self) -> TeamPlant:
-        """The simulated team."""
-        ...
-
-    @property
-    def plan(self) -> Plan:
-        """The plan that is followed."""
-        ...
-
-    def create_context(self) -> Context:
-        """Create a context at the plan's start."""
-        ...
-
-    def release(self) -> None:
-        """Free all memory."""
-        ...
-
+    @abstractmethod
     def places(self, ports: PortRow) -> Places:
         """Add all outputs that are logged to a row, and return where they stand."""
-        ...
 
 
 LoggedLoop = ClosedLoop | World | ReportingLoop
