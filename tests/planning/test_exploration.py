@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from coop_drake.planning.boxes.boxes import explored_channel
-from coop_drake.planning.cells.cell_graph import Kind
+from coop_drake.planning.cells.cell_graph import CellGraph, Kind
 from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.questions.relaxation import relaxed
 from tests.planning.test_search import rod_problem
@@ -42,6 +42,27 @@ def test_the_path_that_is_split_is_the_cheapest_one(budget: int) -> None:
     least = nx.dijkstra_path_length(graph, first.index, last.index)
     along = sum(graph.edges[one.index, other.index]["weight"] for one, other in pairwise(outcome.path))
     assert along == pytest.approx(least, rel=1e-12)
+
+
+@pytest.mark.parametrize("budget", [20, 60, 100])
+def test_a_search_that_goes_on_finds_the_path_of_a_new_one(budget: int) -> None:
+    exploration = Exploration(relaxed(case("closed"), (1,))[0])
+    path, graph = exploration.run(budget).path, CellGraph(exploration.slices)
+    leaves = sorted(
+        (cells[0].index, leaf, cells) for leaf, cells in exploration.graph.by_slice.items() if cells
+    )
+    for _, leaf, cells in leaves:
+        graph.add(leaf, [(cell.kind, cell.region, cell.weight) for cell in cells])
+    ends = [
+        [graph.by_slice[leaf][i] for _, leaf, cells in leaves for i, cell in enumerate(cells) if cell in its]
+        for its in (
+            [cell for cells in exploration._starts.values() for cell in cells],
+            [exploration.graph.cells[k] for cells in exploration._goals.values() for k in cells],
+        )
+    ]
+    again = graph.cheapest(ends[0], {cell.index for cell in ends[1]})
+    assert len(path) > 3
+    assert [cell.region for cell in again] == [cell.region for cell in path]
 
 
 @pytest.mark.parametrize(("name", "robots"), [("base", ()), ("base", (1,)), ("three", (2,)), ("elbow", ())])

@@ -9,7 +9,7 @@ from enum import IntEnum
 import numpy as np
 
 from coop_drake.planning.cells.cells import Region
-from coop_drake.planning.cells.graph_search import NO_WAY, REACHED, Links, Search, begin, go_on, link, unlink
+from coop_drake.planning.cells.graph_search import NO_WAY, REACHED, Links, Search, aim, forget, go_on, link
 from coop_drake.planning.cells.slices import Slices
 
 
@@ -56,6 +56,7 @@ class CellGraph:
         self.by_slice: dict[int, list[GraphCell]] = {}
         self._edges = 0
         self._links, self._search = _links(0, 0), _search(0)
+        self._searched, self._starts = 0, set[int]()
 
     def add(self, index: int, members: Sequence[tuple[Kind, Region, float]]) -> None:
         """Put the cells (kind, region, weight) of a new leaf into the graph."""
@@ -79,17 +80,19 @@ class CellGraph:
     def remove(self, index: int) -> None:
         """Remove the cells of a slice that is about to be halved."""
         if removed := self.by_slice.pop(index):
-            unlink(self._links, removed[0].index, removed[-1].index + 1)
+            first, last = removed[0].index, removed[-1].index + 1
+            self._starts.difference_update(range(first, last))
+            forget(self._links, self._search, first, last, len(self.cells))
 
     def _make_room(self, nodes: int, edges: int) -> None:
         """Let the arrays hold so many nodes and edges, at least twice as many as before where they grow."""
         links, known, stored = self._links, len(self._links.weights), len(self._links.to)
         if nodes > known or edges > stored:
             known = known if nodes <= known else 2 * nodes
+            search, self._search = self._search, _search(known)
             self._links = _links(known, stored if edges <= stored else 2 * edges)
-            for grown, old in zip(self._links, links, strict=True):
+            for grown, old in zip((*self._links, *self._search), (*links, *search), strict=True):
                 grown[: len(old)] = old
-            self._search = _search(known)
 
     def cheapest(self, starts: Sequence[GraphCell], goals: set[int]) -> list[GraphCell] | None:
         """Path of least total weight by Dijkstra's algorithm; of equal costs the lower index comes first.
@@ -101,9 +104,13 @@ class CellGraph:
         Returns:
             Cells from a start to a goal, or None if no path joins them.
         """
+        begins = {cell.index for cell in starts}
+        if not self._starts <= begins:
+            self._search, self._searched = _search(len(self._links.weights)), 0
         links, search = self._links, self._search
-        first, last = (np.array(sorted(ends), dtype=np.int64) for ends in ({c.index for c in starts}, goals))
-        begin(links, search, first, last, len(self.cells))
+        first, last = (np.array(sorted(ends), dtype=np.int64) for ends in (begins, goals))
+        aim(links, search, self._searched, first, last, len(self.cells))
+        self._searched, self._starts = len(self.cells), begins
         while (asked := go_on(links, search)) not in (REACHED, NO_WAY):
             for edge in search.asked[:asked].tolist():
                 links.met[edge // 2] = self._meet(int(links.to[edge ^ 1]), int(links.to[edge]))
@@ -144,5 +151,6 @@ def _links(nodes: int, edges: int) -> Links:
 
 def _search(nodes: int) -> Search:
     """Arrays for a search of so many nodes."""
-    back, heap, place, goal = (np.empty(nodes, np.int64) for _ in range(4))
-    return Search(np.empty(nodes), back, heap, place, goal, np.empty(_ASKED, np.int64), np.zeros(2, np.int64))
+    back, heap, place, goal = (np.full(nodes, -1, np.int64) for _ in range(4))
+    asked, state = np.empty(_ASKED, np.int64), np.zeros(2, np.int64)
+    return Search(np.full(nodes, np.inf), back, heap, place, goal, asked, state)

@@ -1,6 +1,9 @@
 """Dijkstra's algorithm on a graph that changes, compiled: it stops to have edges tested, and goes on.
 
 An edge is tested only when a cheaper way would use it: a test takes longer than many steps of the search.
+When nodes are removed, only the costs of ways through them are forgotten, and the next search goes on from
+all others. It finds what a new search would: of equally cheap ways to a node the one whose last node but one
+has the least cost, and of these the lowest number.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.tree.pose import FloatArray, IntArray
 
-__all__ = ["NO_WAY", "REACHED", "Links", "Search", "begin", "go_on", "link", "unlink"]
+__all__ = ["NO_WAY", "REACHED", "Links", "Search", "aim", "forget", "go_on", "link"]
 
 REACHED, NO_WAY = -1, -2
 """How a search ends: at a goal, or with nothing left to search."""
@@ -93,17 +96,6 @@ def link(links: Links, first: int, last: int, others: IntArray, count: int) -> i
 
 
 @compiled
-def unlink(links: Links, first: int, last: int) -> None:
-    """Remove all edges of some nodes."""
-    for node in range(first, last):
-        edge = links.head[node]
-        while edge >= 0:
-            links.met[edge // 2] = _REMOVED
-            edge = links.following[edge]
-        links.head[node] = -1
-
-
-@compiled
 def _before(search: Search, one: int, other: int) -> bool:
     a, b = search.best[one], search.best[other]
     return bool(a < b or (a == b and one < other))
@@ -149,16 +141,74 @@ def _pop(search: Search) -> int:
 
 
 @compiled
-def begin(links: Links, search: Search, starts: IntArray, goals: IntArray, count: int) -> None:
-    """Begin a search of the first ``count`` nodes, from some of them to others."""
+def _beside(links: Links, search: Search, node: int) -> None:
+    """Let all nodes beside a node that have a cost wait: they may lead to it."""
+    edge = links.head[node]
+    while edge >= 0:
+        other = links.to[edge]
+        if links.met[edge // 2] < _REMOVED and search.best[other] < np.inf:
+            _raise(search, other, search.best[other])
+        edge = links.following[edge]
+
+
+@compiled
+def forget(links: Links, search: Search, first: int, last: int, count: int) -> None:
+    """Remove some nodes of the first ``count``, with their edges, and forget costs of ways through them."""
+    for node in range(first, last):
+        edge = links.head[node]
+        while edge >= 0:
+            links.met[edge // 2] = _REMOVED
+            edge = links.following[edge]
+        links.head[node] = -1
+    unknown, kept, lost = 0, 1, 2
+    state = np.zeros(count, np.int8)
+    state[first:last] = lost
     for node in range(count):
-        search.best[node], search.back[node] = np.inf, -1
-        search.place[node], search.goal[node] = -1, 0
-    search.state[0], search.state[1] = 0, -1
-    for node in goals:
-        search.goal[node] = 1
+        k = node
+        while state[k] == unknown and search.back[k] >= 0:
+            k = search.back[k]
+        found = max(state[k], kept)
+        k = node
+        while k >= 0 and state[k] == unknown:
+            state[k], k = found, search.back[k]
+    waiting = search.heap[: search.state[0]].copy()
+    search.state[0] = 0
+    search.place[waiting] = -1
+    for node in range(count):
+        if state[node] == lost:
+            search.best[node], search.back[node] = np.inf, -1
+    for node in waiting:
+        if state[node] == kept:
+            _raise(search, node, search.best[node])
+    for node in range(count):
+        if state[node] == lost:
+            _beside(links, search, node)
+
+
+@compiled
+def aim(links: Links, search: Search, new: int, starts: IntArray, goals: IntArray, count: int) -> None:
+    """Prepare a search of the first ``count`` nodes.
+
+    Args:
+        links: The graph.
+        search: The state of the last search.
+        new: Nodes from this one on were added since.
+        starts: All nodes to begin at; those of the last search that were not removed are among them.
+        goals: Nodes to end at.
+        count: Nodes so far.
+    """
+    search.goal[:count] = 0
+    search.goal[goals] = 1
+    reached = search.state[1]
+    if reached >= 0 and search.best[reached] < np.inf:
+        _raise(search, reached, search.best[reached])
+    search.state[1] = -1
+    for node in range(new, count):
+        _beside(links, search, node)
     for node in starts:
-        _raise(search, node, links.weights[node])
+        if links.weights[node] < search.best[node]:
+            search.back[node] = -1
+            _raise(search, node, links.weights[node])
 
 
 @compiled
@@ -186,14 +236,16 @@ def go_on(links: Links, search: Search) -> int:
                     links.following[before] = after
             else:
                 other = links.to[edge]
-                cost = search.best[node] + links.weights[other]
-                if cost < search.best[other]:
+                cost, last = search.best[node] + links.weights[other], search.back[other]
+                cheaper = cost < search.best[other]
+                if cheaper or (cost == search.best[other] and last >= 0 and _before(search, node, last)):
                     if met == _UNTESTED:
                         search.asked[unknown] = edge
                         unknown += 1
                     elif met == _JOINED:
                         search.back[other] = node
-                        _raise(search, other, cost)
+                        if cheaper:
+                            _raise(search, other, cost)
                 before = edge
             edge = after
         if unknown > 0:
