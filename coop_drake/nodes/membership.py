@@ -131,6 +131,8 @@ class Membership:
         """Whether a team at rest has waited long enough, or waits for processes that do not come back."""
         if self._deadline is None:
             self._deadline = clocks.monotonic() + self._rejoin
+            names = " and ".join(name_of(index) for index in sorted(self.missing))
+            self._tell(f"the team rests and waits for {names} for at most {self._rejoin:g} s")
         late = clocks.monotonic() >= self._deadline
         return late or any(not self._revived(index) for index in self.missing if self.ended(index))
 

@@ -76,6 +76,7 @@ def test_a_team_at_rest_waits_neither_for_ever_nor_for_who_does_not_come_back(re
     book.membership.see(0.5, {}, rests=False)
     assert not book.membership.trouble
     book.membership.see(1.0, {}, rests=True)
+    assert book.told[-1] == f"the team rests and waits for robot 1 for at most {rejoin:g} s"
     assert (
         book.membership.trouble == "robot 1 has not answered since t = 0.39 s; the team rests since t = 1 s"
     )

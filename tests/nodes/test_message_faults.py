@@ -6,6 +6,7 @@ import pytest
 
 from coop_drake.messages.faults import ChannelFaults, ClockFault, Faults, Gap
 from coop_drake.nodes import simulate_in_processes
+from coop_drake.nodes.pacing import Pacing
 from tests.support.same_runs import differences
 from tests.support.sampled_team import sampled
 from tests.support.small_loop import small_maps
@@ -25,6 +26,11 @@ CASES = {
         Faults(efforts=ChannelFaults(gaps=(Gap(0.4, 0.3, (1,)),))),
         1,
     ),
+    "all of this by the wall clock": (
+        "base",
+        Faults(seed=1, team=BAD, sensors=ChannelFaults(gaps=(Gap(0.4, 0.3, (1,)),)), efforts=POOR),
+        1,
+    ),
     "clocks apart, and a robot hears nothing": (
         "elbow",
         Faults(
@@ -40,7 +46,10 @@ def run(case):
     team, faults, _ = CASES[case]
     facts = {}
     scenario, plan = sampled(team)
-    log = simulate_in_processes(scenario, plan, small_maps(), faults=faults, report=facts.update)
+    pacing = Pacing(allowed=1.0) if "wall clock" in case else None
+    log = simulate_in_processes(
+        scenario, plan, small_maps(), faults=faults, pacing=pacing, report=facts.update
+    )
     return log, facts
 
 
