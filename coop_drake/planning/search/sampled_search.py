@@ -62,8 +62,11 @@ only if boxes cannot cover the path after the shorter one."""
 LIGHT_ATTEMPTS = 4
 """Attempts with few samples, before those with many begin."""
 
-MANY_SAMPLES = 32_000
-"""Samples for every subsystem in later attempts: about a second each."""
+MANY_SAMPLES = 16_000
+"""Samples for every subsystem in later attempts, about a second each."""
+
+LARGEST_SHARE = 4
+"""So many times as many are drawn at most [-]: twice as many take three times as long."""
 
 
 class SampledSearch:
@@ -291,7 +294,7 @@ def _samples(number: int) -> int:
     """Samples for every subsystem in an attempt, counted from 1: few at first, then many."""
     if number <= LIGHT_ATTEMPTS:
         return SAMPLES * luby(number)
-    return MANY_SAMPLES * luby(number - LIGHT_ATTEMPTS)
+    return MANY_SAMPLES * min(luby(number - LIGHT_ATTEMPTS), LARGEST_SHARE)
 
 
 def luby(number: int) -> int:
