@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.planner.family import crowd_problem
+from benchmarks.planner.family import corridor_problem, crowd_problem
+from coop_drake.answers import PlannerSettings
+from coop_drake.planning.boxes.channel import Channel, middle_of
 from coop_drake.planning.questions.margins import marginal_workspace
 from coop_drake.planning.sampling.collision_kernels import is_free
 from coop_drake.planning.sampling.guided_samples import SampledRegion, draw
@@ -13,6 +15,8 @@ from coop_drake.planning.sampling.narrow_passages import are_free
 from coop_drake.planning.sampling.obstacle_grid import grid_for_team
 from coop_drake.planning.sampling.sampler import Sampler
 from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
+from coop_drake.planning.search.sampled_search import SampledSearch
+from coop_drake.planning.search.search import find_channel
 from coop_drake.tree.team_arrays import team_arrays
 
 SAMPLES = 400
@@ -67,3 +71,17 @@ def test_a_path_begins_where_bodies_are_nearer_to_each_other_than_paths_keep(pro
     assert are_free(close, found).all()
     given = replace(close, start=problem.start, goal_joints=tuple(near[3:]))
     assert SubsystemHierarchy(given).gap_at_ends(0.01) == hierarchy.gap_at_ends(0.01)
+
+
+def test_a_path_is_sampled_around_the_channel_of_an_exploration():
+    problem = corridor_problem(1.2)
+    problem = replace(problem, settings=PlannerSettings(strategy="cells", margin=0.0))
+    channel, _ = find_channel(problem)
+    assert isinstance(channel, Channel)
+    guide = middle_of(channel, problem.start)
+    assert len(guide) == len(channel.boxes)
+    assert are_free(problem, guide).all()
+    found = SampledSearch(problem).around(guide)
+    assert found is not None
+    assert np.array_equal(found.path[[0, -1], :2], [problem.start[:2], problem.goal_pose[:2]])
+    assert are_free(problem, found.path).all()

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
+import numpy as np
 from shapely import Polygon
 
 from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.proof import InfeasibilityProof
+from coop_drake.geometry.parts import parts_of
+from coop_drake.geometry.passage import pole
 from coop_drake.tree.pose import FloatArray
 
 
@@ -47,6 +51,23 @@ class Channel:
     goal_angle: float
     path: FloatArray | None = None
     ends: FloatArray | None = None
+
+
+def middle_of(channel: Channel, start: FloatArray) -> FloatArray:
+    """Configurations in the middle of each two boxes' overlap, after the start, shape (m, 3 + n) [m, rad].
+
+    They are free; what is between them need not be.
+
+    Raises:
+        GeometryError: If two boxes have no position in common.
+    """
+    rows = [start]
+    for one, other in pairwise(channel.boxes):
+        parts = parts_of(one.core.intersection(other.core))
+        centre, _ = pole(max(parts, key=lambda part: part.area, default=Polygon()))
+        angles = 0.5 * (np.maximum(one.lower, other.lower) + np.minimum(one.upper, other.upper))
+        rows.append(np.concatenate((centre, angles)))
+    return np.array(rows)
 
 
 @dataclass(frozen=True)

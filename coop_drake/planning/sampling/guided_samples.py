@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,7 +13,7 @@ from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import TeamArrays, place_component
 
-__all__ = ["SampledRegion", "draw", "furthest_row", "guide_row"]
+__all__ = ["GuidePath", "SampledRegion", "draw", "furthest_row", "guide_row"]
 
 _GUIDED = 0.85
 """Fraction of the samples that are drawn around the guiding path [-]; the others are uniform."""
@@ -33,6 +34,21 @@ _STEPS = (0.8191725133961645, 0.6710436067037893, 0.5497004779019703, 0.61803398
 """Steps between the values that are tried of x, y, theta and a joint, as fractions of their ranges [-]: 1/g,
 1/g^2 and 1/g^3 with g^4 = g + 1, whose multiples fill a cube evenly, and 1/g with g^2 = g + 1 for an
 interval."""
+
+
+@dataclass(frozen=True)
+class GuidePath:
+    """A path of a smaller subsystem, around which a larger subsystem is sampled.
+
+    Attributes:
+        path: Configurations, shape (m, 3 + k).
+        joints: For each of its joints the index of that joint in the whole q.
+        has_theta: Whether its theta is to be followed; False for a disc, whose angle has no meaning.
+    """
+
+    path: FloatArray
+    joints: tuple[int, ...]
+    has_theta: bool = True
 
 
 class SampledRegion(NamedTuple):

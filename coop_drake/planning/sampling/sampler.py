@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from shapely import MultiPolygon
 
 from coop_drake.planning.sampling.collision_kernels import is_free
-from coop_drake.planning.sampling.guided_samples import SampledRegion
+from coop_drake.planning.sampling.guided_samples import GuidePath, SampledRegion
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_for_team
 from coop_drake.planning.sampling.random_trees import connect, shortened
 from coop_drake.planning.sampling.subsystems import Subsystem, SubsystemHierarchy
@@ -54,21 +54,6 @@ SPEED, TURN_RATE, JOINT_RATE = 1.2, 0.5, 0.6
 
 _NO_PATH = np.empty((0, 3))
 """The result of a search for a path that found none: no rows."""
-
-
-@dataclass(frozen=True)
-class GuidePath:
-    """A path of a smaller subsystem, around which a larger subsystem is sampled.
-
-    Attributes:
-        path: Configurations, shape (m, 3 + k).
-        joints: For each of its joints the index of that joint in the whole q.
-        has_theta: Whether its theta is to be followed; False for a disc, whose angle has no meaning.
-    """
-
-    path: FloatArray
-    joints: tuple[int, ...]
-    has_theta: bool = True
 
 
 class Sampler:
@@ -167,6 +152,12 @@ class Sampler:
             whole, _ = self._guide(subsystem(robots), None, UNGUIDED_SAMPLES_FACTOR * samples)
             self.object_blocked &= whole is None
         return _NO_PATH if whole is None else whole.path
+
+    def path_around(self, guide: FloatArray, samples: int) -> FloatArray:
+        """Find a path for the whole team around another one, shape (k, 3 + n), which need not be free."""
+        whole = self._hierarchy.subsystem(self._hierarchy.robots)
+        found, _ = self._guide(whole, GuidePath(guide, whole.joints), samples, WHERE_TREES_END)
+        return _NO_PATH if found is None else found.path
 
     def _disc_path(self, samples: int) -> GuidePath | None:
         """Path of the disc: the route if there is one, else sampled."""

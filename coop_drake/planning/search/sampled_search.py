@@ -30,16 +30,13 @@ from coop_drake.planning.sampling.local_floor import object_route
 from coop_drake.planning.sampling.narrow_passages import centred, repaired, widened_floor
 from coop_drake.planning.sampling.sampler import FEW_JOINTS, Sampler
 from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
-from coop_drake.planning.search.attempt import BoxSequence, Tried
+from coop_drake.planning.search.attempt import LIGHT_ATTEMPTS, BoxSequence, Tried, samples_of_attempt
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
 CLEARANCES = (0.015, 0.01), (0.002, 0.002)
 """Clearances from the walls, and distances between bodies of the team, with which paths are sampled, in turns
 [m]: the larger ones leave space for long boxes, the smaller ones let narrow passages through."""
-
-SAMPLES = 4_000
-"""Samples for every subsystem in the first attempt; enough for most floors, at a tenth of a second."""
 
 BODY_GAP = 0.01
 """Distance that other paths keep between bodies of the team [m], so that boxes around them have a width."""
@@ -58,15 +55,6 @@ that still need the walls this far back are left out [m]."""
 FIRST_SMOOTHINGS = (0.05, 600), (0.05, 3_000)
 """Spacing of samples [m] and number of moves with which a new path is smoothed; the longer smoothing follows
 only if boxes cannot cover the path after the shorter one."""
-
-LIGHT_ATTEMPTS = 4
-"""Attempts with few samples, before those with many begin."""
-
-MANY_SAMPLES = 16_000
-"""Samples for every subsystem in later attempts, about a second each."""
-
-LARGEST_SHARE = 4
-"""So many times as many are drawn at most [-]: twice as many take three times as long."""
 
 
 class SampledSearch:
@@ -129,14 +117,36 @@ class SampledSearch:
         trials, self.slices = self.slices - before, before
         return replace(tried, trials=trials)
 
-    def _attempt(self, number: int, progress: Callable[[float], None] | None) -> Tried:
+    def around(self, guide: FloatArray) -> BoxSequence | None:
+        """Sample paths around another one, which need not be free, and cover them at margin zero.
+
+        Args:
+            guide: Configurations, theta unwrapped, shape (m, 3 + n) [m, rad].
+
+        Returns:
+            The boxes, or None if no path was found or covered.
+        """
+        for number in range(LIGHT_ATTEMPTS + 1, LIGHT_ATTEMPTS + 1 + len(CLEARANCES)):
+            tried = self._counted(partial(self._attempt, number, None, guide))
+            self.slices += tried.trials
+            if tried.found is not None:
+                return tried.found
+        return None
+
+    def _attempt(
+        self, number: int, progress: Callable[[float], None] | None, guide: FloatArray | None = None
+    ) -> Tried:
         if not self._start_inside:
             return Tried()
         clearance, gap = CLEARANCES[(number - 1) % len(CLEARANCES)]
         workspace = marginal_workspace(self._problem, clearance)
         sampler = Sampler(self._hierarchy, workspace, gap, number - 1, progress)
         direct = number > 1 or len(self._problem.goal_joints) > FEW_JOINTS
-        path = sampler.direct_path(_samples(number)) if direct else sampler.path(_samples(number))
+        samples = samples_of_attempt(number)
+        if guide is None:
+            path = sampler.direct_path(samples) if direct else sampler.path(samples)
+        else:
+            path = sampler.path_around(guide, samples)
         found = None
         for spacing, moves in FIRST_SMOOTHINGS if len(path) else ():
             path = smoothed(self._problem, path, clearance, 0.0, gap, spacing, moves)
@@ -288,16 +298,3 @@ class SampledSearch:
             return None
         ends = np.array([box.positions[-1] for box in found.boxes])
         return replace(make_channel(self._problem, made, found.margin, found.path), ends=ends)
-
-
-def _samples(number: int) -> int:
-    """Samples for every subsystem in an attempt, counted from 1: few at first, then many."""
-    if number <= LIGHT_ATTEMPTS:
-        return SAMPLES * luby(number)
-    return MANY_SAMPLES * min(luby(number - LIGHT_ATTEMPTS), LARGEST_SHARE)
-
-
-def luby(number: int) -> int:
-    """Luby's sequence of budgets for restarts, 1 1 2 1 1 2 4 and so on, counted from 1."""
-    size = int(np.log2(number + 1))
-    return 1 << size - 1 if number + 1 == 1 << size else luby(number + 1 - (1 << size))

@@ -12,6 +12,7 @@ A sampled path is then moved away from the walls and covered again at the larges
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from time import thread_time
 
 from shapely.errors import ShapelyError
@@ -20,7 +21,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.errors import GeometryError, PatienceError
 from coop_drake.planning.boxes.boxes import explored_channel
-from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel
+from coop_drake.planning.boxes.channel import Channel, CoveredPath, NoChannel, middle_of
 from coop_drake.planning.cells.events import Watch
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.copies import Copies
@@ -157,8 +158,7 @@ class _Search:
     ) -> None:
         self._began, self._unit, self._routed = thread_time(), unit, routed
         self._first_plan: float | None = None
-        self._workers = workers
-        self._problem, self._progress, self._watch = problem, progress, watch
+        self._problem, self._progress, self._watch, self._workers = problem, progress, watch, workers
         self._samples = SampledSearch(problem, routed=routed)
         self._proofs = Proofs(problem, watch)
         self._other_slices = self._narrow_attempts = 0
@@ -206,7 +206,7 @@ class _Search:
                     return NoChannel(True, refutation.reason, refutation.proof)
                 if verdict is Verdict.FOUND:
                     self._first_plan = thread_time() - self._began
-                    return explored_channel(self._problem, self._proofs.boxes())
+                    return self._around(explored_channel(self._problem, self._proofs.boxes()))
                 found = self._first_of(attempts)
             if found is None and 0 < self._narrow_attempts < NARROW_ATTEMPTS:
                 found = self._narrow_sampled()
@@ -256,6 +256,13 @@ class _Search:
         if found is not None:
             self._first_plan = thread_time() - self._began
         return found
+
+    def _around(self, channel: Channel) -> CoveredPath | Channel:
+        """A sampled path around a channel if one is found: slices leave narrower passages free."""
+        with suppress(GeometryError, ShapelyError):
+            found = self._samples.around(middle_of(channel, self._problem.start))
+            return channel if found is None else self._with_margin(found)
+        return channel
 
     def _explored(self, slices: int, robots: int | None = None, *, untested: bool = True) -> Verdict:
         report = self._phase("exploring slices")
