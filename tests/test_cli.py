@@ -26,6 +26,7 @@ from coop_drake.viz import LivePage
 from tests.support.cli import invoke
 from tests.support.no_drawings import NoDrawings
 from tests.support.scenarios import MODELS, ROOM, write_scenario
+from tests.support.short_search import sample_little
 
 PLAN_KEYS = {
     "answer",
@@ -199,7 +200,8 @@ def test_a_gap_too_narrow_is_infeasible_and_an_older_plan_does_not_stay(tmp_path
     assert sorted(path.name for path in out.iterdir()) == [".coop_drake_results.json", "certificate.json"]
 
 
-def test_a_budget_that_ends_is_undecided(tmp_path):
+def test_a_budget_that_ends_is_undecided(tmp_path, monkeypatch):
+    sample_little(monkeypatch)
     text = (MODELS / "closed.scenario.yaml").read_text() + "\nplanner: {max_slices: 5}\n"
     path = tmp_path / "short.scenario.yaml"
     path.write_text(text)

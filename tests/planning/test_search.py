@@ -10,6 +10,7 @@ from coop_drake.planning.search.search import find_channel
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, TreeJoint
 from coop_drake.tree.pose import PlanarPose
 from tests.support.cases import case, rectangle, transport
+from tests.support.short_search import sample_little
 from tests.support.soundness import assert_channel_is_sound
 
 
@@ -71,8 +72,8 @@ def test_a_rod_passes_a_corridor_wider_than_itself_only(corridor: float, found: 
         assert channel.proved
 
 
-@pytest.mark.no_cover
-def test_a_spent_budget_is_no_proof() -> None:
+def test_a_spent_budget_is_no_proof(monkeypatch: pytest.MonkeyPatch) -> None:
+    sample_little(monkeypatch)
     problem = rod_problem(0.2002, PlannerSettings(max_slices=8))
     channel, _ = find_channel(problem)
     assert isinstance(channel, NoChannel)

@@ -14,9 +14,10 @@ from coop_drake.laws import ScheduledGains
 from coop_drake.planning.boxes.channel import CoveredPath
 from coop_drake.planning.copies import Copies
 from coop_drake.planning.planner import plan
-from coop_drake.planning.search import attempt, sampled_search, search
+from coop_drake.planning.search import search
 from coop_drake.planning.search.search import find_path
 from tests.planning.test_search import rod_problem
+from tests.support.short_search import sample_little
 
 WORKERS = (1, 2, 3)
 
@@ -88,10 +89,7 @@ def test_attempts_that_fail_at_first_are_the_same_with_any_number_of_workers():
 @pytest.mark.parametrize(("corridor", "proved"), [(0.197, True), (0.2, False)])
 def test_narrow_passages_and_proofs_are_the_same_with_any_number_of_workers(corridor, proved, monkeypatch):
     monkeypatch.setattr(search, "FIRST_EXPLORATION", 8)
-    monkeypatch.setattr(search, "NARROW_ATTEMPTS", 2)
-    for name in ("SAMPLES", "MANY_SAMPLES"):
-        monkeypatch.setattr(attempt, name, 100)
-    monkeypatch.setattr(sampled_search, "CENTRED_PATHS", 1)
+    sample_little(monkeypatch)
     problem = rod_problem(corridor, PlannerSettings(max_slices=20))
     answers = {found_along(problem, workers) for workers in WORKERS}
     assert [answer[0] for answer in answers] == [proved]
