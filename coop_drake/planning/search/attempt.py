@@ -18,7 +18,7 @@ LIGHT_ATTEMPTS = 4
 MANY_SAMPLES = 16_000
 """Samples for every subsystem in later attempts, about a second each."""
 
-LARGEST_SHARE = 4
+LARGEST_SHARE = 2
 """So many times as many are drawn at most [-]: twice as many take three times as long."""
 
 
