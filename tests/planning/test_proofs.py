@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from shapely import Point, Polygon, box
 
+from benchmarks.planner.family import corridor_problem
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.cells.exploration import Exploration, Verdict
 from coop_drake.planning.proofs.blocked_goals import blocked_goal
@@ -48,6 +49,11 @@ def test_the_whole_of_a_team_is_refuted_along_the_few_axes_that_matter() -> None
     outcome = exploration.run(1000)
     assert outcome.verdict is Verdict.INFEASIBLE
     assert outcome.slices < 600
+
+
+def test_one_of_three_robots_is_refuted_in_a_corridor_near_its_critical_width() -> None:
+    question, _ = relaxed(corridor_problem(0.9895, 1.5, robots=3), (2,))
+    assert Exploration(question).run(1000).verdict is Verdict.INFEASIBLE
 
 
 def test_bodies_in_each_others_way_are_parted_along_their_own_axis() -> None:
