@@ -152,5 +152,5 @@ def _links(nodes: int, edges: int) -> Links:
 def _search(nodes: int) -> Search:
     """Arrays for a search of so many nodes."""
     back, heap, place, goal = (np.full(nodes, -1, np.int64) for _ in range(4))
-    asked, state = np.empty(_ASKED, np.int64), np.zeros(2, np.int64)
+    asked, state = np.empty(_ASKED, np.int64), np.array([0, -1], np.int64)
     return Search(np.full(nodes, np.inf), back, heap, place, goal, asked, state)
