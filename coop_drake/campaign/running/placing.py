@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 from collections.abc import Callable, Iterator, Sequence
@@ -78,6 +79,8 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Client]:
             yield client
         return
     dask.config.update_defaults(_SETTINGS)
+    # Connections that close with the cluster are no news; what silences their logs ends before they do.
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
     with uninterrupted():  # Ctrl-C is for this process, which ends the others.
         cluster = distributed.LocalCluster(
             n_workers=workers or os.cpu_count() or 1,
