@@ -42,9 +42,8 @@ def beside(work: Callable[[Progress], R], meanwhile: Callable[[], object], progr
             result = work(lambda *step: send("progress", *step))
             return result, kernels.wall_seconds, kernels.cpu_seconds
 
-    copy = Copy(
-        told
-    )  # No other thread of a command holds a lock now, for which the copy could wait for ever.
+    # No other thread of a command holds a lock now, for which the copy could wait for ever.
+    copy = Copy(told)
     try:
         thread = Thread(target=_quietly, args=(meanwhile,), daemon=True)
         thread.start()

@@ -58,12 +58,13 @@ def _add_squares(
     """Add the squares of W_k along x and y for all robots k.
 
     Args:
-        chain: The team.
-        of_bodies: The robot and the link of every body.
-        places: Their centres of mass, in the plane of the object's frame with all joints at zero [m].
-        masses: Their masses [kg].
-        joints: Configurations.
-        squares: Receives the sums.
+        chain: The team, of the form that ``team_accelerations`` takes.
+        of_bodies: The robot, in ascending order, and the link of every body, shape (bodies,) each.
+        places: Their centres of mass, in the plane of the object's frame with all joints at zero, shape
+            (bodies, 2) [m].
+        masses: Their masses, shape (bodies,) [kg].
+        joints: Configurations, shape (configurations, n) [rad or m].
+        squares: Receives the sums, shape (configurations, 1 + n) [rad^2/m^2 or -].
     """
     owners, links = of_bodies
     n = joints.shape[1] + 3

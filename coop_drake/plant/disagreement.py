@@ -38,7 +38,8 @@ def moved_bodies(scenario: Scenario, team: TeamPlant) -> list[Bodies]:
     moved = []
     for k, robot in enumerate(robots):
         load = scenario.load_share(robot.name, len(robots))
-        shares = [(body, 1.0 if body.robot == k else load) for body in masses if body.robot in (k, None)]
+        owned = ((body, {k: 1.0, None: load}.get(body.robot, 0.0)) for body in masses)
+        shares = [(body, share) for body, share in owned if share > 0.0]  # A share of the load may be zero.
         moved.append(
             tuple(
                 (float(body.component), share * body.mass, *body.p_CBcm.tolist(), share * body.inertia)

@@ -1,5 +1,7 @@
 """How robots that command different accelerations move the axes, against Drake's mass matrix."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.multibody.tree import JacobianWrtVariable
@@ -70,3 +72,15 @@ def test_light_arms_of_two_joints_bear_the_least_disagreement():
         coupling[name] = largest_disagreement(scenario, build_team_plant(scenario, DiagramBuilder()))
     assert coupling["base"] == pytest.approx(2.73, abs=0.02)
     assert coupling["elbow"] > 3.0 * coupling["base"]
+
+
+def test_a_robot_that_carries_no_share_of_the_load_still_moves_itself():
+    scenario = load_scenario("base")
+    shared = replace(scenario, load_shares={"robot_0": 0.0, "robot_1": 1.0})
+    team = build_team_plant(shared, DiagramBuilder())
+    own, all_of_it = moved_bodies(shared, team)
+    assert all(body[1] > 0.0 for body in own)  # Two bodies without mass have no common centre of mass.
+    assert sum(body[1] for body in own) + sum(body[1] for body in all_of_it) == pytest.approx(
+        sum(body[1] for body in bodies_of_team(team, read_component_tree(team)))
+    )
+    assert 0.0 < largest_disagreement(shared, team) < np.inf
