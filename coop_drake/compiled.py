@@ -35,9 +35,15 @@ _MAKERS = "compiled", "kernel_compiler", "kernel_kinds", "machine_code"
 @overload
 def compiled(function: F) -> F: ...
 @overload
-def compiled(*, reassociate: bool = False, inlined: bool = False) -> Callable[[F], F]: ...
 def compiled(
-    function: F | None = None, *, reassociate: bool = False, inlined: bool = False
+    *, reassociate: bool = False, inlined: bool = False, whole_program: bool = False
+) -> Callable[[F], F]: ...
+def compiled(
+    function: F | None = None,
+    *,
+    reassociate: bool = False,
+    inlined: bool = False,
+    whole_program: bool = False,
 ) -> F | Callable[[F], F]:
     """Compile a function of numbers and arrays at its first call, and keep its machine code on disk.
 
@@ -49,13 +55,15 @@ def compiled(
         reassociate: Whether sums may be added in any order, which is quicker and rounds differently.
         inlined: Whether its machine code becomes part of that of its callers: for small functions of large
             named tuples, whose arrays would take longer to hand over than to use.
+        whole_program: Whether it is optimised together with copies of all that it calls, when Python calls
+            it: for long loops.
 
     Returns:
         The compiled function, or the decorator if only options are given.
     """
     flags = _REASSOCIATED if reassociate else False
     options = {"nogil": True, "error_model": "numpy", "fastmath": flags, "no_cfunc_wrapper": True}
-    options["forceinline"] = inlined
+    options |= {"forceinline": inlined, "whole_program": whole_program}
 
     def decorate(function: F) -> F:
         if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):  # Nothing is compiled.

@@ -10,9 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numba
+from llvmlite import binding as llvm  # type: ignore[import-untyped]
 from numba import types
 from numba.core import event, ir
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
 from numba.core.lowering import Lower
@@ -30,7 +32,7 @@ class NumbaFunction:
 
     Args:
         function: The function.
-        options: Numba's options.
+        options: Numba's options, and ``whole_program`` as in ``compiled``.
         stamp: Digest of all that its machine code depends on.
 
     Attributes:
@@ -38,10 +40,11 @@ class NumbaFunction:
     """
 
     def __init__(self, function: Callable[..., object], options: Mapping[str, object], stamp: str) -> None:
-        options = {**options, "pipeline_class": _Compiler}
-        self._outer = numba.njit(**options)(function)
+        options = dict(options)
+        outer_compiler = _WholeProgramCompiler if options.pop("whole_program") else _Compiler
+        self._outer = numba.njit(pipeline_class=outer_compiler, **options)(function)
         self._outer._cache = _KernelCache(function, stamp, "called from Python")
-        self._inner = numba.njit(no_cpython_wrapper=True, **options)(function)
+        self._inner = numba.njit(pipeline_class=_Compiler, no_cpython_wrapper=True, **options)(function)
         self._inner._cache = _KernelCache(function, stamp, "called from compiled functions")
         self._inner.get_call_template = _by_type_alone(self._inner.get_call_template)
         self.type = types.Dispatcher(self._inner)
@@ -78,6 +81,32 @@ class _Compiler(CompilerBase):  # type: ignore[misc]
         ]
         steps.finalize()
         return [steps]
+
+
+class _WholeProgramCompiler(_Compiler):
+    """Compiles a function into a ``_WholeProgram``."""
+
+    def define_pipelines(self) -> list[Any]:
+        library = _WholeProgram(self.state.targetctx.codegen(), self.state.func_id.func_qualname)
+        library.enable_object_caching()
+        self.state.library = library
+        return super().define_pipelines()
+
+
+class _WholeProgram(JITCodeLibrary):  # type: ignore[misc]
+    """Machine code of a function with its own copies of all that it calls.
+
+    Nobody else sees these copies. LLVM therefore puts a function that is called once in the place of its
+    call, whatever its size.
+    """
+
+    _final_module: Any
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if function.linkage == llvm.Linkage.linkonce_odr and not function.is_declaration:
+                function.linkage = "internal"
+        super()._optimize_final_module()
 
 
 class _Lower(Lower):  # type: ignore[misc]

@@ -264,7 +264,7 @@ def inner(pair, row, chosen):
 def doubled(pair):
     return pair.first * 2.0
 
-@compiled
+@compiled(whole_program={whole_program})
 def outer(pair, rows, chosen):
     last, rest, same, part = inner(pair, 1, chosen)
     for k in rows:
@@ -294,8 +294,9 @@ print(*(int(part.sum()) for part in (*given[:5], given[5].first, given[6])))
 """
 
 
-def test_arrays_of_callers_live_as_long_as_results_hold_them_and_no_longer(tmp_path):
-    (tmp_path / "caller.py").write_text(LIFETIMES)
+@pytest.mark.parametrize("whole_program", [False, True])
+def test_arrays_of_callers_live_as_long_as_results_hold_them_and_no_longer(tmp_path, whole_program):
+    (tmp_path / "caller.py").write_text(LIFETIMES.format(whole_program=whole_program))
     row, moved, total = 4_999_950_000, 14_999_950_000, 19_999_900_000
     results = [
         [row, moved - 100_000, moved + n, 2 * (total + n), total + n, total + n, 1] for n in (101, 102)

@@ -28,7 +28,7 @@ EARLY = 1e-6
 """Share of a period by which an interval that begins at a sample may seem to begin later [-], by rounding."""
 
 
-@compiled
+@compiled(whole_program=True)
 def run_loop(
     cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal, departures: LoopDepartures,
     memory: LoopMemory,
