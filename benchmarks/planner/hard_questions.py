@@ -30,18 +30,18 @@ CAUSES = {
     "of slices of one of them, and meanwhile paths are sampled",
     123: "a door of 0.68 of the narrowest corridor, 20 mm wider than the largest base: the object alone "
     "takes thousands of slices",
-    137: "a corridor of 0.95 of the narrowest one, three robots: a way is certified, but within a cell its "
-    "entrance and its exit are not connected",
+    137: "a corridor of 0.95 of the narrowest one, three robots: a way is certified that is a tenth of a "
+    "millimetre wide",
     204: "a door of 1.22 of the narrowest corridor, four robots: the proof takes nearly a minute",
     291: "a corridor of 1.00 of the narrowest one, two robots: it is proved that no path keeps 0.04 m from "
     "the walls, no way is sampled",
     315: "a corridor of 1.12 of the narrowest one, two robots with two joints each: it is proved that no "
     "path keeps 0.01 m from the walls, no way is sampled",
     337: "a corridor of 0.93 of the narrowest one, two robots: no way is sampled, 6,000 slices prove nothing",
-    409: "a corridor of 1.11 of the narrowest one, four robots with seven joints: a way is certified, but "
-    "shapely raises a TopologyException where a plan is made along it",
-    475: "doors of 0.96 of the narrowest corridor, two robots: a way is certified, but within a cell its "
-    "entrance and its exit are not connected",
+    409: "a corridor of 1.11 of the narrowest one, four robots with seven joints: the way that is certified "
+    "is 2 mm wide for some metres",
+    475: "doors of 0.96 of the narrowest corridor, two robots: no way is sampled; the graph of cells has one "
+    "through passages that are narrower than a tenth of a millimetre",
 }
 """Why a question takes long, by its number."""
 

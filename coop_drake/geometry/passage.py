@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 import shapely
@@ -13,11 +13,16 @@ from shapely import LineString, Polygon
 
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.boundary import BoundaryDistance
+from coop_drake.geometry.edge_pieces import IndexArray
 from coop_drake.geometry.medial import Graph, medial_graph, widest_path
+from coop_drake.geometry.triangles import triangulate
 from coop_drake.tree.pose import FloatArray
 
 POLE = 1e-3
 """How much more clearance than the pole another point may have [m]; less where the polygon is thin."""
+
+LEAST = 1e-9
+"""Passages with less clearance are not told from what rounding leaves of walls that touch [m]."""
 
 LINKS = 24
 """An end is linked to this many nearest nodes of the medial graph, besides those whose disc holds it."""
@@ -76,14 +81,12 @@ class PassageFinder:
             return straight
         graph = self._linked(ends)
         chain = widest_path(graph, len(graph.nodes) - 2, len(graph.nodes) - 1)
-        best = straight
-        if chain is not None:
-            best = max(
-                straight,
-                self._measure(self._distance.shortened(graph.nodes[chain])),
-                key=lambda passage: passage.clearance,
-            )
-        if best.clearance <= 0.0:
+        best = self._wider(straight, graph.nodes, chain)
+        if best.clearance <= 0.0:  # The passage is narrower than samples of the boundary can tell.
+            graph = self._across_triangles(ends)
+            chain = widest_path(graph, len(graph.nodes) - 2, len(graph.nodes) - 1)
+            best = self._wider(best, graph.nodes, chain)
+        if best.clearance < LEAST:
             raise GeometryError(f"no passage joins {_text(ends[0])} and {_text(ends[1])}")
         return best
 
@@ -109,6 +112,35 @@ class PassageFinder:
                 length=np.append(graph.length, away[nodes][seen]),
             )
         return graph
+
+    def _across_triangles(self, ends: FloatArray) -> Graph:
+        """The graph of the middles of a triangulation's diagonals, with the ends as its last two nodes.
+
+        Those of one triangle are joined by edges. It has a path through every passage, however narrow.
+        """
+        parts = triangulate(self._polygon)
+        nodes = np.vstack([parts.vertices[parts.diagonals].mean(axis=1), ends])
+        triangles = [Polygon(corners) for corners in parts.vertices[parts.corners]]
+        held: list[list[int]] = [[] for _ in triangles]
+        for place, neighbours in enumerate(parts.neighbours):
+            for k in neighbours:
+                held[k].append(place)
+        for place, end in enumerate(ends, len(parts.diagonals)):
+            for k in np.flatnonzero(shapely.intersects_xy(triangles, *end)):
+                held[k].append(place)
+        pairs = np.array([pair for places in held for pair in combinations(places, 2)]).reshape(-1, 2)
+        first, second = nodes[pairs[:, 0]], nodes[pairs[:, 1]]
+        clearance = np.array([self._distance.along(a, b) for a, b in zip(first, second, strict=True)])
+        inside = clearance > 0.0
+        length = np.linalg.norm(second - first, axis=1)
+        return Graph(nodes, pairs[inside], clearance[inside], length[inside])
+
+    def _wider(self, passage: Passage, nodes: FloatArray, chain: IndexArray | None) -> Passage:
+        """The wider one of a passage and a chain of nodes, if there is a chain."""
+        if chain is None:
+            return passage
+        other = self._measure(self._distance.shortened(nodes[chain]))
+        return max(passage, other, key=lambda passage: passage.clearance)
 
     def _measure(self, points: FloatArray) -> Passage:
         clearances = [self._distance.along(a, b) for a, b in pairwise(points)]

@@ -117,7 +117,8 @@ def _tidied(region: Polygon, route: _Route, strength: float) -> Polygon:
     if radius > 0.0:
         eroded = region.buffer(-radius, join_style="mitre", mitre_limit=MITRE_LIMIT)
         dilated = eroded.buffer(radius, join_style="mitre", mitre_limit=MITRE_LIMIT)
-        shape = component_at(dilated.intersection(region), route.points[0])
+        # GEOS may give a mitred boundary that crosses itself, which it then refuses to intersect.
+        shape = component_at(shapely.make_valid(dilated).intersection(region), route.points[0])
     if not region.interiors:
         # What the opening leaves out in the middle of a region without holes is safe all the same.
         shape = Polygon(shape.exterior)

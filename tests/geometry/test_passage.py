@@ -20,7 +20,7 @@ def rooms_joined_by(*gaps):
     return floor
 
 
-@pytest.mark.parametrize("width", [0.8, 0.1, 0.02, 0.002])
+@pytest.mark.parametrize("width", [0.8, 0.1, 0.02, 0.002, 1e-4, 1e-6])
 def test_clearance_of_an_aisle_is_half_its_width(width):
     passage = PassageFinder(rooms_joined_by((1.0, 1.0 + width))).find((0.5, 0.5), (4.5, 0.5))
     assert passage.clearance == pytest.approx(0.5 * width, rel=0.03)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 from hypothesis import given, settings
-from shapely import Point, box
+from shapely import Point, Polygon, box
 
 from coop_drake.errors import GeometryError
 from coop_drake.geometry import BoundaryDistance, PassageFinder, sharpest_angle, tidy_cell
@@ -54,6 +54,16 @@ def test_a_clean_convex_room_is_kept_but_for_the_guard():
     tidied = tidy_cell(box(0, 0, 4, 3), [np.array([1.0, 1.0]), np.array([3.0, 2.0])])
     assert tidied.area == pytest.approx(12.0, rel=1e-5)
     assert len(edge_lengths(tidied)) == 4
+
+
+def test_a_region_whose_grown_boundary_crosses_itself_is_tidied():
+    # Shrunk and grown again with mitred corners, it gets a boundary that GEOS does not intersect.
+    corners = [(0.46759, 0.06659), (0.41756, 0.0204), (0.0825, 0.38319), (0.05462, 0.46106)]
+    safe = Polygon([*corners, (0.05344, 0.46232), (0.05394, 0.4628), (0.01733, 0.55409)])
+    place = 0.28, 0.218
+    cell = tidy_cell(safe, [place, place])
+    assert safe.contains(cell)
+    assert BoundaryDistance(cell)(place) > 0.8 * BoundaryDistance(safe)(place)
 
 
 def test_a_point_outside_the_safe_region_is_refused():
