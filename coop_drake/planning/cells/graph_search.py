@@ -1,9 +1,9 @@
-"""Dijkstra's algorithm on a graph that changes, compiled: it stops to have edges tested, and goes on.
+"""Incremental Dijkstra search on a graph that changes, compiled, with lazy tests of edges.
 
 An edge is tested only when a cheaper way would use it: a test takes longer than many steps of the search.
-When nodes are removed, only the costs of ways through them are forgotten, and the next search goes on from
-all others. It finds what a new search would: of equally cheap ways to a node the one whose last node but one
-has the least cost, and of these the lowest number.
+When nodes are removed, only the costs of ways through them are computed again, as in other incremental
+searches; all others are kept. It finds what a new search would: of equally cheap ways to a node the one
+whose last node but one has the least cost, and of these the lowest number.
 """
 
 from __future__ import annotations
