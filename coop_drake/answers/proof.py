@@ -45,6 +45,38 @@ class Witness:
 
 
 @dataclass(frozen=True)
+class Cut:
+    """Places of a disc's centre at which it touches a wall: beyond a line, and not beyond those before it.
+
+    Attributes:
+        piece: 0 for the first disc of a pair, 1 for the second.
+        direction: A unit vector u in W, shape (2,).
+        limit: The places x with u . x at least this are nearer to one wall than the disc's radius [m].
+    """
+
+    piece: Index
+    direction: Vector
+    limit: float
+
+
+@dataclass(frozen=True)
+class Squeeze:
+    """Positions at which two round pieces touch a wall or each other, at every configuration of a slice.
+
+    Attributes:
+        pieces: Numbers of the two pieces, ascending; each is a disc, and they must not meet.
+        component: Index of the nearest component that carries both.
+        polygon: Corners of a convex polygon, the positions, shape (n, 2) [m].
+        cuts: They show where each of the discs touches a wall.
+    """
+
+    pieces: tuple[Index, ...]
+    component: Index
+    polygon: Corners
+    cuts: tuple[Cut, ...]
+
+
+@dataclass(frozen=True)
 class OverSlice:
     """A box of angles and joint values, with everything in it that may be free.
 
@@ -53,12 +85,14 @@ class OverSlice:
         upper: Upper ends, shape (1 + n,).
         witnesses: They show that all else is in collision.
         cells: Regions of positions that cover all that is free; none where all of it is in collision.
+        squeezes: They show further collisions, of pieces between walls.
     """
 
     lower: Vector
     upper: Vector
     witnesses: tuple[Witness, ...]
     cells: tuple[OverCell, ...]
+    squeezes: tuple[Squeeze, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ from coop_drake.checking.team import Question
 
 __all__ = ["RefusedError", "check"]
 
-STEPS, STEPS_EACH = 2 * 10**8, 10**6
-"""Elementary steps that are allowed, a minute; and more for each cell or slice, a third of a second [-]."""
+STEPS, STEPS_EACH = 2 * 10**8, 2 * 10**6
+"""Elementary steps that are allowed, a minute; and more for each cell or slice, a second at most [-]."""
 
 
 def check(question: Any, answer: Any, progress: Any = lambda phase, share: None) -> list[tuple[str, int]]:

@@ -1,12 +1,27 @@
 """A proof holds: forbidden sets and cells cover all configurations, labels separate start from goal."""
 
-from itertools import product
-from math import prod
+from itertools import pairwise, product
+from math import isqrt, prod
 from typing import Any
 
 from coop_drake.checking import plane, team
-from coop_drake.checking.plane import FULL, ONE, Interval, Point, Region, demand, hull, index, points, spend
+from coop_drake.checking.plane import (
+    BITS,
+    FULL,
+    ONE,
+    Interval,
+    Point,
+    Region,
+    demand,
+    hull,
+    index,
+    points,
+    spend,
+)
 from coop_drake.checking.team import Question, Step, free, intervals
+
+COPIES = 16
+"""Copies that enclosures of squeezed pieces are made of, for an interval of angles [-]."""
 
 WIDENING = ONE >> 40
 """Slices are widened by this on either side: ends of a turn in doubles are off by less [rad, m]."""
@@ -37,13 +52,17 @@ def check_proof(question: Question, answer: Any, progress: plane.Progress) -> li
             steps, name = [*chain, Step(offset=place)], "goal" if label else "start"
             clear = free([point], 0, steps, box, wrong, lambda cell, *at: cell.side(*at) < 0)
             demand(clear, where, f"cells may hold the {name} and have reached: {label}")
-        forbidden = _forbidden(question, [Step(0, -1, offset=point), *chain], wide, value["witnesses"], where)
+        frame = [Step(0, -1, offset=point), *chain]
+        forbidden = _forbidden(question, frame, wide, value["witnesses"], where)
         if forbidden is not None:
-            edges += _check_cover([cell for _, cell in cells[k]], forbidden, outside, where)
+            squeezes = value.get("squeezes", [])
+            pressed = [_squeezed(question, frame, wide, one, f"{where}.squeezes") for one in squeezes]
+            edges += _check_cover([cell for _, cell in cells[k]], pressed, forbidden, outside, where)
         progress("checking slices", (k + 1) / len(slices))
     return [
         ("slices tile a turn and the limits of the joints", len(slices)),
         ("pieces hold witnesses in all of a slice", sum(len(value["witnesses"]) for value in slices)),
+        ("pieces are squeezed in all of a slice", sum(len(value.get("squeezes", [])) for value in slices)),
         ("edges of cells and of forbidden positions lie inside others: they are all positions", edges),
         ("cells that touch, in a slice or across a facet, have one label", len(neighbours)),
         ("the start lies in reached cells alone, the goal in none of them", 2),
@@ -80,6 +99,46 @@ def _forbidden(question: Question, frame: list[Step], box: list[Interval], witne
     return None if any(len(witness["pieces"]) == 2 for witness in witnesses) else polygons
 
 
+def _squeezed(question: Question, frame: list[Step], box: list[Interval], value: Any, where: str) -> Region:
+    """Check that two round pieces touch a wall or each other, wherever p is in a polygon; returns it.
+
+    A convex set holds all places of a piece's centre. A cut takes off a convex part, of which all corners are
+    nearer to one wall than the radius, and so all of it. What is left to both centres, a and b, gives vectors
+    b - a; those that are possible as well by the angles must be shorter than the sum of the radii.
+    """
+    pieces = [question.pieces[index(k, len(question.pieces))] for k in value["pieces"]]
+    paired = tuple(value["pieces"]) in question.pairs and all(len(piece.corners) == 1 for piece in pieces)
+    demand(paired, where, "is about what is no pair of round pieces")
+    seen = question.chains[index(value["component"], len(question.chains))]
+    onwards, positions = team.relative(seen, frame), hull(points(value["polygon"]))
+    centres = [team.swept(p.corners, 0, team.relative(p.chain, seen), box, COPIES) for p in pieces]
+    places = [team.swept(*centre, onwards, box, COPIES) for centre in centres]
+    places = [(hull((x + p, y + q) for x, y in positions for p, q in about), gap) for about, gap in places]
+    for cut in value["cuts"]:
+        k, (u, v, limit) = index(cut["piece"], 2), plane.numbers([*cut["direction"], cut["limit"]], 3)
+        touching, gap = plane.below(*places[k], (-u, -v), -limit << BITS)
+        near = question.floor.near(plane.box_of(places[k][0]), pieces[k].radius)
+        spend(100 + 10 * len(near) * len(touching))
+        walls, room = [question.floor.edges[wall] for wall in near], pieces[k].radius - gap
+        held = any(all(plane.nearer(point, wall, room) for point in touching) for wall in walls)
+        demand(held or not touching, where, f"may leave {pieces[k].body} clear of the walls beside it")
+        places[k] = plane.below(*places[k], (u, v), limit << BITS)
+        if not places[k][0]:
+            return Region([positions])
+    ((a, s), (b, t)), ((first, gap), (second, more)) = centres, places
+    turns = [Step(axis, sign, angle) for axis, sign, angle, *_ in onwards]
+    apart, spread = team.swept(plane.difference(b, a), s + t, turns, box, COPIES)
+    ring = plane.difference(second, first)
+    for (x, y), (p, q) in pairwise([ring[-1], *ring]):
+        u, v = q - y, x - p  # The outward normal.
+        bound = u * x + v * y + (isqrt(u * u + v * v) + 1) * (gap + more)
+        apart, spread = plane.below(apart, spread, (u, v), bound) if apart else (apart, spread)
+    room, origin = sum(piece.radius for piece in pieces) - spread, ((0, 0), (0, 0))
+    together = all(plane.nearer(vector, origin, room) for vector in apart)
+    demand(together, where, f"may leave room between {pieces[0].body} and {pieces[1].body}")
+    return Region([positions])
+
+
 def _inside(piece: list[Point], corners: list[Point], depth: int) -> bool:
     """Whether corners lie more than a depth inside a convex polygon, or less than -depth outside."""
     least, gap = (1, depth) if depth >= 0 else (0, -depth - 1)
@@ -87,15 +146,15 @@ def _inside(piece: list[Point], corners: list[Point], depth: int) -> bool:
 
 
 class _Sets:
-    """Open sets of positions: cells, and what polygons K forbid, made as far as it is looked for.
+    """Open sets of positions: given ones, and what polygons K forbid, made as far as it is looked for.
 
     Attributes:
         known: A region by its number, and how far its points are moved to be positions.
     """
 
-    def __init__(self, cells: list[Region], polygons: list[list[Point]], outside: Region) -> None:
+    def __init__(self, given: list[Region], polygons: list[list[Point]], outside: Region) -> None:
         self.known, self.polygons, self.walls = dict[int, tuple[Region, Point]](), polygons, outside.edges
-        for cell in cells:
+        for cell in given:
             self.known[len(self.known)] = cell, (0, 0)
         for polygon in polygons:
             x, y = (sum(values) // len(polygon) for values in zip(*polygon, strict=True))
@@ -128,7 +187,9 @@ class _Sets:
         return region.stretches([(px - x, py - y) for px, py in edge])
 
 
-def _check_cover(cells: list[Region], polygons: list[list[Point]], outside: Region, where: str) -> int:
+def _check_cover(
+    cells: list[Region], pressed: list[Region], polygons: list[list[Point]], outside: Region, where: str
+) -> int:
     """Check that the interiors of cells and forbidden sets cover the plane; counts their edges.
 
     The union of some open sets is open. If each point of each of their boundaries lies in one of them, it is
@@ -136,7 +197,7 @@ def _check_cover(cells: list[Region], polygons: list[list[Point]], outside: Regi
     covers a part of a boundary. Of many edges it is tested first whether a box about them lies in a cell.
     """
     demand(len(cells) + len(polygons) > 0, where, "has neither cells nor witnesses")
-    sets, count, taken = _Sets(cells, polygons, outside), 0, set(range(max(len(cells), 1)))
+    sets, count, taken = _Sets([*cells, *pressed], polygons, outside), 0, set(range(max(len(cells), 1)))
     left = [sets.edges(k) for k in taken]
     while left:
         edges = left.pop()

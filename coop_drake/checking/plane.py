@@ -156,6 +156,31 @@ def apart(first: Sequence[Point], second: Sequence[Point], gap: int) -> bool:
     return least > 0 and least * least > gap * gap * square
 
 
+def nearer(point: Point, segment: Sequence[Point], gap: int) -> bool:
+    """Whether a point is nearer to a segment than a gap [2^-80 m]."""
+    (x, y), ((ax, ay), (bx, by)) = point, segment
+    x, y, dx, dy = x - ax, y - ay, bx - ax, by - ay
+    along, square = x * dx + y * dy, dx * dx + dy * dy
+    if 0 < along < square:
+        return gap > 0 and (x * dy - y * dx) ** 2 < gap * gap * square
+    return gap > 0 and min(x * x + y * y, (x - dx) ** 2 + (y - dy) ** 2) < gap * gap
+
+
+def below(corners: Sequence[Point], grown: int, direction: Point, bound: int) -> tuple[list[Point], int]:
+    """Enclose the part of a grown convex set where u . x <= bound [2^-160], by its corners and growth.
+
+    Where an edge crosses the line that is further by the growth, the corner is rounded by less than 2 units.
+    """
+    (u, v), found = direction, list[Point]()
+    bound += (isqrt(u * u + v * v) + 1) * grown
+    levels = [(p, u * p[0] + v * p[1] - bound) for p in corners]
+    for (a, s), (b, t) in pairwise([levels[-1], *levels]):
+        if (s <= 0) != (t <= 0):
+            found.append(((b[0] * s - a[0] * t) // (s - t), (b[1] * s - a[1] * t) // (s - t)))
+        found += [b] if t <= 0 else []
+    return found, grown + 2
+
+
 class Region:
     """Points from which a ray crosses an odd (or even) number of edges; open without the edges themselves."""
 

@@ -35,18 +35,21 @@ def relative(chain: list[Step], other: list[Step]) -> list[Step]:
     return chain
 
 
-def swept(corners: list[Point], grown: int, steps: list[Step], box: plane.Box) -> tuple[list[Point], int]:
+def swept(
+    corners: list[Point], grown: int, steps: list[Step], box: plane.Box, copies: int = 4
+) -> tuple[list[Point], int]:
     """Enclose what a grown convex set meets that is moved by steps, at all values of a box of (theta, q...).
 
-    An interval of angles stands for five turned copies. Between two that differ by an angle b, a point at the
-    distance r from the pivot is nowhere further than r (1 - cos(b / 2)) <= r b^2 / 8 from the segment of its
-    two places. More than a turn fills a disc. A slide lies in the hull of its ends. Each copy is rounded by
-    less than 4 r / 2^80 + 3 units, each place by less than 2. Returns a hull, and its growth [2^-80 m].
+    An interval of angles stands for so many turned copies and one more. Between two that differ by an angle
+    b, a point at the distance r from the pivot is nowhere further than r (1 - cos(b / 2)) <= r b^2 / 8 from
+    the segment of its two places. More than a turn fills a disc. A slide lies in the hull of its ends. Each
+    copy is rounded by less than 4 r / 2^80 + 3 units, each place by less than 2. Returns a hull, and its
+    growth [2^-80 m].
     """
     for axis, sign, angle, (u, v), (x, y) in steps:
         demand(len(corners) <= 10**4, "corners", "are too many for a convex set that moves")
         first, last = sorted(sign * value + angle for value in box[axis])
-        reach, parts = isqrt(max([x * x + y * y for x, y in corners])) + 1, 4 if first < last else 1
+        reach, parts = isqrt(max([x * x + y * y for x, y in corners])) + 1, copies if first < last else 1
         if last - first > TURN:
             corners, grown = [(0, 0)], grown + reach
         elif first or last:

@@ -103,6 +103,7 @@ def verify_proof(
     """
     checks = _exactly(problem, proof_document(proof, problem), progress)
     pieces = {number for part in proof.slices for witness in part.witnesses for number in witness.pieces}
+    pieces |= {number for part in proof.slices for squeeze in part.squeezes for number in squeeze.pieces}
     names = [body.name for c in problem.tree.components for body in c.bodies for _ in body.shapes]
     bodies = ", ".join(dict.fromkeys(names[number] for number in sorted(pieces)))
     subject = f"there is no plan, by {len(proof.slices)} slices about {bodies}"

@@ -16,10 +16,14 @@ from coop_drake.geometry.convex import following
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.safeguards import components, meet, shared
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
+from coop_drake.planning.cells.squeezes import SqueezedPair, Squeezes
 from coop_drake.tree.pose import FloatArray
 
 NEGLIGIBLE_AREA = 1e-9
 """Under-cells with less area are dropped: they are remnants of rounding [m^2]."""
+
+SQUEEZE_GROWTH = 1e-3
+"""Squeezed pairs are asked for so far beyond an over-cell [m]: what a proof leaves free is a little wider."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +88,20 @@ class CellMaker:
         swept: Sweeps of the team's pieces.
         pairs: Self-collision of the team.
         workspace: Where the team may be; the margin is already taken off [m].
+        squeezing: Whether over-cells leave out where two round pieces are squeezed between walls.
     """
 
-    def __init__(self, swept: SweptTree, pairs: BodyPairs, workspace: Polygon | MultiPolygon) -> None:
+    def __init__(
+        self,
+        swept: SweptTree,
+        pairs: BodyPairs,
+        workspace: Polygon | MultiPolygon,
+        *,
+        squeezing: bool = False,
+    ) -> None:
         self._swept, self._pairs = swept, pairs
         self._under_space, self._over_space = FreeSpace.under(workspace), FreeSpace.over(workspace)
+        self._squeezes = Squeezes(swept, pairs, self._over_space.edges) if squeezing else None
         self._everywhere = self._positions(workspace)
         self._members = [
             [n for n, piece in enumerate(swept.pieces) if piece.component == c]
@@ -110,8 +123,30 @@ class CellMaker:
         """Regions outside which no configuration of the nominal slice is free."""
         if intervals not in self._cells:  # Trial splits ask for halves that may become slices.
             free = self._pairs.overlapping(intervals) is None
-            self._cells[intervals] = regions_of(self._common(intervals, over=True), over=True) if free else []
+            found = regions_of(self._common(intervals, over=True), over=True) if free else []
+            self._cells[intervals] = self.unsqueezed(intervals, found, SQUEEZE_GROWTH)[1]
         return self._cells[intervals]
+
+    def unsqueezed(
+        self, intervals: Intervals, regions: Sequence[Region], growth: float
+    ) -> tuple[list[SqueezedPair], list[Region]]:
+        """Pairs that are squeezed all over a slice in some regions, and the other regions.
+
+        Args:
+            intervals: The slice.
+            regions: Over-approximations of its free positions.
+            growth: How far the pairs' positions reach beyond the regions, about [m].
+        """
+        found, rest = list[SqueezedPair](), list[Region]()
+        for region in regions:
+            pair = None
+            if self._squeezes is not None and region.breadth < self._squeezes.breadth:
+                pair = self._squeezes.find(intervals, np.concatenate(region.rings), growth)
+            if pair is None:
+                rest.append(region)
+            else:
+                found.append(pair)
+        return found, rest
 
     def under_cells(self, expanded: Intervals) -> list[Region]:
         """Regions in which every configuration of the expanded slice is free."""

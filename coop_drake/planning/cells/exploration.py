@@ -106,7 +106,8 @@ class Subdivision(ABC):
         self.swept = SweptTree(problem.tree)
         self.pairs = BodyPairs(self.swept)
         self.slices = Slices(problem.tree, problem.settings.slice_overlap, printed=printed)
-        self.maker = CellMaker(self.swept, self.pairs, problem.workspace if workspace is None else workspace)
+        floor = problem.workspace if workspace is None else workspace
+        self.maker = CellMaker(self.swept, self.pairs, floor, squeezing=not printed)
         self.finest = finest_widths(problem)
         self._robots = tuple(sorted({joint.robot for joint in problem.tree.joints}))
         self._tell(ExplorationBegan(question, self._robots))

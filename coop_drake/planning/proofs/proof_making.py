@@ -14,7 +14,7 @@ from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
 
 from coop_drake.answers.problem import PlanningProblem
-from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice, Witness
+from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice, Squeeze, Witness
 from coop_drake.errors import GeometryError
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
 from coop_drake.geometry.parts import parts_of
@@ -34,6 +34,9 @@ that merely touch."""
 
 TOUCHING = 1e-6
 """Cells nearer to each other than this count as touching, as they do for the verifier [m]."""
+
+LEAST_OVERLAP = 1e-5
+"""Squeezed pieces forbid positions at least so far beyond what else is left free [m]: they must overlap."""
 
 
 def slices_proof(
@@ -64,11 +67,14 @@ def slices_proof(
 
     def separated(growth: float) -> list[OverSlice] | None:
         shown, cells = dict[int, tuple[Witness, ...]](), dict[int, list[Polygon]]()
+        squeezes, beyond = dict[int, tuple[Squeeze, ...]](), max(0.5 * growth, LEAST_OVERLAP)
         for leaf in leaves:
             intervals = slices.all[leaf].intervals
             overlaps = () if regions[leaf] else witnesses.overlaps(intervals)
             shown[leaf] = overlaps or witnesses.inner_sweeps(intervals, growth)
-            cells[leaf] = [] if overlaps else _grown(_not_forbidden(space, shown[leaf]), growth)
+            left = [] if overlaps else _not_forbidden(space, shown[leaf])
+            squeezes[leaf], left = witnesses.squeezed(intervals, left, beyond)
+            cells[leaf] = _grown(left, growth)
         labels = _reached(cells, joined, starts, Point(question.start[:2]))
         goal = Point(question.goal_pose[:2])
         if any(
@@ -82,6 +88,7 @@ def slices_proof(
                 *witnesses.ends(slices.all[leaf].intervals),
                 shown[leaf],
                 tuple(map(OverCell, labels[leaf], cells[leaf])),
+                squeezes[leaf],
             )
             for leaf in leaves
         ]

@@ -171,7 +171,7 @@ class Proofs:
         """Write the proof down; return False if that fails, because cells almost touch or geometry fails."""
         question, _ = relaxed(self._problem, chosen)
         exploration = self._exploration(chosen)
-        witnesses = Witnesses(self._problem.tree, exploration.swept, exploration.pairs)
+        witnesses = Witnesses(self._problem.tree, exploration.swept, exploration.pairs, exploration.maker)
         proof = slices_proof(question, exploration.slices, exploration.over_leaves(), witnesses)
         if proof is None:
             return False

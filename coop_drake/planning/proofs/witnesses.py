@@ -1,16 +1,17 @@
-"""Witnesses for the exact checker: polygons that bodies cover in a whole slice, points where two overlap."""
+"""Witnesses for the exact checker: what bodies cover in a whole slice, where two overlap or are squeezed."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import shapely
 from shapely import Polygon
 
-from coop_drake.answers.proof import Witness
+from coop_drake.answers.proof import Cut, Squeeze, Witness
 from coop_drake.geometry.body_pairs import BodyPair, BodyPairs
 from coop_drake.geometry.swept_tree import Interval, Intervals, SweptTree
+from coop_drake.planning.cells.cells import CellMaker, Region
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
 
@@ -28,9 +29,13 @@ class Witnesses:
         tree: The whole team, whose pieces are numbered in the order of components, bodies and shapes.
         swept: Sweeps of the pieces that the question keeps.
         pairs: Pairs of bodies among them.
+        maker: Looks for pairs of round pieces between walls, if such positions were left out.
     """
 
-    def __init__(self, tree: ComponentTree, swept: SweptTree, pairs: BodyPairs) -> None:
+    def __init__(
+        self, tree: ComponentTree, swept: SweptTree, pairs: BodyPairs, maker: CellMaker | None = None
+    ) -> None:
+        self._maker = maker
         kept = {component.name for component in swept.tree.components}
         names = [c.name for c in tree.components for body in c.bodies for _ in body.shapes]
         self._numbers = [number for number, name in enumerate(names) if name in kept]
@@ -65,6 +70,27 @@ class Witnesses:
         rings = [(number, self._swept.under(k, intervals)) for k, number in enumerate(self._numbers)]
         found = [(number, smaller(ring, loss)) for number, ring in rings if ring is not None]
         return tuple(Witness((number,), 0, ring) for number, ring in found if ring is not None)
+
+    def squeezed(
+        self, intervals: Intervals, regions: Sequence[Region], growth: float
+    ) -> tuple[tuple[Squeeze, ...], list[Region]]:
+        """Pairs of pieces that are squeezed in some of a slice's regions, and the other regions.
+
+        Args:
+            intervals: The slice.
+            regions: Regions of positions.
+            growth: How far the statements hold beyond these regions, about [m].
+        """
+        if self._maker is None:
+            return (), list(regions)
+        pairs, rest = self._maker.unsqueezed(intervals, regions, growth)
+        found = []
+        for pair in pairs:
+            numbers = tuple(self._numbers[k] for k in pair.pieces)
+            common = common_component(self._tree, *(self._owners[number] for number in numbers))
+            cuts = [Cut(k, row[:2], float(row[2])) for k, rows in enumerate(pair.cuts) for row in rows]
+            found.append(Squeeze(numbers, common, pair.polygon, tuple(cuts)))
+        return tuple(found), rest
 
     def _common(
         self, pair: BodyPair, intervals: Intervals

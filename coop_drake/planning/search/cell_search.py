@@ -91,7 +91,7 @@ def _boxes_at_margin(problem: PlanningProblem, found: list[tuple[Intervals, Regi
 def _no_channel(problem: PlanningProblem, exploration: Subdivision, outcome: ExplorationResult) -> NoChannel:
     """The answer of an exploration at margin zero that found no channel."""
     if outcome.verdict is Verdict.INFEASIBLE:
-        witnesses = Witnesses(problem.tree, exploration.swept, exploration.pairs)
+        witnesses = Witnesses(problem.tree, exploration.swept, exploration.pairs, exploration.maker)
         proof = slices_proof(problem, exploration.slices, exploration.over_leaves(), witnesses)
         if proof is None:
             return NoChannel(False, "a proof of infeasibility was found but cannot be written down")

@@ -15,7 +15,7 @@ from coop_drake.answers.limits import TeamLimits
 from coop_drake.answers.mixed_cell import MixedCell
 from coop_drake.answers.plan import Cell, Plan
 from coop_drake.answers.problem import PlannerSettings, PlanningProblem
-from coop_drake.answers.proof import InfeasibilityProof, OverCell, OverSlice
+from coop_drake.answers.proof import Cut, InfeasibilityProof, OverCell, OverSlice
 from coop_drake.laws.gains import FixedGains, GainSet
 from coop_drake.planning.boxes.channel import Channel, CoveredPath, FreeBox, NoChannel
 from coop_drake.planning.cells.cells import Region
@@ -158,7 +158,14 @@ class Rescaling:
     def _slice(self, part: OverSlice) -> OverSlice:
         witnesses = tuple(replace(one, polygon=self.unit * one.polygon) for one in part.witnesses)
         cells = tuple(OverCell(cell.reached, _scaled(cell.polygon, self.unit)) for cell in part.cells)
-        return OverSlice(self._ends(part.lower), self._ends(part.upper), witnesses, cells)
+        squeezes = tuple(
+            replace(one, polygon=self.unit * one.polygon, cuts=tuple(map(self._cut, one.cuts)))
+            for one in part.squeezes
+        )
+        return OverSlice(self._ends(part.lower), self._ends(part.upper), witnesses, cells, squeezes)
+
+    def _cut(self, cut: Cut) -> Cut:
+        return replace(cut, limit=self.unit * cut.limit)
 
     def _ends(self, ends: FloatArray) -> FloatArray:
         """Ends of a slice in metres; those that are limits are the limits, without rounding."""
