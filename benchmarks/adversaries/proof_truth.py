@@ -22,6 +22,7 @@ from benchmarks.adversaries.collisions import (
     boxes_sampled,
     floor_of,
     polygon_of,
+    positions_sampled,
 )
 
 __all__ = ["proof_fault"]
@@ -103,7 +104,7 @@ class _ProofTruth:
         for k in range(len(self._slices)) if chosen is None else chosen:
             part = self._slices[k]
             angles = np.array(self._sampled(list(zip(part["lower"], part["upper"], strict=True))))
-            fault = self._held(part, angles)
+            fault = self._held(part, angles) or self._roomy(part, angles)
             if not fault and all(len(witness["pieces"]) == 1 for witness in part["witnesses"]):
                 fault = self._uncovered(part)
             if fault:
@@ -111,9 +112,7 @@ class _ProofTruth:
         return ""
 
     def _held(self, part: Document, angles: FloatArray) -> str:
-        at_zero = np.column_stack((np.zeros(len(angles)), angles[:, 1:]))
-        theta = angles[:, 0] - self._team.frames(at_zero)[self._component][1]
-        frames = self._team.frames(np.column_stack((theta, angles[:, 1:])))
+        frames = self._frames(angles)
         for witness in part["witnesses"]:
             numbers, corners = tuple(witness["pieces"]), np.array(witness["polygon"])
             if not all(0 <= number < len(self._team.pieces) for number in numbers):
@@ -131,6 +130,38 @@ class _ProofTruth:
                     return "a polygon leaves its piece"
         return ""
 
+    def _frames(self, angles: FloatArray) -> list[tuple[FloatArray, FloatArray]]:
+        """Origins and angles of all components for the angle of the proof's component and q; p_WL = 0."""
+        at_zero = np.column_stack((np.zeros(len(angles)), angles[:, 1:]))
+        theta = angles[:, 0] - self._team.frames(at_zero)[self._component][1]
+        return self._team.frames(np.column_stack((theta, angles[:, 1:])))
+
+    def _roomy(self, part: Document, angles: FloatArray) -> str:
+        """Positions of a squeeze at which both discs are clear of all walls and of each other."""
+        floor, frames = floor_of(self._question), self._frames(angles)
+        seen = zip(*frames[self._component], strict=True)
+        points = np.array([place + _turn(self._centre, angle) for place, angle in seen])
+        for squeeze in part.get("squeezes", []):
+            pieces = [self._team.pieces[number] for number in squeeze["pieces"]]
+            centres = [self._centres(piece, frames) - points for piece in pieces]
+            radii = [piece.radius + SURELY for piece in pieces]
+            away = np.hypot(*(centres[1] - centres[0]).T) > sum(radii)
+            polygon = shapely.MultiPoint(squeeze["polygon"]).convex_hull
+            for p in positions_sampled(polygon, self._random, ANGLES):
+                clear = away
+                for about, radius in zip(centres, radii, strict=True):
+                    far = shapely.distance(floor.boundary, shapely.points(about + p)) > radius
+                    clear = clear & far & shapely.contains_xy(floor, about + p)
+                if clear.any():
+                    return "two discs have room where they are said to be squeezed"
+        return ""
+
+    @staticmethod
+    def _centres(piece: Any, frames: list[tuple[FloatArray, FloatArray]]) -> FloatArray:
+        """Places of a disc's centre, p_WL = 0, shape (N, 2) [m]."""
+        corner, seen = shapely.get_coordinates(piece.hull)[0], zip(*frames[piece.component], strict=True)
+        return np.array([place + _turn(corner, angle) for place, angle in seen])
+
     def _uncovered(self, part: Document) -> str:
         """Positions outside all cells that are not forbidden, or where cells of two labels would meet."""
         if not part["witnesses"]:
@@ -146,7 +177,8 @@ class _ProofTruth:
             rest = rest.intersection(translate(floor, -middle[0], -middle[1]))
             copies = (walls[:, :, None, :] - ring).reshape(len(walls), -1, 2)
             sums.append(shapely.convex_hull(shapely.multipoints(copies)))
-        left = rest.difference(shapely.union_all(np.concatenate(sums))).buffer(-SURELY)
+        squeezed = [shapely.MultiPoint(one["polygon"]).convex_hull for one in part.get("squeezes", [])]
+        left = rest.difference(shapely.union_all([*np.concatenate(sums), *squeezed])).buffer(-SURELY)
         cells = [(polygon_of(cell["polygon"]), cell["reached"]) for cell in part["cells"]]
         if not left.difference(shapely.union_all([cell for cell, _ in cells])).buffer(-SURELY).is_empty:
             return "a position is neither in a cell nor shown to be blocked"
