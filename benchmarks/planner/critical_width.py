@@ -45,7 +45,7 @@ class Corridor:
 
 CORRIDORS = {
     "two": Corridor(corridor_problem, 0.77, 0.79, 2e-4),
-    "three": Corridor(lambda width: corridor_problem(width, 1.5, robots=3), 0.9895, 1.0005, 5e-3),
+    "three": Corridor(lambda width: corridor_problem(width, 1.5, robots=3), 0.9955, 1.0005, 5e-3),
     "elbow": Corridor(lambda width: corridor_problem(width, joints_per_arm=2), 0.62, 0.7, 5e-3),
 }
 """Teams of the family of questions, and between which widths the critical one lies."""

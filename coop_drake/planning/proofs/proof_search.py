@@ -86,6 +86,8 @@ class Proofs:
     ) -> Verdict:
         """Continue every exploration until it has an answer or has made its slices.
 
+        When all of them have spent ``planner.max_slices``, the whole question gets so many slices by itself.
+
         Args:
             slices: Slices of each exploration, those of earlier calls included.
             robots: How many robots a relaxation keeps at most, the whole question being left out; None for
@@ -105,14 +107,22 @@ class Proofs:
                 self.refutation = Refutation(reason, (), disc)
         for chosen in self._questions(robots):
             if self.refutation is None and self._goes_on(chosen, asked=robots is not None and untested):
-                outcome = self._exploration(chosen).run(self._most(chosen, slices), progress)
-                if outcome.verdict is Verdict.INFEASIBLE and not self._refute(chosen):
-                    outcome = replace(outcome, verdict=Verdict.RESOLUTION)
-                self._outcomes[chosen] = outcome
+                self._explore(chosen, self._most(chosen, slices), progress)
+        most, latest = self._problem.settings.max_slices, self._outcomes.get(self._all)
+        spent = robots is None and self.refutation is None and self.slices >= most
+        if spent and latest is not None and latest.verdict is Verdict.BUDGET:
+            self._explore(self._all, most, progress)
         if self.refutation is not None:
             return Verdict.INFEASIBLE
         latest = self._outcomes.get(self._all)
         return Verdict.BUDGET if latest is None else latest.verdict
+
+    def _explore(self, chosen: tuple[int, ...], slices: int, progress: Callable[[int], None] | None) -> None:
+        """Continue one exploration, and write the proof down if there is one."""
+        outcome = self._exploration(chosen).run(slices, progress)
+        if outcome.verdict is Verdict.INFEASIBLE and not self._refute(chosen):
+            outcome = replace(outcome, verdict=Verdict.RESOLUTION)
+        self._outcomes[chosen] = outcome
 
     def boxes(self) -> list[tuple[Intervals, Region]]:
         """Expanded intervals and regions of the whole question's free channel."""
