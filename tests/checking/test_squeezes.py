@@ -173,3 +173,9 @@ def free(configuration):
     places = [(x, y), (x + value * cos(angle), y + value * sin(angle))]
     inside = all(RADIUS <= v <= 1 - RADIUS and RADIUS <= u <= LENGTH - RADIUS for u, v in places)
     return inside and hypot(value * cos(angle), value * sin(angle)) >= 2 * RADIUS
+
+
+def test_a_polygon_that_was_shown_for_one_slice_is_not_taken_for_another():
+    document = deepcopy(PROOF)
+    document["slices"][3]["witnesses"][1] = document["slices"][1]["witnesses"][1]
+    assert "slices[3].witnesses: may leave the inside of second" in refusal(document)

@@ -130,16 +130,15 @@ class Squeezes:
 
     def _apart(self, intervals: Intervals, i: int, j: int, first: int, second: int) -> Places:
         """All vectors from one centre to another, in directions of W."""
-        one, grown = self._places(i, intervals, first)
-        other, more = self._places(j, intervals, second)
-        piece = self._swept.pieces[i]
-        steps = list(zip(piece.chain[first:], piece.axes[first:], strict=True))
-        return self._moved(
-            (convex_hull((other[:, None] - one).reshape(-1, 2)), grown + more),
-            steps,
-            intervals,
-            sliding=False,
-        )
+        pieces = self._swept.pieces
+        key = (i, j, "apart", *[intervals[axis] for axis in (*pieces[i].axes, *pieces[j].axes)])
+        if key not in self._known:
+            one, grown = self._places(i, intervals, first)
+            other, more = self._places(j, intervals, second)
+            between = convex_hull((other[:, None] - one).reshape(-1, 2)), grown + more
+            steps = list(zip(pieces[i].chain[first:], pieces[i].axes[first:], strict=True))
+            self._known[key] = self._moved(between, steps, intervals, sliding=False)
+        return self._known[key]
 
     def _moved(
         self, places: Places, steps: list[tuple[int, int]], intervals: Intervals, *, sliding: bool
