@@ -33,8 +33,8 @@ class PlannerSettings:
         angle_resolution: Slices of angles are not split below this width [rad].
         length_resolution: Slices of prismatic joints are not split below this width [m].
         max_slices: Work budget of explorations: none begins once all of them have made so many slices. The
-            last one may exceed it by as many slices as it was allowed; that of the whole team then goes on to
-            so many slices of its own.
+            last one may exceed it by as many slices as it was allowed. If bases are squeezed between walls,
+            that of a whole team of three or more robots may then go on to so many slices of its own.
         min_clearance: Least clearance of the object's path in a cell, half the width of the passage there,
             and of the target where the cell is left [m]. Narrower ones take minutes. For very large or very
             small teams it is scaled to the team.

@@ -89,6 +89,9 @@ class CellMaker:
         pairs: Self-collision of the team.
         workspace: Where the team may be; the margin is already taken off [m].
         squeezing: Whether over-cells leave out where two round pieces are squeezed between walls.
+
+    Attributes:
+        squeezed: How often such a pair was found.
     """
 
     def __init__(
@@ -99,6 +102,7 @@ class CellMaker:
         *,
         squeezing: bool = False,
     ) -> None:
+        self.squeezed = 0
         self._swept, self._pairs = swept, pairs
         self._under_space, self._over_space = FreeSpace.under(workspace), FreeSpace.over(workspace)
         self._squeezes = Squeezes(swept, pairs, self._over_space.edges) if squeezing else None
@@ -146,6 +150,7 @@ class CellMaker:
                 rest.append(region)
             else:
                 found.append(pair)
+        self.squeezed += len(found)
         return found, rest
 
     def under_cells(self, expanded: Intervals) -> list[Region]:

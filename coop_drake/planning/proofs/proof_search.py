@@ -86,7 +86,8 @@ class Proofs:
     ) -> Verdict:
         """Continue every exploration until it has an answer or has made its slices.
 
-        When all of them have spent ``planner.max_slices``, the whole question gets so many slices by itself.
+        When all of them have spent ``planner.max_slices``, the whole question gets so many slices by itself
+        where walls squeeze bases of three or more robots together: it may then be proved by few slices more.
 
         Args:
             slices: Slices of each exploration, those of earlier calls included.
@@ -108,14 +109,20 @@ class Proofs:
         for chosen in self._questions(robots):
             if self.refutation is None and self._goes_on(chosen, asked=robots is not None and untested):
                 self._explore(chosen, self._most(chosen, slices), progress)
-        most, latest = self._problem.settings.max_slices, self._outcomes.get(self._all)
-        spent = robots is None and self.refutation is None and self.slices >= most
-        if spent and latest is not None and latest.verdict is Verdict.BUDGET:
+        most = self._problem.settings.max_slices
+        if robots is None and self.refutation is None and self.slices >= most and self._may_be_squeezed():
             self._explore(self._all, most, progress)
         if self.refutation is not None:
             return Verdict.INFEASIBLE
         latest = self._outcomes.get(self._all)
         return Verdict.BUDGET if latest is None else latest.verdict
+
+    def _may_be_squeezed(self) -> bool:
+        """Whether the whole question is undecided, and of three or more robots two are squeezed in places."""
+        latest = self._outcomes.get(self._all)
+        undecided = latest is not None and latest.verdict is Verdict.BUDGET
+        squeezed = undecided and self._exploration(self._all).maker.squeezed > 0
+        return squeezed and len(self._all) > MOST_ROBOTS
 
     def _explore(self, chosen: tuple[int, ...], slices: int, progress: Callable[[int], None] | None) -> None:
         """Continue one exploration, and write the proof down if there is one."""
