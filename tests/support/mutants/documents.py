@@ -12,6 +12,9 @@ from tests.support.mutants.mutant import Mutant, Place, at, dotted, leaves, put,
 
 Document = dict[str, Any]
 _FREE = ("gain_set", "problem", "digest", "goal_joints")
+_OPTIONAL = ("squeezes",)
+"""Keys that files of older versions do not have."""
+
 _FIXED_LENGTH = [
     "start",
     "goal_pose",
@@ -126,9 +129,9 @@ def _of_mapping(document: Document, place: Place, value: Any) -> Iterator[Mutant
     for name in value:
         here = (*place, name)
         if here != ("digest",):
-            yield Mutant(
-                "missing key", dotted(here), "it is required", _signed(without(document, here)), dotted(here)
-            )
+            if name not in _OPTIONAL:
+                missing = _signed(without(document, here))
+                yield Mutant("missing key", dotted(here), "it is required", missing, dotted(here))
             wrong = (*place, f"{name}_")
             changed = _signed(renamed(document, here, wrong[-1]))
             yield Mutant("misspelt key", dotted(here), "no key has this name", changed, dotted(here))
