@@ -198,6 +198,18 @@ def is_free(team: TeamArrays, grid: ObstacleGrid, z: FloatArray, gap: float) -> 
 
 
 @compiled
+def first_collision(team: TeamArrays, grid: ObstacleGrid, path: FloatArray, gap: float) -> int:
+    """Index of the first configuration of a path, shape (m, 3 + n), that is not free; m if all of them are.
+
+    The other arguments are those of ``is_free``.
+    """
+    for k in range(len(path)):
+        if not is_free(team, grid, path[k], gap):
+            return k
+    return len(path)
+
+
+@compiled
 def segment_is_free(
     team: TeamArrays,
     grid: ObstacleGrid,

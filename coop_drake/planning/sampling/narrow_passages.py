@@ -12,7 +12,7 @@ from shapely import MultiPolygon, Polygon
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.parts import parts_of
 from coop_drake.planning.sampling.clearance_program import with_wider_passages
-from coop_drake.planning.sampling.collision_kernels import is_free
+from coop_drake.planning.sampling.collision_kernels import first_collision, is_free
 from coop_drake.planning.sampling.elastic_band_kernels import improve
 from coop_drake.planning.sampling.obstacle_grid import grid_for_team
 from coop_drake.planning.sampling.sampler import densified
@@ -140,22 +140,33 @@ def amount_needed(eased: Eased, path: FloatArray, most: float) -> tuple[float, i
     lower, upper, worst = 0.0, most, 0
     for _ in range(HALVINGS):
         middle = 0.5 * (lower + upper)
-        blocked = np.flatnonzero(~are_free(eased(middle), path))
-        if len(blocked):
-            lower, worst = middle, int(blocked[0])
+        blocked = first_blocked(eased(middle), path)
+        if blocked < len(path):
+            lower, worst = middle, blocked
         else:
             upper = middle
     return upper, worst
 
 
+def first_blocked(problem: PlanningProblem, path: FloatArray) -> int:
+    """Index of the first sample that is not within limits and free of collisions, m if all are; exact."""
+    team, within = team_arrays(problem.tree), _within_limits(problem, path)
+    count = len(path) if within.all() else int(np.argmin(within))
+    return first_collision(team, grid_for_team(problem.workspace, team), path[:count], 0.0)
+
+
 def are_free(problem: PlanningProblem, path: FloatArray) -> NDArray[np.bool_]:
     """Whether each sample is within limits and free of collisions; exact, shape (m,)."""
-    tree = problem.tree
-    team = team_arrays(tree)
+    team = team_arrays(problem.tree)
     grid = grid_for_team(problem.workspace, team)
-    within = np.all((path[:, 3:] >= tree.joint_lower) & (path[:, 3:] <= tree.joint_upper), axis=1)
-    free: NDArray[np.bool_] = within & np.array([is_free(team, grid, z, 0.0) for z in path])
-    return free
+    free: NDArray[np.bool_] = np.array([is_free(team, grid, z, 0.0) for z in path])
+    return free & _within_limits(problem, path)
+
+
+def _within_limits(problem: PlanningProblem, path: FloatArray) -> NDArray[np.bool_]:
+    lower, upper = problem.tree.joint_lower, problem.tree.joint_upper
+    within: NDArray[np.bool_] = np.all((path[:, 3:] >= lower) & (path[:, 3:] <= upper), axis=1)
+    return within
 
 
 def widened_floor(workspace: Polygon, amount: float) -> MultiPolygon:
