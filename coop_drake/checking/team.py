@@ -126,7 +126,6 @@ class Question:
         numbered = [(i, j) for j in range(len(self.pieces)) for i in range(j) if (i, j) not in aside]
         self.pairs = [(i, j) for i, j in numbered if self.pieces[i].chain != self.pieces[j].chain]
         (self.start, self.goal), angles = points([value["start"][:2], value["goal"]]), value["start"][2:]
-        self.inner = set[tuple[Any, ...]]()
         self.start_box = intervals(angles, angles, self.axes)
         demand(holds(self.limits, self.start_box[1:]), "question.start", "is beyond the limits of a joint")
         self.goal_box = intervals(value["goal_lower"], value["goal_upper"], self.axes)

@@ -164,6 +164,7 @@ def are_free(problem: PlanningProblem, path: FloatArray) -> NDArray[np.bool_]:
 
 
 def _within_limits(problem: PlanningProblem, path: FloatArray) -> NDArray[np.bool_]:
+    """Whether all joints of each sample are within their limits, shape (m,)."""
     lower, upper = problem.tree.joint_lower, problem.tree.joint_upper
     within: NDArray[np.bool_] = np.all((path[:, 3:] >= lower) & (path[:, 3:] <= upper), axis=1)
     return within
