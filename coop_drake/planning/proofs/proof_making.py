@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial, reduce
+from itertools import combinations, product
 from math import pi
 from typing import TypeVar
 
 import numpy as np
 import shapely
+from manifold3d import CrossSection
 from shapely import Point, Polygon
 from shapely.errors import ShapelyError
 from shapely.geometry.base import BaseGeometry
@@ -63,20 +65,24 @@ def slices_proof(
     starts = set(slices.holding([float(angle) for angle in question.start[2:]]))
     goals = set(slices.holding([float(question.goal_pose[2]), *question.goal_joints]))
 
-    space = FreeSpace.over(question.workspace)
+    start, goal = Point(question.start[:2]), Point(question.goal_pose[:2])
+    floor = _Floor(FreeSpace.over(question.workspace))
+    polygons = {leaf: [to_polygon(region.section) for region in its] for leaf, its in regions.items()}
+    apart = _Graph(polygons, joined, start, starts).apart(goal, goals)
 
     def separated(growth: float) -> list[OverSlice] | None:
+        if 2.0 * growth > apart:
+            return None  # These cells hold the regions, and would touch.
         shown, cells = dict[int, tuple[Witness, ...]](), dict[int, list[Polygon]]()
         squeezes, beyond = dict[int, tuple[Squeeze, ...]](), max(0.5 * growth, LEAST_OVERLAP)
         for leaf in leaves:
             intervals = slices.all[leaf].intervals
             overlaps = () if regions[leaf] else witnesses.overlaps(intervals)
             shown[leaf] = overlaps or witnesses.inner_sweeps(intervals, growth)
-            left = [] if overlaps else _not_forbidden(space, shown[leaf])
+            left = [] if overlaps else floor.not_forbidden(shown[leaf])
             squeezes[leaf], left = witnesses.squeezed(intervals, left, beyond)
             cells[leaf] = _grown(left, growth)
-        labels = _reached(cells, joined, starts, Point(question.start[:2]))
-        goal = Point(question.goal_pose[:2])
+        labels = _Graph(cells, joined, start, starts).reached
         if any(
             label and cell.dwithin(goal, TOUCHING)
             for leaf in goals
@@ -147,16 +153,35 @@ def _first(separated: Callable[[float], Found | None]) -> Found | None:
     return None
 
 
-def _not_forbidden(space: FreeSpace, sweeps: Sequence[Witness]) -> list[Region]:
-    """Regions of all positions that polygons inside pieces do not forbid.
+class _Floor:
+    """Positions on a floor that witnesses leave free; those of a witness that slices share are kept.
 
-    Raises:
-        GeometryError: There are no polygons: nothing is forbidden.
+    Args:
+        space: Where polygons fit.
     """
-    if not sweeps:
-        raise GeometryError("no piece is known to hold a polygon all over a slice")
-    sections = [space.minus(sweep.polygon) for sweep in sweeps]
-    return regions_of(reduce(partial(shared, over=True), sections), over=True)
+
+    def __init__(self, space: FreeSpace) -> None:
+        self._space = space
+        self._known: dict[bytes, CrossSection] = {}
+
+    def not_forbidden(self, sweeps: Sequence[Witness]) -> list[Region]:
+        """Regions of all positions that polygons inside pieces do not forbid.
+
+        Raises:
+            GeometryError: There are no polygons: nothing is forbidden.
+        """
+        if not sweeps:
+            raise GeometryError("no piece is known to hold a polygon all over a slice")
+        return regions_of(
+            reduce(partial(shared, over=True), [self._fitting(sweep.polygon) for sweep in sweeps]), over=True
+        )
+
+    def _fitting(self, polygon: FloatArray) -> CrossSection:
+        """Positions at which a polygon fits."""
+        key = polygon.tobytes()
+        if key not in self._known:
+            self._known[key] = self._space.minus(polygon)
+        return self._known[key]
 
 
 def _grown(regions: Sequence[Region], growth: float) -> list[Polygon]:
@@ -167,32 +192,64 @@ def _grown(regions: Sequence[Region], growth: float) -> list[Polygon]:
     return sorted(parts, key=lambda part: (part.bounds, part.area))
 
 
-def _reached(
-    cells: Mapping[int, Sequence[Polygon]],
-    joined: Mapping[int, Sequence[int]],
-    starts: set[int],
-    start: Point,
-) -> dict[int, list[bool]]:
-    """Which cells a sequence of touching cells of neighbouring leaves connects to the start."""
-    import networkx as nx  # Plans do not need it, and its import takes a tenth of a second.
+class _Graph:
+    """Cells, joined where those of neighbouring leaves touch.
 
-    flat = [(leaf, i) for leaf in cells for i in range(len(cells[leaf]))]
-    place = {entry: k for k, entry in enumerate(flat)}
-    pairs = np.array(
-        [
-            (place[leaf, i], place[other, j])
+    Args:
+        cells: The cells of every leaf by its id.
+        joined: For each leaf those of its neighbours whose id is higher.
+        start: Where paths begin.
+        starts: Leaves that hold the angles at the start.
+
+    Attributes:
+        reached: For each leaf which of its cells a sequence of touching cells joins to the start.
+    """
+
+    def __init__(
+        self,
+        cells: Mapping[int, Sequence[Polygon]],
+        joined: Mapping[int, Sequence[int]],
+        start: Point,
+        starts: set[int],
+    ) -> None:
+        import networkx as nx  # Plans do not need it, and its import takes a tenth of a second.
+
+        numbers = iter(range(sum(map(len, cells.values()))))
+        self._places = {leaf: [next(numbers) for _ in its] for leaf, its in cells.items()}
+        self._polygons = np.array([cell for its in cells.values() for cell in its], dtype=object)
+        beside = [
+            pair
             for leaf, others in joined.items()
             for other in others
-            for i in range(len(cells[leaf]))
-            for j in range(len(cells[other]))
-        ],
-        dtype=np.int64,
-    ).reshape(-1, 2)
-    polygons = np.array([cells[leaf][i] for leaf, i in flat], dtype=object)
-    touching = pairs[shapely.dwithin(polygons[pairs[:, 0]], polygons[pairs[:, 1]], TOUCHING)]
-    graph: nx.Graph[int] = nx.Graph()
-    graph.add_edges_from(touching.tolist())
-    first = [k for k, (leaf, _) in enumerate(flat) if leaf in starts and polygons[k].dwithin(start, TOUCHING)]
-    graph.add_nodes_from(first)
-    reached: set[int] = set().union(*(nx.node_connected_component(graph, k) for k in first))
-    return {leaf: [place[leaf, i] in reached for i in range(len(cells[leaf]))] for leaf in cells}
+            for pair in product(self._places[leaf], self._places[other])
+        ]
+        self._beside = np.array(beside, dtype=np.int64).reshape(-1, 2)
+        self._first = np.array([k for leaf in sorted(starts) for k in self._places[leaf]], dtype=np.int64)
+        self._start = start
+        graph: nx.Graph[int] = nx.Graph()
+        first = self._first[shapely.dwithin(self._polygons[self._first], start, TOUCHING)].tolist()
+        graph.add_nodes_from(first)
+        one, other = self._polygons[self._beside.T]
+        touching = shapely.dwithin(one, other, TOUCHING)
+        graph.add_edges_from(self._beside[touching].tolist())
+        reached = set[int]().union(*(nx.node_connected_component(graph, k) for k in first))
+        self.reached = {leaf: [k in reached for k in its] for leaf, its in self._places.items()}
+
+    def apart(self, goal: Point, goals: set[int]) -> float:
+        """Twice the least growth of all cells that joins the start to a goal or to further cells [m].
+
+        Args:
+            goal: Where paths end.
+            goals: Leaves that hold the angles at the goal.
+        """
+        labels = np.array([label for its in self.reached.values() for label in its], dtype=bool)
+        inside = [pair for its in self._places.values() for pair in combinations(its, 2)]
+        pairs = np.concatenate((self._beside, np.array(inside, dtype=np.int64).reshape(-1, 2)))
+        pairs = pairs[labels[pairs[:, 0]] != labels[pairs[:, 1]]]
+        ends = [k for leaf in sorted(goals) for k in self._places[leaf] if labels[k]]
+        new = self._first[~labels[self._first]]
+        one, other = self._polygons[pairs.T]
+        between = shapely.distance(one, other)
+        to_goal = shapely.distance(self._polygons[ends], goal)
+        to_start = shapely.distance(self._polygons[new], self._start)
+        return float(np.concatenate((between, 2.0 * to_goal, 2.0 * to_start)).min(initial=np.inf))

@@ -40,6 +40,7 @@ class Witnesses:
         names = [c.name for c in tree.components for body in c.bodies for _ in body.shapes]
         self._numbers = [number for number, name in enumerate(names) if name in kept]
         self._tree, self._swept, self._pairs = tree, swept, pairs
+        self._sweeps: dict[tuple[object, ...], Witness | None] = {}
         self._owners = [k for k, c in enumerate(tree.components) for body in c.bodies for _ in body.shapes]
 
     def ends(self, intervals: Intervals) -> tuple[FloatArray, FloatArray]:
@@ -67,9 +68,17 @@ class Witnesses:
             growth: How far the slice's cells reach beyond the positions that these polygons leave free [m].
         """
         loss = LEAST_LOSS + LOSS_PER_GROWTH * max(growth, 0.0)
-        rings = [(number, self._swept.under(k, intervals)) for k, number in enumerate(self._numbers)]
-        found = [(number, smaller(ring, loss)) for number, ring in rings if ring is not None]
-        return tuple(Witness((number,), 0, ring) for number, ring in found if ring is not None)
+        found = [self._inner_sweep(k, intervals, loss) for k in range(len(self._numbers))]
+        return tuple(witness for witness in found if witness is not None)
+
+    def _inner_sweep(self, index: int, intervals: Intervals, loss: float) -> Witness | None:
+        """The witness of one piece, if any; slices that differ along other axes share it."""
+        key = (index, loss, *[intervals[axis] for axis in self._swept.pieces[index].axes])
+        if key not in self._sweeps:
+            ring = self._swept.under(index, intervals)
+            inside = None if ring is None else smaller(ring, loss)
+            self._sweeps[key] = None if inside is None else Witness((self._numbers[index],), 0, inside)
+        return self._sweeps[key]
 
     def squeezed(
         self, intervals: Intervals, regions: Sequence[Region], growth: float
