@@ -105,7 +105,8 @@ class CellMaker:
         self.squeezed = 0
         self._swept, self._pairs = swept, pairs
         self._under_space, self._over_space = FreeSpace.under(workspace), FreeSpace.over(workspace)
-        self._squeezes = Squeezes(swept, pairs, self._over_space.edges) if squeezing else None
+        squeezes = Squeezes(swept, pairs, self._over_space.edges) if squeezing else None
+        self._squeezes = squeezes if squeezes is not None and squeezes.breadth > 0.0 else None
         self._everywhere = self._positions(workspace)
         self._members = [
             [n for n, piece in enumerate(swept.pieces) if piece.component == c]

@@ -34,6 +34,10 @@ GROWTHS = (1e-3, 1e-4, 1e-5, 0.0, -5e-7)
 faster the check. The last one takes back half of the tolerance by which the planner grows cells, for cells
 that merely touch."""
 
+GROWN_SHARE = 0.25
+"""Share of the distance between regions by which cells of these are grown at most [-]: at half of it they
+would touch, and witnesses hold a little less than the pieces."""
+
 TOUCHING = 1e-6
 """Cells nearer to each other than this count as touching, as they do for the verifier [m]."""
 
@@ -68,11 +72,10 @@ def slices_proof(
     start, goal = Point(question.start[:2]), Point(question.goal_pose[:2])
     floor = _Floor(FreeSpace.over(question.workspace))
     polygons = {leaf: [to_polygon(region.section) for region in its] for leaf, its in regions.items()}
-    apart = _Graph(polygons, joined, start, starts).apart(goal, goals)
+    most = GROWN_SHARE * _Graph(polygons, joined, start, starts).apart(goal, goals)
+    growths = [growth for growth in GROWTHS if growth <= most]
 
     def separated(growth: float) -> list[OverSlice] | None:
-        if 2.0 * growth > apart:
-            return None  # These cells hold the regions, and would touch.
         shown, cells = dict[int, tuple[Witness, ...]](), dict[int, list[Polygon]]()
         squeezes, beyond = dict[int, tuple[Squeeze, ...]](), max(0.5 * growth, LEAST_OVERLAP)
         for leaf in leaves:
@@ -99,7 +102,7 @@ def slices_proof(
             for leaf in leaves
         ]
 
-    parts = _first(separated)
+    parts = _first(separated, growths)
     return None if parts is None else InfeasibilityProof("slices", 0, np.zeros(2), tuple(parts))
 
 
@@ -138,12 +141,13 @@ def disc_proof(
         ends = slice_ends(tree, (-pi, pi), {})
         return OverSlice(*ends, (inside,), tuple(map(OverCell, labels, cells)))
 
-    found = _first(separated)
+    found = _first(separated, GROWTHS)
     return None if found is None else InfeasibilityProof("disc", component, centre, (found,))
 
 
-def _first(separated: Callable[[float], Found | None]) -> Found | None:
-    for growth in GROWTHS:
+def _first(separated: Callable[[float], Found | None], growths: Sequence[float]) -> Found | None:
+    """What is found for the first growth of cells [m] that keeps start and goal apart, if any does."""
+    for growth in growths:
         try:
             found = separated(growth)
         except (ShapelyError, GeometryError, ValueError):
@@ -236,7 +240,7 @@ class _Graph:
         self.reached = {leaf: [k in reached for k in its] for leaf, its in self._places.items()}
 
     def apart(self, goal: Point, goals: set[int]) -> float:
-        """Twice the least growth of all cells that joins the start to a goal or to further cells [m].
+        """Twice the least growth of all cells that would join the start to a goal or to further cells [m].
 
         Args:
             goal: Where paths end.
