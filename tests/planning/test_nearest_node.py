@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from coop_drake.planning.sampling.random_trees import _add, _empty_tree, _nearest
+from coop_drake.planning.sampling.nearest_node import add, empty_tree, nearest
 
 LOWER, UPPER = np.array([-1.0, 2.0, -np.pi, -1.5]), np.array([9.0, 6.0, np.pi, 1.5])
 
@@ -15,10 +15,10 @@ def test_the_nearest_node_is_found(spread):
     middle, size = 0.5 * (LOWER + UPPER), 1.2 * (UPPER - LOWER)  # Some nodes are beyond the floor.
     nodes = middle + spread * (random.random((400, 4)) - 0.5) * size
     nodes[:, 2] *= 3.0  # Theta is not limited to one turn.
-    tree = _empty_tree(len(nodes), LOWER, UPPER)
+    tree = empty_tree(len(nodes), LOWER, UPPER)
     for k, z in enumerate(nodes):
-        _add(tree, k, z, -1)
+        add(tree, k, z, -1)
         sample = middle + 1.3 * (random.random(4) - 0.5) * size
         d = sample - nodes[: k + 1]
         d[:, 2] -= 2.0 * np.pi * np.round(d[:, 2] / (2.0 * np.pi))
-        assert _nearest(tree, sample, scale) == np.argmin(((d * scale) ** 2).sum(axis=1))
+        assert nearest(tree, sample, scale) == np.argmin(((d * scale) ** 2).sum(axis=1))
