@@ -8,6 +8,7 @@ from enum import IntEnum
 
 import numpy as np
 
+from coop_drake.compiled import prepared
 from coop_drake.planning.cells.cells import Region
 from coop_drake.planning.cells.graph_search import NO_WAY, REACHED, Links, Search, aim, forget, go_on, link
 from coop_drake.planning.cells.slices import Slices
@@ -56,6 +57,7 @@ class CellGraph:
         self.by_slice: dict[int, list[GraphCell]] = {}
         self._edges = 0
         self._links, self._search = _links(0, 0), _search(0)
+        self._go_on = prepared(go_on, (self._links, self._search))
         self._searched, self._starts = 0, set[int]()
 
     def add(self, index: int, members: Sequence[tuple[Kind, Region, float]]) -> None:
@@ -82,7 +84,7 @@ class CellGraph:
         if removed := self.by_slice.pop(index):
             first, last = removed[0].index, removed[-1].index + 1
             self._starts.difference_update(range(first, last))
-            forget(self._links, self._search, first, last, len(self.cells))
+            forget(self._links, self._search, first, last)
 
     def _make_room(self, nodes: int, edges: int) -> None:
         """Let the arrays hold so many nodes and edges, at least twice as many as before where they grow."""
@@ -93,6 +95,7 @@ class CellGraph:
             self._links = _links(known, stored if edges <= stored else 2 * edges)
             for grown, old in zip((*self._links, *self._search), (*links, *search), strict=True):
                 grown[: len(old)] = old
+            self._go_on = prepared(go_on, (self._links, self._search))
 
     def cheapest(self, starts: Sequence[GraphCell], goals: set[int]) -> list[GraphCell] | None:
         """Path of least total weight by Dijkstra's algorithm; of equal costs the lower index comes first.
@@ -107,11 +110,12 @@ class CellGraph:
         begins = {cell.index for cell in starts}
         if not self._starts <= begins:
             self._search, self._searched = _search(len(self._links.weights)), 0
+            self._go_on = prepared(go_on, (self._links, self._search))
         links, search = self._links, self._search
         first, last = (np.array(sorted(ends), dtype=np.int64) for ends in (begins, goals))
         aim(links, search, self._searched, first, last, len(self.cells))
         self._searched, self._starts = len(self.cells), begins
-        while (asked := go_on(links, search)) not in (REACHED, NO_WAY):
+        while (asked := self._go_on()) not in (REACHED, NO_WAY):
             for edge in search.asked[:asked].tolist():
                 links.met[edge // 2] = self._meet(int(links.to[edge ^ 1]), int(links.to[edge]))
         return None if asked == NO_WAY else self._trace(int(search.state[1]))
@@ -151,6 +155,7 @@ def _links(nodes: int, edges: int) -> Links:
 
 def _search(nodes: int) -> Search:
     """Arrays for a search of so many nodes."""
-    back, heap, place, goal = (np.full(nodes, -1, np.int64) for _ in range(4))
-    asked, state = np.empty(_ASKED, np.int64), np.array([0, -1], np.int64)
-    return Search(np.full(nodes, np.inf), back, heap, place, goal, asked, state)
+    back, onward, heap, place, goal, lost = (np.full(nodes, -1, np.int64) for _ in range(6))
+    beside, asked = np.full((nodes, 2), -1, np.int64), np.empty(_ASKED, np.int64)
+    state = np.array([0, -1], np.int64)
+    return Search(np.full(nodes, np.inf), back, onward, beside, heap, place, goal, lost, asked, state)

@@ -50,18 +50,24 @@ class Search(NamedTuple):
     Attributes:
         best: Least cost known of each node, infinite where there is none, shape (N,).
         back: The node before it, -1 for none, shape (N,).
+        onward: The first of the nodes that it is before, -1 for none, shape (N,).
+        beside: For each of these the next one and the one before that, -1 for none, shape (N, 2).
         heap: Nodes that wait, the one of least cost first, of equal ones the lowest; shape (N,).
         place: Place of each node in the heap, shape (N,).
         goal: 1 for goals, shape (N,).
+        lost: Memory for the nodes whose costs are forgotten, shape (N,).
         asked: Edges that have to be tested, shape (A,).
         state: How many nodes wait, and the node whose edges are looked at, -1 if there is none, shape (2,).
     """
 
     best: FloatArray
     back: IntArray
+    onward: IntArray
+    beside: IntArray
     heap: IntArray
     place: IntArray
     goal: IntArray
+    lost: IntArray
     asked: IntArray
     state: IntArray
 
@@ -102,14 +108,9 @@ def _before(search: Search, one: int, other: int) -> bool:
 
 
 @compiled
-def _raise(search: Search, node: int, cost: float) -> None:
-    """Give a node a lower cost, and let it wait."""
+def _rise(search: Search, node: int, at: int) -> None:
+    """Put a waiting node at a place of the heap, or nearer to its top."""
     heap, place = search.heap, search.place
-    search.best[node] = cost
-    at = place[node]
-    if at < 0:
-        at = search.state[0]
-        search.state[0] += 1
     while at > 0 and _before(search, node, heap[(at - 1) // 2]):
         heap[at] = heap[(at - 1) // 2]
         place[heap[at]] = at
@@ -118,26 +119,58 @@ def _raise(search: Search, node: int, cost: float) -> None:
 
 
 @compiled
-def _pop(search: Search) -> int:
-    """Take the node of least cost out of the heap."""
+def _raise(search: Search, node: int, cost: float) -> None:
+    """Give a node a lower cost, and let it wait."""
+    at = search.place[node]
+    search.best[node] = cost
+    if at < 0:
+        at = search.state[0]
+        search.state[0] += 1
+    _rise(search, node, at)
+
+
+@compiled
+def _take(search: Search, taken: int) -> None:
+    """Take a node that waits out of the heap; the last one comes to its place."""
     heap, place = search.heap, search.place
-    top = heap[0]
-    place[top] = -1
+    at = place[taken]
+    place[taken] = -1
     search.state[0] -= 1
     size = search.state[0]
-    if size > 0:
-        node, at = heap[size], 0
-        while 2 * at + 1 < size:
-            child = 2 * at + 1
-            if child + 1 < size and _before(search, heap[child + 1], heap[child]):
-                child += 1
-            if not _before(search, heap[child], node):
-                break
-            heap[at] = heap[child]
-            place[heap[at]] = at
-            at = child
-        heap[at], place[node] = node, at
-    return int(top)
+    node = heap[size]
+    if node == taken:
+        return
+    while 2 * at + 1 < size:
+        child = 2 * at + 1
+        if child + 1 < size and _before(search, heap[child + 1], heap[child]):
+            child += 1
+        if not _before(search, heap[child], node):
+            break
+        heap[at] = heap[child]
+        place[heap[at]] = at
+        at = child
+    _rise(search, node, at)
+
+
+@compiled
+def _lead(search: Search, node: int, last: int) -> None:
+    """Let the cheapest way to a node come from another one, or begin there (-1)."""
+    old, (following, before) = search.back[node], search.beside[node]
+    if old >= 0:
+        if before >= 0:
+            search.beside[before, 0] = following
+        else:
+            search.onward[old] = following
+        if following >= 0:
+            search.beside[following, 1] = before
+    search.back[node] = last
+    search.beside[node, 0] = search.beside[node, 1] = -1
+    if last >= 0:
+        first = search.onward[last]
+        search.beside[node, 0] = first
+        search.onward[last] = node
+        if first >= 0:
+            search.beside[first, 1] = node
 
 
 @compiled
@@ -152,37 +185,38 @@ def _beside(links: Links, search: Search, node: int) -> None:
 
 
 @compiled
-def forget(links: Links, search: Search, first: int, last: int, count: int) -> None:
-    """Remove some nodes of the first ``count``, with their edges, and forget costs of ways through them."""
+def _lose(search: Search, node: int, count: int) -> int:
+    """Forget the cost of a node, and note it after ``count`` others; returns how many are noted."""
+    if search.best[node] == np.inf:
+        return count
+    if search.place[node] >= 0:
+        _take(search, node)
+    search.best[node], search.lost[count] = np.inf, node
+    return count + 1
+
+
+@compiled
+def forget(links: Links, search: Search, first: int, last: int) -> None:
+    """Remove some nodes with their edges, and forget costs of ways through them."""
+    lost = 0
     for node in range(first, last):
         edge = links.head[node]
         while edge >= 0:
             links.met[edge // 2] = _REMOVED
             edge = links.following[edge]
         links.head[node] = -1
-    unknown, kept, lost = 0, 1, 2
-    state = np.zeros(count, np.int8)
-    state[first:last] = lost
-    for node in range(count):
-        k = node
-        while state[k] == unknown and search.back[k] >= 0:
-            k = search.back[k]
-        found = max(state[k], kept)
-        k = node
-        while k >= 0 and state[k] == unknown:
-            state[k], k = found, search.back[k]
-    waiting = search.heap[: search.state[0]].copy()
-    search.state[0] = 0
-    search.place[waiting] = -1
-    for node in range(count):
-        if state[node] == lost:
-            search.best[node], search.back[node] = np.inf, -1
-    for node in waiting:
-        if state[node] == kept:
-            _raise(search, node, search.best[node])
-    for node in range(count):
-        if state[node] == lost:
-            _beside(links, search, node)
+        lost = _lose(search, node, lost)
+    k = 0
+    while k < lost:
+        node = search.onward[search.lost[k]]
+        while node >= 0:
+            lost = _lose(search, node, lost)
+            node = search.beside[node, 0]
+        k += 1
+    for k in range(lost):
+        _lead(search, search.lost[k], -1)
+    for k in range(lost):
+        _beside(links, search, search.lost[k])
 
 
 @compiled
@@ -207,7 +241,7 @@ def aim(links: Links, search: Search, new: int, starts: IntArray, goals: IntArra
         _beside(links, search, node)
     for node in starts:
         if links.weights[node] < search.best[node]:
-            search.back[node] = -1
+            _lead(search, node, -1)
             _raise(search, node, links.weights[node])
 
 
@@ -221,7 +255,8 @@ def go_on(links: Links, search: Search) -> int:
     """
     while search.state[0] > 0 or search.state[1] >= 0:
         if search.state[1] < 0:
-            search.state[1] = _pop(search)
+            search.state[1] = search.heap[0]
+            _take(search, search.state[1])
             if search.goal[search.state[1]] == 1:
                 return REACHED
         node = search.state[1]
@@ -243,7 +278,7 @@ def go_on(links: Links, search: Search) -> int:
                         search.asked[unknown] = edge
                         unknown += 1
                     elif met == _JOINED:
-                        search.back[other] = node
+                        _lead(search, other, node)
                         if cheaper:
                             _raise(search, other, cost)
                 before = edge
