@@ -50,8 +50,8 @@ class Search(NamedTuple):
     Attributes:
         best: Least cost known of each node, infinite where there is none, shape (N,).
         back: The node before it, -1 for none, shape (N,).
-        onward: The first of the nodes that it is before, -1 for none, shape (N,).
-        beside: For each of these the next one and the one before that, -1 for none, shape (N, 2).
+        onward: The first in the list of the nodes that it is ``back`` of, -1 for none, shape (N,).
+        beside: The node after it and the one before it in the list it is in, -1 for none, shape (N, 2).
         heap: Nodes that wait, the one of least cost first, of equal ones the lowest; shape (N,).
         place: Place of each node in the heap, shape (N,).
         goal: 1 for goals, shape (N,).
