@@ -16,9 +16,9 @@ SETTINGS = QuestionSettings(seeds=(20261, 20262, 20263))
 """The settings of ``benchmarks/campaigns/questions.campaign.yaml`` that determine its questions."""
 
 CAUSES = {
-    4: "a corridor of 1.06 of the narrowest one, two robots: no way is sampled, 4,000 slices prove nothing",
-    15: "doors of 0.89 of the narrowest corridor, two robots: no way is sampled, and searching the graph of "
-    "42,000 cells for every one or two slices that are halved takes half of the time",
+    4: "a corridor of 1.06 of the narrowest one, two robots: a way is certified that is narrower than the "
+    "limits allow",
+    15: "doors of 0.89 of the narrowest corridor, two robots: no way is sampled, thousands of slices",
     22: "a door of 0.70 of the narrowest corridor, four robots: the proof takes slices of one of them",
     30: "a corridor of 0.98 of the narrowest one, four robots: no way is sampled, 4,000 slices prove nothing",
     32: "doors of 0.89 of the narrowest corridor, two robots: no way is sampled, thousands of slices",
@@ -32,7 +32,8 @@ CAUSES = {
     "takes thousands of slices",
     137: "a corridor of 0.95 of the narrowest one, three robots: a way is certified that is a tenth of a "
     "millimetre wide",
-    204: "a door of 1.22 of the narrowest corridor, four robots: the proof takes nearly a minute",
+    204: "a door of 1.22 of the narrowest corridor, four robots: the proof takes 3,782 slices of one of them, "
+    "and meanwhile paths are sampled",
     291: "a corridor of 1.00 of the narrowest one, two robots: it is proved that no path keeps 0.04 m from "
     "the walls, no way is sampled",
     315: "a corridor of 1.12 of the narrowest one, two robots with two joints each: it is proved that no "
