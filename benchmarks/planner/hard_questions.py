@@ -32,8 +32,8 @@ CAUSES = {
     "takes thousands of slices",
     137: "a corridor of 0.95 of the narrowest one, three robots: a way is certified that is a tenth of a "
     "millimetre wide",
-    204: "a door of 1.22 of the narrowest corridor, four robots: the proof takes 3,782 slices of one of them, "
-    "and meanwhile paths are sampled",
+    204: "a door of 1.22 of the narrowest corridor, four robots: the proof takes thousands of slices of one "
+    "of them, and meanwhile paths are sampled",
     291: "a corridor of 1.00 of the narrowest one, two robots: it is proved that no path keeps 0.04 m from "
     "the walls, no way is sampled",
     315: "a corridor of 1.12 of the narrowest one, two robots with two joints each: it is proved that no "
