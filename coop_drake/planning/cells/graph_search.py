@@ -108,7 +108,7 @@ def _before(search: Search, one: int, other: int) -> bool:
 
 
 @compiled
-def _rise(search: Search, node: int, at: int) -> None:
+def _sift_up(search: Search, node: int, at: int) -> None:
     """Put a waiting node at a place of the heap, or nearer to its top."""
     heap, place = search.heap, search.place
     while at > 0 and _before(search, node, heap[(at - 1) // 2]):
@@ -126,7 +126,7 @@ def _raise(search: Search, node: int, cost: float) -> None:
     if at < 0:
         at = search.state[0]
         search.state[0] += 1
-    _rise(search, node, at)
+    _sift_up(search, node, at)
 
 
 @compiled
@@ -149,7 +149,7 @@ def _take(search: Search, taken: int) -> None:
         heap[at] = heap[child]
         place[heap[at]] = at
         at = child
-    _rise(search, node, at)
+    _sift_up(search, node, at)
 
 
 @compiled

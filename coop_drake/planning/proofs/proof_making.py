@@ -44,6 +44,9 @@ TOUCHING = 1e-6
 LEAST_OVERLAP = 1e-5
 """Squeezed pieces forbid positions at least so far beyond what else is left free [m]: they must overlap."""
 
+_FAILURES = ShapelyError, GeometryError, ValueError
+"""What failing geometry raises."""
+
 
 def slices_proof(
     question: PlanningProblem, slices: Slices, regions: Mapping[int, Sequence[Region]], witnesses: Witnesses
@@ -71,9 +74,11 @@ def slices_proof(
 
     start, goal = Point(question.start[:2]), Point(question.goal_pose[:2])
     floor = _Floor(FreeSpace.over(question.workspace))
-    polygons = {leaf: [to_polygon(region.section) for region in its] for leaf, its in regions.items()}
-    most = GROWN_SHARE * _Graph(polygons, joined, start, starts).apart(goal, goals)
-    growths = [growth for growth in GROWTHS if growth <= most]
+    try:
+        polygons = {leaf: [to_polygon(region.section) for region in its] for leaf, its in regions.items()}
+        most = GROWN_SHARE * _Graph(polygons, joined, start, starts).apart(goal, goals)
+    except _FAILURES:
+        most = max(GROWTHS)
 
     def separated(growth: float) -> list[OverSlice] | None:
         shown, cells = dict[int, tuple[Witness, ...]](), dict[int, list[Polygon]]()
@@ -102,7 +107,7 @@ def slices_proof(
             for leaf in leaves
         ]
 
-    parts = _first(separated, growths)
+    parts = _first(separated, [growth for growth in GROWTHS if growth <= most])
     return None if parts is None else InfeasibilityProof("slices", 0, np.zeros(2), tuple(parts))
 
 
@@ -150,7 +155,7 @@ def _first(separated: Callable[[float], Found | None], growths: Sequence[float])
     for growth in growths:
         try:
             found = separated(growth)
-        except (ShapelyError, GeometryError, ValueError):
+        except _FAILURES:
             continue
         if found is not None:
             return found
@@ -176,9 +181,8 @@ class _Floor:
         """
         if not sweeps:
             raise GeometryError("no piece is known to hold a polygon all over a slice")
-        return regions_of(
-            reduce(partial(shared, over=True), [self._fitting(sweep.polygon) for sweep in sweeps]), over=True
-        )
+        sections = [self._fitting(sweep.polygon) for sweep in sweeps]
+        return regions_of(reduce(partial(shared, over=True), sections), over=True)
 
     def _fitting(self, polygon: FloatArray) -> CrossSection:
         """Positions at which a polygon fits."""
