@@ -20,8 +20,8 @@ __all__ = ["NO_WAY", "REACHED", "Links", "Search", "aim", "forget", "go_on", "li
 REACHED, NO_WAY = -1, -2
 """How a search ends: at a goal, or with nothing left to search."""
 
-_UNTESTED, _APART, _JOINED, _REMOVED = -1, 0, 1, 2
-"""What is known about an edge."""
+_UNTESTED, _APART, _JOINED = -1, 0, 1
+"""What is known about an edge; searches leave out those whose nodes are apart or were removed."""
 
 
 class Links(NamedTuple):
@@ -33,7 +33,8 @@ class Links(NamedTuple):
         head: First edge that leaves each node, -1 if there is none, shape (N,).
         following: The next edge that leaves the same node, -1 after the last, shape (2 E,).
         to: The node that an edge leads to, shape (2 E,).
-        met: Whether the regions of an edge's nodes meet: 0 or 1; -1 if untested, 2 if one was removed, (E,).
+        met: 1 where the regions of an edge's nodes meet, 0 where they do not or one was removed, -1 if
+            untested, shape (E,).
     """
 
     weights: FloatArray
@@ -179,7 +180,7 @@ def _beside(links: Links, search: Search, node: int) -> None:
     edge = links.head[node]
     while edge >= 0:
         other = links.to[edge]
-        if links.met[edge // 2] < _REMOVED and search.best[other] < np.inf:
+        if links.met[edge // 2] != _APART and search.best[other] < np.inf:
             _raise(search, other, search.best[other])
         edge = links.following[edge]
 
@@ -202,7 +203,7 @@ def forget(links: Links, search: Search, first: int, last: int) -> None:
     for node in range(first, last):
         edge = links.head[node]
         while edge >= 0:
-            links.met[edge // 2] = _REMOVED
+            links.met[edge // 2] = _APART
             edge = links.following[edge]
         links.head[node] = -1
         lost = _lose(search, node, lost)
@@ -264,7 +265,7 @@ def go_on(links: Links, search: Search) -> int:
         before, edge = -1, links.head[node]
         while edge >= 0 and unknown < len(search.asked):
             met, after = links.met[edge // 2], links.following[edge]
-            if met == _REMOVED:
+            if met == _APART:
                 if before < 0:
                     links.head[node] = after
                 else:
