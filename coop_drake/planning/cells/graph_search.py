@@ -51,14 +51,14 @@ class Search(NamedTuple):
     Attributes:
         best: Least cost known of each node, infinite where there is none, shape (N,).
         back: The node before it, -1 for none, shape (N,).
-        onward: The first in the list of the nodes that it is ``back`` of, -1 for none, shape (N,).
-        beside: The node after it and the one before it in the list it is in, -1 for none, shape (N, 2).
-        heap: Nodes that wait, the one of least cost first, of equal ones the lowest; shape (N,).
+        onward: The first of its successors, the nodes that it is ``back`` of, -1 for none, shape (N,).
+        beside: The next and the last node in the list of successors it is in, -1 for none, shape (N, 2).
+        heap: Open nodes, the one of least cost first, of equal ones the lowest; shape (N,).
         place: Place of each node in the heap, shape (N,).
         goal: 1 for goals, shape (N,).
         lost: Memory for the nodes whose costs are forgotten, shape (N,).
         asked: Edges that have to be tested, shape (A,).
-        state: How many nodes wait, and the node whose edges are looked at, -1 if there is none, shape (2,).
+        state: How many nodes are open, and the node whose edges are looked at, -1 if none is, shape (2,).
     """
 
     best: FloatArray
@@ -110,7 +110,7 @@ def _before(search: Search, one: int, other: int) -> bool:
 
 @compiled
 def _sift_up(search: Search, node: int, at: int) -> None:
-    """Put a waiting node at a place of the heap, or nearer to its top."""
+    """Put an open node into the heap, at a place or nearer to the top."""
     heap, place = search.heap, search.place
     while at > 0 and _before(search, node, heap[(at - 1) // 2]):
         heap[at] = heap[(at - 1) // 2]
@@ -121,7 +121,7 @@ def _sift_up(search: Search, node: int, at: int) -> None:
 
 @compiled
 def _raise(search: Search, node: int, cost: float) -> None:
-    """Give a node a lower cost, and let it wait."""
+    """Give a node a lower cost, and put it into the heap of open nodes."""
     at = search.place[node]
     search.best[node] = cost
     if at < 0:
@@ -132,7 +132,7 @@ def _raise(search: Search, node: int, cost: float) -> None:
 
 @compiled
 def _take(search: Search, taken: int) -> None:
-    """Take a node that waits out of the heap; the last one comes to its place."""
+    """Take an open node out of the heap; the last one comes to its place."""
     heap, place = search.heap, search.place
     at = place[taken]
     place[taken] = -1
@@ -155,7 +155,7 @@ def _take(search: Search, taken: int) -> None:
 
 @compiled
 def _lead(search: Search, node: int, last: int) -> None:
-    """Let the cheapest way to a node come from another one, or begin there (-1)."""
+    """Set the predecessor of a node, -1 for none, and keep the lists of successors."""
     old, (following, before) = search.back[node], search.beside[node]
     if old >= 0:
         if before >= 0:
@@ -187,7 +187,7 @@ def _beside(links: Links, search: Search, node: int) -> None:
 
 @compiled
 def _lose(search: Search, node: int, count: int) -> int:
-    """Forget the cost of a node, and note it after ``count`` others; returns how many are noted."""
+    """Forget the cost of a node, and append it to the ``count`` lost ones; returns how many there are."""
     if search.best[node] == np.inf:
         return count
     if search.place[node] >= 0:
