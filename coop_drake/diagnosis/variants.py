@@ -11,7 +11,7 @@ from coop_drake.errors import GeometryError, PlanError
 from coop_drake.planning.boxes.boxes import explored_channel
 from coop_drake.planning.cells.exploration import Verdict
 from coop_drake.planning.proofs.proof_search import Proofs
-from coop_drake.planning.sampling.sampler import densified
+from coop_drake.planning.sampling.densify import densified
 from coop_drake.planning.search.sampled_search import SampledSearch
 from coop_drake.progress import Progress
 from coop_drake.tree.levers import configuration_scale

@@ -73,6 +73,33 @@ def test_a_path_begins_where_bodies_are_nearer_to_each_other_than_paths_keep(pro
     assert SubsystemHierarchy(given).gap_at_ends(0.01) == hierarchy.gap_at_ends(0.01)
 
 
+def test_a_part_of_the_team_is_sampled_first_where_it_seems_hard(problem):
+    def sampler(asked):
+        return Sampler(SubsystemHierarchy(asked), marginal_workspace(asked, 0.015), 0.01, 0)
+
+    found = sampler(problem).direct_path(4_000, (1,))
+    assert np.array_equal(found[0], problem.start)
+    assert np.array_equal(found[-1, :2], problem.goal_pose[:2])
+    assert are_free(problem, found).all()
+
+
+def test_no_sample_is_spent_on_the_team_where_a_part_of_it_finds_no_path(monkeypatch):
+    problem, sampled = corridor_problem(0.7), []
+    inner = Sampler._connect
+
+    def connect(self, subsystem, *rest):
+        sampled.append(len(subsystem.joints))
+        return inner(self, subsystem, *rest)
+
+    monkeypatch.setattr(Sampler, "_connect", connect)
+    hierarchy = SubsystemHierarchy(problem)
+    for part, most in ((None, 2), ((), 0), ((0,), 1)):
+        sampled.clear()
+        path = Sampler(hierarchy, marginal_workspace(problem, 0.0), 0.0, 0).direct_path(500, part)
+        assert len(path) == 0
+        assert max(sampled) == most
+
+
 def test_a_path_is_sampled_around_the_channel_of_an_exploration():
     problem = corridor_problem(1.2)
     problem = replace(problem, settings=PlannerSettings(strategy="cells", margin=0.0))

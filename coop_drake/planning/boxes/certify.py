@@ -11,8 +11,8 @@ from shapely import MultiPolygon, Polygon
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
 from coop_drake.planning.boxes.box_kernels import BoxArrays, longest_box, padded
+from coop_drake.planning.sampling.densify import densified
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_inside
-from coop_drake.planning.sampling.sampler import densified
 from coop_drake.tree.pose import FloatArray, IntArray
 
 LEVELS = ((0.06, 0.02), (0.03, 0.01), (0.015, 0.004), (0.004, 0.001), (0.001, 0.0003))

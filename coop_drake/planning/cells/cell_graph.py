@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coop_drake.compiled import prepared
 from coop_drake.planning.cells.cells import Region
-from coop_drake.planning.cells.graph_search import NO_WAY, REACHED, Links, Search, aim, forget, go_on, link
+from coop_drake.planning.cells.graph_edges import BLOCK, empty_links, link, settle
+from coop_drake.planning.cells.graph_search import NO_WAY, REACHED, aim, empty_search, forget, go_on
 from coop_drake.planning.cells.slices import Slices
 
 
@@ -55,8 +58,7 @@ class CellGraph:
         self._slices = slices
         self.cells: list[GraphCell] = []
         self.by_slice: dict[int, list[GraphCell]] = {}
-        self._edges = 0
-        self._links, self._search = _links(0, 0), _search(0)
+        self._links, self._search = empty_links(0, 0), empty_search(0)
         self._go_on = prepared(go_on, (self._links, self._search))
         self._searched, self._starts = 0, set[int]()
 
@@ -74,10 +76,10 @@ class CellGraph:
         beside = [self.by_slice.get(other, ()) for other in sorted(self._slices.all[index].neighbours)]
         ranges = np.array([(its[0].index, its[-1].index + 1) for its in beside if its], dtype=np.int64)
         others, last = ranges.reshape(-1, 2), len(self.cells)
-        self._make_room(last, self._edges + 2 * len(made) * int((others[:, 1] - others[:, 0]).sum()))
+        self._make_room(last, len(made), int((others[:, 1] - others[:, 0]).sum()))
         self._links.weights[first:last] = [cell.weight for cell in made]
         self._links.bounds[first:last] = [cell.region.bounds for cell in made]
-        self._edges = link(self._links, first, last, others, self._edges)
+        link(self._links, first, last, others)
 
     def remove(self, index: int) -> None:
         """Remove the cells of a slice that is about to be halved."""
@@ -86,15 +88,21 @@ class CellGraph:
             self._starts.difference_update(range(first, last))
             forget(self._links, self._search, first, last)
 
-    def _make_room(self, nodes: int, edges: int) -> None:
-        """Let the arrays hold so many nodes and edges, at least twice as many as before where they grow."""
-        links, known, stored = self._links, len(self._links.weights), len(self._links.to)
-        if nodes > known or edges > stored:
-            known = known if nodes <= known else 2 * nodes
-            search, self._search = self._search, _search(known)
-            self._links = _links(known, stored if edges <= stored else 2 * edges)
-            for grown, old in zip((*self._links, *self._search), (*links, *search), strict=True):
-                grown[: len(old)] = old
+    def _make_room(self, nodes: int, new: int, others: int) -> None:
+        """Let the arrays hold so many nodes, and edges of all new ones with the others that they may meet.
+
+        Arrays have at least twice as much room as before where they grow.
+        """
+        links, room, stored = self._links, len(self._links.weights), len(self._links.following)
+        blocks = int(links.state[1]) + new + others + 2 * (new * others // BLOCK)
+        if nodes > room or blocks > stored:
+            room = room if nodes <= room else 2 * nodes
+            before: list[NDArray[Any]] = [*links, *self._search]
+            self._search = empty_search(room)
+            self._links = empty_links(room, stored if blocks <= stored else 2 * blocks)
+            grown: list[NDArray[Any]] = [*self._links, *self._search]
+            for larger, old in zip(grown, before, strict=True):
+                larger[: len(old)] = old
             self._go_on = prepared(go_on, (self._links, self._search))
 
     def cheapest(self, starts: Sequence[GraphCell], goals: set[int]) -> list[GraphCell] | None:
@@ -109,15 +117,16 @@ class CellGraph:
         """
         begins = {cell.index for cell in starts}
         if not self._starts <= begins:
-            self._search, self._searched = _search(len(self._links.weights)), 0
+            self._search, self._searched = empty_search(len(self._links.weights)), 0
             self._go_on = prepared(go_on, (self._links, self._search))
         links, search = self._links, self._search
         first, last = (np.array(sorted(ends), dtype=np.int64) for ends in (begins, goals))
         aim(links, search, self._searched, first, last, len(self.cells))
         self._searched, self._starts = len(self.cells), begins
         while (asked := self._go_on()) not in (REACHED, NO_WAY):
-            for edge in search.asked[:asked].tolist():
-                links.met[edge // 2] = self._meet(int(links.to[edge ^ 1]), int(links.to[edge]))
+            node, entries = int(search.state[1]), search.asked[:asked]
+            meet = [self._meet(node, other) for other in links.to[entries].tolist()]
+            settle(links, node, entries, np.array(meet))
         return None if asked == NO_WAY else self._trace(int(search.state[1]))
 
     def _meet(self, one: int, other: int) -> bool:
@@ -134,28 +143,3 @@ class CellGraph:
         while (before := int(self._search.back[path[-1]])) >= 0:
             path.append(before)
         return [self.cells[i] for i in reversed(path)]
-
-
-_ASKED = 256
-"""Edges that are tested before a search goes on, at most [-]."""
-
-
-def _links(nodes: int, edges: int) -> Links:
-    """Arrays for so many nodes and edges, both directions counted."""
-    ints = np.int64
-    return Links(
-        np.empty(nodes),
-        np.empty((nodes, 4)),
-        np.full(nodes, -1, ints),
-        np.empty(edges, ints),
-        np.empty(edges, ints),
-        np.empty((edges + 1) // 2, ints),
-    )
-
-
-def _search(nodes: int) -> Search:
-    """Arrays for a search of so many nodes."""
-    back, onward, heap, place, goal, lost = (np.full(nodes, -1, np.int64) for _ in range(6))
-    beside, asked = np.full((nodes, 2), -1, np.int64), np.empty(_ASKED, np.int64)
-    state = np.array([0, -1], np.int64)
-    return Search(np.full(nodes, np.inf), back, onward, beside, heap, place, goal, lost, asked, state)

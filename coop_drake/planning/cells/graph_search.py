@@ -13,36 +13,16 @@ from typing import NamedTuple
 import numpy as np
 
 from coop_drake.compiled import compiled
+from coop_drake.planning.cells.graph_edges import BLOCK, Links, drop
 from coop_drake.tree.pose import FloatArray, IntArray
 
-__all__ = ["NO_WAY", "REACHED", "Links", "Search", "aim", "forget", "go_on", "link"]
+__all__ = ["NO_WAY", "REACHED", "Search", "aim", "empty_search", "forget", "go_on"]
 
 REACHED, NO_WAY = -1, -2
 """How a search ends: at a goal, or with nothing left to search."""
 
-_UNTESTED, _APART, _JOINED = -1, 0, 1
-"""What is known about an edge; searches leave out those whose nodes are apart or were removed."""
-
-
-class Links(NamedTuple):
-    """Nodes and edges. Edges 2 k and 2 k + 1 are the two directions of edge k.
-
-    Attributes:
-        weights: Cost of passing through each node, shape (N,).
-        bounds: (x_min, y_min, x_max, y_max) of each node's region, shape (N, 4) [m].
-        head: First edge that leaves each node, -1 if there is none, shape (N,).
-        following: The next edge that leaves the same node, -1 after the last, shape (2 E,).
-        to: The node that an edge leads to, shape (2 E,).
-        met: 1 where the regions of an edge's nodes meet, 0 where they do not or one was removed, -1 if
-            untested, shape (E,).
-    """
-
-    weights: FloatArray
-    bounds: FloatArray
-    head: IntArray
-    following: IntArray
-    to: IntArray
-    met: IntArray
+_ASKED = 256
+"""Edges that are tested before a search goes on, at most [-]."""
 
 
 class Search(NamedTuple):
@@ -57,7 +37,7 @@ class Search(NamedTuple):
         place: Place of each node in the heap, shape (N,).
         goal: 1 for goals, shape (N,).
         lost: Memory for the nodes whose costs are forgotten, shape (N,).
-        asked: Edges that have to be tested, shape (A,).
+        asked: Entries of edges that have to be tested, all of one node, as ``settle`` wants them, shape (A,).
         state: How many nodes are open, and the node whose edges are looked at, -1 if none is, shape (2,).
     """
 
@@ -73,33 +53,11 @@ class Search(NamedTuple):
     state: IntArray
 
 
-@compiled
-def link(links: Links, first: int, last: int, others: IntArray, count: int) -> int:
-    """Join nodes to those of some ranges whose bounds meet theirs, by untested edges.
-
-    Args:
-        links: The graph, with room for the edges.
-        first: The first node.
-        last: The node after the last one.
-        others: Ranges of nodes, each its first and the one after its last, shape (R, 2).
-        count: Edges so far, both directions counted.
-
-    Returns:
-        Edges now.
-    """
-    for node in range(first, last):
-        west, south, east, north = links.bounds[node]
-        for row in range(len(others)):
-            for other in range(others[row, 0], others[row, 1]):
-                its = links.bounds[other]
-                if its[0] > east or its[2] < west or its[1] > north or its[3] < south:
-                    continue
-                links.met[count // 2] = _UNTESTED
-                for start, end in ((node, other), (other, node)):
-                    links.to[count], links.following[count] = end, links.head[start]
-                    links.head[start] = count
-                    count += 1
-    return count
+def empty_search(nodes: int) -> Search:
+    """A search that has not begun, for so many nodes."""
+    back, onward, heap, place, goal, lost = (np.full(nodes, -1) for _ in range(6))
+    beside, asked, state = np.full((nodes, 2), -1), np.zeros(_ASKED, np.int64), np.array([0, -1])
+    return Search(np.full(nodes, np.inf), back, onward, beside, heap, place, goal, lost, asked, state)
 
 
 @compiled
@@ -176,13 +134,14 @@ def _lead(search: Search, node: int, last: int) -> None:
 
 @compiled
 def _beside(links: Links, search: Search, node: int) -> None:
-    """Let all nodes beside a node that have a cost wait: they may lead to it."""
-    edge = links.head[node]
-    while edge >= 0:
-        other = links.to[edge]
-        if links.met[edge // 2] != _APART and search.best[other] < np.inf:
-            _raise(search, other, search.best[other])
-        edge = links.following[edge]
+    """Open all nodes beside a node that have a cost: they may lead to it."""
+    block, count = links.head[node], links.filled[node]
+    while block >= 0:
+        for entry in range(BLOCK * block, BLOCK * block + count):
+            other = links.to[entry]
+            if search.place[other] < 0 and search.best[other] < np.inf:
+                _raise(search, other, search.best[other])
+        block, count = links.following[block], BLOCK
 
 
 @compiled
@@ -201,11 +160,8 @@ def forget(links: Links, search: Search, first: int, last: int) -> None:
     """Remove some nodes with their edges, and forget costs of ways through them."""
     lost = 0
     for node in range(first, last):
-        edge = links.head[node]
-        while edge >= 0:
-            links.met[edge // 2] = _APART
-            edge = links.following[edge]
-        links.head[node] = -1
+        while links.head[node] >= 0:
+            drop(links, node, BLOCK * links.head[node] + links.filled[node] - 1)
         lost = _lose(search, node, lost)
     k = 0
     while k < lost:
@@ -247,6 +203,37 @@ def aim(links: Links, search: Search, new: int, starts: IntArray, goals: IntArra
 
 
 @compiled
+def _ask(links: Links, search: Search, node: int) -> int:
+    """Take all cheaper ways over known edges of a node, and gather untested edges that might be cheaper.
+
+    Returns:
+        How many edges have to be tested.
+    """
+    unknown, here = 0, search.best[node]
+    block, count = links.head[node], links.filled[node]
+    while block >= 0:
+        for entry in range(BLOCK * block + count - 1, BLOCK * block - 1, -1):
+            other = links.to[entry]
+            cost, known = here + links.weights[other], search.best[other]
+            if cost > known:
+                continue
+            last = search.back[other]
+            if cost == known and (last < 0 or not _before(search, node, last)):
+                continue
+            if links.joined[entry] == 0:
+                search.asked[unknown] = entry
+                unknown += 1
+                if unknown == len(search.asked):
+                    return unknown
+            else:
+                _lead(search, other, node)
+                if cost < known:
+                    _raise(search, other, cost)
+        block, count = links.following[block], BLOCK
+    return unknown
+
+
+@compiled
 def go_on(links: Links, search: Search) -> int:
     """Search until there is an answer or edges have to be tested.
 
@@ -260,30 +247,7 @@ def go_on(links: Links, search: Search) -> int:
             _take(search, search.state[1])
             if search.goal[search.state[1]] == 1:
                 return REACHED
-        node = search.state[1]
-        unknown = 0
-        before, edge = -1, links.head[node]
-        while edge >= 0 and unknown < len(search.asked):
-            met, after = links.met[edge // 2], links.following[edge]
-            if met == _APART:
-                if before < 0:
-                    links.head[node] = after
-                else:
-                    links.following[before] = after
-            else:
-                other = links.to[edge]
-                cost, last = search.best[node] + links.weights[other], search.back[other]
-                cheaper = cost < search.best[other]
-                if cheaper or (cost == search.best[other] and last >= 0 and _before(search, node, last)):
-                    if met == _UNTESTED:
-                        search.asked[unknown] = edge
-                        unknown += 1
-                    elif met == _JOINED:
-                        _lead(search, other, node)
-                        if cheaper:
-                            _raise(search, other, cost)
-                before = edge
-            edge = after
+        unknown = _ask(links, search, search.state[1])
         if unknown > 0:
             return unknown
         search.state[1] = -1

@@ -76,6 +76,19 @@ class Proofs:
         """Compound slices made so far."""
         return sum(outcome.slices for outcome in self._outcomes.values())
 
+    @property
+    def hardest(self) -> tuple[int, ...] | None:
+        """Robots of the smallest relaxation that is explored without an answer so far; None without any.
+
+        The relaxation test found no path for it.
+        """
+        blocked = [
+            chosen
+            for chosen, outcome in self._outcomes.items()
+            if chosen != self._all and outcome.verdict in (Verdict.BUDGET, Verdict.RESOLUTION)
+        ]
+        return min(blocked, key=lambda chosen: (len(chosen), chosen), default=None)
+
     def run(
         self,
         slices: int,

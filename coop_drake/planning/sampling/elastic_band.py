@@ -6,9 +6,10 @@ import numpy as np
 
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.questions.margins import marginal_workspace
+from coop_drake.planning.sampling.densify import densified
 from coop_drake.planning.sampling.elastic_band_kernels import clearances, improve
 from coop_drake.planning.sampling.obstacle_grid import FAR, grid_for_team
-from coop_drake.planning.sampling.sampler import JOINT_RATE, SPEED, TURN_RATE, densified
+from coop_drake.planning.sampling.sampler import JOINT_RATE, SPEED, TURN_RATE
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray

@@ -13,9 +13,9 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.geometry.parts import parts_of
 from coop_drake.planning.sampling.clearance_program import with_wider_passages
 from coop_drake.planning.sampling.collision_kernels import first_collision, is_free
+from coop_drake.planning.sampling.densify import densified
 from coop_drake.planning.sampling.elastic_band_kernels import improve
 from coop_drake.planning.sampling.obstacle_grid import grid_for_team
-from coop_drake.planning.sampling.sampler import densified
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.team_arrays import team_arrays

@@ -9,6 +9,7 @@ import numpy as np
 from shapely import MultiPolygon
 
 from coop_drake.planning.sampling.collision_kernels import is_free
+from coop_drake.planning.sampling.densify import densified
 from coop_drake.planning.sampling.guided_samples import GuidePath, SampledRegion
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_for_team
 from coop_drake.planning.sampling.random_trees import connect, shortened
@@ -127,36 +128,52 @@ class Sampler:
                 return _NO_PATH
         return _NO_PATH if best is None else best.path
 
-    def direct_path(self, samples: int) -> FloatArray:
-        """Find a path for the whole team at once, around the disc's path, else around one of the object.
+    def direct_path(self, samples: int, part: tuple[int, ...] | None = None) -> FloatArray:
+        """Find a path for the whole team at once, see ``direct``.
+
+        Args:
+            samples: Samples drawn at most for each subsystem.
+            part: Robots for which, with the object alone, a path is sampled first, and then one of the whole
+                team around it; if there is none for these, there is none for the team.
+
+        Returns:
+            As ``path``.
+        """
+        if part is not None:
+            guide = self.direct(part, samples)
+            path = _NO_PATH if guide is None else self.path_around(guide, samples)
+            if guide is None or len(path):
+                return path
+        whole = self.direct(self._hierarchy.robots, samples)
+        return _NO_PATH if whole is None else whole.path
+
+    def direct(self, robots: tuple[int, ...], samples: int) -> GuidePath | None:
+        """Find a path of the object with some robots at once, around the disc's path, else the object's.
 
         Samples are free component by component, and lie where the trees have come furthest. If neither guide
         helps, because the team has to take another way than the disc and the object, samples lie anywhere.
 
         Args:
+            robots: The robots, ascending.
             samples: Samples drawn at most for each subsystem.
-
-        Returns:
-            As ``path``.
         """
-        robots, subsystem = self._hierarchy.robots, self._hierarchy.subsystem
-        disc = self._disc_path(samples)
-        whole = None if disc is None else self._guide(subsystem(robots), disc, samples, WHERE_TREES_END)[0]
+        chosen, disc = self._hierarchy.subsystem(robots), self._disc_path(samples)
+        found = None if disc is None else self._guide(chosen, disc, samples, WHERE_TREES_END)[0]
         self._report(0.5)
-        if whole is None:
-            alone, _ = self._guide(subsystem(()), disc, samples, WHERE_TREES_END)
+        if found is None and robots:
+            alone, _ = self._guide(self._hierarchy.subsystem(()), disc, samples, WHERE_TREES_END)
             self.object_blocked = alone is None
             if alone is not None:
-                whole, _ = self._guide(subsystem(robots), alone, samples, WHERE_TREES_END)
-        if whole is None:
-            whole, _ = self._guide(subsystem(robots), None, UNGUIDED_SAMPLES_FACTOR * samples)
-            self.object_blocked &= whole is None
-        return _NO_PATH if whole is None else whole.path
+                found, _ = self._guide(chosen, alone, samples, WHERE_TREES_END)
+        if found is None:
+            found, _ = self._guide(chosen, None, UNGUIDED_SAMPLES_FACTOR * samples)
+            self.object_blocked = found is None and (self.object_blocked or not robots)
+        return found
 
-    def path_around(self, guide: FloatArray, samples: int) -> FloatArray:
-        """Find a path for the whole team around another one, shape (k, 3 + n), which need not be free."""
+    def path_around(self, guide: GuidePath, samples: int) -> FloatArray:
+        """Find a path for the whole team around another one, which need not be free."""
         whole = self._hierarchy.subsystem(self._hierarchy.robots)
-        found, _ = self._guide(whole, GuidePath(guide, whole.joints), samples, WHERE_TREES_END)
+        found, _ = self._guide(whole, guide, samples, WHERE_TREES_END)
         return _NO_PATH if found is None else found.path
 
     def _disc_path(self, samples: int) -> GuidePath | None:
@@ -264,24 +281,3 @@ def _sampling_region(subsystem: Subsystem, around: GuidePath | None) -> tuple[Fl
     spread[columns] = ANGLE_SPREAD
     spread[:2] = POSITION_SPREAD
     return guide, spread
-
-
-def densified(path: FloatArray, scale: FloatArray, step: float) -> FloatArray:
-    """A path with samples added, so that neighbours are at most a step apart in every scaled axis.
-
-    Args:
-        path: Configurations, shape (k, d).
-        scale: How far a unit of each axis moves the team, shape (d,).
-        step: The distance [m].
-
-    Returns:
-        Configurations, shape (m, d), those of the path among them.
-    """
-    if len(path) < 2:
-        return path.copy()
-    moved = np.abs(np.diff(path, axis=0) * scale).max(axis=1)
-    parts = np.maximum(1, np.ceil(moved / step)).astype(int)
-    rows = np.repeat(np.arange(len(parts)), parts)
-    fraction = (np.arange(len(rows)) - np.repeat(np.cumsum(parts) - parts, parts) + 1.0) / parts[rows]
-    dense: FloatArray = path[rows] + fraction[:, None] * (path[rows + 1] - path[rows])
-    return np.concatenate((path[:1], dense))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from itertools import product
 
 import numpy as np
 from shapely.errors import ShapelyError
@@ -26,31 +25,18 @@ from coop_drake.planning.sampling.clear_paths import (
     moved_from_obstacles,
 )
 from coop_drake.planning.sampling.elastic_band import smoothed
+from coop_drake.planning.sampling.guided_samples import GuidePath
 from coop_drake.planning.sampling.local_floor import object_route
-from coop_drake.planning.sampling.narrow_passages import centred, repaired, widened_floor
 from coop_drake.planning.sampling.sampler import FEW_JOINTS, Sampler
 from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
 from coop_drake.planning.search.attempt import LIGHT_ATTEMPTS, BoxSequence, Tried, samples_of_attempt
+from coop_drake.planning.search.narrow_search import BODY_GAP, NarrowSearch
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
 
 CLEARANCES = (0.015, 0.01), (0.002, 0.002)
 """Clearances from the walls, and distances between bodies of the team, with which paths are sampled, in turns
 [m]: the larger ones leave space for long boxes, the smaller ones let narrow passages through."""
-
-BODY_GAP = 0.01
-"""Distance that other paths keep between bodies of the team [m], so that boxes around them have a width."""
-
-FLOOR_GROWTHS, SEEDS_PER_GROWTH = (0.1, 0.06, 0.03), 2
-"""Amounts by which walls are moved back for paths through narrow passages [m], largest first because these
-are the easiest to sample, and random seeds for each of them."""
-
-NARROW_SAMPLES = 16_000
-"""Samples for every subsystem on these floors: fewer often find no path near the critical width."""
-
-CENTRED_PATHS, CENTRED_SHORT = 3, 0.005
-"""So many of these paths, those that fit the floor best, are moved to the middle of their passages; those
-that still need the walls this far back are left out [m]."""
 
 FIRST_SMOOTHINGS = (0.05, 600), (0.05, 3_000)
 """Spacing of samples [m] and number of moves with which a new path is smoothed; the longer smoothing follows
@@ -77,13 +63,18 @@ class SampledSearch:
         self._pairs = BodyPairs(self._swept)
         self._scale = configuration_scale(problem.tree)
         self._hierarchy = SubsystemHierarchy(problem, object_route(problem) if routed else None)
+        self._narrow = NarrowSearch(problem, self._hierarchy, self._closely)
         self._start_inside = problem.workspace.contains(exact_footprint(problem.tree, problem.start))
         self._attempts = 0
         self.slices = 0
         self.object_blocked = 0
 
     def attempts(
-        self, number: int, copies: int = 0, progress: Callable[[float], None] | None = None
+        self,
+        number: int,
+        copies: int = 0,
+        progress: Callable[[float], None] | None = None,
+        part: tuple[int, ...] | None = None,
     ) -> Copies[Tried]:
         """Sample some paths and cover each of them at margin zero, all with other samples.
 
@@ -91,13 +82,14 @@ class SampledSearch:
             number: How many.
             copies: As ``Copies`` has it; attempts in copies of this process report no progress.
             progress: Called with the fraction of an attempt that is done.
+            part: Robots for which, with the object alone, a path seems hard to find: it is sampled first.
 
         Returns:
             What comes of the attempts, each for ``taken``, which counts it.
         """
         first, report = self._attempts + 1, None if copies else progress
-        numbers = range(first, first + number)
-        return Copies([partial(self._counted, partial(self._attempt, k, report)) for k in numbers], copies)
+        works = (partial(self._attempt, k, report, part=part) for k in range(first, first + number))
+        return Copies([partial(self._counted, work) for work in works], copies)
 
     def taken(self, tried: Tried) -> BoxSequence | None:
         """Count an attempt; returns its boxes, None if no path was found or covered."""
@@ -134,7 +126,11 @@ class SampledSearch:
         return None
 
     def _attempt(
-        self, number: int, progress: Callable[[float], None] | None, guide: FloatArray | None = None
+        self,
+        number: int,
+        progress: Callable[[float], None] | None,
+        guide: FloatArray | None = None,
+        part: tuple[int, ...] | None = None,
     ) -> Tried:
         if not self._start_inside:
             return Tried()
@@ -144,9 +140,10 @@ class SampledSearch:
         direct = number > 1 or len(self._problem.goal_joints) > FEW_JOINTS
         samples = samples_of_attempt(number)
         if guide is None:
-            path = sampler.direct_path(samples) if direct else sampler.path(samples)
+            path = sampler.direct_path(samples, part) if direct else sampler.path(samples)
         else:
-            path = sampler.path_around(guide, samples)
+            joints = tuple(range(guide.shape[1] - 3))
+            path = sampler.path_around(GuidePath(guide, joints), samples)
         found = None
         for spacing, moves in FIRST_SMOOTHINGS if len(path) else ():
             path = smoothed(self._problem, path, clearance, 0.0, gap, spacing, moves)
@@ -156,63 +153,38 @@ class SampledSearch:
         return Tried(found, path, sampler.object_blocked)
 
     def narrow_attempt(
-        self, number: int, copies: int = 0, progress: Callable[[float], None] | None = None
+        self,
+        number: int,
+        copies: int = 0,
+        progress: Callable[[float], None] | None = None,
+        part: tuple[int, ...] | None = None,
     ) -> BoxSequence | None:
-        """Sample paths on larger floors, repair them until they fit the floor, and cover them at margin zero.
-
-        This finds passages that are too narrow for samples. Later attempts sample all robots at once: one
-        after the other they go where the object alone goes most easily.
+        """Look for a path through passages that are too narrow for samples, and cover it at margin zero.
 
         Args:
             number: How many such attempts there were before.
             copies: Copies of this process that work.
             progress: Called with the fraction of an attempt that is done.
+            part: As for ``attempts``.
 
         Returns:
             The boxes, or None if no path was found or covered.
         """
-        first, report = SEEDS_PER_GROWTH * max(0, number - 1), None if copies else progress
-        ways = product((number > 0,), range(first, first + SEEDS_PER_GROWTH), FLOOR_GROWTHS)
-        tries = [partial(self._repaired, *way, report) for way in ways if self._start_inside]
+        tries = self._narrow.tries(number, part, None if copies else progress) if self._start_inside else []
         paths: list[Tried] = []
         with Copies([partial(self._counted, one) for one in tries], copies) as results:
             for tried in results:
                 self.slices += tried.trials
                 if tried.failed or tried.found is not None:
                     return tried.found
-                if tried.path is not None:
-                    paths.append(tried)
+                paths.append(tried)
         try:
-            return self._through_middle(sorted(paths, key=lambda tried: tried.short))
+            return self._narrow.through_middle([tried for tried in paths if tried.path is not None])
         except (GeometryError, ShapelyError):
             return None
 
-    def _repaired(
-        self, direct: bool, seed: int, growth: float, progress: Callable[[float], None] | None
-    ) -> Tried:
-        """Sample a path on a larger floor, repair it, and cover it if it fits."""
-        floor = widened_floor(self._problem.workspace, growth)
-        sampler = Sampler(self._hierarchy, floor, BODY_GAP, seed, progress)
-        path = (sampler.direct_path if direct else sampler.path)(NARROW_SAMPLES)
-        if not len(path):
-            return Tried()
-        path, short = repaired(self._problem, path, growth)
-        found = None if short > 0.0 else self._covered(path, 0.0, longest=True)
-        return Tried(found, path, short=short)
-
-    def _through_middle(self, paths: Sequence[Tried]) -> BoxSequence | None:
-        """Cover one of some paths, those that fit best first, with boxes in the middle of its passages.
-
-        The boxes are the smallest ones, so a transport through them takes long.
-        """
-        for tried in paths[:CENTRED_PATHS]:
-            if tried.path is not None and tried.short < CENTRED_SHORT:
-                path, short = centred(self._problem, tried.path, tried.short)
-                if short <= 0.0:
-                    found = self._covered(path, 0.0, longest=True, smallest=True)
-                    if found is not None:
-                        return found
-        return None
+    def _closely(self, path: FloatArray, smallest: bool) -> BoxSequence | None:
+        return self._covered(path, 0.0, longest=True, smallest=smallest)
 
     def with_margin(
         self, first: BoxSequence, progress: Callable[[float, float], None], share: float = 1.0

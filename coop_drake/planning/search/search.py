@@ -37,8 +37,8 @@ from coop_drake.planning.search.sampled_search import SampledSearch
 from coop_drake.progress import Progress
 from coop_drake.tree.usual_unit import usual_unit
 
-ATTEMPTS_PER_ROUND = 4
-"""Sampled attempts in every round of the search."""
+FURTHER_ATTEMPTS, ATTEMPTS_PER_ROUND = 2, 3
+"""Sampled attempts after the first one, and those in every round of explorations."""
 
 ROUTED_ATTEMPTS = 2
 """Sampled attempts along a route, one for each clearance."""
@@ -192,7 +192,7 @@ class _Search:
         each, short = min(FIRST_EXPLORATION, budget), min(SHORT_EXPLORATION, budget)
         object_blocked = self._samples.object_blocked > 0
         if not object_blocked or self._explored(short, robots=0) is not Verdict.INFEASIBLE:
-            found = self._sampled(ATTEMPTS_PER_ROUND - 2)
+            found = self._sampled(FURTHER_ATTEMPTS)
             object_blocked = found is None and self._samples.object_blocked >= ENOUGH_BLOCKED_ATTEMPTS
         if found is None and self._proofs.refutation is None:
             found = self._narrow(short if object_blocked else each, object_blocked)
@@ -226,7 +226,7 @@ class _Search:
         return self._workers if self._workers > 1 else 0
 
     def _attempts(self, number: int, copies: int) -> Copies[Tried]:
-        return self._samples.attempts(number, copies, self._phase("sampling paths"))
+        return self._samples.attempts(number, copies, self._phase("sampling paths"), self._proofs.hardest)
 
     def _first_of(self, attempts: Copies[Tried]) -> BoxSequence | None:
         """The first boxes of some attempts; attempts end where the object alone seems blocked."""
@@ -250,8 +250,8 @@ class _Search:
 
     def _narrow_sampled(self) -> BoxSequence | None:
         """Sample paths through narrow passages, other ones each time."""
-        phase = self._phase("sampling narrow passages")
-        found = self._samples.narrow_attempt(self._narrow_attempts, self._copies, phase)
+        phase, part = self._phase("sampling narrow passages"), self._proofs.hardest
+        found = self._samples.narrow_attempt(self._narrow_attempts, self._copies, phase, part)
         self._narrow_attempts += 1
         if found is not None:
             self._first_plan = thread_time() - self._began
