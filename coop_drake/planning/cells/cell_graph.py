@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from coop_drake.compiled import prepared
 from coop_drake.planning.cells.cells import Region
-from coop_drake.planning.cells.graph_edges import BLOCK, empty_links, link, settle
+from coop_drake.planning.cells.graph_edges import BLOCK, empty_links, link
 from coop_drake.planning.cells.graph_search import NO_WAY, REACHED, aim, empty_search, forget, go_on
 from coop_drake.planning.cells.slices import Slices
 
@@ -124,9 +124,8 @@ class CellGraph:
         aim(links, search, self._searched, first, last, len(self.cells))
         self._searched, self._starts = len(self.cells), begins
         while (asked := self._go_on()) not in (REACHED, NO_WAY):
-            node, entries = int(search.state[1]), search.asked[:asked]
-            meet = [self._meet(node, other) for other in links.to[entries].tolist()]
-            settle(links, node, entries, np.array(meet))
+            node, others = int(search.state[1]), links.to[search.asked[:asked]].tolist()
+            search.meet[:asked] = [self._meet(node, other) for other in others]
         return None if asked == NO_WAY else self._trace(int(search.state[1]))
 
     def _meet(self, one: int, other: int) -> bool:

@@ -159,7 +159,12 @@ class Subdivision(ABC):
             self._watch(event)
 
     def _searched(self, path: Sequence[GraphCell]) -> None:
-        self._tell(ChannelSearched(seen(path), sum(cell.weight for cell in path)))
+        if self._watch is not None:
+            self._watch(ChannelSearched(seen(path), sum(cell.weight for cell in path)))
+
+    def _added(self, index: int, cells: Sequence[GraphCell]) -> None:
+        if self._watch is not None:
+            self._watch(SliceAdded(index, self.slices.all[index].intervals, seen(cells)))
 
     def _result(self, verdict: Verdict, path: Sequence[GraphCell]) -> ExplorationResult:
         return ExplorationResult(verdict, tuple(path), len(self.slices.all))
@@ -232,7 +237,7 @@ class Exploration(Subdivision):
         members += [(Kind.MIXED, region, weight) for region in mixed]
         self.graph.add(index, members)
         self._note_ends(index, intervals)
-        self._tell(SliceAdded(index, intervals, seen(self.graph.by_slice[index])))
+        self._added(index, self.graph.by_slice[index])
 
     def _note_ends(self, index: int, intervals: Intervals) -> None:
         """Record which cells of a new leaf hold the start and which hold the goal."""

@@ -124,7 +124,7 @@ def settle(links: Links, node: int, entries: IntArray, meet: NDArray[np.bool_]) 
         node: The node.
         entries: Its entries, block by block, of every block the last one first, shape (k,): entries that
             move to the places of removed ones have then been looked at.
-        meet: Whether the regions meet, shape (k,).
+        meet: Whether the regions meet, shape (k,) or longer.
     """
     for k in range(len(entries)):
         entry = entries[k]

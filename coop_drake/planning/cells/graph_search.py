@@ -11,9 +11,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coop_drake.compiled import compiled
-from coop_drake.planning.cells.graph_edges import BLOCK, Links, drop
+from coop_drake.planning.cells.graph_edges import BLOCK, Links, drop, settle
 from coop_drake.tree.pose import FloatArray, IntArray
 
 __all__ = ["NO_WAY", "REACHED", "Search", "aim", "empty_search", "forget", "go_on"]
@@ -38,7 +39,9 @@ class Search(NamedTuple):
         goal: 1 for goals, shape (N,).
         lost: Memory for the nodes whose costs are forgotten, shape (N,).
         asked: Entries of edges that have to be tested, all of one node, as ``settle`` wants them, shape (A,).
-        state: How many nodes are open, and the node whose edges are looked at, -1 if none is, shape (2,).
+        meet: Whether the regions of each of these meet, to be written before a search goes on, shape (A,).
+        state: How many nodes are open; the node whose edges are looked at, -1 if none is; and how many of
+            these were asked for; shape (3,).
     """
 
     best: FloatArray
@@ -50,14 +53,16 @@ class Search(NamedTuple):
     goal: IntArray
     lost: IntArray
     asked: IntArray
+    meet: NDArray[np.bool_]
     state: IntArray
 
 
 def empty_search(nodes: int) -> Search:
     """A search that has not begun, for so many nodes."""
     back, onward, heap, place, goal, lost = (np.full(nodes, -1) for _ in range(6))
-    beside, asked, state = np.full((nodes, 2), -1), np.zeros(_ASKED, np.int64), np.array([0, -1])
-    return Search(np.full(nodes, np.inf), back, onward, beside, heap, place, goal, lost, asked, state)
+    beside, asked, meet = np.full((nodes, 2), -1), np.zeros(_ASKED, np.int64), np.zeros(_ASKED, np.bool_)
+    best, state = np.full(nodes, np.inf), np.array([0, -1, 0])
+    return Search(best, back, onward, beside, heap, place, goal, lost, asked, meet, state)
 
 
 @compiled
@@ -193,7 +198,7 @@ def aim(links: Links, search: Search, new: int, starts: IntArray, goals: IntArra
     reached = search.state[1]
     if reached >= 0 and search.best[reached] < np.inf:
         _raise(search, reached, search.best[reached])
-    search.state[1] = -1
+    search.state[1], search.state[2] = -1, 0
     for node in range(new, count):
         _beside(links, search, node)
     for node in starts:
@@ -235,20 +240,22 @@ def _ask(links: Links, search: Search, node: int) -> int:
 
 @compiled
 def go_on(links: Links, search: Search) -> int:
-    """Search until there is an answer or edges have to be tested.
+    """Settle the edges that were tested, and search until there is an answer or others have to be tested.
 
     Returns:
         How many of ``asked`` have to be tested first, ``REACHED`` with the goal in ``state[1]``, or
         ``NO_WAY``.
     """
+    settle(links, search.state[1], search.asked[: search.state[2]], search.meet)
+    search.state[2] = 0
     while search.state[0] > 0 or search.state[1] >= 0:
         if search.state[1] < 0:
             search.state[1] = search.heap[0]
             _take(search, search.state[1])
             if search.goal[search.state[1]] == 1:
                 return REACHED
-        unknown = _ask(links, search, search.state[1])
-        if unknown > 0:
-            return unknown
+        search.state[2] = _ask(links, search, search.state[1])
+        if search.state[2] > 0:
+            return int(search.state[2])
         search.state[1] = -1
     return NO_WAY

@@ -9,7 +9,7 @@ from shapely import MultiPolygon, Polygon
 from coop_drake.answers.problem import PlanningProblem
 from coop_drake.planning.cells.cell_graph import CellGraph, GraphCell, Kind
 from coop_drake.planning.cells.cells import Region
-from coop_drake.planning.cells.events import SliceAdded, SliceSplit, Watch, seen
+from coop_drake.planning.cells.events import SliceSplit, Watch
 from coop_drake.planning.cells.exploration import ExplorationResult, Subdivision, Verdict
 from coop_drake.tree.pose import FloatArray
 
@@ -116,7 +116,7 @@ class PaperExploration(Subdivision):
         self.over.add(index, [(Kind.MIXED, region, weight) for region in over])
         self.under.add(index, [(Kind.FREE, region, weight) for region in under])
         cells = [*self.under.by_slice[index], *self.over.by_slice[index]]
-        self._tell(SliceAdded(index, part.intervals, seen(cells)))
+        self._added(index, cells)
 
     def over_leaves(self) -> dict[int, list[Region]]:
         """Over-cells of every leaf by its id; an empty list where the whole leaf is blocked."""
