@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import inf
+from math import inf, isfinite
 
 from benchmarks.isolated import in_own_process
 from benchmarks.planner.family import corridor_problem
@@ -117,9 +117,11 @@ def critical_width_rows(name: str, corridor: Corridor, limit: float) -> Rows:
         return ("none", limit) if done.value is None else (done.value.answer, done.value.cpu_seconds)
 
     found = critical_interval(corridor, answer)
+    bounds = [f"{bound:.5f} m" if isfinite(bound) else "unknown" for bound in (found.no_way, found.way)]
+    apart = found.way - found.no_way
     return [
-        Row(f"{name}/answer", 1.0, f"{found.no_way:.5f} m to {found.way:.5f} m"),
-        Row(f"{name}/apart_mm", 1e3 * (found.way - found.no_way), "mm"),
+        Row(f"{name}/answer", float(isfinite(apart)), " to ".join(bounds)),
+        *([Row(f"{name}/apart_mm", 1e3 * apart, "mm")] if isfinite(apart) else []),
         Row(f"{name}/undecided", len(found.undecided), f"of {len(found.seconds)} widths"),
         Row(f"{name}/slowest_cpu_seconds", max(found.seconds), "s"),
         Row(f"{name}/cpu_seconds", sum(found.seconds), "s"),

@@ -1,8 +1,12 @@
 """The bisection of critical widths, with answers by hand."""
 
+from math import isfinite
+from types import SimpleNamespace
+
 import pytest
 
-from benchmarks.planner.critical_width import CORRIDORS, Corridor, critical_interval
+from benchmarks.planner import critical_width
+from benchmarks.planner.critical_width import CORRIDORS, Corridor, critical_interval, critical_width_rows
 
 
 def asked(answer):
@@ -28,6 +32,15 @@ def test_undecided_widths_keep_the_bounds_apart():
     assert 0.74 < found.way <= 0.741
     assert all(0.72 <= width <= 0.74 for width in found.undecided)
     assert len(found.seconds) < 20
+
+
+def test_a_bound_that_takes_too_long_is_unknown(monkeypatch):
+    ended = SimpleNamespace(value=None)
+    monkeypatch.setattr(critical_width, "in_own_process", lambda *given, limit: ended)
+    rows = critical_width_rows("two", Corridor(lambda width: width, 0.7, 0.8, 1e-3), 60.0)
+    assert all(isfinite(row.value) for row in rows)
+    assert (rows[0].name, rows[0].value, rows[0].unit) == ("two/answer", 0.0, "unknown to unknown")
+    assert rows[1].unit == "of 2 widths"
 
 
 @pytest.mark.parametrize("name", CORRIDORS)

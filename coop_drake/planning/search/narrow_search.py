@@ -45,7 +45,7 @@ class NarrowSearch:
         self._problem, self._hierarchy, self._covered = problem, hierarchy, covered
 
     def tries(
-        self, number: int, part: tuple[int, ...] | None, progress: Callable[[float], None] | None
+        self, number: int, progress: Callable[[float], None] | None, *, object_first: bool
     ) -> list[Callable[[], Tried]]:
         """Ways to find a path, other ones for every number, each to be called.
 
@@ -54,19 +54,20 @@ class NarrowSearch:
 
         Args:
             number: How many lists were asked for before.
-            part: Robots for which, with the object alone, a path seems hard to find: if it cannot be
-                repaired for these, it cannot be for the team.
             progress: Called with the fraction of a way that is done.
+            object_first: Whether these repair a path of the object alone first, and give up where it does not
+                fit. The same with some of the robots loses ways: their repairs end in other places than
+                those of the whole team.
         """
         first = SEEDS_PER_GROWTH * max(0, number - 1)
         seeds = range(first, first + SEEDS_PER_GROWTH)
         ways = product(seeds, FLOOR_GROWTHS)
-        return [partial(self._repaired, number > 0, part, *way, progress) for way in ways]
+        return [partial(self._repaired, number > 0, object_first, *way, progress) for way in ways]
 
     def _repaired(
         self,
         direct: bool,
-        part: tuple[int, ...] | None,
+        object_first: bool,
         seed: int,
         growth: float,
         progress: Callable[[float], None] | None,
@@ -76,25 +77,25 @@ class NarrowSearch:
         sampler = Sampler(self._hierarchy, floor, BODY_GAP, seed, progress)
         if not direct:
             path = sampler.path(NARROW_SAMPLES)
-        elif part is None:
-            path = sampler.direct_path(NARROW_SAMPLES)
-        else:
-            guide = self._repaired_part(sampler, part, growth)
+        elif object_first:
+            guide = self._repaired_object(sampler, growth)
             if guide is None:
                 return Tried()
             path = sampler.path_around(guide, NARROW_SAMPLES)
+        else:
+            path = sampler.direct_path(NARROW_SAMPLES)
         if not len(path):
             return Tried()
         path, short = repaired(self._problem, path, growth)
         found = None if short > 0.0 else self._covered(path, False)
         return Tried(found, path, short=short)
 
-    def _repaired_part(self, sampler: Sampler, part: tuple[int, ...], growth: float) -> GuidePath | None:
-        """Path of the object with some robots, repaired; None if there is none that almost fits the floor."""
-        guide = sampler.direct(part, NARROW_SAMPLES)
+    def _repaired_object(self, sampler: Sampler, growth: float) -> GuidePath | None:
+        """Path of the object alone, repaired; None if there is none that almost fits the floor."""
+        guide = sampler.direct((), NARROW_SAMPLES)
         if guide is None:
             return None
-        path, short = repaired(self._hierarchy.subsystem(part).question, guide.path, growth)
+        path, short = repaired(self._hierarchy.subsystem(()).question, guide.path, growth)
         return None if short > CENTRED_SHORT else GuidePath(path, guide.joints)
 
     def through_middle(self, paths: Sequence[Tried]) -> BoxSequence | None:

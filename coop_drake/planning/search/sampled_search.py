@@ -157,7 +157,8 @@ class SampledSearch:
         number: int,
         copies: int = 0,
         progress: Callable[[float], None] | None = None,
-        part: tuple[int, ...] | None = None,
+        *,
+        object_first: bool = False,
     ) -> BoxSequence | None:
         """Look for a path through passages that are too narrow for samples, and cover it at margin zero.
 
@@ -165,12 +166,14 @@ class SampledSearch:
             number: How many such attempts there were before.
             copies: Copies of this process that work.
             progress: Called with the fraction of an attempt that is done.
-            part: As for ``attempts``.
+            object_first: Whether a path seems hard to find for the object alone: it is sampled first.
 
         Returns:
             The boxes, or None if no path was found or covered.
         """
-        tries = self._narrow.tries(number, part, None if copies else progress) if self._start_inside else []
+        if not self._start_inside:
+            return None
+        tries = self._narrow.tries(number, None if copies else progress, object_first=object_first)
         paths: list[Tried] = []
         with Copies([partial(self._counted, one) for one in tries], copies) as results:
             for tried in results:

@@ -250,8 +250,8 @@ class _Search:
 
     def _narrow_sampled(self) -> BoxSequence | None:
         """Sample paths through narrow passages, other ones each time."""
-        phase, part = self._phase("sampling narrow passages"), self._proofs.hardest
-        found = self._samples.narrow_attempt(self._narrow_attempts, self._copies, phase, part)
+        phase, alone = self._phase("sampling narrow passages"), self._proofs.hardest == ()
+        found = self._samples.narrow_attempt(self._narrow_attempts, self._copies, phase, object_first=alone)
         self._narrow_attempts += 1
         if found is not None:
             self._first_plan = thread_time() - self._began
