@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from shapely import Point
 
+from benchmarks.planner.family import corridor_problem
 from coop_drake.planning import Channel, find_channel
 from coop_drake.planning.sampling.narrow_passages import (
     amount_needed,
@@ -15,6 +16,10 @@ from coop_drake.planning.sampling.narrow_passages import (
     repaired,
     widened_floor,
 )
+from coop_drake.planning.sampling.sampler import Sampler
+from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
+from coop_drake.planning.search import narrow_search
+from coop_drake.planning.search.narrow_search import NarrowSearch
 from tests.planning.test_search import rod_problem
 from tests.support.cases import transport
 from tests.support.soundness import assert_channel_is_sound
@@ -59,6 +64,26 @@ def test_a_wider_floor_holds_the_floor():
     floor = rod_problem(0.2).workspace
     assert widened_floor(floor, 0.05).contains(floor)
     assert widened_floor(floor, 0.05).contains(Point(0.0, 0.14))
+
+
+@pytest.mark.parametrize(("width", "sampled_joints"), [(0.4, 0), (0.9, 2)])
+def test_the_team_is_sampled_only_where_the_object_alone_almost_fits(monkeypatch, width, sampled_joints):
+    """Walls are 0.1 m further back for samples: the object, 0.5 m wide, passes there at 0.4 m, too."""
+    problem, sampled = corridor_problem(width), []
+    inner = Sampler._connect
+
+    def connect(self, subsystem, *rest):
+        sampled.append(len(subsystem.joints))
+        return inner(self, subsystem, *rest)
+
+    monkeypatch.setattr(Sampler, "_connect", connect)
+    monkeypatch.setattr(narrow_search, "NARROW_SAMPLES", 4_000)
+    search = NarrowSearch(problem, SubsystemHierarchy(problem), lambda path, smallest: None)
+    tried = search.tries(1, None, object_first=True)[0]()
+    assert max(sampled) == sampled_joints
+    assert (tried.path is not None) == (sampled_joints > 0)
+    if tried.path is not None:
+        assert are_free(problem, tried.path).all() == (tried.short <= 0.0)
 
 
 @pytest.mark.no_cover
