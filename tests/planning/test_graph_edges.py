@@ -26,10 +26,8 @@ def edges_of(links):
         for entry in entries_of(links, node):
             other, mate = int(links.to[entry]), links.mate[entry]
             assert (links.to[mate], links.mate[mate]) == (node, entry)
-            assert (
-                found.setdefault((min(node, other), max(node, other)), links.joined[entry])
-                == (links.joined[mate])
-            )
+            pair = min(node, other), max(node, other)
+            assert found.setdefault(pair, links.joined[entry]) == links.joined[mate]
     return found
 
 
@@ -66,6 +64,7 @@ def test_what_tests_and_removals_leave_is_what_a_dictionary_would_hold(linked, s
             while linked.head[node] >= 0:
                 drop(linked, node, int(entries_of(linked, node)[0]))
             expected = {pair: joined for pair, joined in expected.items() if node not in pair}
+            assert edges_of(linked) == expected
             continue
         entries = entries_of(linked, node)
         chosen = entries[random.random(len(entries)) < 0.6]

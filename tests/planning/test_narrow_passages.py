@@ -68,7 +68,7 @@ def test_a_wider_floor_holds_the_floor():
 
 @pytest.mark.parametrize(("width", "sampled_joints"), [(0.4, 0), (0.9, 2)])
 def test_the_team_is_sampled_only_where_the_object_alone_almost_fits(monkeypatch, width, sampled_joints):
-    """Walls are 0.1 m further back for samples: the object, 0.5 m wide, passes there at 0.4 m, too."""
+    """Walls are 0.1 m further back for samples: there the object, 0.5 m wide, passes at 0.4 m, too."""
     problem, sampled = corridor_problem(width), []
     inner = Sampler._connect
 

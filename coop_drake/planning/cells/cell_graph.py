@@ -89,9 +89,12 @@ class CellGraph:
             forget(self._links, self._search, first, last)
 
     def _make_room(self, nodes: int, new: int, others: int) -> None:
-        """Let the arrays hold so many nodes, and edges of all new ones with the others that they may meet.
+        """Let the arrays grow, to twice what is needed, where they are too small for new nodes and edges.
 
-        Arrays have at least twice as much room as before where they grow.
+        Args:
+            nodes: All nodes, the new ones included.
+            new: New nodes.
+            others: Nodes that each of these may meet.
         """
         links, room, stored = self._links, len(self._links.weights), len(self._links.following)
         blocks = int(links.state[1]) + new + others + 2 * (new * others // BLOCK)

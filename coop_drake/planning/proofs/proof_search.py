@@ -77,17 +77,17 @@ class Proofs:
         return sum(outcome.slices for outcome in self._outcomes.values())
 
     @property
-    def hardest(self) -> tuple[int, ...] | None:
-        """Robots of the smallest relaxation that is explored without an answer so far; None without any.
+    def blocked_part(self) -> tuple[int, ...] | None:
+        """Robots of the smallest relaxation whose exploration has no answer yet; None if there is none.
 
-        The relaxation test found no path for it.
+        Relaxations are explored where sampling has found no path for them.
         """
-        blocked = [
+        undecided = [
             chosen
             for chosen, outcome in self._outcomes.items()
             if chosen != self._all and outcome.verdict in (Verdict.BUDGET, Verdict.RESOLUTION)
         ]
-        return min(blocked, key=lambda chosen: (len(chosen), chosen), default=None)
+        return min(undecided, key=lambda chosen: (len(chosen), chosen), default=None)
 
     def run(
         self,

@@ -133,8 +133,8 @@ class Sampler:
 
         Args:
             samples: Samples drawn at most for each subsystem.
-            part: Robots for which, with the object alone, a path is sampled first, and then one of the whole
-                team around it; if there is none for these, there is none for the team.
+            part: Robots that are sampled with the object first, ascending; the team is then sampled around
+                their path, and not at all if none is found. None: the team is sampled at once.
 
         Returns:
             As ``path``.
@@ -156,6 +156,9 @@ class Sampler:
         Args:
             robots: The robots, ascending.
             samples: Samples drawn at most for each subsystem.
+
+        Returns:
+            The path, or None if none was found.
         """
         chosen, disc = self._hierarchy.subsystem(robots), self._disc_path(samples)
         found = None if disc is None else self._guide(chosen, disc, samples, WHERE_TREES_END)[0]
@@ -171,7 +174,15 @@ class Sampler:
         return found
 
     def path_around(self, guide: GuidePath, samples: int) -> FloatArray:
-        """Find a path for the whole team around another one, which need not be free."""
+        """Find a path for the whole team around another one, which need not be free.
+
+        Args:
+            guide: Path of the team or of a part of it.
+            samples: Samples drawn at most.
+
+        Returns:
+            As ``path``.
+        """
         whole = self._hierarchy.subsystem(self._hierarchy.robots)
         found, _ = self._guide(whole, guide, samples, WHERE_TREES_END)
         return _NO_PATH if found is None else found.path

@@ -47,17 +47,17 @@ class NarrowSearch:
     def tries(
         self, number: int, progress: Callable[[float], None] | None, *, object_first: bool
     ) -> list[Callable[[], Tried]]:
-        """Ways to find a path, other ones for every number, each to be called.
+        """The attempts of one round as functions to call, with other random numbers in every round.
 
-        Those after the first ones sample all robots at once: one after the other they go where the object
-        alone goes most easily.
+        The first round adds robot after robot, later ones sample all robots at once: added one by one they
+        go where the object alone goes most easily.
 
         Args:
-            number: How many lists were asked for before.
-            progress: Called with the fraction of a way that is done.
-            object_first: Whether these repair a path of the object alone first, and give up where it does not
-                fit. The same with some of the robots loses ways: their repairs end in other places than
-                those of the whole team.
+            number: The round, counted from 0.
+            progress: Called with the fraction of an attempt that is done.
+            object_first: Whether attempts of later rounds repair a path of the object alone first, and end
+                where it does not fit the floor. This is not done for parts of the team with robots: their
+                paths are repaired to other places than the team's, and ways were lost by it.
         """
         first = SEEDS_PER_GROWTH * max(0, number - 1)
         seeds = range(first, first + SEEDS_PER_GROWTH)
@@ -98,15 +98,17 @@ class NarrowSearch:
         path, short = repaired(self._hierarchy.subsystem(()).question, guide.path, growth)
         return None if short > CENTRED_SHORT else GuidePath(path, guide.joints)
 
-    def through_middle(self, paths: Sequence[Tried]) -> BoxSequence | None:
-        """Cover one of some paths, those that fit best first, with boxes in the middle of its passages.
+    def through_middle(self, done: Sequence[Tried]) -> BoxSequence | None:
+        """Cover the path of one of some attempts, those that fit best first, in the middle of its passages.
 
         The boxes are the smallest ones, so a transport through them takes long.
         """
-        for tried in sorted(paths, key=lambda tried: tried.short)[:CENTRED_PATHS]:
-            if tried.path is not None and tried.short < CENTRED_SHORT:
-                path, short = centred(self._problem, tried.path, tried.short)
-                found = None if short > 0.0 else self._covered(path, True)
-                if found is not None:
-                    return found
+        fitting = [
+            (one.short, one.path) for one in done if one.path is not None and one.short < CENTRED_SHORT
+        ]
+        for needed, path in sorted(fitting, key=lambda one: one[0])[:CENTRED_PATHS]:
+            moved, short = centred(self._problem, path, needed)
+            found = None if short > 0.0 else self._covered(moved, True)
+            if found is not None:
+                return found
         return None

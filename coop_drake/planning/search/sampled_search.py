@@ -166,7 +166,7 @@ class SampledSearch:
             number: How many such attempts there were before.
             copies: Copies of this process that work.
             progress: Called with the fraction of an attempt that is done.
-            object_first: Whether a path seems hard to find for the object alone: it is sampled first.
+            object_first: Whether a path of the object alone is to be found before one of the team.
 
         Returns:
             The boxes, or None if no path was found or covered.
@@ -174,19 +174,20 @@ class SampledSearch:
         if not self._start_inside:
             return None
         tries = self._narrow.tries(number, None if copies else progress, object_first=object_first)
-        paths: list[Tried] = []
+        done: list[Tried] = []
         with Copies([partial(self._counted, one) for one in tries], copies) as results:
             for tried in results:
                 self.slices += tried.trials
                 if tried.failed or tried.found is not None:
                     return tried.found
-                paths.append(tried)
+                done.append(tried)
         try:
-            return self._narrow.through_middle([tried for tried in paths if tried.path is not None])
+            return self._narrow.through_middle(done)
         except (GeometryError, ShapelyError):
             return None
 
     def _closely(self, path: FloatArray, smallest: bool) -> BoxSequence | None:
+        """Cover a path at margin zero by the longest boxes, or by small ones that need little space."""
         return self._covered(path, 0.0, longest=True, smallest=smallest)
 
     def with_margin(

@@ -59,8 +59,8 @@ FEW_ROBOTS = 1
 """Robots that are kept in explorations before paths through narrow passages are sampled."""
 
 NARROW_ATTEMPTS = 3
-"""Attempts to find paths through narrow passages, one in each round at first: a new one of three robots takes
-four seconds, and a round of explorations ten or more."""
+"""Attempts to find paths through narrow passages, one in each round at first: one of three robots takes four
+seconds, and a round of explorations ten or more."""
 
 
 def find_channel(
@@ -226,7 +226,8 @@ class _Search:
         return self._workers if self._workers > 1 else 0
 
     def _attempts(self, number: int, copies: int) -> Copies[Tried]:
-        return self._samples.attempts(number, copies, self._phase("sampling paths"), self._proofs.hardest)
+        phase, part = self._phase("sampling paths"), self._proofs.blocked_part
+        return self._samples.attempts(number, copies, phase, part)
 
     def _first_of(self, attempts: Copies[Tried]) -> BoxSequence | None:
         """The first boxes of some attempts; attempts end where the object alone seems blocked."""
@@ -244,14 +245,12 @@ class _Search:
         """Look for narrow passages, unless a short exploration of few robots answers the question."""
         robots = 0 if object_blocked else FEW_ROBOTS
         verdict = self._explored(slices, robots, untested=object_blocked)
-        if verdict in (Verdict.INFEASIBLE, Verdict.FOUND):
-            return None
-        return self._narrow_sampled()
+        return None if verdict in (Verdict.INFEASIBLE, Verdict.FOUND) else self._narrow_sampled()
 
     def _narrow_sampled(self) -> BoxSequence | None:
         """Sample paths through narrow passages, other ones each time."""
-        phase, alone = self._phase("sampling narrow passages"), self._proofs.hardest == ()
-        found = self._samples.narrow_attempt(self._narrow_attempts, self._copies, phase, object_first=alone)
+        phase, first = self._phase("sampling narrow passages"), self._proofs.blocked_part == ()
+        found = self._samples.narrow_attempt(self._narrow_attempts, self._copies, phase, object_first=first)
         self._narrow_attempts += 1
         if found is not None:
             self._first_plan = thread_time() - self._began
