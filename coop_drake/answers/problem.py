@@ -57,9 +57,9 @@ class PlannerSettings:
     strategy: Literal["portfolio", "cells", "paper"] = "portfolio"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PlanningProblem:
-    """One question to the planner.
+    """One question to the planner; questions are equal only if they are the same object.
 
     A joint that starts or is to end nearer to a limit than ``LIMIT_ROOM``, or that cannot move, may be
     planned up to so much beyond that limit, everywhere on the way: plans and proofs are about these wider

@@ -12,7 +12,6 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.geometry.convex import SLACK
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays, moved
 
 _TURN = 2.0 * pi
 
@@ -249,43 +248,3 @@ def grown(vertices: FloatArray, radius: float, largest_turn: float) -> FloatArra
     for k in range(len(offsets)):
         offsets[k] += radius
     return circumscribed(directions, offsets)
-
-
-@compiled
-def over_piece(
-    team: TeamArrays, piece: int, lower: FloatArray, upper: FloatArray, stages: int, rounded: bool
-) -> FloatArray:
-    """Compute a polygon that encloses a piece at every configuration of a slice, eq. (6).
-
-    Args:
-        team: The team.
-        piece: Index of the piece.
-        lower: Lower ends of (theta, q...), shape (1 + n,) [rad, m].
-        upper: Upper ends, shape (1 + n,).
-        stages: Number of joints to sweep, from the piece's own; theta is the last one, and any larger number
-            means all.
-        rounded: Whether to grow the sweep by the piece's radius.
-
-    Returns:
-        Vertices, counter-clockwise, shape (n, 2) [m].
-    """
-    ring = team.vertices[team.pieces[piece, 1] : team.pieces[piece, 2]].copy()
-    widest = 0.0
-    link = team.pieces[piece, 0]
-    while link >= 0 and stages > 0:
-        axis = team.links[link, 1] - 2
-        low, high = lower[axis], upper[axis]
-        widest = max(widest, high - low)
-        if team.links[link, 2] == 1:
-            ring = over_revolute(ring, team.joints[link, 3] * 0.5 * (low + high), 0.5 * (high - low))
-        else:
-            ax, ay = team.joints[link, 4], team.joints[link, 5]
-            ring = over_prismatic(ring, ax * low, ay * low, ax * high, ay * high)
-        x, y, angle = team.joints[link, 0], team.joints[link, 1], team.joints[link, 2]
-        c, s = cos(angle), sin(angle)
-        for i in range(len(ring)):
-            ring[i, 0], ring[i, 1] = moved(x, y, c, s, ring[i, 0], ring[i, 1])
-        link, stages = team.links[link, 0], stages - 1
-    if rounded and team.radii[piece] > 0.0:
-        ring = grown(ring, team.radii[piece], disc_turn(0.5 * widest))
-    return ring

@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from coop_drake.geometry.convex import normals
-from coop_drake.geometry.sweep_kernels import closed_directions, disc_turn, edge_directions, over_piece
+from coop_drake.geometry.piece_sweeps import over_piece
+from coop_drake.geometry.sweep_kernels import closed_directions, disc_turn, edge_directions
 from coop_drake.geometry.under_kernels import common_disc, under_prismatic, under_revolute
 from coop_drake.tree.component_tree import ComponentTree, ConvexShape, TreeJoint
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays, team_arrays
+from coop_drake.tree.team_arrays import TeamArrays
 
 _NUDGE = 1e-6
 """Angle on either side of a direction at which the vertices of an edge are looked for [rad]."""
@@ -66,7 +67,7 @@ class SweptTree:
                 for shape in body.shapes
             ]
         self.pieces: tuple[Piece, ...] = tuple(pieces)
-        self.arrays: TeamArrays = team_arrays(tree)
+        self.arrays: TeamArrays = tree.arrays
         self._over: dict[tuple[object, ...], FloatArray] = {}
         self._under: dict[tuple[object, ...], FloatArray] = {}
 

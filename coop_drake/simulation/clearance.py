@@ -12,7 +12,7 @@ from coop_drake.geometry.boundary import edges_of
 from coop_drake.simulation.step_kernels import team_distances
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays, team_arrays
+from coop_drake.tree.team_arrays import TeamArrays
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class TeamClearance:
         ]
         if not self._names:
             raise GeometryError("the component tree has no body with a shape, so no clearance is defined")
-        self._arrays = team_arrays(tree), np.ascontiguousarray(edges_of(workspace))
+        self._arrays = tree.arrays, np.ascontiguousarray(edges_of(workspace))
 
     @property
     def kernel_arguments(self) -> tuple[TeamArrays, FloatArray]:

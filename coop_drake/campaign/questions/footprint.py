@@ -11,7 +11,6 @@ from coop_drake.compiled import prepared
 from coop_drake.planning.sampling.collision_kernels import is_free
 from coop_drake.planning.sampling.obstacle_grid import grid_for_team
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import team_arrays
 
 __all__ = ["free_goals", "prepared_check"]
 
@@ -24,7 +23,7 @@ def prepared_check(problem: PlanningProblem) -> Callable[..., bool]:
 
     The team and the floor are handed over once, which makes a call three times as quick.
     """
-    team = team_arrays(problem.tree)
+    team = problem.tree.arrays
     grid = grid_for_team(problem.workspace, team)
     check = prepared(is_free, (team, grid), problem.start.astype(float), 0.0)
     return lambda *values: check(np.array(values), 0.0)

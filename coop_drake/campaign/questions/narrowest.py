@@ -10,7 +10,7 @@ from coop_drake.compiled import compiled
 from coop_drake.planning.sampling.collision_kernels import bodies_apart
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays, place, team_arrays
+from coop_drake.tree.team_arrays import TeamArrays, place
 
 _DRAWN, _REFINED = 4_000, 8_000
 """Configurations drawn anywhere, and drawn near the best one so far [-]: together some 20 ms."""
@@ -31,7 +31,7 @@ def narrowest_corridor(tree: ComponentTree, random: np.random.Generator) -> floa
     """
     lower = np.array([0.0, 0.0, -np.pi, *tree.joint_lower])
     upper = np.array([0.0, 0.0, np.pi, *tree.joint_upper])
-    return float(_narrowest(team_arrays(tree), lower, upper, random, _DRAWN, _REFINED))
+    return float(_narrowest(tree.arrays, lower, upper, random, _DRAWN, _REFINED))
 
 
 @compiled

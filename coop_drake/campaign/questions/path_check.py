@@ -14,7 +14,6 @@ from coop_drake.planning.sampling.obstacle_grid import grid_for_team
 from coop_drake.tree.component_tree import ConvexShape
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import team_arrays
 
 __all__ = ["fault_of"]
 
@@ -47,7 +46,7 @@ def fault_of(problem: PlanningProblem, path: FloatArray) -> str:
     joints, tree = path[:, 3:], problem.tree
     if (joints < tree.joint_lower - _ARRIVED).any() or (joints > tree.joint_upper + _ARRIVED).any():
         return "a joint leaves its range"
-    team = team_arrays(tree)
+    team = tree.arrays
     grid = grid_for_team(problem.workspace, team)
     scale = configuration_scale(tree)
     for z in _densified(path, scale, _DENSE):

@@ -26,7 +26,6 @@ from coop_drake.scenario.limits import RobotLimits
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.levers import axis_levers
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import team_arrays
 
 _DRAFTS = 200
 """Teams and floors that are drawn for one question at most; usually a handful suffices."""
@@ -145,7 +144,7 @@ def _free(
     random: Random, floor: Polygon, region: Polygon, tree: ComponentTree, count: int
 ) -> Iterator[FloatArray]:
     """At most ``count`` configurations without collision whose object's origin is in a region."""
-    team = team_arrays(tree)
+    team = tree.arrays
     grid = grid_for_team(floor.buffer(-_GAP), team)
     found = 0
     for _ in range(_TRIES):

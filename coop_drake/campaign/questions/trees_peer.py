@@ -17,7 +17,6 @@ from coop_drake.campaign.questions.peer import GOALS, MOTION_STEP, RANGE, PeerRu
 from coop_drake.campaign.questions.tree_kernels import rrt_connect
 from coop_drake.planning.sampling.obstacle_grid import grid_for_team
 from coop_drake.tree.levers import configuration_scale
-from coop_drake.tree.team_arrays import team_arrays
 
 __all__ = ["CHECKS", "run_trees"]
 
@@ -34,7 +33,7 @@ def run_trees(problem: PlanningProblem, seeds: Sequence[int], checks: int = CHEC
         checks: Configurations that each run may check.
     """
     tree = problem.tree
-    team, scale, check = team_arrays(tree), configuration_scale(tree), prepared_check(problem)
+    team, scale, check = tree.arrays, configuration_scale(tree), prepared_check(problem)
     grid = grid_for_team(problem.workspace, team)
     x_lower, y_lower, x_upper, y_upper = problem.workspace.bounds
     lower = np.array([x_lower, y_lower, -np.pi, *tree.joint_lower])

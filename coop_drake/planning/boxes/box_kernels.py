@@ -8,94 +8,31 @@ any direction.
 from __future__ import annotations
 
 from math import hypot
-from typing import NamedTuple
 
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.geometry.body_pairs import TOUCH
-from coop_drake.geometry.distances import separated
-from coop_drake.geometry.sweep_kernels import over_piece
+from coop_drake.planning.boxes.box_sweeps import (
+    BoxArrays,
+    bodies_apart,
+    enclosing_disc,
+    room_for_sweeps,
+    swept_piece,
+    with_ring,
+)
 from coop_drake.planning.sampling.collision_kernels import ring_clearance
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.planning.travel_time import SETTLING_TIME, SPEED_PER_CLEARANCE
-from coop_drake.tree.pose import FloatArray, IntArray
-from coop_drake.tree.team_arrays import TeamArrays
+from coop_drake.tree.pose import FloatArray
 
-COARSENESS = 0.15
+COARSENESS = 0.2
 """A box may fall short of the longest one by this fraction of its samples [-]: fewer boxes are tried."""
+
+_GROWTH = 0.5
+"""Samples by which a free box is made longer, over those that it holds [-]."""
 
 _STEP_FRACTION = 0.5
 """Step along a path over the clearance there [-]: below 1, so that every place lies in a free disc."""
-
-
-class BoxArrays(NamedTuple):
-    """The team and the joint limits as arrays, used to test whether a box is free.
-
-    Attributes:
-        team: The team.
-        frames: Pieces and numbers of stages that collision pairs need, each once, shape (F, 2).
-        pairs: Pairs of rows of ``frames`` that must not touch, shape (K, 2).
-        lower: Lower limits of (theta, q...), minus infinity for theta, shape (1 + n,).
-        upper: Upper limits, shape (1 + n,).
-    """
-
-    team: TeamArrays
-    frames: IntArray
-    pairs: IntArray
-    lower: FloatArray
-    upper: FloatArray
-
-
-@compiled
-def enclosing_disc(ring: FloatArray, disc: FloatArray) -> None:
-    """Write a disc (x, y, radius) that holds a ring, shape (n, 2) [m], into ``disc``, shape (3,) [m]."""
-    disc[0], disc[1], disc[2] = 0.0, 0.0, 0.0
-    for i in range(len(ring)):
-        disc[0] += ring[i, 0] / len(ring)
-        disc[1] += ring[i, 1] / len(ring)
-    for i in range(len(ring)):
-        disc[2] = max(disc[2], hypot(ring[i, 0] - disc[0], ring[i, 1] - disc[1]))
-
-
-@compiled
-def _with_ring(vertices: FloatArray, size: int, ring: FloatArray) -> FloatArray:
-    """Write a ring into the rows from ``size`` on; returns a longer copy where there are too few, (V, 2)."""
-    if size + len(ring) > len(vertices):
-        longer = np.empty((2 * (size + len(ring)), 2))
-        for k in range(size):
-            longer[k, 0], longer[k, 1] = vertices[k, 0], vertices[k, 1]
-        vertices = longer
-    for k in range(len(ring)):
-        vertices[size + k, 0], vertices[size + k, 1] = ring[k, 0], ring[k, 1]
-    return vertices
-
-
-@compiled
-def bodies_apart(boxes: BoxArrays, lower: FloatArray, upper: FloatArray) -> bool:
-    """Whether no two bodies touch anywhere in a box: their over-sweeps are separated.
-
-    Args:
-        boxes: The team.
-        lower: Lower ends of (theta, q...), shape (1 + n,) [rad, m].
-        upper: Upper ends, shape (1 + n,).
-    """
-    count = len(boxes.frames)
-    vertices, first = np.empty((32 * count, 2)), np.zeros(count + 1, np.int64)
-    discs = np.empty((count, 3))
-    for k in range(count):
-        ring = over_piece(boxes.team, boxes.frames[k, 0], lower, upper, boxes.frames[k, 1], True)
-        enclosing_disc(ring, discs[k])
-        vertices = _with_ring(vertices, first[k], ring)
-        first[k + 1] = first[k] + len(ring)
-    for k in range(len(boxes.pairs)):
-        i, j = boxes.pairs[k, 0], boxes.pairs[k, 1]
-        far = hypot(discs[i, 0] - discs[j, 0], discs[i, 1] - discs[j, 1])
-        if far <= discs[i, 2] + discs[j, 2] + 2.0 * TOUCH and not separated(
-            vertices[first[i] : first[i + 1]], vertices[first[j] : first[j + 1]], TOUCH
-        ):
-            return False
-    return True
 
 
 @compiled
@@ -130,10 +67,11 @@ def box_clearance(
     count = len(boxes.team.radii)
     vertices, first = np.empty((32 * count, 2)), np.zeros(count + 1, np.int64)
     discs = np.empty((count, 3))
+    sweeps, swept, frame = room_for_sweeps(len(boxes.frames)), np.empty((16 * len(boxes.frames), 2)), 0
     for k in range(count):
-        ring = over_piece(boxes.team, count - 1 - k, lower, upper, len(boxes.team.links), True)
+        ring, swept, frame = swept_piece(boxes, count - 1 - k, lower, upper, sweeps, swept, frame)
         enclosing_disc(ring, discs[k])
-        vertices = _with_ring(vertices, first[k], ring)
+        vertices = with_ring(vertices, first[k], ring)
         first[k + 1] = first[k] + len(ring)
         for at in (start, end):
             x, y = path[at, 0], path[at, 1]
@@ -144,7 +82,7 @@ def box_clearance(
                 <= enough
             ):
                 return -1.0
-    if not bodies_apart(boxes, lower, upper):
+    if not bodies_apart(boxes, sweeps, swept):
         return -1.0
     least, passed = np.inf, 0.0
     for at in range(start, end + 1):
@@ -200,15 +138,16 @@ def clearances_in_box(
     for k in range(len(result)):
         result[k] = most
     disc = np.empty(3)
+    sweeps, swept, frame = room_for_sweeps(len(boxes.frames)), np.empty((16 * len(boxes.frames), 2)), 0
     for piece in range(len(boxes.team.radii) - 1, -1, -1):
-        ring = over_piece(boxes.team, piece, lower, upper, len(boxes.team.links), True)
+        ring, swept, frame = swept_piece(boxes, piece, lower, upper, sweeps, swept, frame)
         enclosing_disc(ring, disc)
         for k in range(len(result)):
             x, y = path[start + k, 0], path[start + k, 1]
             result[k] = ring_clearance(grid, ring, 0, len(ring), 0.0, disc, x, y, 1.0, 0.0, result[k])
             if result[k] < 0.0:
                 return result[:0]
-    return result if bodies_apart(boxes, lower, upper) else result[:0]
+    return result if bodies_apart(boxes, sweeps, swept) else result[:0]
 
 
 @compiled
@@ -249,14 +188,14 @@ def longest_box(
     clearance: float,
     margin: float,
 ) -> tuple[int, int, int]:
-    """Find about how far along a path one free box reaches: doubling, then bisection.
+    """Find about how far along a path one free box reaches: longer ones by half, then bisection.
 
     Args:
         boxes: The team.
         grid: The floor, from which the margin has been taken off.
         samples: The path, shape (m, 3 + n).
         first: Sample that the box begins with.
-        guess: By how many samples to reach out at first.
+        guess: Sample after the first one at which the first box that is tried ends; about where it ends.
         pad: Padding of the intervals, see ``padded``.
         clearance: Distance from the obstacles that is needed at both ends [m].
         margin: Clearance that positions have beyond that floor [m].
@@ -266,7 +205,7 @@ def longest_box(
         one, and the number of boxes tried.
     """
     last = len(samples) - 1
-    best, failed, reach = first, last + 1, 1
+    best, failed, reach = first, last + 1, guess
     quickest, fastest, trials = first, 0.0, 0
     length, measured = 0.0, first
     while failed - best > max(1, int(COARSENESS * (best - first))):
@@ -277,8 +216,7 @@ def longest_box(
         if found < 0.0:
             failed = j
             continue
-        reach = guess if best == first else 2 * reach
-        best = j
+        best, reach = j, max(1, int(_GROWTH * (j - first)))
         while measured < j:
             dx, dy = (
                 samples[measured + 1, 0] - samples[measured, 0],

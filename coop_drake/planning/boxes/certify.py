@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +10,8 @@ from shapely import MultiPolygon, Polygon
 
 from coop_drake.geometry.body_pairs import BodyPairs
 from coop_drake.geometry.swept_tree import Intervals, SweptTree
-from coop_drake.planning.boxes.box_kernels import BoxArrays, longest_box, padded
+from coop_drake.planning.boxes.box_kernels import longest_box, padded
+from coop_drake.planning.boxes.box_sweeps import BoxArrays
 from coop_drake.planning.sampling.densify import densified
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_inside
 from coop_drake.tree.pose import FloatArray, IntArray
@@ -35,7 +36,7 @@ REFINEMENT = 4
 """Where no box holds two consecutive samples, so many intervals take the place of one."""
 
 FIRST_REACH = 4
-"""Samples by which the first box reaches out before its length is known."""
+"""Samples in the first box that is tried, before the length of any box is known."""
 
 
 @dataclass(frozen=True)
@@ -131,9 +132,9 @@ class Certifier:
                 self._boxes, self._grid, samples, i, self._reach, pad, clearance, self._margin
             )
             self.trials += trials
+            self._reach = max(1, furthest - i)
             j = furthest if longest else fastest
             if j > i:
-                self._reach = max(1, (furthest - i) // 2)
                 lower, upper = padded(self._boxes, samples, i, j, pad)
                 intervals = tuple((float(a), float(b)) for a, b in zip(lower, upper, strict=True))
                 return j, PathBox(intervals, samples[i : j + 1, :2].copy())
@@ -149,20 +150,19 @@ def _finer(samples: FloatArray, i: int) -> FloatArray:
 
 def box_arrays(swept: SweptTree, pairs: BodyPairs) -> BoxArrays:
     """Arrays of a team for the compiled boxes; a piece that several collision pairs need is swept once."""
-    frames: dict[tuple[int, int], int] = {}
-    rows: list[tuple[int, int]] = []
-    for i, j, first_stages, second_stages in pairs.pieces.tolist():
-        first = frames.setdefault((i, first_stages), len(frames))
-        rows.append((first, frames.setdefault((j, second_stages), len(frames))))
+    rows = pairs.pieces.tolist()
+    needed = {(i, stages) for i, _, stages, _ in rows} | {(j, stages) for _, j, _, stages in rows}
+    frames = sorted(needed, key=lambda frame: (-frame[0], frame[1]))
+    row = {frame: k for k, frame in enumerate(frames)}
     infinite = np.array([np.inf])
     return BoxArrays(
         swept.arrays,
-        _table(list(frames)),
-        _table(rows),
+        _table(frames),
+        _table([(row[i, first], row[j, second]) for i, j, first, second in rows]),
         np.concatenate((-infinite, swept.tree.joint_lower)),
         np.concatenate((infinite, swept.tree.joint_upper)),
     )
 
 
-def _table(rows: list[tuple[int, int]]) -> IntArray:
+def _table(rows: Sequence[tuple[int, int]]) -> IntArray:
     return np.array(rows, dtype=np.int64).reshape(-1, 2)

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from coop_drake.compiled import compiled
-from coop_drake.laws.gain_schedule import Schedule
-from coop_drake.planning.boxes.box_kernels import BoxArrays, clearances_in_box
+from coop_drake.laws.governor import FIELD_SPEED
+from coop_drake.planning.boxes.box_kernels import clearances_in_box
 from coop_drake.planning.execution.transport_kernels import PERIOD
 from coop_drake.planning.improvement.box_crossing import cross_box
+from coop_drake.planning.improvement.box_sequences import BegunBoxes, Sequences, Waypoints, box_rows
 from coop_drake.planning.improvement.object_motion import ObjectMotion, object_motion, smallest, soonest_exit
-from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid
 from coop_drake.planning.travel_time import SETTLING_TIME
 from coop_drake.tree.pose import FloatArray, IntArray
 
@@ -27,6 +25,10 @@ LARGEST_DELAY = SETTLING_TIME
 """Box sequences that reach a waypoint later than the fastest one by more than this are dropped [s]: the time
 that angles need to settle is the most that a wider box can save."""
 
+LARGEST_SPEED = 2.0 * FIELD_SPEED
+"""The object is taken to move at most this fast between two ends that are tried for a box [m/s]: twice the
+largest speed of p_G, because an end with more clearance may be left from further away."""
+
 DENSE_ENDS, SPARSE_STEP = 8, 3
 """Each of the first eight waypoints of a box is tried as its end; after them only every third one is."""
 
@@ -37,62 +39,6 @@ ROUNDING = 1e-9
 """Differences of times may be wrong by this [s]: of equally quick boxes the one that begins first is used."""
 
 
-class Waypoints(NamedTuple):
-    """Waypoints of a path, and the data with which boxes along them are tried.
-
-    Attributes:
-        boxes: The team.
-        grid: The floor.
-        path: Waypoints z, theta unwrapped, shape (n, 3 + joints) [m, rad].
-        places: Where they lie along the path, shape (n,) [m].
-        pads: Paddings of a box to choose from, shape (p,) [rad or m].
-        goals: Lower and upper ends of the last goal intervals, shape (2, m) [rad, m].
-        schedule: The rules by which gains are chosen.
-        limits: Largest speed of the object, then largest rates of all axes, shape (1 + m,) [m/s, rad/s].
-        least_clearance: Clearance that every waypoint must keep [m].
-        tolerance: Tolerance of the goal's position [m].
-    """
-
-    boxes: BoxArrays
-    grid: ObstacleGrid
-    path: FloatArray
-    places: FloatArray
-    pads: FloatArray
-    goals: FloatArray
-    schedule: Schedule
-    limits: FloatArray
-    least_clearance: float
-    tolerance: float
-
-
-class _Sequences(NamedTuple):
-    """The fastest box sequence to every waypoint, for every padding of the box that follows.
-
-    Attributes:
-        time: When each waypoint is reached, by the next box's padding, shape (n, p) [s].
-        states: States in which that happens, shape (n, p, 3 + 2 m).
-        before: First waypoint and padding of the box before, -1 for none, shape (n, p, 2).
-    """
-
-    time: FloatArray
-    states: FloatArray
-    before: IntArray
-
-
-class _Boxes(NamedTuple):
-    """The boxes that begin at each waypoint, as far as they have been followed.
-
-    Attributes:
-        lower: Least values of (theta, q...) from each waypoint on, shape (n, m) [rad, m].
-        upper: Greatest values, shape (n, m).
-        held: 1 where the box with each padding may hold further waypoints, shape (n, p).
-    """
-
-    lower: FloatArray
-    upper: FloatArray
-    held: IntArray
-
-
 @compiled
 def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
     """Find the sequence of boxes along waypoints that is crossed in the shortest time.
@@ -100,7 +46,8 @@ def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
     Each box holds some consecutive waypoints, padded by one of a few widths. By dynamic programming, for
     every waypoint and every width of the next box, the fastest sequence and its final state are stored.
     Of the boxes that end at a waypoint the motion of the object comes first: it bounds the time from below.
-    The axes are simulated only in boxes whose bound is less than the fastest time known.
+    The axes are simulated only in boxes whose bound is less than the fastest time known. A box that was too
+    slow at an earlier waypoint is looked at again where it may have caught up.
 
     Args:
         waypoints: The waypoints.
@@ -110,10 +57,13 @@ def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
         waypoint, index of the padding).
     """
     n, count, m = len(waypoints.path), len(waypoints.pads), waypoints.path.shape[1] - 2
-    found = _Sequences(
+    found = Sequences(
         np.full((n, count), np.inf), np.zeros((n, count, 3 + 2 * m)), np.full((n, count, 2), -1)
     )
-    boxes = _Boxes(waypoints.path[:, 2:].copy(), waypoints.path[:, 2:].copy(), np.ones((n, count), np.int64))
+    boxes = BegunBoxes(
+        waypoints.path[:, 2:].copy(), waypoints.path[:, 2:].copy(), np.ones((n, count), np.int64),
+        np.zeros((n, count)),
+    )  # fmt: skip
     for p in range(count):
         found.time[0, p] = 0.0
         for a in range(m):
@@ -124,15 +74,18 @@ def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
         for p in range(count):
             if not found.time[j - 1, p] < smallest(found.time[j - 1]) + LARGEST_DELAY:
                 boxes.held[j - 1, p] = 0
+            boxes.delay[j - 1, p] = (
+                found.time[j - 1, p] + BOX_COST / waypoints.pads[p] - waypoints.places[j - 1] / LARGEST_SPEED
+            )
         while first < j and boxes.held[first].sum() == 0:
             first += 1
         _end_boxes(waypoints, first, j, boxes, found, checks)
-    return found.time[n - 1, 0], _box_rows(found.before)
+    return found.time[n - 1, 0], box_rows(found.before)
 
 
 @compiled
 def _end_boxes(
-    waypoints: Waypoints, first: int, j: int, boxes: _Boxes, found: _Sequences, checks: FloatArray
+    waypoints: Waypoints, first: int, j: int, boxes: BegunBoxes, found: Sequences, checks: FloatArray
 ) -> None:
     """Find the fastest sequences that reach waypoint j, by boxes that begin at waypoint ``first`` or later.
 
@@ -146,7 +99,8 @@ def _end_boxes(
     """
     m = boxes.lower.shape[1]
     lower, upper = np.empty(m), np.empty(m)
-    begins, soonest, clearances_of = [(0, 0)][:0], [0.0][:0], [np.empty(0)][:0]
+    unknown = np.empty(0)
+    begins, soonest, clearances_of = [(0, 0)][:0], [0.0][:0], [unknown][:0]
     for i in range(first, j):
         for a in range(m):
             boxes.lower[i, a] = min(boxes.lower[i, a], waypoints.path[j, 2 + a])
@@ -154,25 +108,11 @@ def _end_boxes(
         if j - i > DENSE_ENDS and (j - i) % SPARSE_STEP != 0 and j + 1 < len(waypoints.path):
             continue
         for p in range(boxes.held.shape[1]):
-            if boxes.held[i, p] == 0:
-                continue
-            _widened(waypoints, boxes, i, p, lower, upper)
-            clearances = clearances_in_box(
-                waypoints.boxes, waypoints.grid, lower, upper, waypoints.path, i, j, LARGEST_CLEARANCE
-            )
-            boxes.held[i, p] = len(clearances) > 0 and smallest(clearances) >= waypoints.least_clearance
-            if boxes.held[i, p] == 0:
-                continue
-            motion = _motion(waypoints, found, i, p, j, clearances, checks)
-            crossed = soonest_exit(motion, LONGEST)
-            if crossed == np.inf:
-                if j - i > DENSE_ENDS:  # Only near ends can have less clearance than further ones.
-                    boxes.held[i, p] = 0
-                continue
-            begins.append((i, p))
-            soonest.append(found.time[i, p] + BOX_COST / waypoints.pads[p] + crossed)
-            clearances_of.append(clearances)
-    for _ in range(len(begins)):
+            if boxes.held[i, p] == 1:
+                begins.append((i, p))
+                soonest.append(boxes.delay[i, p] + waypoints.places[j] / LARGEST_SPEED)
+                clearances_of.append(unknown)
+    for _ in range(2 * len(begins)):
         k = 0
         for other in range(1, len(begins)):
             if soonest[other] < soonest[k]:
@@ -181,13 +121,51 @@ def _end_boxes(
         if not _is_useful(soonest[k], j, found):
             break
         _widened(waypoints, boxes, i, p, lower, upper)
-        motion = _motion(waypoints, found, i, p, j, clearances_of[k], checks)
-        _reach(waypoints, i, p, j, lower, upper, motion, soonest[k], found)
-        soonest[k] = np.inf
+        if len(clearances_of[k]) == 0:
+            clearances_of[k] = clearances_in_box(
+                waypoints.boxes, waypoints.grid, lower, upper, waypoints.path, i, j, LARGEST_CLEARANCE
+            )
+            soonest[k] = _soonest_end(waypoints, boxes, found, i, p, j, clearances_of[k], checks)
+        else:
+            motion = _motion(waypoints, found, i, p, j, clearances_of[k], checks)
+            _reach(waypoints, i, p, j, lower, upper, motion, soonest[k], found)
+            soonest[k] = np.inf
+    latest = smallest(found.time[j]) + LARGEST_DELAY - waypoints.places[j] / LARGEST_SPEED
+    for i, p in begins:
+        if boxes.delay[i, p] > latest:
+            boxes.held[i, p] = 0
 
 
 @compiled
-def _is_useful(soonest: float, j: int, found: _Sequences) -> bool:
+def _soonest_end(
+    waypoints: Waypoints,
+    boxes: BegunBoxes,
+    found: Sequences,
+    i: int,
+    p: int,
+    j: int,
+    clearances: FloatArray,
+    checks: FloatArray,
+) -> float:
+    """When the box with padding p from waypoint i may be left at j, whatever the axes do [s].
+
+    Infinity where it may not. A box that holds no further waypoints is not followed any more.
+    """
+    boxes.held[i, p] = len(clearances) > 0 and smallest(clearances) >= waypoints.least_clearance
+    if boxes.held[i, p] == 0:
+        return np.inf
+    crossed = soonest_exit(_motion(waypoints, found, i, p, j, clearances, checks), LONGEST)
+    if crossed == np.inf:
+        if j - i > DENSE_ENDS:  # Only near ends can have less clearance than further ones.
+            boxes.held[i, p] = 0
+        return np.inf
+    soonest: float = found.time[i, p] + BOX_COST / waypoints.pads[p] + crossed
+    boxes.delay[i, p] = soonest - waypoints.places[j] / LARGEST_SPEED
+    return soonest
+
+
+@compiled
+def _is_useful(soonest: float, j: int, found: Sequences) -> bool:
     """Whether a sequence that reaches waypoint j at a time would be the fastest for some next padding."""
     nexts = 1 if j + 1 == len(found.time) else found.time.shape[1]
     useful = False
@@ -198,7 +176,7 @@ def _is_useful(soonest: float, j: int, found: _Sequences) -> bool:
 
 @compiled
 def _widened(
-    waypoints: Waypoints, boxes: _Boxes, i: int, p: int, lower: FloatArray, upper: FloatArray
+    waypoints: Waypoints, boxes: BegunBoxes, i: int, p: int, lower: FloatArray, upper: FloatArray
 ) -> None:
     """Write the ends of the box that begins at waypoint i, with padding p, shape (m,) each [rad, m]."""
     for a in range(len(lower)):
@@ -209,7 +187,7 @@ def _widened(
 @compiled
 def _motion(
     waypoints: Waypoints,
-    found: _Sequences,
+    found: Sequences,
     i: int,
     p: int,
     j: int,
@@ -233,7 +211,7 @@ def _reach(
     upper: FloatArray,
     motion: ObjectMotion,
     soonest: float,
-    found: _Sequences,
+    found: Sequences,
 ) -> None:
     """Cross a box from waypoint i to j for every padding of the next box, and keep what is faster.
 
@@ -278,15 +256,3 @@ def _reach(
             for k in range(len(state)):
                 found.states[j, q, k] = state[k]
             found.before[j, q, 0], found.before[j, q, 1] = i, p
-
-
-@compiled
-def _box_rows(before: IntArray) -> IntArray:
-    """A row (first waypoint, last waypoint, padding) for each box; none if the goal was not reached."""
-    rows = np.empty((len(before), 3), np.int64)
-    j, q, first = len(before) - 1, 0, len(rows)
-    while j > 0 and before[j, q, 0] >= 0:
-        first -= 1
-        rows[first, 0], rows[first, 1], rows[first, 2] = before[j, q, 0], j, before[j, q, 1]
-        j, q = before[j, q, 0], before[j, q, 1]
-    return rows[first:]

@@ -14,13 +14,15 @@ from coop_drake.geometry.minkowski import to_polygon
 from coop_drake.geometry.swept_tree import SweptTree
 from coop_drake.laws import GainSet
 from coop_drake.laws.gain_schedule import schedule_of
-from coop_drake.planning.boxes.box_kernels import BoxArrays, longest_box
+from coop_drake.planning.boxes.box_kernels import longest_box
+from coop_drake.planning.boxes.box_sweeps import BoxArrays
 from coop_drake.planning.boxes.boxes import Regions
 from coop_drake.planning.boxes.certify import PathBox, box_arrays
 from coop_drake.planning.boxes.channel import Channel, FreeBox
 from coop_drake.planning.cells.slices import nearest_turn
 from coop_drake.planning.execution.channel_ends import final_intervals
-from coop_drake.planning.improvement.box_choice import Waypoints, choose_boxes
+from coop_drake.planning.improvement.box_choice import choose_boxes
+from coop_drake.planning.improvement.box_sequences import Waypoints
 from coop_drake.planning.questions.margins import shrunk
 from coop_drake.planning.sampling.obstacle_grid import ObstacleGrid, grid_inside
 from coop_drake.tree.pose import FloatArray

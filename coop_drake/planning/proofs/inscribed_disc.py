@@ -13,14 +13,13 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.answers.proof import InfeasibilityProof
 from coop_drake.geometry.convex import normals
 from coop_drake.geometry.minkowski import FreeSpace, to_polygon
-from coop_drake.geometry.sweep_kernels import over_piece
+from coop_drake.geometry.piece_sweeps import over_piece
 from coop_drake.planning.cells.cells import regions_of
 from coop_drake.planning.proofs.proof_making import disc_proof
 from coop_drake.planning.proofs.witnesses import LEAST_LOSS
 from coop_drake.planning.questions.relaxation import inscribed_disc
 from coop_drake.tree.component_tree import ComponentTree, ConvexShape
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import team_arrays
 
 _DIRECTIONS = normals(np.arange(0.0, 32.0) * (pi / 16.0))
 """Corners of a regular polygon inside the unit disc, shape (32, 2) [-]: its radius is 0.5 % too small."""
@@ -74,7 +73,7 @@ def _places(problem: PlanningProblem, component: int, centre: FloatArray) -> Bas
             for joint, goal in zip(tree.joints, problem.goal_joints, strict=True)
         ]
     )
-    point = team_arrays(tree)._replace(pieces=np.array([[component, 0, 1]]), vertices=centre[None, :].copy())
+    point = tree.arrays._replace(pieces=np.array([[component, 0, 1]]), vertices=centre[None, :].copy())
     ring = over_piece(
         point, 0, bounds[:, 0].copy(), bounds[:, 1].copy(), len(tree.ancestors[component]), False
     )

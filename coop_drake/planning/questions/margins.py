@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from math import pi
 
 import numpy as np
@@ -35,6 +36,9 @@ NEXT_FRACTION = 0.7
 
 PATCH_FACTOR = 2.0
 """The floor around a start or goal that is shrunk less reaches this many margins beyond its footprint [-]."""
+
+_REMEMBERED = 4
+"""Floors at a margin that are remembered [-]."""
 
 ARC_SEGMENTS = 32
 """Segments of a quarter circle in exact footprints: a disc's polygon is right to 3e-4 of its radius."""
@@ -71,11 +75,13 @@ def disc_polygon(radius: float) -> FloatArray:
     return octagon
 
 
+@lru_cache(maxsize=_REMEMBERED)
 def marginal_workspace(problem: PlanningProblem, margin: float) -> MultiPolygon:
     """Workspace shrunk by the margin, but less near a start or goal that stands close to a wall.
 
     There the floor around the footprint is shrunk by a fifth of the footprint's own clearance only, so that a
-    start near a wall does not forbid a margin everywhere else.
+    start near a wall does not forbid a margin everywhere else. The last few are remembered: a search uses
+    the same margins again and again.
     """
     result = shrunk(problem.workspace, margin)
     for footprint, clearance in _close_ends(problem, margin):

@@ -20,7 +20,6 @@ from coop_drake.planning.sampling.near_contacts import Contacts, body_contacts, 
 from coop_drake.planning.sampling.obstacle_grid import grid_for_team
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import team_arrays
 
 if TYPE_CHECKING:
     from scipy.optimize import LinearConstraint
@@ -57,7 +56,7 @@ def with_wider_passages(
     from scipy.optimize import Bounds, milp  # Here: its import takes a tenth of a second.
 
     tree = problem.tree
-    team, scale = team_arrays(tree), configuration_scale(tree)
+    team, scale = tree.arrays, configuration_scale(tree)
     clear = clearances(team, grid_for_team(problem.workspace, team), path, WIDE_ENOUGH + NEAR)
     chosen = np.convolve(clear < WIDE_ENOUGH + most, np.ones(1 + 2 * BESIDE), "same") > 0.0
     chosen[[0, -1]] = False

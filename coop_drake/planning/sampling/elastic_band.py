@@ -13,7 +13,6 @@ from coop_drake.planning.sampling.sampler import JOINT_RATE, SPEED, TURN_RATE
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import team_arrays
 
 CLEARANCE_PRICE = 0.12
 """Cost of a unit length of the path for its narrowness, times the clearance there [m]."""
@@ -65,7 +64,7 @@ def smoothed(
     """
     tree = problem.tree
     scale = configuration_scale(tree)
-    team = team_arrays(tree)
+    team = tree.arrays
     grid = grid_for_team(marginal_workspace(problem, clearance), team)
     unbounded = np.full(3, np.inf)
     better: FloatArray = improve(
@@ -91,7 +90,7 @@ def estimated_duration(problem: PlanningProblem, path: FloatArray) -> float:
         problem: The question.
         path: Configurations, theta unwrapped, shape (m, 3 + n).
     """
-    scale, team = configuration_scale(problem.tree), team_arrays(problem.tree)
+    scale, team = configuration_scale(problem.tree), problem.tree.arrays
     samples = densified(path, scale, SPACING)
     clear = np.maximum(clearances(team, grid_for_team(problem.workspace, team), samples, FAR), 0.0)
     moved = np.abs(np.diff(samples, axis=0))
@@ -114,7 +113,7 @@ def path_clearance(problem: PlanningProblem, path: FloatArray, most: float) -> f
     Returns:
         The clearance; it is measured at samples and proves nothing [m].
     """
-    scale, team = configuration_scale(problem.tree), team_arrays(problem.tree)
+    scale, team = configuration_scale(problem.tree), problem.tree.arrays
     samples = densified(path, scale, 0.5 * SPACING)
     clear = clearances(team, grid_for_team(problem.workspace, team), samples, FAR)
     moved = [(np.abs(samples - samples[end]) * scale).sum(axis=1) for end in (0, -1)]

@@ -18,7 +18,6 @@ from coop_drake.planning.sampling.elastic_band_kernels import improve
 from coop_drake.planning.sampling.obstacle_grid import grid_for_team
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import team_arrays
 
 BODY_GAP = 0.002
 """Distance that bodies of the team keep from each other [m]."""
@@ -117,7 +116,7 @@ def with_larger_least_clearance(
         free_end: Whether the path ends at the goal, where free joints may move.
     """
     tree = problem.tree
-    team, scale = team_arrays(tree), configuration_scale(tree)
+    team, scale = tree.arrays, configuration_scale(tree)
     unbounded = np.full(3, np.inf)
     better: FloatArray = improve(
         team,
@@ -150,14 +149,14 @@ def amount_needed(eased: Eased, path: FloatArray, most: float) -> tuple[float, i
 
 def first_blocked(problem: PlanningProblem, path: FloatArray) -> int:
     """Index of the first sample that is not within limits and free of collisions, m if all are; exact."""
-    team, within = team_arrays(problem.tree), _within_limits(problem, path)
+    team, within = problem.tree.arrays, _within_limits(problem, path)
     count = len(path) if within.all() else int(np.argmin(within))
     return first_collision(team, grid_for_team(problem.workspace, team), path[:count], 0.0)
 
 
 def are_free(problem: PlanningProblem, path: FloatArray) -> NDArray[np.bool_]:
     """Whether each sample is within limits and free of collisions; exact, shape (m,)."""
-    team = team_arrays(problem.tree)
+    team = problem.tree.arrays
     grid = grid_for_team(problem.workspace, team)
     free: NDArray[np.bool_] = np.array([is_free(team, grid, z, 0.0) for z in path])
     return free & _within_limits(problem, path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from math import sqrt
 from typing import NamedTuple
 
@@ -25,6 +26,9 @@ _MOST_SQUARES = 40_000
 
 _SQUARES_PER_REACH = 6.0
 """Squares in the distance within which edges are listed [-]: lists of neighbouring squares differ little."""
+
+_REMEMBERED = 4
+"""Grids that are remembered [-]; one over a large floor takes some megabytes."""
 
 _OFF_THE_EDGES = np.array([0.317, 0.291])
 """Shift of the grid against the floor's corner, in squares [-]: middles of squares then hardly ever lie on
@@ -175,9 +179,19 @@ def centres_inside(edges: FloatArray, corner: FloatArray, side: float, rows: int
 
 def grid_for_team(workspace: Polygon | MultiPolygon, team: TeamArrays) -> ObstacleGrid:
     """Lay a grid over a floor, fine and wide enough for a team and for distances up to ``FAR``."""
-    return lay_grid(polygon_rings(workspace), float(team.discs[:, 2].max(initial=0.0)) + FAR)
+    return _grid(workspace, float(team.discs[:, 2].max(initial=0.0)) + FAR)
 
 
+@lru_cache(maxsize=_REMEMBERED)
+def _grid(workspace: Polygon | MultiPolygon, reach: float) -> ObstacleGrid:
+    """A grid over a floor; the last few are remembered, for a search uses them again and again."""
+    return lay_grid(polygon_rings(workspace), reach)
+
+
+@lru_cache(maxsize=_REMEMBERED)
 def grid_inside(workspace: Polygon | MultiPolygon, reach: float) -> ObstacleGrid:
-    """Lay a grid over a floor shrunk by ``SAFE_SIDE``: all inside it is on the floor, despite rounding."""
+    """Lay a grid over a floor shrunk by ``SAFE_SIDE``: all inside it is on the floor, despite rounding.
+
+    The last few are remembered.
+    """
     return lay_grid(FreeSpace.under(workspace).rings, reach + FAR)

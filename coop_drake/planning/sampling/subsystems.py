@@ -13,7 +13,7 @@ from coop_drake.planning.sampling.collision_kernels import bodies_apart
 from coop_drake.tree.component_tree import Body, Component, ComponentTree, ConvexShape
 from coop_drake.tree.levers import configuration_scale
 from coop_drake.tree.pose import FloatArray
-from coop_drake.tree.team_arrays import TeamArrays, place, team_arrays
+from coop_drake.tree.team_arrays import TeamArrays, place
 
 DISC_TOLERANCE, DISC_SHRINKAGE = 1e-3, 0.98
 """Accuracy of a guiding disc over its piece's perimeter, and the factor by which it is smaller than the
@@ -33,7 +33,7 @@ class Subsystem:
 
     def __init__(self, question: PlanningProblem, joints: tuple[int, ...]) -> None:
         self.question, self.joints = question, joints
-        self.team: TeamArrays = team_arrays(question.tree)
+        self.team: TeamArrays = question.tree.arrays
         self.scale = configuration_scale(question.tree)
         self.start = question.start.astype(float)
 
