@@ -82,8 +82,9 @@ def plan(
         problem = replace(problem, settings=replace(problem.settings, effort=effort))
     local, near = local_question(problem), None
     if local is not None:
+        part, route = local
         near = _answer(
-            local, gain_set, gain_set_name, budget, progress, partial(find_path, routed=True), workers
+            part, gain_set, gain_set_name, budget, progress, partial(find_path, route=route), workers
         )
         if isinstance(near, Found | BeyondLimits):
             near = replace(near, plan=replace(near.plan, problem=problem_digest(problem)))

@@ -52,8 +52,10 @@ def test_a_route_prefers_the_wide_passage_and_few_turns() -> None:
 def test_a_plan_near_a_route_answers_the_question_on_the_whole_floor() -> None:
     far = shelf_problem(MANY_CORNERS + 200)
     question = replace(far, goal_pose=far.start[:3] + np.array([9.0, 0.0, 0.0]))  # three aisles further
-    local = local_question(question)
-    assert local is not None
+    near = local_question(question)
+    assert near is not None
+    local, route = near
+    assert local.workspace.contains(LineString(route))
     assert question.workspace.buffer(1e-9).contains(local.workspace)
     assert shapely.get_num_coordinates(local.workspace) < MANY_CORNERS / 2
     assert all(local.workspace.contains(Point(p[:2])) for p in (question.start, question.goal_pose))

@@ -27,11 +27,14 @@ SMALLER = 0.5
 """A local floor with more than this fraction of the floor's corners is not used [-]."""
 
 
-def local_question(problem: PlanningProblem) -> PlanningProblem | None:
+def local_question(problem: PlanningProblem) -> tuple[PlanningProblem, FloatArray] | None:
     """The question on the part of its floor near a route; None if the floor is small or there is no route.
 
     What is free there is free on the floor, because the part lies inside it. That no path exists there says
     nothing about the floor.
+
+    Returns:
+        The question, and the route, shape (k, 2) [m].
 
     Raises:
         PlanError: If the question has no meaning; names the entry and what is allowed.
@@ -52,7 +55,7 @@ def local_question(problem: PlanningProblem) -> PlanningProblem | None:
         Point(problem.goal_pose[:2])
     ):
         return None
-    return replace(problem, workspace=near)
+    return replace(problem, workspace=near), route
 
 
 def object_route(problem: PlanningProblem) -> FloatArray | None:

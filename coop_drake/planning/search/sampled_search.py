@@ -26,7 +26,6 @@ from coop_drake.planning.sampling.clear_paths import (
 )
 from coop_drake.planning.sampling.elastic_band import smoothed
 from coop_drake.planning.sampling.guided_samples import GuidePath
-from coop_drake.planning.sampling.local_floor import object_route
 from coop_drake.planning.sampling.sampler import FEW_JOINTS, Sampler
 from coop_drake.planning.sampling.subsystems import SubsystemHierarchy
 from coop_drake.planning.search.attempt import LIGHT_ATTEMPTS, BoxSequence, Tried, samples_of_attempt
@@ -50,19 +49,20 @@ class SampledSearch:
 
     Args:
         problem: The question.
-        routed: Whether the object is sampled along a route for a disc that is computed, not sampled.
+        route: A route for a disc inside the object, around which paths are sampled, shape (k, 2) [m]; None:
+            the disc's path is sampled, too.
 
     Attributes:
         slices: Boxes tried so far.
         object_blocked: Number of attempts in a row in which no path was found even for the object alone.
     """
 
-    def __init__(self, problem: PlanningProblem, *, routed: bool = False) -> None:
+    def __init__(self, problem: PlanningProblem, route: FloatArray | None = None) -> None:
         self._problem = problem
         self._swept = SweptTree(problem.tree)
         self._pairs = BodyPairs(self._swept)
         self._scale = configuration_scale(problem.tree)
-        self._hierarchy = SubsystemHierarchy(problem, object_route(problem) if routed else None)
+        self._hierarchy = SubsystemHierarchy(problem, route)
         self._narrow = NarrowSearch(problem, self._hierarchy, self._closely)
         self._start_inside = problem.workspace.contains(exact_footprint(problem.tree, problem.start))
         self._attempts = 0

@@ -35,6 +35,7 @@ from coop_drake.planning.search.cell_search import search_by_cells
 from coop_drake.planning.search.rescaling import Rescaling
 from coop_drake.planning.search.sampled_search import SampledSearch
 from coop_drake.progress import Progress
+from coop_drake.tree.pose import FloatArray
 from coop_drake.tree.usual_unit import usual_unit
 
 FURTHER_ATTEMPTS, ATTEMPTS_PER_ROUND = 2, 3
@@ -85,7 +86,7 @@ def find_path(
     progress: Progress | None = None,
     watch: Watch | None = None,
     *,
-    routed: bool = False,
+    route: FloatArray | None = None,
     workers: int = 1,
 ) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
     """Find a path that boxes cover, or prove that there is none; then look for a larger margin.
@@ -97,7 +98,7 @@ def find_path(
         problem: The question.
         progress: Called with a phase and the fraction of it that is done.
         watch: Called with the events of explorations.
-        routed: Whether only paths along a route for a disc are sampled, and nothing is proved.
+        route: Route for a disc, along which alone paths are sampled, shape (k, 2) [m]; it proves nothing.
         workers: Processes at a time, see ``plan``.
 
     Returns:
@@ -113,10 +114,11 @@ def find_path(
         return NoChannel(True, beyond, proof), SearchReport(slices)
     unit = usual_unit(problem.tree)
     if unit == 1.0:
-        return _answered(problem, progress, watch, routed=routed, workers=workers)
+        return _answered(problem, progress, watch, route=route, workers=workers)
     scale = Rescaling(problem, unit)
     question, seen = scale.question(), scale.watched(watch)
-    answer, report = _answered(question, progress, seen, unit, routed=routed, workers=workers)
+    route = None if route is None else route / unit
+    answer, report = _answered(question, progress, seen, unit, route=route, workers=workers)
     return scale.answer(answer), report
 
 
@@ -126,12 +128,12 @@ def _answered(
     watch: Watch | None,
     unit: float = 1.0,
     *,
-    routed: bool,
+    route: FloatArray | None,
     workers: int,
 ) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
     if problem.settings.strategy != "portfolio":
         return search_by_cells(problem, progress, watch)
-    return _Search(problem, progress, watch, unit, routed=routed, workers=workers).run()
+    return _Search(problem, progress, watch, unit, route=route, workers=workers).run()
 
 
 class _Search:
@@ -142,7 +144,7 @@ class _Search:
         progress: Called with a phase and the fraction of it that is done.
         watch: Called with the events of explorations.
         unit: The question's unit of length, for sentences [m].
-        routed: Whether only paths along a route are sampled.
+        route: Route along which alone paths are sampled, shape (k, 2).
         workers: Processes at a time.
     """
 
@@ -153,26 +155,25 @@ class _Search:
         watch: Watch | None,
         unit: float,
         *,
-        routed: bool,
+        route: FloatArray | None,
         workers: int,
     ) -> None:
-        self._began, self._unit, self._routed = thread_time(), unit, routed
+        self._began, self._unit, self._route = thread_time(), unit, route
         self._first_plan: float | None = None
         self._problem, self._progress, self._watch, self._workers = problem, progress, watch, workers
-        self._samples = SampledSearch(problem, routed=routed)
+        self._samples = SampledSearch(problem, route)
         self._proofs = Proofs(problem, watch)
         self._other_slices = self._narrow_attempts = 0
 
     def run(self) -> tuple[CoveredPath | Channel | NoChannel, SearchReport]:
         """Sample, then prove and sample in turns."""
-        answer = self._routed_answer() if self._routed else self._answer()
+        answer = self._answer() if self._route is None else self._routed_answer()
         return answer, SearchReport(self._slices(), self._first_plan)
 
     def _routed_answer(self) -> CoveredPath | NoChannel:
         found = self._sampled(ROUTED_ATTEMPTS)
-        return (
-            NoChannel(False, "no path along a route was found") if found is None else self._with_margin(found)
-        )
+        none = NoChannel(False, "no path along a route was found")
+        return none if found is None else self._with_margin(found)
 
     def _answer(self) -> CoveredPath | Channel | NoChannel:
         found = self._sampled(1)

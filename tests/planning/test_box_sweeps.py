@@ -1,0 +1,34 @@
+"""A box sweeps each piece once; what pairs of bodies need is the sweep over the first joints of a piece."""
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from coop_drake.geometry.body_pairs import BodyPairs
+from coop_drake.geometry.piece_sweeps import over_piece
+from coop_drake.geometry.swept_tree import SweptTree
+from coop_drake.planning.boxes.box_sweeps import bodies_apart, room_for_sweeps, swept_piece
+from coop_drake.planning.boxes.certify import box_arrays
+from tests.support.trees import slices_of, trees
+
+SOME = settings(max_examples=25)
+
+
+@SOME
+@given(st.data())
+def test_sweeps_are_those_of_each_piece_and_bodies_touch_where_pairs_do(data: st.DataObject) -> None:
+    tree = data.draw(trees())
+    intervals = data.draw(slices_of(tree))
+    swept = SweptTree(tree)
+    pairs = BodyPairs(swept)
+    boxes, bounds = box_arrays(swept, pairs), np.array(intervals)
+    lower, upper = bounds[:, 0].copy(), bounds[:, 1].copy()
+    sweeps, vertices, frame = room_for_sweeps(len(boxes.frames)), np.empty((1, 2)), 0
+    for piece in reversed(range(len(swept.pieces))):
+        ring, vertices, frame = swept_piece(boxes, piece, lower, upper, sweeps, vertices, frame)
+        assert (ring == over_piece(boxes.team, piece, lower, upper, len(boxes.team.links), True)).all()
+    assert frame == len(boxes.frames)
+    for k, (piece, stages) in enumerate(boxes.frames.tolist()):
+        kept = vertices[sweeps.first[k] : sweeps.first[k + 1]]
+        assert (kept == over_piece(boxes.team, piece, lower, upper, stages, False)).all()
+    assert bodies_apart(boxes, sweeps, vertices) == (pairs.touching(intervals) is None)
