@@ -82,7 +82,7 @@ class Certifier:
         self._boxes = box_arrays(swept, pairs)
         self._grid: ObstacleGrid = grid_inside(workspace, swept.tree.reach)
         self._scale, self._margin = scale, margin
-        self._reach = FIRST_REACH
+        self._reach, self._level = FIRST_REACH, 0
         self.trials = 0
 
     def boxes(
@@ -109,7 +109,7 @@ class Certifier:
         finest = SMALLEST_SPACING if smallest else FINEST_SPACING
         samples = densified(path, self._scale, SPACING)
         boxes: list[PathBox] = []
-        i = 0
+        i, self._level = 0, 0
         while i < len(samples) - 1:
             found = self._next_box(samples, i, longest, levels)
             if found is None:
@@ -126,8 +126,13 @@ class Certifier:
     def _next_box(
         self, samples: FloatArray, i: int, longest: bool, levels: tuple[tuple[float, float], ...]
     ) -> tuple[int, PathBox] | None:
-        """The box that begins at sample i, and the sample at which it ends; None if there is none."""
-        for pad, clearance in levels:
+        """The box that begins at sample i, and the sample at which it ends; None if there is none.
+
+        Levels wider than that of the box before by more than one are not tried: they would fail in narrow
+        passages again and again.
+        """
+        for level in range(max(self._level - 1, 0), len(levels)):
+            pad, clearance = levels[level]
             fastest, furthest, trials = longest_box(
                 self._boxes, self._grid, samples, i, self._reach, pad, clearance, self._margin
             )
@@ -135,6 +140,7 @@ class Certifier:
             self._reach = max(1, furthest - i)
             j = furthest if longest else fastest
             if j > i:
+                self._level = level
                 lower, upper = padded(self._boxes, samples, i, j, pad)
                 intervals = tuple((float(a), float(b)) for a, b in zip(lower, upper, strict=True))
                 return j, PathBox(intervals, samples[i : j + 1, :2].copy())
