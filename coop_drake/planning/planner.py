@@ -80,6 +80,8 @@ def plan(
         if not 0.0 <= effort < inf:
             raise ValueError(f"effort is {effort}; allowed are numbers of 0 or more")
         problem = replace(problem, settings=replace(problem.settings, effort=effort))
+    # Floors are remembered by question, and the caller may change the arrays of a question between two calls.
+    problem = replace(problem, start=problem.start.copy(), goal_pose=problem.goal_pose.copy())
     local, near = local_question(problem), None
     if local is not None:
         part, route = local

@@ -54,6 +54,16 @@ def test_a_channel_becomes_a_plan(asked):
     assert result.report == REPORT
 
 
+def test_a_question_that_is_changed_afterwards_is_another_question(asked):
+    problem, _ = bent_channel(cells=3)
+    questions = asked(NoChannel(True, "separated"), NoChannel(True, "separated"))
+    ask(problem)
+    problem.start[0] += 0.01
+    ask(problem)
+    assert questions[0] != questions[1]
+    assert questions[1].start[0] == pytest.approx(questions[0].start[0] + 0.01)
+
+
 def test_a_proof_is_infeasible_and_a_spent_budget_undecided(asked):
     problem, _ = bent_channel(cells=3)
     asked(NoChannel(True, "separated"))

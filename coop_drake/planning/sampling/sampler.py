@@ -128,13 +128,16 @@ class Sampler:
                 return _NO_PATH
         return _NO_PATH if best is None else best.path
 
-    def direct_path(self, samples: int, part: tuple[int, ...] | None = None) -> FloatArray:
+    def direct_path(
+        self, samples: int, part: tuple[int, ...] | None = None, *, anywhere: bool = True
+    ) -> FloatArray:
         """Find a path for the whole team at once, see ``direct``.
 
         Args:
             samples: Samples drawn at most for each subsystem.
             part: Robots that are sampled with the object first, ascending; the team is then sampled around
                 their path, and not at all if none is found. None: the team is sampled at once.
+            anywhere: See ``direct``.
 
         Returns:
             As ``path``.
@@ -144,10 +147,10 @@ class Sampler:
             path = _NO_PATH if guide is None else self.path_around(guide, samples)
             if guide is None or len(path):
                 return path
-        whole = self.direct(self._hierarchy.robots, samples)
+        whole = self.direct(self._hierarchy.robots, samples, anywhere=anywhere)
         return _NO_PATH if whole is None else whole.path
 
-    def direct(self, robots: tuple[int, ...], samples: int) -> GuidePath | None:
+    def direct(self, robots: tuple[int, ...], samples: int, *, anywhere: bool = True) -> GuidePath | None:
         """Find a path of the object with some robots at once, around the disc's path, else the object's.
 
         Samples are free component by component, and lie where the trees have come furthest. If neither guide
@@ -156,6 +159,7 @@ class Sampler:
         Args:
             robots: The robots, ascending.
             samples: Samples drawn at most for each subsystem.
+            anywhere: Whether samples lie anywhere if neither guide helps.
 
         Returns:
             The path, or None if none was found.
@@ -168,7 +172,7 @@ class Sampler:
             self.object_blocked = alone is None
             if alone is not None:
                 found, _ = self._guide(chosen, alone, samples, WHERE_TREES_END)
-        if found is None:
+        if found is None and anywhere:
             found, _ = self._guide(chosen, None, UNGUIDED_SAMPLES_FACTOR * samples)
             self.object_blocked = found is None and (self.object_blocked or not robots)
         return found

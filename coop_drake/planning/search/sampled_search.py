@@ -140,7 +140,10 @@ class SampledSearch:
         direct = number > 1 or len(self._problem.goal_joints) > FEW_JOINTS
         samples = samples_of_attempt(number)
         if guide is None:
-            path = sampler.direct_path(samples, part) if direct else sampler.path(samples)
+            # Samples anywhere take as long as all others, and hardly ever help where these did not.
+            path = (
+                sampler.direct_path(samples, part, anywhere=number > 1) if direct else sampler.path(samples)
+            )
         else:
             joints = tuple(range(guide.shape[1] - 3))
             path = sampler.path_around(GuidePath(guide, joints), samples)
