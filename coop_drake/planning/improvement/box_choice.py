@@ -74,9 +74,7 @@ def choose_boxes(waypoints: Waypoints) -> tuple[float, IntArray]:
         for p in range(count):
             if not found.time[j - 1, p] < smallest(found.time[j - 1]) + LARGEST_DELAY:
                 boxes.held[j - 1, p] = 0
-            boxes.delay[j - 1, p] = (
-                found.time[j - 1, p] + BOX_COST / waypoints.pads[p] - waypoints.places[j - 1] / LARGEST_SPEED
-            )
+            boxes.delay[j - 1, p] = _begun(waypoints, found, j - 1, p) - _least_time(waypoints, j - 1)
         while first < j and boxes.held[first].sum() == 0:
             first += 1
         _end_boxes(waypoints, first, j, boxes, found, checks)
@@ -110,7 +108,7 @@ def _end_boxes(
         for p in range(boxes.held.shape[1]):
             if boxes.held[i, p] == 1:
                 begins.append((i, p))
-                soonest.append(boxes.delay[i, p] + waypoints.places[j] / LARGEST_SPEED)
+                soonest.append(boxes.delay[i, p] + _least_time(waypoints, j))
                 clearances_of.append(unknown)
     for _ in range(2 * len(begins)):
         k = 0
@@ -130,7 +128,7 @@ def _end_boxes(
             motion = _motion(waypoints, found, i, p, j, clearances_of[k], checks)
             _reach(waypoints, i, p, j, lower, upper, motion, soonest[k], found)
             soonest[k] = np.inf
-    latest = smallest(found.time[j]) + LARGEST_DELAY - waypoints.places[j] / LARGEST_SPEED
+    latest = smallest(found.time[j]) + LARGEST_DELAY - _least_time(waypoints, j)
     for i, p in begins:
         if boxes.delay[i, p] > latest:
             boxes.held[i, p] = 0
@@ -159,9 +157,23 @@ def _soonest_end(
         if j - i > DENSE_ENDS:  # Only near ends can have less clearance than further ones.
             boxes.held[i, p] = 0
         return np.inf
-    soonest: float = found.time[i, p] + BOX_COST / waypoints.pads[p] + crossed
-    boxes.delay[i, p] = soonest - waypoints.places[j] / LARGEST_SPEED
+    soonest: float = _begun(waypoints, found, i, p) + crossed
+    boxes.delay[i, p] = soonest - _least_time(waypoints, j)
     return soonest
+
+
+@compiled
+def _begun(waypoints: Waypoints, found: Sequences, i: int, p: int) -> float:
+    """When the box with padding p from waypoint i is entered, with what a box costs besides its time [s]."""
+    begun: float = found.time[i, p] + BOX_COST / waypoints.pads[p]
+    return begun
+
+
+@compiled
+def _least_time(waypoints: Waypoints, j: int) -> float:
+    """Time in which the path up to waypoint j is passed at ``LARGEST_SPEED`` [s]."""
+    least: float = waypoints.places[j] / LARGEST_SPEED
+    return least
 
 
 @compiled
@@ -229,7 +241,7 @@ def _reach(
     last = j + 1 == len(waypoints.path)
     m, nexts = len(lower), 1 if last else len(waypoints.pads)
     ends, state = np.empty((2, m)), np.empty(3 + 2 * m)
-    begun = found.time[i, p] + BOX_COST / waypoints.pads[p]
+    begun = _begun(waypoints, found, i, p)
     for q in range(nexts):
         if soonest > found.time[j, q]:
             continue
