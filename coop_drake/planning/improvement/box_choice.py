@@ -27,7 +27,7 @@ that angles need to settle is the most that a wider box can save."""
 
 LARGEST_SPEED = 2.0 * FIELD_SPEED
 """The object is taken to move at most this fast between two ends that are tried for a box [m/s]: twice the
-largest speed of p_G, because an end with more clearance may be left from further away."""
+largest field (13). It is no bound: a box in which the object is quicker may be looked at again too late."""
 
 DENSE_ENDS, SPARSE_STEP = 8, 3
 """Each of the first eight waypoints of a box is tried as its end; after them only every third one is."""
