@@ -1,5 +1,6 @@
 """A proof holds: forbidden sets and cells cover all configurations, labels separate start from goal."""
 
+from collections.abc import Iterator
 from itertools import pairwise, product
 from math import isqrt, prod
 from typing import Any
@@ -9,6 +10,7 @@ from coop_drake.checking.plane import (
     BITS,
     FULL,
     ONE,
+    Convex,
     Interval,
     Point,
     Region,
@@ -149,30 +151,33 @@ class _Sets:
     """Open sets of positions: given ones, and what polygons K forbid, made as far as it is looked for.
 
     Attributes:
-        known: A region by its number, and how far its points are moved to be positions.
+        known: A set by its number, and how far its points are moved to be positions.
+        taken: Numbers of the sets whose edges are to be covered, or have been.
+        last: Numbers of those that covered the last edge.
     """
 
     def __init__(self, given: list[Region], polygons: list[list[Point]], outside: Region) -> None:
-        self.known, self.polygons, self.walls = dict[int, tuple[Region, Point]](), polygons, outside.edges
-        for cell in given:
-            self.known[len(self.known)] = cell, (0, 0)
+        self.known = dict[int, tuple[Region | Convex, Point]](enumerate((one, (0, 0)) for one in given))
+        self.given, self.polygons, self.outside = given, polygons, outside
+        self.boxes, self.reaches = [one.box for one in given], [plane.box_of(its) for its in polygons]
+        self.taken, self.last = set[int](), set[int]()
         for polygon in polygons:
             x, y = (sum(values) // len(polygon) for values in zip(*polygon, strict=True))
             self.known[len(self.known)] = outside, (-x, -y)
-        self.always, self.outside = list(self.known), outside
 
     def near(self, edge: tuple[Point, Point]) -> list[int]:
-        """The sets that may meet an edge."""
-        box, regions = plane.box_of(edge), [self.known[k][0] for k in self.always]
-        spend(len(regions))
-        found = [k for k, one in enumerate(regions) if not (one.odd and plane.boxes_apart(one.box, box, 0))]
+        """The given sets, and those of positions where K meets a wall, that may meet an edge."""
+        box = plane.box_of(edge)
+        spend(len(self.given))
+        found = plane.boxes_near(self.boxes, range(len(self.boxes)), box, 0)
         for number, polygon in enumerate(self.polygons):
-            zone = [end + off for end, off in zip(box, plane.box_of(polygon), strict=True)]
+            zone = [end + off for end, off in zip(box, self.reaches[number], strict=True)]
             for wall in self.outside.near(zone, 0):
-                k = len(self.always) + number * len(self.walls) + wall
+                k = len(self.given) + len(self.polygons) + number * len(self.outside.edges) + wall
                 if k not in self.known:
-                    corners = hull((wx - x, wy - y) for wx, wy in self.walls[wall] for x, y in polygon)
-                    self.known[k] = Region([corners]), (0, 0)
+                    ends = self.outside.edges[wall]
+                    corners = hull((wx - x, wy - y) for wx, wy in ends for x, y in polygon)
+                    self.known[k] = Convex(corners), (0, 0)
                 found.append(k)
         return found
 
@@ -181,10 +186,34 @@ class _Sets:
         region, (x, y) = self.known[k]
         return [((ax + x, ay + y), (bx + x, by + y)) for (ax, ay), (bx, by) in region.edges]
 
-    def stretches(self, k: int, edge: tuple[Point, Point]) -> list[Interval]:
-        """Stretches of an edge in a set."""
-        region, (x, y) = self.known[k]
-        return region.stretches([(px - x, py - y) for px, py in edge])
+    def covering(self, edge: tuple[Point, Point]) -> set[int]:
+        """One set that covers an edge, or some that do together, taken ones if possible; none if they do not.
+
+        What covered the last edge often covers this one. Positions at which K is off the floor come last,
+        because their stretches take longest.
+        """
+        stretches, tried = list[tuple[int, int, int]](), set[int]()
+        for among in self._candidates(edge):
+            for k in sorted(among - tried):
+                region, (x, y) = self.known[k]
+                own = region.stretches([(px - x, py - y) for px, py in edge])
+                if own == [(0, FULL)]:
+                    return {k}
+                stretches += [(low, high, k) for low, high in own]
+            tried |= among
+            if chosen := _chosen(stretches):
+                return chosen
+        return set()
+
+    def _candidates(self, edge: tuple[Point, Point]) -> Iterator[set[int]]:
+        """Sets that may cover an edge, those to be tried first in front."""
+        yield self.last
+        near = set(self.near(edge))
+        yield near & self.taken
+        off_floor = set(range(len(self.given), len(self.given) + len(self.polygons)))
+        yield off_floor & self.taken
+        yield near
+        yield off_floor
 
 
 def _check_cover(
@@ -197,8 +226,9 @@ def _check_cover(
     covers a part of a boundary. Of many edges it is tested first whether a box about them lies in a cell.
     """
     demand(len(cells) + len(polygons) > 0, where, "has neither cells nor witnesses")
-    sets, count, taken = _Sets([*cells, *pressed], polygons, outside), 0, set(range(max(len(cells), 1)))
-    left = [sets.edges(k) for k in taken]
+    sets, count = _Sets([*cells, *pressed], polygons, outside), 0
+    sets.taken = set(range(max(len(cells), 1)))
+    left = [sets.edges(k) for k in sets.taken]
     while left:
         edges = left.pop()
         if len(edges) > plane.MANY:
@@ -210,18 +240,17 @@ def _check_cover(
             left += [edges[: len(edges) // 2], edges[len(edges) // 2 :]]
             continue
         for edge in edges:
-            count, near, (x, y) = count + 1, sets.near(edge), edge[0]
-            chosen = _chosen(sets, [k for k in near if k in taken], edge) or _chosen(sets, near, edge)
+            count, (x, y) = count + 1, edge[0]
+            chosen = sets.last = sets.covering(edge)
             place = f"({x / ONE:.6f}, {y / ONE:.6f})"
             demand(len(chosen) > 0, where, f"no cell covers {place}, which may be free")
-            left += [sets.edges(k) for k in sorted(chosen - taken)]
-            taken |= chosen
+            left += [sets.edges(k) for k in sorted(chosen - sets.taken)]
+            sets.taken |= chosen
     return count
 
 
-def _chosen(sets: _Sets, among: list[int], edge: tuple[Point, Point]) -> set[int]:
-    """Some sets whose stretches together cover an edge, the far-reaching first; none if they do not."""
-    stretches = [(low, high, k) for k in among for low, high in sets.stretches(k, edge)]
+def _chosen(stretches: list[tuple[int, int, int]]) -> set[int]:
+    """Numbers of some stretches that together cover an edge, the far-reaching first; none if they do not."""
     chosen, covered = set[int](), -1
     while covered < FULL:
         high, k = max([(high, -k) for low, high, k in stretches if low <= max(covered, 0)], default=(-1, 0))

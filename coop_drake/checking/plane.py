@@ -13,6 +13,7 @@ from typing import Any
 Point = tuple[int, int]
 Interval = tuple[int, int]
 Box = list[Interval]
+Bounds = Sequence[int]  # (x_min, y_min, x_max, y_max)
 Progress = Callable[[str, float], object]
 
 BITS = 80
@@ -129,14 +130,25 @@ def _edges(ring: Sequence[Point]) -> tuple[Point, list[Point]]:
 
 
 def box_of(corners: Iterable[Point]) -> tuple[int, int, int, int]:
-    """The bounding box (x_min, y_min, x_max, y_max)."""
+    """The bounding box, see ``Bounds``."""
     xs, ys = zip(*corners, strict=True)
     return min(xs), min(ys), max(xs), max(ys)
 
 
-def boxes_apart(a: Sequence[int], b: Sequence[int], gap: int) -> bool:
+def boxes_near(boxes: Sequence[Bounds], among: Iterable[int], box: Bounds, gap: int) -> list[int]:
+    """Those of numbered boxes that are not further than a gap [2^-80 m] from a box along x or along y."""
+    low_x, low_y, high_x, high_y = box[0] - gap, box[1] - gap, box[2] + gap, box[3] + gap
+    found = []
+    for k in among:
+        x0, y0, x1, y1 = boxes[k]
+        if x0 <= high_x and low_x <= x1 and y0 <= high_y and low_y <= y1:
+            found.append(k)
+    return found
+
+
+def boxes_apart(a: Bounds, b: Bounds, gap: int) -> bool:
     """Whether two boxes are further apart than a gap [2^-80 m] along x or along y."""
-    return a[0] - b[2] > gap or b[0] - a[2] > gap or a[1] - b[3] > gap or b[1] - a[3] > gap
+    return not boxes_near([a], (0,), b, gap)
 
 
 def apart(first: Sequence[Point], second: Sequence[Point], gap: int) -> bool:
@@ -201,7 +213,7 @@ class Region:
                 row.append(k)
         return height, rows
 
-    def near(self, box: Sequence[int], gap: int) -> list[int]:
+    def near(self, box: Bounds, gap: int) -> list[int]:
         """Edges whose boxes are not further than a gap from a box, looked for in the rows near it."""
         seen: Iterable[int] = range(len(self.edges))
         if len(self.edges) > MANY:
@@ -210,7 +222,7 @@ class Region:
             seen = sorted({k for row in rows[first : max(first, last + 1)] for k in row})
             spend(4 * len(seen))
         spend(len(self.edges) if len(self.edges) <= MANY else 10)
-        return [k for k in seen if not boxes_apart(self.boxes[k], box, gap)]
+        return boxes_near(self.boxes, seen, box, gap)
 
     def has_inside(self, x: int, y: int, scale: int = 1) -> bool:
         """Whether the point (x, y) / scale, which is on no edge, lies in the region."""
@@ -259,6 +271,28 @@ class Region:
                 found.append((low, high))
             low = max(low, after)
         return found
+
+
+class Convex:
+    """Points to the left of all edges of a convex ring, which is counter-clockwise; open."""
+
+    def __init__(self, corners: list[Point]) -> None:
+        self.edges = [*pairwise([corners[-1], *corners])]
+
+    def stretches(self, segment: Sequence[Point]) -> list[Interval]:
+        """The stretch of a segment in the set, if there is one: places rounded inwards, as of a region."""
+        ((ax, ay), (bx, by)), low, high = segment, 0, FULL
+        spend(len(self.edges))
+        for (px, py), (qx, qy) in self.edges:
+            dx, dy = qx - px, qy - py
+            first, last = dx * (ay - py) - dy * (ax - px), dx * (by - py) - dy * (bx - px)
+            if first <= 0 and last <= 0:
+                return []
+            if first <= 0:
+                low = max(low, -first * FULL // (last - first) + 2)
+            elif last <= 0:
+                high = min(high, first * FULL // (first - last) - 1)
+        return [(low, high)] if low <= high else []
 
 
 def read_region(value: Any) -> Region:

@@ -16,6 +16,7 @@ from coop_drake.checking.plane import (
     FULL,
     ONE,
     TURN,
+    Convex,
     Region,
     apart,
     cosine_and_sine,
@@ -108,6 +109,20 @@ def test_the_stretch_in_a_convex_polygon_is_all_of_its_interior(edge, corners):
     inside = 0.0 if LineString(edge).relate_pattern(Polygon(ring), "F********") else inside
     found = sum(high - low for low, high in region(ring).stretches(edge)) / FULL * LineString(edge).length
     assert found == pytest.approx(inside, abs=1e-9)
+
+
+@given(SEGMENT, st.lists(PLACE, min_size=1, max_size=7))
+@settings(max_examples=300)
+def test_a_convex_set_has_the_stretches_of_the_region_in_its_ring(edge, corners):
+    ring = hull(corners)
+    made, found = region(ring), Convex(ring).stretches(edge)
+    lengths = [sum(high - low for low, high in each) for each in (found, made.stretches(edge))]
+    assert len(found) <= 1
+    assert abs(lengths[0] - lengths[1]) <= 10
+    for place in (place for stretch in found for place in stretch):
+        x, y = (a * FULL + (b - a) * place for a, b in zip(*edge, strict=True))
+        assert made.has_inside(x, y, FULL)
+        assert all(off_edge((x, y), side) for side in made.edges)
 
 
 @given(SEGMENT, st.lists(PLACE, min_size=3, max_size=6), st.lists(PLACE, min_size=3, max_size=5))
