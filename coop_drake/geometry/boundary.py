@@ -57,6 +57,15 @@ def _segment_clearance(edges: FloatArray, ax: float, ay: float, bx: float, by: f
 
 
 @compiled
+def _segment_clearances(edges: FloatArray, starts: FloatArray, ends: FloatArray) -> FloatArray:
+    """Distances of many segments, whose ends have the shape (n, 2) each, from the nearest edge, (n,) [m]."""
+    result = np.empty(len(starts))
+    for k in range(len(starts)):
+        result[k] = _segment_clearance(edges, starts[k, 0], starts[k, 1], ends[k, 0], ends[k, 1])
+    return result
+
+
+@compiled
 def _signed_distances(edges: FloatArray, points: FloatArray) -> FloatArray:
     """Signed distance of many points, shape (n, 2) -> (n,) [m]."""
     result = np.empty(points.shape[0])
@@ -122,10 +131,9 @@ class BoundaryDistance:
         shorter: FloatArray = points[_shortened(self.edges, np.ascontiguousarray(points))]
         return shorter
 
-    def along(self, start: ArrayLike, end: ArrayLike) -> float:
-        """Smallest distance of the straight segment between two points, (2,) each, to the boundary [m].
+    def along(self, starts: FloatArray, ends: FloatArray) -> FloatArray:
+        """Smallest distances of straight segments to the boundary, shapes (n, 2) each to (n,) [m].
 
-        Zero where the segment crosses the boundary; also positive for a segment that lies outside.
+        Zero where a segment crosses the boundary; also positive for a segment that lies outside.
         """
-        (ax, ay), (bx, by) = cast(FloatArray, start), cast(FloatArray, end)
-        return _segment_clearance(self.edges, float(ax), float(ay), float(bx), float(by))
+        return _segment_clearances(self.edges, np.ascontiguousarray(starts), np.ascontiguousarray(ends))

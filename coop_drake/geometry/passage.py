@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations, pairwise
+from itertools import combinations
 
 import numpy as np
 import shapely
@@ -101,7 +101,7 @@ class PassageFinder:
             close = np.flatnonzero(away <= np.partition(away, least)[least])
             near = close[np.argsort(away[close], kind="stable")][:LINKS]
             nodes = np.union1d(near[np.isfinite(away[near])], np.flatnonzero(away <= clearance_there))
-            clearance = np.array([self._distance.along(end, graph.nodes[node]) for node in nodes])
+            clearance = self._distance.along(np.tile(end, (len(nodes), 1)), graph.nodes[nodes])
             seen = clearance > 0.0
             graph = replace(
                 graph,
@@ -130,7 +130,7 @@ class PassageFinder:
                 held[k].append(place)
         pairs = np.array([pair for places in held for pair in combinations(places, 2)]).reshape(-1, 2)
         first, second = nodes[pairs[:, 0]], nodes[pairs[:, 1]]
-        clearance = np.array([self._distance.along(a, b) for a, b in zip(first, second, strict=True)])
+        clearance = self._distance.along(first, second)
         inside = clearance > 0.0
         length = np.linalg.norm(second - first, axis=1)
         return Graph(nodes, pairs[inside], clearance[inside], length[inside])
@@ -143,7 +143,7 @@ class PassageFinder:
         return max(passage, other, key=lambda passage: passage.clearance)
 
     def _measure(self, points: FloatArray) -> Passage:
-        clearances = [self._distance.along(a, b) for a, b in pairwise(points)]
+        clearances = self._distance.along(points[:-1], points[1:])
         worst = int(np.argmin(clearances))
         segment = LineString(points[worst : worst + 2])
         narrowest = shapely.get_coordinates(shapely.shortest_line(segment, self._polygon.boundary))[0]

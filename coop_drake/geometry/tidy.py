@@ -81,7 +81,7 @@ def tidy_cell(safe: Polygon, points: Sequence[FloatArray]) -> Polygon:
     for strength in STRENGTHS:
         cell = _tidied(opened, route, strength)
         for candidate in (_without_bays(cell, route), cell):
-            if candidate is not None and _serves(candidate, safe, points, CLEARANCE_KEPT * route.clearance):
+            if candidate is not None and _serves(candidate, safe, points, route):
                 return candidate
     return opened
 
@@ -130,11 +130,15 @@ def _simplified(shape: Polygon, route: _Route, strength: float) -> Polygon:
     return simplify_inward(shape, max(depth, SLACK), SLACK) if not shape.is_empty else shape
 
 
-def _serves(cell: Polygon, safe: Polygon, points: Sequence[FloatArray], clearance: float) -> bool:
+def _serves(cell: Polygon, safe: Polygon, points: Sequence[FloatArray], route: _Route) -> bool:
     """Whether a cell lies inside the safe region and still joins all points widely enough."""
     if cell.is_empty or not cell.is_valid or not safe.covers(cell):
         return False
     if not all(cell.contains(Point(point)) for point in points):
         return False
+    least, path = CLEARANCE_KEPT * route.clearance, shapely.get_coordinates(route.path)
+    # The path through the safe region is a passage of the cell, too, unless tidying came near it.
+    if BoundaryDistance(cell).along(path[:-1], path[1:]).min() >= least:
+        return True
     finder = PassageFinder(cell)
-    return all(finder.find(start, end).clearance >= clearance for start, end in pairwise(points))
+    return all(finder.find(start, end).clearance >= least for start, end in pairwise(points))

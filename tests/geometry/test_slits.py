@@ -57,5 +57,5 @@ def test_no_hole_is_left_and_the_passage_stays_inside(floor_with_ends):
     assert floor.buffer(1e-9).covers(cut)
     assert cut.contains(Point(start))
     assert cut.contains(Point(end))
-    assert BoundaryDistance(cut).along(start, start) > 0.0
+    assert BoundaryDistance(cut)(start) > 0.0
     assert cut.boundary.distance(passage.path) >= 0.4 * passage.clearance
