@@ -8,6 +8,7 @@ from math import pi
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
 from shapely import MultiPolygon, Polygon
 from shapely.geometry.base import BaseGeometry
 
@@ -98,18 +99,23 @@ def is_patched(problem: PlanningProblem, margin: float) -> bool:
 
 def _close_ends(problem: PlanningProblem, margin: float) -> list[tuple[BaseGeometry, float]]:
     """Footprints at start and goal that are too close to a wall for a margin, and their clearances [m]."""
-    boundary = problem.workspace.boundary
     close = []
-    for configuration, components in _ends(problem):
-        pieces, radii = _pieces(problem.tree, configuration, components)
-        # The footprint has the clearance of its nearest piece; for most questions that is enough.
-        if (shapely.distance(boundary, pieces) - radii).min() >= CLOSE_FACTOR * margin:
+    for (configuration, components), bound in zip(_ends(problem), _end_clearances(problem), strict=True):
+        if bound >= CLOSE_FACTOR * margin:
             continue
         footprint = exact_footprint(problem.tree, configuration, components)
-        clearance = float(boundary.distance(footprint))
+        clearance = float(problem.workspace.boundary.distance(footprint))
         if clearance < CLOSE_FACTOR * margin and problem.workspace.contains(footprint):
             close.append((footprint, clearance))
     return close
+
+
+@lru_cache(maxsize=_REMEMBERED)
+def _end_clearances(problem: PlanningProblem) -> list[float]:
+    """Clearances of the nearest pieces at start and goal [m]; most questions need no footprints."""
+    placed = [_pieces(problem.tree, *end) for end in _ends(problem)]
+    boundary = problem.workspace.boundary
+    return [float((shapely.distance(boundary, pieces) - radii).min()) for pieces, radii in placed]
 
 
 def _ends(problem: PlanningProblem) -> list[tuple[FloatArray, int | None]]:
@@ -139,13 +145,15 @@ def exact_footprint(
 
 def _pieces(
     tree: ComponentTree, configuration: FloatArray, components: int | None
-) -> tuple[list[BaseGeometry], FloatArray]:
+) -> tuple[NDArray[np.object_], FloatArray]:
     """Hulls of the pieces of the first components at a configuration, and the radii they are grown by [m]."""
     chosen: list[Component] = list(tree.components[:components])
     placed = [
-        (shapely.MultiPoint(X_WC.apply(shape.vertices)).convex_hull, shape.radius)
+        (X_WC.apply(shape.vertices), shape.radius)
         for component, X_WC in zip(chosen, tree.poses(configuration), strict=False)
         for body in component.bodies
         for shape in body.shapes
     ]
-    return [hull for hull, _ in placed], np.array([radius for _, radius in placed])
+    owners = np.repeat(np.arange(len(placed)), [len(vertices) for vertices, _ in placed])
+    corners = shapely.multipoints(np.concatenate([vertices for vertices, _ in placed]), indices=owners)
+    return np.asarray(shapely.convex_hull(corners)), np.array([radius for _, radius in placed])
