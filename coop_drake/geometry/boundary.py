@@ -135,5 +135,10 @@ class BoundaryDistance:
         """Smallest distances of straight segments to the boundary, shapes (n, 2) each to (n,) [m].
 
         Zero where a segment crosses the boundary; also positive for a segment that lies outside.
+
+        Raises:
+            ValueError: If there are not as many starts as ends.
         """
+        if starts.shape != ends.shape:
+            raise ValueError(f"starts have the shape {starts.shape}, ends the shape {ends.shape}")
         return _segment_clearances(self.edges, np.ascontiguousarray(starts), np.ascontiguousarray(ends))

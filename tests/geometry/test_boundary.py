@@ -62,6 +62,11 @@ def test_a_segment_that_is_a_point_has_the_clearance_of_the_point():
     assert BoundaryDistance(ROOM_WITH_PILLAR).along(point, point) == pytest.approx(0.5)
 
 
+def test_segments_need_as_many_starts_as_ends():
+    with pytest.raises(ValueError, match=r"starts have the shape \(2, 2\), ends the shape \(1, 2\)"):
+        BoundaryDistance(ROOM_WITH_PILLAR).along(np.zeros((2, 2)), np.ones((1, 2)))
+
+
 def test_an_empty_polygon_is_refused():
     with pytest.raises(GeometryError, match="empty polygon has no boundary"):
         BoundaryDistance(Polygon())

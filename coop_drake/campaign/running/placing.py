@@ -23,14 +23,15 @@ _WAITING = 1000
 
 _SETTINGS = {
     "distributed": {
-        "scheduler": {"allowed-failures": 100, "worker-ttl": "60s"},
+        "scheduler": {"allowed-failures": 100, "worker-ttl": "30s"},
         "worker": {"profile": {"enabled": False}},
         "admin": {"tick": {"interval": "500ms"}, "system-monitor": {"interval": "5s"}},
     }
 }
-"""A batch is tried again when its worker was lost, and given to another worker when its own has been silent
-for a minute. Dask's measurements of itself are off or rare: scheduler and two workers would use a seventh of
-a core for them. Settings of the user's own in Dask's configuration stand above these."""
+"""A batch is tried again when its worker was lost, and given to another worker after a minute at most in
+which its own was silent: Dask looks every half minute which workers have been silent for as long. Its
+measurements of itself are off or rare: scheduler and two workers would use a seventh of a core for them.
+The user's own settings in Dask's configuration stand above these where they differ from Dask's defaults."""
 
 
 def place(

@@ -39,7 +39,7 @@ PATCH_FACTOR = 2.0
 """The floor around a start or goal that is shrunk less reaches this many margins beyond its footprint [-]."""
 
 _REMEMBERED = 4
-"""Floors at a margin that are remembered [-]."""
+"""Floors at a margin, and questions with the clearances of their ends, that are remembered [-]."""
 
 ARC_SEGMENTS = 32
 """Segments of a quarter circle in exact footprints: a disc's polygon is right to 3e-4 of its radius."""
