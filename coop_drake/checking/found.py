@@ -5,7 +5,8 @@ from math import isqrt
 from typing import Any
 
 from coop_drake.checking import plane
-from coop_drake.checking.plane import ONE, Interval, Point, Region, demand, hull, numbers, points
+from coop_drake.checking.plane import ONE, Interval, Point, demand, hull, numbers, points
+from coop_drake.checking.regions import Region, read_region
 from coop_drake.checking.team import Question, free, holds, intervals, relative, swept, unwrapped
 
 ROUNDING = 10**9
@@ -16,7 +17,7 @@ def check_plan(question: Question, answer: Any, progress: plane.Progress) -> lis
     """Check a plan; returns the statements that hold and how often each was checked."""
     cells, transitions, entry = answer["cells"], answer["transitions"], question.start
     boxes = [intervals(cell["lower"], cell["upper"], question.axes, 1) for cell in cells]
-    regions, count = [plane.read_region(cell["tidied"]) for cell in cells], len(cells)
+    regions, count = [read_region(cell["tidied"]) for cell in cells], len(cells)
     demand(0 < count == len(transitions), "transitions", "are not as many as the cells")
     demand(holds(boxes[0], question.start_box), "cells[0]", "does not hold the start's angles")
     room, nearest = numbers([transitions[-1]["inradius"], transitions[-1]["goal_lower"][0]], 2)

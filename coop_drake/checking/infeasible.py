@@ -5,21 +5,19 @@ from itertools import pairwise, product
 from math import isqrt, prod
 from typing import Any
 
-from coop_drake.checking import plane, team
+from coop_drake.checking import plane, regions, team
 from coop_drake.checking.plane import (
     BITS,
-    FULL,
     ONE,
-    Convex,
     Interval,
     Point,
-    Region,
     demand,
     hull,
     index,
     points,
     spend,
 )
+from coop_drake.checking.regions import FULL, Convex, Region
 from coop_drake.checking.team import Question, Step, free, intervals
 
 COPIES = 16
@@ -39,7 +37,7 @@ def check_proof(question: Question, answer: Any, progress: plane.Progress) -> li
     chain = question.chains[index(answer["component"], len(question.chains))]
     boxes = [intervals(value["lower"], value["upper"], question.axes) for value in slices]
     neighbours = _facets(boxes, question.limits) + [(k, k) for k in range(len(boxes))]
-    cells = [[(c["reached"], plane.read_region(c["polygon"])) for c in value["cells"]] for value in slices]
+    cells = [[(c["reached"], regions.read_region(c["polygon"])) for c in value["cells"]] for value in slices]
     for a, b in neighbours:
         spend(len(cells[a]) * len(cells[b]))
         for (i, (one, cell)), (j, (other, another)) in product(enumerate(cells[a]), enumerate(cells[b])):
@@ -189,8 +187,8 @@ class _Sets:
     def covering(self, edge: tuple[Point, Point]) -> set[int]:
         """One set that covers an edge, or some that do together, taken ones if possible; none if they do not.
 
-        What covered the last edge often covers this one. Positions at which K is off the floor come last,
-        because their stretches take longest.
+        What covered the last edge often covers this one. Of sets that were not taken yet, positions at which
+        K is off the floor come last, because their stretches take longest.
         """
         stretches, tried = list[tuple[int, int, int]](), set[int]()
         for among in self._candidates(edge):
@@ -231,7 +229,7 @@ def _check_cover(
     left = [sets.edges(k) for k in sets.taken]
     while left:
         edges = left.pop()
-        if len(edges) > plane.MANY:
+        if len(edges) > regions.MANY:
             low_x, low_y, high_x, high_y = plane.box_of([corner for edge in edges for corner in edge])
             around = [(low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y)]
             if any(cell.side(around, 0) > 0 for cell in cells):
@@ -251,12 +249,16 @@ def _check_cover(
 
 def _chosen(stretches: list[tuple[int, int, int]]) -> set[int]:
     """Numbers of some stretches that together cover an edge, the far-reaching first; none if they do not."""
-    chosen, covered = set[int](), -1
+    left, chosen, covered, furthest = sorted(stretches, reverse=True), set[int](), -1, (-1, 0)
+    spend(4 * len(left))
     while covered < FULL:
-        high, k = max([(high, -k) for low, high, k in stretches if low <= max(covered, 0)], default=(-1, 0))
-        if high <= covered:
+        while left and left[-1][0] <= max(covered, 0):
+            _, high, k = left.pop()
+            furthest = max(furthest, (high, -k))
+        if furthest[0] <= covered:
             return set()
-        chosen, covered = chosen | {-k}, high
+        covered = furthest[0]
+        chosen.add(-furthest[1])
     return chosen
 
 

@@ -5,7 +5,7 @@ cosines, and places on a segment are rounded, with stated bounds.
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import pairwise
 from math import isqrt
 from typing import Any
@@ -17,15 +17,12 @@ Bounds = Sequence[int]  # (x_min, y_min, x_max, y_max)
 Progress = Callable[[str, float], object]
 
 BITS = 80
-ONE, FULL = 1 << BITS, 1 << 64
-"""The number 1 in units of 2^-80; the end of a segment, whose places are integers from 0 at its beginning."""
+ONE = 1 << BITS
+"""The number 1 in units of 2^-80."""
 
 FINE_TURN = 0x6_487ED511_0B4611A6_2633145C_06E0E689_48127044
 TURN = FINE_TURN >> BITS
 """2 pi, rounded down to a multiple of 2^-160, and of 2^-80."""
-
-MANY = 50
-"""The edges of regions with more than so many are put into rows [-]."""
 
 work_left = [0]  # Elementary steps that are still allowed.
 
@@ -136,7 +133,7 @@ def box_of(corners: Iterable[Point]) -> tuple[int, int, int, int]:
 
 
 def boxes_near(boxes: Sequence[Bounds], among: Iterable[int], box: Bounds, gap: int) -> list[int]:
-    """Those of numbered boxes that are not further than a gap [2^-80 m] from a box along x or along y."""
+    """Those of numbered boxes that are not further than a gap [2^-80 m] from a box, neither along x nor y."""
     low_x, low_y, high_x, high_y = box[0] - gap, box[1] - gap, box[2] + gap, box[3] + gap
     found = []
     for k in among:
@@ -191,110 +188,3 @@ def below(corners: Sequence[Point], grown: int, direction: Point, bound: int) ->
             found.append(((b[0] * s - a[0] * t) // (s - t), (b[1] * s - a[1] * t) // (s - t)))
         found += [b] if t <= 0 else []
     return found, grown + 2
-
-
-class Region:
-    """Points from which a ray crosses an odd (or even) number of edges; open without the edges themselves."""
-
-    def __init__(self, rings: list[list[Point]], *, odd: bool = True) -> None:
-        self.rings, self.odd = rings, odd
-        self.edges = [edge for ring in rings for edge in pairwise([ring[-1], *ring])]
-        self.boxes = [box_of(edge) for edge in self.edges]
-        self.box = box_of([corner for ring in rings for corner in ring])
-
-    @cached_property
-    def rows(self) -> tuple[int, list[list[int]]]:
-        """Height of some rows along y, and the edges that reach into each: three times as many at most."""
-        low, high, count = self.box[1], self.box[3], len(self.edges)
-        height = 1 + max(sum(its[3] - its[1] for its in self.boxes) // count, (high - low) // isqrt(count))
-        rows = [list[int]() for _ in range(1 + (high - low) // height)]
-        for k, its in enumerate(self.boxes):
-            for row in rows[(its[1] - low) // height : 1 + (its[3] - low) // height]:
-                row.append(k)
-        return height, rows
-
-    def near(self, box: Bounds, gap: int) -> list[int]:
-        """Edges whose boxes are not further than a gap from a box, looked for in the rows near it."""
-        seen: Iterable[int] = range(len(self.edges))
-        if len(self.edges) > MANY:
-            (height, rows), low = self.rows, self.box[1]
-            first, last = max(0, (box[1] - gap - low) // height), (box[3] + gap - low) // height
-            seen = sorted({k for row in rows[first : max(first, last + 1)] for k in row})
-            spend(4 * len(seen))
-        spend(len(self.edges) if len(self.edges) <= MANY else 10)
-        return boxes_near(self.boxes, seen, box, gap)
-
-    def has_inside(self, x: int, y: int, scale: int = 1) -> bool:
-        """Whether the point (x, y) / scale, which is on no edge, lies in the region."""
-        odd, level = False, y // scale
-        for k in self.near((self.box[0], level, self.box[2], level), 0):
-            (px, py), (qx, qy) = self.edges[k]
-            if (py * scale > y) != (qy * scale > y):
-                odd ^= ((qx - px) * (y - py * scale) > (qy - py) * (x - px * scale)) == (qy > py)
-        return odd == self.odd
-
-    def side(self, convex: Sequence[Point], gap: int) -> int:
-        """1 if a convex set is inside, -1 if outside, by more than a gap [2^-80 m] each; 0 otherwise."""
-        spend(10)
-        box = box_of(convex)
-        if self.odd and boxes_apart(self.box, box, gap):
-            return -1
-        if not all(apart(self.edges[k], convex, gap) for k in self.near(box, gap)):
-            return 0
-        return 1 if self.has_inside(*convex[0]) else -1
-
-    def touches(self, other: "Region") -> bool:
-        """Whether two closed regions share a point: one meets an edge of the other, or lies inside it."""
-        met = any(self.side(edge, 0) >= 0 for edge in other.edges)
-        return met or any(other.has_inside(*ring[0]) for ring in self.rings)
-
-    def stretches(self, segment: Sequence[Point]) -> list[Point]:
-        """Stretches of a segment in the open region: pairs of places from 0 to ``FULL``, rounded inwards."""
-        ((ax, ay), (bx, by)), box, cuts = segment, box_of(segment), [(FULL, FULL)]
-        dx, dy = bx - ax, by - ay
-        square, after = (dx * dx + dy * dy, 2) if dx or dy else (1, FULL + 1)
-        for k in self.near(box, 0):
-            (px, py), (qx, qy) = self.edges[k]
-            first, last = dx * (py - ay) - dy * (px - ax), dx * (qy - ay) - dy * (qx - ax)
-            across = (px - ax) * (qy - py) - (py - ay) * (qx - px)
-            if min(first, last) > 0 or max(first, last) < 0 or (first == last and across):
-                continue
-            places = [across * FULL // (last - first or 1)]
-            if first == last:  # On one line: all between the edge's ends is cut out.
-                places = [((x - ax) * dx + (y - ay) * dy) * FULL // square for x, y in ((px, py), (qx, qy))]
-            cuts.append((min(places) - 1, max(places) + after))
-        found, low = [], 0
-        for before, after in sorted(cuts):
-            high = min(before, FULL)
-            x, y = ax * FULL + dx * ((low + high) // 2), ay * FULL + dy * ((low + high) // 2)
-            if low <= high and self.has_inside(x, y, FULL):
-                found.append((low, high))
-            low = max(low, after)
-        return found
-
-
-class Convex:
-    """Points to the left of all edges of a convex ring, which is counter-clockwise; open."""
-
-    def __init__(self, corners: list[Point]) -> None:
-        self.edges = [*pairwise([corners[-1], *corners])]
-
-    def stretches(self, segment: Sequence[Point]) -> list[Interval]:
-        """The stretch of a segment in the set, if there is one: places rounded inwards, as of a region."""
-        ((ax, ay), (bx, by)), low, high = segment, 0, FULL
-        spend(len(self.edges))
-        for (px, py), (qx, qy) in self.edges:
-            dx, dy = qx - px, qy - py
-            first, last = dx * (ay - py) - dy * (ax - px), dx * (by - py) - dy * (bx - px)
-            if first <= 0 and last <= 0:
-                return []
-            if first <= 0:
-                low = max(low, -first * FULL // (last - first) + 2)
-            elif last <= 0:
-                high = min(high, first * FULL // (first - last) - 1)
-        return [(low, high)] if low <= high else []
-
-
-def read_region(value: Any) -> Region:
-    """Read ``{"outer": [[x, y], ...], "holes": [[[x, y], ...], ...]}``."""
-    return Region([points(ring) for ring in (value["outer"], *value["holes"])])

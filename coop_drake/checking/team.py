@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from coop_drake.checking import plane
 from coop_drake.checking.plane import BITS, ONE, TURN, Interval, Point, demand, hull, index, numbers, points
+from coop_drake.checking.regions import read_region
 
 
 class Step(NamedTuple):
@@ -106,7 +107,7 @@ class Question:
         asked, parts = (value["format"], value["version"]), (value["components"], value["pieces"])
         fit = asked == ("coop_drake question", 2) and max(map(len, parts)) <= 1000
         demand(fit, "question", "is not of version 2, or has more than 1000 components or pieces")
-        self.floor, self.chains = plane.read_region(value["floor"]), [[Step(0, 1)]]
+        self.floor, self.chains = read_region(value["floor"]), [[Step(0, 1)]]
         self.limits = intervals(value["lower"], value["upper"], len(value["lower"]))
         self.axes, self.pieces = 1 + len(self.limits), list[Piece]()
         for part in value["components"]:

@@ -9,21 +9,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from shapely import LineString, MultiPoint, Point, Polygon
 
-from coop_drake.checking import plane
+from coop_drake.checking import plane, regions
 from coop_drake.checking.infeasible import _inside
 from coop_drake.checking.plane import (
     BITS,
-    FULL,
     ONE,
     TURN,
-    Convex,
-    Region,
     apart,
     cosine_and_sine,
     difference,
     hull,
     numbers,
 )
+from coop_drake.checking.regions import FULL, Convex, Region
 
 PLACE = st.tuples(st.integers(-9, 9), st.integers(-9, 9))
 PLACES = st.lists(PLACE, min_size=1, max_size=7)
@@ -179,18 +177,17 @@ def test_a_point_beside_a_slanted_edge_lies_inside_though_it_is_in_the_edges_box
     st.tuples(st.integers(-50, 50), st.integers(-60, 60), st.integers(0, 30), st.integers(0, 30)),
     st.integers(0, 12),
 )
-def test_edges_near_a_box_are_found_in_rows_as_among_all(offsets, place, gap):
+def test_edges_near_a_box_are_found_in_squares_as_among_all(offsets, place, gap):
     around = [
         (int(radius * cos(0.1 * k)), int(radius * sin(0.1 * k)) + jump)
         for k, (radius, jump) in enumerate(offsets)
     ]
     many, (x, y, width, height) = region(around), place
     box = x, y, x + width, y + height
-    assert len(many.edges) > plane.MANY
-    assert many.near(box, gap) == [
-        k for k, its in enumerate(many.boxes) if not plane.boxes_apart(its, box, gap)
-    ]
-    assert sum(map(len, many.rows[1])) <= 3 * len(many.edges)
+    assert len(many.edges) > regions.MANY
+    near = [k for k, its in enumerate(many.boxes) if not plane.boxes_apart(its, box, gap)]
+    assert sorted(many.near(box, gap)) == near
+    assert sum(map(len, many.squares[1].values())) <= 7 * len(many.edges)
 
 
 def test_a_point_is_inside_a_region_of_many_edges_as_in_shapely():
