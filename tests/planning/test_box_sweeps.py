@@ -23,12 +23,12 @@ def test_sweeps_are_those_of_each_piece_and_bodies_touch_where_pairs_do(data: st
     pairs = BodyPairs(swept)
     boxes, bounds = box_arrays(swept, pairs), np.array(intervals)
     lower, upper = bounds[:, 0].copy(), bounds[:, 1].copy()
-    sweeps, vertices, frame = room_for_sweeps(len(boxes.frames)), np.empty((1, 2)), 0
+    sweeps, vertices, row = room_for_sweeps(len(boxes.pair_sweeps)), np.empty((1, 2)), 0
     for piece in reversed(range(len(swept.pieces))):
-        ring, vertices, frame = swept_piece(boxes, piece, lower, upper, sweeps, vertices, frame)
+        ring, vertices, row = swept_piece(boxes, piece, lower, upper, sweeps, vertices, row)
         assert (ring == over_piece(boxes.team, piece, lower, upper, len(boxes.team.links), True)).all()
-    assert frame == len(boxes.frames)
-    for k, (piece, stages) in enumerate(boxes.frames.tolist()):
+    assert row == len(boxes.pair_sweeps)
+    for k, (piece, stages) in enumerate(boxes.pair_sweeps.tolist()):
         kept = vertices[sweeps.first[k] : sweeps.first[k + 1]]
         assert (kept == over_piece(boxes.team, piece, lower, upper, stages, False)).all()
     assert bodies_apart(boxes, sweeps, vertices) == (pairs.touching(intervals) is None)

@@ -67,9 +67,10 @@ def box_clearance(
     count = len(boxes.team.radii)
     vertices, first = np.empty((32 * count, 2)), np.zeros(count + 1, np.int64)
     discs = np.empty((count, 3))
-    sweeps, swept, frame = room_for_sweeps(len(boxes.frames)), np.empty((16 * len(boxes.frames), 2)), 0
+    needed, row = len(boxes.pair_sweeps), 0
+    sweeps, swept = room_for_sweeps(needed), np.empty((16 * needed, 2))
     for k in range(count):
-        ring, swept, frame = swept_piece(boxes, count - 1 - k, lower, upper, sweeps, swept, frame)
+        ring, swept, row = swept_piece(boxes, count - 1 - k, lower, upper, sweeps, swept, row)
         enclosing_disc(ring, discs[k])
         vertices = with_ring(vertices, first[k], ring)
         first[k + 1] = first[k] + len(ring)
@@ -138,9 +139,10 @@ def clearances_in_box(
     for k in range(len(result)):
         result[k] = most
     disc = np.empty(3)
-    sweeps, swept, frame = room_for_sweeps(len(boxes.frames)), np.empty((16 * len(boxes.frames), 2)), 0
+    needed, row = len(boxes.pair_sweeps), 0
+    sweeps, swept = room_for_sweeps(needed), np.empty((16 * needed, 2))
     for piece in range(len(boxes.team.radii) - 1, -1, -1):
-        ring, swept, frame = swept_piece(boxes, piece, lower, upper, sweeps, swept, frame)
+        ring, swept, row = swept_piece(boxes, piece, lower, upper, sweeps, swept, row)
         enclosing_disc(ring, disc)
         for k in range(len(result)):
             x, y = path[start + k, 0], path[start + k, 1]

@@ -20,15 +20,15 @@ class BoxArrays(NamedTuple):
 
     Attributes:
         team: The team.
-        frames: Pieces and numbers of stages that collision pairs need, each once, in the order in which a box
-            sweeps them: the last piece first, fewer stages first, shape (F, 2).
-        pairs: Pairs of rows of ``frames`` that must not touch, shape (K, 2).
+        pair_sweeps: The sweeps that collision pairs need, each once: a piece and its number of stages, in the
+            order in which a box sweeps them: the last piece first, fewer stages first, shape (S, 2).
+        pairs: Pairs of rows of ``pair_sweeps`` that must not touch, shape (K, 2).
         lower: Lower limits of (theta, q...), minus infinity for theta, shape (1 + n,).
         upper: Upper limits, shape (1 + n,).
     """
 
     team: TeamArrays
-    frames: IntArray
+    pair_sweeps: IntArray
     pairs: IntArray
     lower: FloatArray
     upper: FloatArray
@@ -59,11 +59,11 @@ def with_ring(vertices: FloatArray, size: int, ring: FloatArray) -> FloatArray:
 
 
 class PairSweeps(NamedTuple):
-    """Memory for the sweeps that collision pairs need, those of ``BoxArrays.frames``.
+    """Memory for the sweeps that collision pairs need, those of ``BoxArrays.pair_sweeps``.
 
     Attributes:
-        first: First vertex of each and the vertex after the last one, shape (F + 1,).
-        widths: Width of the widest interval that each was swept through, shape (F,) [rad or m].
+        first: First vertex of each and the vertex after the last one, shape (S + 1,).
+        widths: Width of the widest interval that each was swept through, shape (S,) [rad or m].
     """
 
     first: IntArray
@@ -84,36 +84,37 @@ def swept_piece(
     upper: FloatArray,
     sweeps: PairSweeps,
     vertices: FloatArray,
-    frame: int,
+    row: int,
 ) -> tuple[FloatArray, FloatArray, int]:
     """Sweep a piece through a box, eq. (6), and keep what collision pairs need of it on the way.
 
-    A sweep over a piece's first joints is a stage of the sweep over all of them.
+    The sweep over a piece's first joints is an intermediate result of the sweep over all of them.
 
     Args:
         boxes: The team.
         piece: Index of the piece.
         lower: Lower ends of (theta, q...), shape (1 + n,) [rad, m].
         upper: Upper ends, shape (1 + n,).
-        sweeps: Memory; its entries for the piece's frames are written.
-        vertices: Sweeps of the frames before, not grown by radii, shape (V, 2) [m].
-        frame: The first frame of the piece or of one that follows.
+        sweeps: Memory; its entries for the piece are written.
+        vertices: Sweeps of the rows before, not grown by radii, shape (V, 2) [m].
+        row: First row of ``pair_sweeps`` that is of this piece or of one that follows.
 
     Returns:
         The sweep over all joints with the piece's radius, shape (n, 2) [m]; ``vertices`` with the piece's
-        frames, a longer copy where there were too few rows; the first frame of a following piece.
+        sweeps, a longer copy where there were too few rows; the first row of a following piece.
     """
     team = boxes.team
     ring = team.vertices[team.pieces[piece, 1] : team.pieces[piece, 2]].copy()
     link, stages, widest = team.pieces[piece, 0], 0, 0.0
     while True:
-        if frame < len(boxes.frames) and boxes.frames[frame, 0] == piece and boxes.frames[frame, 1] == stages:
-            vertices = with_ring(vertices, sweeps.first[frame], ring)
-            sweeps.first[frame + 1] = sweeps.first[frame] + len(ring)
-            sweeps.widths[frame] = widest
-            frame += 1
+        needed = row < len(boxes.pair_sweeps) and boxes.pair_sweeps[row, 0] == piece
+        if needed and boxes.pair_sweeps[row, 1] == stages:
+            vertices = with_ring(vertices, sweeps.first[row], ring)
+            sweeps.first[row + 1] = sweeps.first[row] + len(ring)
+            sweeps.widths[row] = widest
+            row += 1
         if link < 0:
-            return rounded_sweep(team, piece, ring, widest), vertices, frame
+            return rounded_sweep(team, piece, ring, widest), vertices, row
         widest = max(widest, joint_width(team, link, lower, upper))
         ring = over_joint(team, link, ring, lower, upper)
         link, stages = team.links[link, 0], stages + 1
@@ -125,15 +126,15 @@ def bodies_apart(boxes: BoxArrays, sweeps: PairSweeps, swept: FloatArray) -> boo
 
     Args:
         boxes: The team.
-        sweeps: Where the sweeps of all frames are.
+        sweeps: Where the sweeps are.
         swept: The sweeps, see ``swept_piece``, shape (V, 2) [m].
     """
-    count = len(boxes.frames)
+    count = len(boxes.pair_sweeps)
     vertices, first = np.empty((32 * count, 2)), np.zeros(count + 1, np.int64)
     discs = np.empty((count, 3))
     for k in range(count):
         ring = swept[sweeps.first[k] : sweeps.first[k + 1]]
-        ring = rounded_sweep(boxes.team, boxes.frames[k, 0], ring, sweeps.widths[k])
+        ring = rounded_sweep(boxes.team, boxes.pair_sweeps[k, 0], ring, sweeps.widths[k])
         enclosing_disc(ring, discs[k])
         vertices = with_ring(vertices, first[k], ring)
         first[k + 1] = first[k] + len(ring)

@@ -158,12 +158,12 @@ def box_arrays(swept: SweptTree, pairs: BodyPairs) -> BoxArrays:
     """Arrays of a team for the compiled boxes; a piece that several collision pairs need is swept once."""
     rows = pairs.pieces.tolist()
     needed = {(i, stages) for i, _, stages, _ in rows} | {(j, stages) for _, j, _, stages in rows}
-    frames = sorted(needed, key=lambda frame: (-frame[0], frame[1]))
-    row = {frame: k for k, frame in enumerate(frames)}
+    sweeps = sorted(needed, key=lambda sweep: (-sweep[0], sweep[1]))
+    row = {sweep: k for k, sweep in enumerate(sweeps)}
     infinite = np.array([np.inf])
     return BoxArrays(
         swept.arrays,
-        _table(frames),
+        _table(sweeps),
         _table([(row[i, first], row[j, second]) for i, j, first, second in rows]),
         np.concatenate((-infinite, swept.tree.joint_lower)),
         np.concatenate((infinite, swept.tree.joint_upper)),
