@@ -97,7 +97,7 @@ class _WholeProgram(JITCodeLibrary):  # type: ignore[misc]
     """Machine code of a function with its own copies of all that it calls.
 
     Nobody else sees these copies. LLVM therefore puts a function that is called once in the place of its
-    call, whatever its size.
+    call, whatever its size, and changes how the others are called.
     """
 
     _final_module: Any
@@ -107,6 +107,20 @@ class _WholeProgram(JITCodeLibrary):  # type: ignore[misc]
             if function.linkage == llvm.Linkage.linkonce_odr and not function.is_declaration:
                 function.linkage = "internal"
         super()._optimize_final_module()
+        self._name_copies()
+
+    def _name_copies(self) -> None:
+        """Give the copies names of their own.
+
+        The loader of machine code finds functions of the whole process by name, internal ones, too. Under
+        their old names, functions compiled later would call these copies as if they were the originals.
+        """
+        defined = [function for function in self._final_module.functions if not function.is_declaration]
+        own = sorted(function.name for function in defined if function.linkage == llvm.Linkage.external)
+        program = sha256("\n".join(own).encode()).hexdigest()
+        for function in defined:
+            if function.linkage == llvm.Linkage.internal:
+                function.name = f"{function.name}.of.{program}"
 
 
 class _Lower(Lower):  # type: ignore[misc]

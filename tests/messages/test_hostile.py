@@ -41,6 +41,7 @@ def test_a_name_that_is_unknown_or_of_somebody_else_is_refused(pairs):
     honest, stranger = pairs.connect(0), pairs.stranger()
     stranger.send(encode(Hello(5, 1, 2), 9, 0, 0))
     assert pairs.refused(1) == {"SENDER": 1}
+    pairs.server.peers[1].last = honest.session  # Sessions are drawn; these two must differ.
     other = pairs.connect(1)
     other._put(encode(Ready(1, True), 0, honest.session, 2))
     assert pairs.refused(2) == {"SENDER": 1, "SESSION": 1}
