@@ -98,7 +98,8 @@ app = typer.Typer(
     name="coop-drake",
     help="Plan, map, control and simulate several mobile manipulators that carry one object.",
     epilog="Begin with `coop-drake run base`, and for a case of your own with `coop-drake new NAME`.\n\n"
-    "Exit codes: 0 done, 1 failed run, 2 bad input, 3 infeasible, 4 undecided, 130 interrupted.",
+    "Exit codes: 0 done, 1 failed run, 2 bad input, 3 infeasible, 4 undecided, "
+    "5 beyond limits, 130 interrupted.",
     no_args_is_help=True,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 _BASE = "models/base.scenario.yaml"
+_REAL = "real.scenario.yaml"
 
 EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "run": (
@@ -41,10 +42,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("schema", "the same on standard output"),
     ),
     "world": (
-        (f"world {_BASE}", "with a control rate in it: wait for supervisor and robots, simulate, record"),
+        (f"world {_REAL}", "with a control rate in it: wait for supervisor and robots, simulate, record"),
     ),
-    "robot-node": ((f"robot-node {_BASE} 1", "be the second robot"),),
-    "supervisor": ((f"supervisor {_BASE} --addresses keys/addresses.yaml", "be the supervisor"),),
+    "robot-node": ((f"robot-node {_REAL} 1", "be the second robot"),),
+    "supervisor": ((f"supervisor {_REAL} --addresses keys/addresses.yaml", "be the supervisor"),),
     "keys": (
         ("keys --robots 2 --out keys", "for processes on this machine that prove who they are"),
         ("keys --robots 3 --world 192.168.1.10 --supervisor 192.168.1.11", "for several machines"),

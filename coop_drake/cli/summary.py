@@ -54,7 +54,7 @@ _MORE_ROWS = (
     ("largest acceleration error", "{max_acceleration_error:.1e} m/s²"),
     ("largest wrench error", "{max_wrench_error_n:.1e} N"),
     ("largest grasp error", "{max_grasp_error_m:.1e} m"),
-    ("messages between robots", "{messages}"),
+    ("messages in the team", "{messages}"),
     ("their payload", "{message_bytes} bytes"),
     ("peak rate of base forces", "{peak_base_force_rate_n_s:.0f} N/s"),
     ("peak joint torque", "{peak_joint_torque_nm:.1f} N m"),

@@ -19,8 +19,9 @@ def tune_command(
             "--criterion",
             "-c",
             metavar="NAME[=WEIGHT]",
-            help="What to improve: time, peak_force, mean_force, peak_base_torque, peak_torque, "
-            "peak_turning, clearance, cell_margin, funnel_margin. Several are weighed; default peak_force.",
+            help="What to improve: time, peak_force, force_rate, mean_force, peak_base_torque, "
+            "peak_torque, peak_turning, clearance, cell_margin, funnel_margin. Several are weighed; default "
+            "peak_force.",
         ),
     ] = None,
     limits: Annotated[

@@ -95,7 +95,7 @@ def _check(scenario: Scenario) -> None:
     """Refuse what does not change from run to run and the loop does not know."""
     control = scenario.control
     for key, found, allowed in (
-        ("plant.grasps", scenario.plant.grasps if not scenario.plant.ideal else None, "rigid"),
+        ("plant.grasps", scenario.plant.grasps if not scenario.plant.ideal else None, "joints"),
         ("control.predictor", control.predictor or None, "false"),
         ("control.observer", control.observer or None, "false"),
         ("control.hold", control.hold, "null"),
@@ -109,7 +109,8 @@ def _refusal(scenario: Scenario, key: str, found: object, allowed: str) -> Scena
         str(scenario.path),
         key,
         found,
-        f"{allowed}: the compiled loop, and one block for a sampled team, know no other",
+        f"{allowed}: the compiled loop, and fused blocks of a sampled team, support only teams with rigid "
+        "grasps, models without springs, and controllers without predictor, observer and holds",
     )
 
 

@@ -28,8 +28,6 @@ map are rough in any case."""
 
 _MOST_CORNERS = 20_000
 """Corners after the quick simplification from which the exact one would take minutes."""
-_SLOW = 500
-"""Corners from which planning takes minutes, which a note says."""
 _SPECK = 0.1
 """Other rooms smaller than this are not reported [m^2]."""
 _ROUNDING = 1e-9
@@ -99,8 +97,6 @@ def read_floor_plan(
             file, "the floor", f"it would grow by {stray:.2g} m", "change the tolerance a little"
         )
     notes = (*notes, *room.notes)
-    if (corners := shapely.get_num_coordinates(floor)) > _SLOW:
-        notes += (f"plans on {corners:,} corners take long; a larger tolerance saves corners",)
     others = tuple(area for area in room.others if area >= _SPECK)
     return FloorPlan(floor, room.floor, others, notes)
 

@@ -79,7 +79,7 @@ def load_own_keys(book: AddressBook, index: int, path: Path | None) -> KeyPair |
     if not book.secured:
         return None
     if path is None:
-        raise ScenarioError("the address book", "keys", None, f"--keys FILE, as {key_file(index)}")
+        raise ScenarioError("the address book", "keys", None, f"--key FILE, as {key_file(index)}")
     pair = load_keys(path)
     if pair.public != book.key_of(index):
         allowed = f"the key that the address book has for this process, as in {key_file(index)}"

@@ -1,4 +1,4 @@
-"""Counts the messages that the robots of a run sent to each other."""
+"""Counts the messages that the robots and the cell planner of a run exchange."""
 
 from __future__ import annotations
 

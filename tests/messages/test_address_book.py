@@ -132,7 +132,7 @@ def test_team_files_fit_together_and_each_process_has_its_own_key(tmp_path):
     assert pair.public == book.supervisor.key
     with pytest.raises(ScenarioError, match="the key that the address book has for this process"):
         load_own_keys(book, 0, key_files[1])
-    with pytest.raises(ScenarioError, match=r"--keys FILE, as robot_1\.key"):
+    with pytest.raises(ScenarioError, match=r"--key FILE, as robot_1\.key"):
         load_own_keys(book, 1, None)
     assert load_own_keys(local_book(2), 1, None) is None
 
