@@ -35,7 +35,8 @@ from tests.support.small_plan import GOAL_POSE, ROOM, START_POSE, small_plan
 
 MODELS = Path(__file__).parents[1] / "models"
 SCENARIOS = sorted(MODELS.glob("*.scenario.yaml"))
-TYPED = [Path("models") / path.name for path in SCENARIOS]
+TYPED = [Path("real.scenario.yaml"), *(Path("models") / path.name for path in SCENARIOS)]
+"""Scenarios in examples: that of the guide to processes of their own, and the shipped ones."""
 COMMAND = typer.main.get_command(app)
 BLIND = {"no number", "an infinity", "a negative infinity"}
 """What JSON has no words for; loading refuses it all the same."""

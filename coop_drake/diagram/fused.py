@@ -171,7 +171,7 @@ def _check(scenario: Scenario, knowledge: Sequence[RobotKnowledge]) -> None:
         raise ScenarioError(
             str(scenario.path),
             *refused,
-            "rigid grasps (`grasps: joints`), models without springs, no predictor or observer, holds only at "
-            "times that the scenario states, of deployment only mass_error, start_offset and seed: fused blocks "
-            "in continuous time support only these; use `--blocks named` for the rest",
+            "rigid grasps (`grasps: joints`), models without springs, no predictor or observer, holds only "
+            "at times that the scenario states, of deployment only mass_error, start_offset and seed: fused "
+            "blocks in continuous time support only these; use `--blocks named` for the rest",
         )
