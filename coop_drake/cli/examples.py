@@ -26,6 +26,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "verify": (
         (f"verify out/base/plan.json {_BASE}", "check a plan"),
         ("verify out/closed/certificate.json models/closed.scenario.yaml", "check a proof"),
+        (f"verify out/base/log.npz {_BASE}", "check a run by its log"),
     ),
     "show": (
         (f"show {_BASE}", "a picture of floor, start and goal"),

@@ -134,7 +134,8 @@ Apart = Annotated[
     bool,
     typer.Option(
         "--apart",
-        help="Run every robot and the supervisor as a process of its own; same results, bit for bit.",
+        help="Run every robot and the supervisor as a process of its own; same results, bit for bit. Needs "
+        "`deployment: {control_rate}`.",
     ),
 ]
 FreeRunning = Annotated[

@@ -22,7 +22,8 @@ def verify_command(
     certificate: Annotated[
         Path,
         typer.Argument(
-            metavar="FILE", help="plan.json or certificate.json, as `plan` wrote it, or log.npz of `run`."
+            metavar="FILE",
+            help="plan.json, way.json or certificate.json, as `plan` wrote it, or log.npz of `run`.",
         ),
     ],
     scenario: ScenarioPath,
