@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from math import nan
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from coop_drake.campaign.batches import Batch
 from coop_drake.campaign.records import QuestionRecord, Record, RunRecord, schema_of, table_of
 from coop_drake.campaign.search.findings import BreakingPoint, Finding
+from coop_drake.errors import CoopDrakeError
 from coop_drake.files import write_atomically
 
 if TYPE_CHECKING:
@@ -85,16 +87,28 @@ class CampaignFolder:
 
     def _records(self, batches: Sequence[Batch], kind: type[Record]) -> pyarrow.Table:
         import pyarrow
-        import pyarrow.parquet
 
         mine = [one for one in batches if one.record is kind]
-        there = [pyarrow.parquet.read_table(self.path / one.file) for one in mine if self.has(one)]
+        there = [self._read(one) for one in mine if self.has(one)]
         return pyarrow.concat_tables(there) if there else schema_of(kind).empty_table()
+
+    def _read(self, batch: Batch) -> pyarrow.Table:
+        import pyarrow.parquet
+
+        file = self.path / batch.file
+        try:
+            return pyarrow.parquet.read_table(file)
+        except (OSError, pyarrow.ArrowInvalid) as error:
+            again = "remove it, and `coop-drake campaign` makes its runs again"
+            raise CoopDrakeError(f"{file} is damaged ({' '.join(str(error).split())}); {again}") from error
 
     def costs(self, batches: Iterable[Batch]) -> list[dict[str, Any]]:
         """Return what the batches took whose costs are known, as `note` was told."""
-        files = [self.path / batch.costs for batch in batches]
-        return [json.loads(file.read_bytes()) for file in files if file.exists()]
+        known = []
+        for batch in batches:
+            with suppress(OSError, ValueError):  # Results do not depend on these files.
+                known.append(json.loads((self.path / batch.costs).read_bytes()))
+        return known
 
     def cpu_seconds(self, batches: Iterable[Batch]) -> float:
         """Return the mean processor time of a run, question or search with its share of starting, or NaN."""

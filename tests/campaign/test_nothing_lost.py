@@ -11,6 +11,7 @@ import subprocess
 import sys
 import threading
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -266,3 +267,20 @@ def test_a_scenario_that_was_changed_meanwhile_is_not_run(undisturbed, tmp_path)
     changed.write_text(changed.read_text().replace("max: 0.1", "max: 0.2"))
     with pytest.raises(ProcessError, match="was changed while the campaign ran"):
         make_batch(order)
+
+
+def test_a_log_that_cannot_be_written_ends_the_command_and_loses_no_run(undisturbed, tmp_path):
+    order = undisturbed.order(tmp_path / "kept")
+    folder = CampaignFolder(tmp_path / "kept")
+    file = undisturbed.file.with_name("kept.campaign.yaml")
+    file.write_text(FILE.replace("blocks: fused", "blocks: fused\n  keep: all"))
+    folder.campaign.write_bytes(file.read_bytes())
+    batch = next(Batching(Variation(load_campaign(file)), undisturbed.plans).batches())
+    order = replace(order, campaign=str(file), batch=batch)
+    (folder.path / "logs").write_text("no folder")
+    with pytest.raises(ProcessError, match="logs"):
+        make_batch(order)
+    assert not folder.has(batch)
+    (folder.path / "logs").unlink()
+    assert make_batch(order)
+    assert all(row["arrived"] for row in folder.table([batch]).to_pylist())

@@ -6,6 +6,7 @@ from math import isnan, nan
 
 import numpy as np
 import pytest
+import shapely
 from shapely import box
 
 from coop_drake.answers import Found, Infeasible, Undecided
@@ -117,6 +118,13 @@ def test_sampled_cells_keep_bodies_apart_and_moved_ones_do_not(question, planned
     moved = plan.cells[0].tidied.buffer(0.05, join_style="mitre")
     forged = replace(plan, cells=(replace(plan.cells[0], tidied=moved), *plan.cells[1:]))
     assert sampled_margin(problem, forged, 40, 1) <= 0.0
+
+
+def test_one_sample_of_a_thin_cell_is_taken(question, planned):
+    problem, plan = question.problem, planned.plan
+    thin = shapely.LineString([(0.0, 0.0), (1.0, 1.0)]).buffer(1e-9)
+    cell = replace(plan.cells[0], tidied=thin)
+    assert np.isfinite(sampled_margin(problem, replace(plan, cells=(cell,)), 1, 1))
 
 
 def test_a_wider_interval_than_proved_is_found_by_sampling(question, planned):

@@ -1,4 +1,3 @@
-from dataclasses import replace
 from math import inf, nan
 
 import numpy as np
@@ -8,7 +7,7 @@ import coop_drake
 from coop_drake.campaign.records import RunRecord
 from coop_drake.campaign.search.bounds import BoundedDepartures
 from coop_drake.campaign.search.breaking import first_lost
-from coop_drake.campaign.search.worst import LOST, margin_of, search_worst
+from coop_drake.campaign.search.worst import margin_of, search_worst
 from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of
 from coop_drake.scenario.measured_bounds import wave_bounds
@@ -110,14 +109,35 @@ def test_a_lost_run_ends_a_search():
     assert len(found.margins) < 60
 
 
-def test_a_lost_run_counts_as_less_than_any_other():
+def test_a_lost_run_ends_a_search_whatever_the_margins_of_those_that_arrived():
+    def shares(values):
+        lost = [x["a"] > 0.6 for x in values]
+        return [
+            record(nan, arrived=not gone, budget_share=nan if gone else 1.5 + x["b"])
+            for x, gone in zip(values, lost, strict=True)
+        ]
+
+    found = search_worst(np.full(2, 0.5), named, shares, margin="budget_share", evaluations=500, seed=1)
+    assert not found.record.arrived
+    assert found.values["a"] > 0.6
+    assert len(found.margins) < 60
+    assert found.first.budget_share == 2.0
+
+
+def test_the_lost_run_with_the_smallest_margin_is_the_worst_of_its_generation():
+    def falling(values):
+        return [record(-x["b"], arrived=x["a"] == 0.5) for x in values]
+
+    found = search_worst(np.full(2, 0.5), named, falling, margin="funnel_margin", evaluations=500, seed=1)
+    assert not found.record.arrived
+    assert found.record.funnel_margin == min(found.margins[1:])
+
+
+def test_a_margin_that_a_run_does_not_tell_is_larger_than_any_other():
     assert margin_of(record(2e-3), "funnel_margin") == 2e-3
-    assert margin_of(record(2e-3, arrived=False), "funnel_margin") == LOST
-    assert margin_of(record(-2e-3, arrived=False), "funnel_margin") == -2e-3
     assert margin_of(record(nan), "funnel_margin") == inf
     assert margin_of(record(2e-3, budget_share=0.7), "budget_share") == pytest.approx(0.3)
-    assert margin_of(record(2e-3, arrived=False, budget_share=1.2), "budget_share") == pytest.approx(-0.2)
-    assert margin_of(replace(record(nan), arrived=False), "funnel_margin") == LOST
+    assert margin_of(record(2e-3), "budget_share") == inf
 
 
 @pytest.mark.parametrize("edge", [0.3, 1.0, 1.7, 11.3])

@@ -41,7 +41,8 @@ def sampled_margin(problem: PlanningProblem, plan: Plan, samples: int, seed: int
 
 def _positions(random: np.random.Generator, region: Polygon, count: int) -> FloatArray:
     """Corners, points along the boundary and points inside, shape (count, 2) [m]."""
-    corners = random.choice(shapely.get_coordinates(region), round(_CORNERS * count))
+    all_corners = shapely.get_coordinates(region)
+    corners = random.choice(all_corners, round(_CORNERS * count))
     boundary = shapely.boundary(region)
     along = random.random(round(_BOUNDARY * count))
     points = shapely.get_coordinates(shapely.line_interpolate_point(boundary, along, normalized=True))
@@ -50,5 +51,5 @@ def _positions(random: np.random.Generator, region: Polygon, count: int) -> Floa
     inside = random.uniform(low, high, (8 * left, 2))
     inside = inside[shapely.contains_xy(region, inside)][:left]
     # A thin region may hold few of the points drawn in its bounds; its corners make up for them.
-    missing = random.choice(corners, left - len(inside))
+    missing = random.choice(all_corners, left - len(inside))
     return np.concatenate((corners, points, inside, missing))

@@ -35,7 +35,7 @@ def main(order: dict[str, Any]) -> int:
     threading.Thread(target=_end_with_supervisor, daemon=True).start()
     try:
         _make(order)
-    except CoopDrakeError as error:
+    except (CoopDrakeError, OSError) as error:  # A full disk is no fault of the run that met it.
         _say("error", str(error))
         return 1
     return 0

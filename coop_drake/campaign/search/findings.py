@@ -14,11 +14,12 @@ class Finding:
         scenario: Name of the scenario.
         tier: Which loop simulated the runs.
         seed: Seed of the search.
-        evaluations: Runs simulated.
+        evaluations: Runs simulated; 0 where processes were lost in the search.
         margin: Name of the column that was driven down, or up if it is ``budget_share``.
         before: Its value in the first run, whose departures were drawn at random [unit of the column].
-        worst: Its worst value [unit of the column]. Both are NaN where processes were lost in the search.
-        arrived: Whether the worst run arrived.
+        worst: Its value in the worst run [unit of the column]. Both are NaN where a run does not tell it, or
+            where processes were lost in the search.
+        arrived: Whether the worst run arrived; a lost run is worse than all that arrived.
         reason: Why not; empty if it arrived.
         file: Campaign file of the worst run, in the campaign's folder; empty where none was written.
     """
@@ -43,8 +44,10 @@ class BreakingPoint:
         scenario: Name of the scenario.
         tier: Which loop simulated the runs.
         departure: Name of the departure.
-        certified: What is certified, in the departure's unit; the runs have this times the multiple.
-        kept: Largest multiple tried at which no run was lost [-].
+        certified: What is certified, in the departure's unit; the runs have this times the multiple. NaN
+            where processes were lost in the bisection, which then found nothing.
+        kept: Largest multiple tried at which no run was lost [-]; below 1 where one was lost inside what is
+            certified.
         lost: Smallest multiple tried at which a run was lost [-]; infinity where none was.
         runs: Runs at every multiple.
         reason: Why the first run was lost.

@@ -20,7 +20,7 @@ from coop_drake.campaign.search.findings import BreakingPoint, Finding
 from coop_drake.campaign.search.multiples import SCALED, departures_at, largest_multiple
 from coop_drake.campaign.search.settings import Breaking, Searches
 from coop_drake.campaign.search.trials import Trials
-from coop_drake.campaign.search.worst import in_column, search_worst
+from coop_drake.campaign.search.worst import search_worst
 from coop_drake.campaign.settings import Campaign
 
 _NO_MATTER = ("scenarios", "count", "departures", "batch", "time_limit")
@@ -108,7 +108,8 @@ class Searching:
             evaluations=asked.evaluations,
             seed=seed,
         )
-        file = self._folder.path / "found" / f"{trials.name}_{seed}.campaign.yaml"
+        search = content_digest(self._content)[:8]  # Others may be of a scenario of the same name.
+        file = self._folder.path / "found" / f"{trials.name}_{seed}_{search}.campaign.yaml"
         trials.write_found(found.values, file)
         return Finding(
             trials.name,
@@ -116,8 +117,8 @@ class Searching:
             seed,
             len(found.margins),
             asked.margin,
-            in_column(found.margins[0], asked.margin),
-            in_column(min(found.margins), asked.margin),
+            float(getattr(found.first, asked.margin)),
+            float(getattr(found.record, asked.margin)),
             found.record.arrived,
             found.record.reason,
             str(file.relative_to(self._folder.path)),

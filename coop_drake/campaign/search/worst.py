@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any
 
@@ -20,42 +20,32 @@ _FIRST_STEP = 0.3
 """Standard deviation of the first generation, as a fraction of every number's range [-]: nothing is known of
 where the worst departures are."""
 
-LOST = -1.0
-"""Margin of a lost run that has none of its own below zero [rad or m]: less than any other."""
-
 
 @dataclass(frozen=True)
 class Worst:
     """What a search found.
 
     Attributes:
-        margins: The margin of every run in the order of the search.
-        values: The departures of the run with the smallest one.
+        margins: The margin of every run in the order of the search; infinite where a run does not tell it.
+        values: The departures of a lost run if there is one, else those of the run with the smallest margin.
         record: The record of this run.
+        first: The record of the first run.
     """
 
     margins: tuple[float, ...]
     values: Values
     record: RunRecord
+    first: RunRecord
 
 
 def margin_of(record: RunRecord, name: str) -> float:
-    """Return a margin of a run, and below zero if the run was lost.
+    """Return the margin of a run that a search drives down; infinite where the run does not tell it.
 
     ``budget_share`` counts as what is left of the budget's stated distance.
     """
-    margin = in_column(float(getattr(record, name)), name)
-    if record.arrived:
-        return margin if isfinite(margin) else np.inf
-    return margin if margin < 0.0 else LOST
-
-
-def in_column(margin: float, name: str) -> float:
-    """Return the value of a column for a margin that is driven down; called twice, it gives the margin back.
-
-    Only the used share of a budget is another number than its margin: the margin is what is left of it [-].
-    """
-    return 1.0 - margin if name == "budget_share" else margin
+    value = float(getattr(record, name))
+    margin = 1.0 - value if name == "budget_share" else value
+    return margin if isfinite(margin) else np.inf
 
 
 def search_worst(
@@ -87,7 +77,7 @@ def search_worst(
     strategy = evolution_strategy(start, evaluations, seed, first_step=_FIRST_STEP)
     first = values_of(start)
     (record,) = run_all([first])
-    found = Worst((margin_of(record, margin),), first, record)
+    found = Worst((margin_of(record, margin),), first, record, record)
     while found.record.arrived and len(found.margins) < evaluations and not strategy.stop():
         asked = strategy.ask()[: evaluations - len(found.margins)]
         chosen = [values_of(fractions) for fractions in asked]
@@ -95,13 +85,20 @@ def search_worst(
         margins = [margin_of(record, margin) for record in records]
         if len(margins) == strategy.popsize:
             strategy.tell(asked, margins)
-        least = int(np.argmin(margins))
-        before = min(found.margins)
-        values, record = (
-            (chosen[least], records[least]) if margins[least] < before else (found.values, found.record)
-        )
-        found = Worst((*found.margins, *margins), values, record)
+        found = _worse(found, chosen, records, margins)
         if progress is not None:
             text = f"smallest {margin.replace('_', ' ')} {min(found.margins):.4g}"
             progress(text, len(found.margins) / evaluations)
     return found
+
+
+def _worse(
+    found: Worst, chosen: Sequence[Values], records: Sequence[RunRecord], margins: Sequence[float]
+) -> Worst:
+    """Add runs to what was found. Any lost run is worse than all that arrived, whatever their margins."""
+    ranks = [(record.arrived, margin) for record, margin in zip(records, margins, strict=True)]
+    worst = min(range(len(ranks)), key=ranks.__getitem__)
+    all_margins = (*found.margins, *margins)
+    if ranks[worst] < (found.record.arrived, min(found.margins)):
+        return Worst(all_margins, chosen[worst], records[worst], found.first)
+    return replace(found, margins=all_margins)

@@ -1,0 +1,42 @@
+"""Results that are damaged are named; what batches cost is left out where it cannot be read."""
+
+import pytest
+
+from coop_drake.campaign.batches import BREAKING, Batch
+from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.search import BreakingPoint
+from coop_drake.errors import CoopDrakeError
+
+
+@pytest.fixture
+def folder_and_batch(tmp_path):
+    folder, batch = CampaignFolder(tmp_path), Batch(0, BREAKING, 0, 2, "0" * 64)
+    point = BreakingPoint("base", "compiled", "lag", 0.005, 5.0, 5.5, 4, "left its cell")
+    folder.write(batch, [point, point])
+    return folder, batch
+
+
+def test_a_file_that_is_damaged_inside_is_named_with_what_to_do(folder_and_batch):
+    folder, batch = folder_and_batch
+    file = folder.path / batch.file
+    content = bytearray(file.read_bytes())
+    content[4:200] = bytes(196)  # The end, which says how many rows there are, is whole.
+    file.write_bytes(content)
+    assert folder.has(batch)
+    with pytest.raises(CoopDrakeError, match=r"0\.parquet is damaged \(.*\); remove it, and"):
+        folder.findings([batch])
+
+
+def test_a_file_without_its_end_counts_as_missing(folder_and_batch):
+    folder, batch = folder_and_batch
+    file = folder.path / batch.file
+    file.write_bytes(file.read_bytes()[:-20])
+    assert folder.missing([batch]) == [batch]
+
+
+def test_costs_that_cannot_be_read_are_not_counted(folder_and_batch):
+    folder, batch = folder_and_batch
+    folder.note(batch, {"runs": 2, "cpu_seconds": 1.0})
+    assert folder.cpu_seconds([batch]) == 0.5
+    (folder.path / batch.costs).write_text("")
+    assert folder.costs([batch]) == []
