@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 
@@ -20,7 +21,7 @@ _REASONS = 5
 
 @dataclass(frozen=True)
 class Distribution:
-    """How the values of a column are distributed, in its own unit.
+    """How the values of a column are distributed, in its own unit; numbers are NaN where there are no values.
 
     Attributes:
         count: Values that are numbers.
@@ -39,6 +40,10 @@ class Distribution:
     high: float
     largest: float
     heights: tuple[int, ...]
+
+
+NOTHING = Distribution(0, nan, nan, nan, nan, nan, ())
+"""The distribution of no values."""
 
 
 @dataclass(frozen=True)

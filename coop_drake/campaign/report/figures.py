@@ -124,8 +124,8 @@ def breaking_svg(points: Sequence[BreakingPoint]) -> str:
 
 
 def growth_svg(questions: Sequence[Questions]) -> str:
-    """Draw the planner's CPU time in every group of questions; empty without questions."""
-    groups = [one for one in questions if one.axis != ALL]
+    """Draw the planner's CPU time in every group of questions; empty without answers."""
+    groups = [one for one in questions if one.axis != ALL and one.seconds.count]
     if not groups:
         return ""
     names = [f"{one.axis} {one.group}" for one in groups]

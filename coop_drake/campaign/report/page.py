@@ -7,11 +7,12 @@ from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
-from coop_drake.campaign.report.columns import COSTS, MARGINS, MEASURES, SHARE, Measure, significant
+from coop_drake.campaign.report.columns import COSTS, MARGINS, MEASURES, SHARE, Measure
 from coop_drake.campaign.report.distributions import Group
 from coop_drake.campaign.report.document import Report
 from coop_drake.campaign.report.figures import breaking_svg, distributions_svg, growth_svg, searches_svg
 from coop_drake.campaign.report.influences import Influence
+from coop_drake.campaign.report.questions import seconds_shown
 from coop_drake.campaign.report.rates import percent
 from coop_drake.campaign.report.searches import summarise_searches
 from coop_drake.campaign.report.worst import WorstRun
@@ -64,7 +65,7 @@ def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
         ],
         searched=searched,
         broken=_broken(report.breaking),
-        seconds=lambda time: f"{significant(time, 2)} s",
+        seconds=seconds_shown,
         shown=_shown,
         percent=percent,
         figures={

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from math import inf
+from math import inf, isnan
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coop_drake.campaign.report.columns import significant
-from coop_drake.campaign.report.distributions import Distribution, distribution
+from coop_drake.campaign.report.distributions import NOTHING, Distribution, distribution
 
 ALL = "all"
 """Name of the group of all questions."""
@@ -34,7 +34,7 @@ class Questions:
     Attributes:
         axis: By what they are grouped: ``floor``, ``robots``, ``joints``, ``corners`` or ``width``; ``all``.
         group: The value, or the values, of all questions in the group.
-        count: Questions asked.
+        count: Questions asked, those that failed with them.
         plans: Answered with a plan.
         beyond_limits: Answered with a plan that limits of the scenario refuse.
         infeasible: Answered with a proof that there is none.
@@ -43,7 +43,7 @@ class Questions:
         contact: Plans with a sampled configuration at which something touches.
         contradicted: Proofs of infeasibility although another planner found a way.
         peer_found: Undecided questions for which another planner found a way.
-        seconds: CPU time of the answers [s].
+        seconds: CPU time of the answers; questions that failed have none [s].
     """
 
     axis: str
@@ -69,11 +69,19 @@ class Questions:
         counts = (self.count, self.plans, self.beyond_limits, self.infeasible, self.undecided, self.wrong)
         times = (self.seconds.median, self.seconds.high, self.seconds.largest)
         name = ALL if self.axis == ALL else f"{self.axis} {self.group}"
-        return name, *map(str, counts), *(f"{significant(time, 2)} s" for time in times)
+        return name, *map(str, counts), *map(seconds_shown, times)
+
+
+def seconds_shown(time: float) -> str:
+    """A time with two significant digits; empty for NaN."""
+    return "" if isnan(time) else f"{significant(time, 2)} s"
 
 
 def summarise_questions(table: Any) -> tuple[Questions, ...]:
     """Return how the questions of every group were answered, and all of them in the last row.
+
+    Of a question whose process was lost nothing is known but that it was asked: it counts in the last
+    row alone.
 
     Args:
         table: A pyarrow table with the columns of ``QuestionRecord``.
@@ -88,13 +96,14 @@ def summarise_questions(table: Any) -> tuple[Questions, ...]:
 
 def _groups(columns: dict[str, NDArray[Any]]) -> Iterator[tuple[str, str, NDArray[np.bool_]]]:
     """Yield what is grouped by, the group's name, and which questions belong to it."""
+    known = columns["floor"] != ""
     for axis in ("floor", "robots"):
-        for value in np.unique(columns[axis]):
-            yield axis, str(value), columns[axis] == value
+        for value in np.unique(columns[axis][known]):
+            yield axis, str(value), known & (columns[axis] == value)
     for axis, least in (("joints", JOINTS), ("corners", CORNERS)):
         for low, high in pairwise((*least, inf)):
             name = f"{low} or more" if high == inf else f"{low} to {high - 1:g}"
-            yield axis, name, (columns[axis] >= low) & (columns[axis] < high)
+            yield axis, name, known & (columns[axis] >= low) & (columns[axis] < high)
     for low, high in pairwise((*WIDTHS, inf)):
         name = f"{low:g} or more" if high == inf else f"{low:g} to {high:g}"
         yield "width", name, (columns["width_ratio"] >= low) & (columns["width_ratio"] < high)
@@ -108,8 +117,8 @@ def _count(axis: str, group: str, columns: dict[str, NDArray[Any]]) -> Questions
     found = columns["peer_found"].astype(bool)
     refused = ~columns["verified"].astype(bool) & ~undecided
     contact = (plans | beyond) & (columns["sampled_margin"].astype(float) <= 0.0)
-    seconds = distribution(columns["cpu_seconds"].astype(float))
-    assert seconds is not None  # every question took some time
+    answered = columns["verdict"] != "failed"
+    seconds = distribution(columns["cpu_seconds"].astype(float)[answered]) or NOTHING
     return Questions(
         axis,
         group,
