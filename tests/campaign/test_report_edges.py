@@ -1,10 +1,14 @@
 """What a report says of results that are few, equal, lost or made twice."""
 
+from math import inf, nan
+
 import numpy as np
 
 from coop_drake.campaign.records import QuestionRecord, table_of
 from coop_drake.campaign.report import make_report
 from coop_drake.campaign.report.page import headline, render_page, verdict
+from coop_drake.campaign.search import BreakingPoint
+from tests.support.campaign_table import run_table
 
 
 def replay(run):
@@ -32,3 +36,35 @@ def test_questions_whose_processes_were_all_lost_make_a_page_without_times():
     assert "nan" not in page
     assert "<svg" not in page
     assert np.isnan(every.seconds.median)
+
+
+def test_a_run_lost_inside_what_is_certified_is_bad():
+    good = BreakingPoint("base", "drake", "lag", 0.1, 4.0, 4.5, 5, "left")
+    inside = BreakingPoint("tight", "drake", "all", 1.0, 0.5, 0.625, 5, "left")
+    assert verdict(make_report("good", breaking=[good])) == "good"
+    report = make_report("inside", breaking=[good, inside])
+    assert headline(report) == "A run was lost at 0.62 times what is certified (all, tight)."
+    assert verdict(report) == "bad"
+    assert '<td class="n some">0.5</td>' in render_page(report, replay)
+
+
+def test_a_bisection_whose_process_was_lost_is_not_determined_and_bad():
+    good = BreakingPoint("base", "drake", "lag", 0.1, 4.0, inf, 5, "")
+    lost = BreakingPoint("base", "drake", "model_error", nan, 0.0, inf, 5, "no result within 60 s")
+    for points in ([good, lost], [lost]):
+        report = make_report("lost", breaking=points)
+        assert headline(report) == "1 breaking point is not determined (model error, base)."
+        assert verdict(report) == "bad"
+        page = render_page(report, replay)
+        assert page.count(">not determined</td>") == 4
+        assert ">nan" not in page
+        assert ">inf" not in page
+        assert "0 or more" not in page
+
+
+def test_what_bisections_found_bad_is_told_with_the_rate_of_lost_runs():
+    inside = BreakingPoint("tight", "drake", "all", 1.0, 0.0, 0.125, 5, "left")
+    report = make_report("runs", run_table(20), breaking=[inside])
+    assert headline(report).startswith("None of 20 runs was lost.")
+    assert headline(report).endswith("A run was lost at 0.12 times what is certified (all, tight).")
+    assert verdict(report) == "bad"

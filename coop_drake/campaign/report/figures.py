@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from coop_drake.campaign.report.bisections import is_determined, is_good
 from coop_drake.campaign.report.columns import MEASURES, SHARE, Measure
 from coop_drake.campaign.report.distributions import Distribution, Group
 from coop_drake.campaign.report.questions import ALL, Questions
@@ -98,8 +99,9 @@ def _is_beyond(measure: Measure, value: float) -> bool:
 def breaking_svg(points: Sequence[BreakingPoint]) -> str:
     """Draw up to which multiple of what is certified no run was lost: dots for scenarios, a bar to the least.
 
-    Empty without points.
+    Empty without points; those that are not determined are left out.
     """
+    points = [point for point in points if is_determined(point)]
     if not points:
         return ""
     names = list(dict.fromkeys(point.departure for point in points))
@@ -107,7 +109,7 @@ def breaking_svg(points: Sequence[BreakingPoint]) -> str:
     for place, name in zip(np.arange(len(names))[::-1] + 0.35, names, strict=True):
         own = sorted((point for point in points if point.departure == name), key=lambda point: point.kept)
         ends = [max(point.kept, _LEAST) for point in own]
-        ax.barh(place, ends[0], height=0.5, color=GREEN if own[0].kept >= 1.0 else VERMILLION)
+        ax.barh(place, ends[0], height=0.5, color=GREEN if is_good(own[0]) else VERMILLION)
         ax.plot(ends, [place] * len(ends), "o", color=BLUE, markersize=4.5)
         beyond = "" if np.isfinite(own[0].lost) else " or more"
         text = f"{own[0].kept:.3g}{beyond}, {own[0].scenario}"

@@ -7,6 +7,7 @@ from math import isnan, nan
 from pathlib import Path
 from typing import Any
 
+from coop_drake.campaign.report.bisections import ends_shown, is_good, multiple_shown, sentences
 from coop_drake.campaign.report.columns import COSTS, MARGINS, MEASURES, SHARE, Measure
 from coop_drake.campaign.report.distributions import Group
 from coop_drake.campaign.report.document import Report
@@ -65,6 +66,7 @@ def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
         ],
         searched=searched,
         broken=_broken(report.breaking),
+        ends=[(point, ends_shown(point)) for point in report.breaking],
         seconds=seconds_shown,
         shown=_shown,
         percent=percent,
@@ -80,7 +82,15 @@ def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
 
 
 def headline(report: Report) -> str:
-    """The most important sentence of a report."""
+    """The most important sentence of a report, and what is bad of its bisections."""
+    main, broken = _main_sentence(report), sentences(report.breaking)
+    if not main:
+        return " ".join(broken) or "There are no results yet."
+    return main if all(map(is_good, report.breaking)) else " ".join((main, *broken))
+
+
+def _main_sentence(report: Report) -> str:
+    """Say what runs, questions or searches found; empty without any of them."""
     if report.rate is not None:
         return report.rate.sentence + _beyond(report.exceeded, report.most_used, "run")
     if report.questions:
@@ -94,17 +104,13 @@ def headline(report: Report) -> str:
         told = f"{found} of {len(report.findings):,} searches, with {runs:,} runs, found a run that is lost."
         used = [one.worst for one in report.findings if one.margin == SHARE]
         return told + _beyond(sum(one > 1.0 for one in used), max(used, default=nan), "search")
-    if report.breaking:
-        least = min(report.breaking, key=lambda point: point.kept)
-        name = least.departure.replace("_", " ")
-        return f"No run was lost up to {least.kept:.2g} times what is certified ({name}, {least.scenario})."
-    return "There are no results yet."
+    return ""
 
 
 def verdict(report: Report) -> str:
-    """``bad`` where something was lost or is wrong, ``some`` where more was used than a budget states."""
+    """``bad`` where something was lost, wrong or not known, ``some`` where more was used than is budgeted."""
     lost = (report.rate is not None and report.rate.lost) or not all(one.arrived for one in report.findings)
-    if lost or any(row.wrong for row in report.questions):
+    if lost or any(row.wrong for row in report.questions) or not all(map(is_good, report.breaking)):
         return "bad"
     found = any(one.margin == SHARE and one.worst > 1.0 for one in report.findings)
     return "some" if report.exceeded or found else "good"
@@ -138,12 +144,13 @@ def _row(group: Group) -> dict[str, Any]:
 
 
 def _broken(points: tuple[BreakingPoint, ...]) -> dict[str, Any]:
-    """Scenarios, and one row for each departure with the multiple of every scenario."""
+    """Scenarios, and for each departure a row: the multiple of every scenario, and whether it is good."""
     names = list(dict.fromkeys(point.scenario for point in points))
     rows = []
     for departure in dict.fromkeys(point.departure for point in points):
         own = {point.scenario: point for point in points if point.departure == departure}
-        rows.append((departure, [own.get(name) for name in names]))
+        points_shown = [own.get(name) for name in names]
+        rows.append((departure, [(multiple_shown(one), one is None or is_good(one)) for one in points_shown]))
     return {"scenarios": names, "rows": rows}
 
 
