@@ -3,10 +3,12 @@
 from math import inf, nan
 
 import numpy as np
+import pyarrow as pa
 
 from coop_drake.campaign.records import QuestionRecord, table_of
 from coop_drake.campaign.report import make_report
 from coop_drake.campaign.report.page import headline, render_page, verdict
+from coop_drake.campaign.report.rates import loss_rate
 from coop_drake.campaign.search import BreakingPoint
 from tests.support.campaign_table import run_table
 
@@ -68,3 +70,24 @@ def test_what_bisections_found_bad_is_told_with_the_rate_of_lost_runs():
     assert headline(report).startswith("None of 20 runs was lost.")
     assert headline(report).endswith("A run was lost at 0.12 times what is certified (all, tight).")
     assert verdict(report) == "bad"
+
+
+def test_a_run_that_both_tiers_made_is_one_trial():
+    table = run_table(60, tiers=("drake", "compiled"), lost=(7,))
+    report = make_report("both", table)
+    assert (report.rate.lost, report.rate.runs) == (1, 60)
+    assert sum(group.rate.runs for group in report.groups) == 120
+    paired = pa.concat_tables([run_table(60, tiers=("compiled",)), run_table(10, lost=(3, 4))])
+    assert make_report("paired", paired).rate == loss_rate(2, 60)
+
+
+def test_a_run_that_used_more_than_the_budget_in_both_tiers_counts_once():
+    table = run_table(20, tiers=("drake", "compiled"))
+    shares = pa.array(np.where(table["run"].to_numpy() == 5, 1.2, 0.4))
+    table = table.set_column(table.schema.get_field_index("budget_share"), "budget_share", shares)
+    assert make_report("both", table).exceeded == 1
+
+
+def test_runs_of_the_same_index_in_two_scenarios_are_two_trials():
+    table = pa.concat_tables([run_table(10, scenarios=(name,)) for name in ("base", "tight")])
+    assert make_report("two", table).rate.runs == 20

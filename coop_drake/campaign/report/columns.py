@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coop_drake.tree.pose import FloatArray, IntArray
 
@@ -91,6 +92,21 @@ class Runs:
     def text(self, name: str, row: int) -> str:
         """Return the text of a column in one row."""
         return str(self._table[name][int(row)].as_py())
+
+    @cached_property
+    def trials(self) -> IntArray:
+        """The trial of every row, shape (runs,): runs of one scenario and index in two tiers are one trial."""
+        numbers = self.integers("run")
+        scenarios = np.empty(self.count, dtype=np.int64)
+        names = sorted({scenario for scenario, _, _ in self.groups})
+        for scenario, _, rows in self.groups:
+            scenarios[rows] = names.index(scenario)
+        pairs = scenarios * (numbers.max(initial=0) + 1) + numbers
+        return np.asarray(np.unique(pairs, return_inverse=True)[1], dtype=np.int64)
+
+    def count_trials(self, chosen: NDArray[np.bool_] | None = None) -> int:
+        """Return how many trials have a chosen row; by default, all trials."""
+        return int(np.unique(self.trials if chosen is None else self.trials[chosen]).size)
 
     @cached_property
     def groups(self) -> tuple[tuple[str, str, IntArray], ...]:

@@ -27,7 +27,9 @@ class Report:
     Attributes:
         title: Name of the campaign.
         facts: What was asked for: name and value, in the order shown.
-        rate: How many of all runs were lost; None without runs.
+        rate: How many of all runs were lost; None without runs. Here and in the next number a run that both
+            tiers made counts once: it has the same values and the same seed in both, and is lost if it was
+            lost in any.
         exceeded: Runs that used more than all of what the budget states, lost or not.
         most_used: Largest share of what the budget states that a run used; NaN where none is known [-].
         groups: The runs of every scenario and tier.
@@ -84,8 +86,10 @@ def make_report(
     return Report(
         title,
         tuple(facts),
-        None if known is None else loss_rate(int(known.lost.sum()), known.count, confidence),
-        int((used > 1.0).sum()),
+        None
+        if known is None
+        else loss_rate(known.count_trials(known.lost), known.count_trials(), confidence),
+        0 if known is None else known.count_trials(used > 1.0),
         float(np.nanmax(used)) if np.isfinite(used).any() else math.nan,
         () if known is None else summarise(known, confidence),
         () if known is None else influences(known),
