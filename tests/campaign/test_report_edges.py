@@ -1,11 +1,12 @@
 """What a report says of results that are few, equal, lost or made twice."""
 
+import json
 from math import inf, nan
 
 import numpy as np
 import pyarrow as pa
 
-from coop_drake.campaign.records import QuestionRecord, table_of
+from coop_drake.campaign.records import QuestionRecord, RunRecord, table_of
 from coop_drake.campaign.report import make_report
 from coop_drake.campaign.report.page import headline, render_page, verdict
 from coop_drake.campaign.report.rates import loss_rate
@@ -91,3 +92,30 @@ def test_a_run_that_used_more_than_the_budget_in_both_tiers_counts_once():
 def test_runs_of_the_same_index_in_two_scenarios_are_two_trials():
     table = pa.concat_tables([run_table(10, scenarios=(name,)) for name in ("base", "tight")])
     assert make_report("two", table).rate.runs == 20
+
+
+def table_of_margins(values, margins):
+    """Runs of one scenario with these values of one key and these funnel margins."""
+    records = [
+        RunRecord(k, "base", "drake", k, json.dumps({"mass_error": value}), True, funnel_margin=margin)
+        for k, (value, margin) in enumerate(zip(values, margins, strict=True))
+    ]
+    return table_of(records, RunRecord)
+
+
+def test_a_fault_that_takes_margin_to_both_sides_is_found():
+    generator = np.random.default_rng(5)
+    errors = generator.uniform(-0.2, 0.2, 200)
+    margins = 9e-3 - 0.01 * np.abs(errors) + generator.normal(0.0, 2e-4, 200)
+    report = make_report("symmetric", table_of_margins(errors, margins))
+    (found,) = report.influences
+    assert found.clear
+    assert found.taken > 1e-3
+    assert "no\nclear effect, or too few runs" in render_page(report, replay)
+
+
+def test_noise_is_no_clear_effect():
+    generator = np.random.default_rng(5)
+    table = table_of_margins(generator.uniform(-0.2, 0.2, 200), generator.normal(9e-3, 2e-4, 200))
+    (found,) = make_report("noise", table).influences
+    assert not found.clear

@@ -95,7 +95,7 @@ class Runs:
 
     @cached_property
     def trials(self) -> IntArray:
-        """The trial of every row, shape (runs,): runs of one scenario and index in two tiers are one trial."""
+        """The trial of every row, shape (runs,): runs of one scenario and index in two tiers are one."""
         numbers = self.integers("run")
         scenarios = np.empty(self.count, dtype=np.int64)
         names = sorted({scenario for scenario, _, _ in self.groups})

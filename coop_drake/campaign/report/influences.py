@@ -19,7 +19,7 @@ _FEWEST = 20
 """Runs below which nothing is said about a key [-]: a part would have less than four."""
 
 _CHANCE = 0.01
-"""Share of campaigns in which chance alone may give a rank correlation that counts [-]."""
+"""Share of campaigns in which chance alone may give a difference that counts [-]."""
 
 
 @dataclass(frozen=True)
@@ -31,16 +31,17 @@ class Influence:
     Attributes:
         key: Dotted path of the key in the scenario.
         measure: Name of the margin's column.
-        correlation: Spearman's rank correlation of key and margin [-].
-        clear: Whether chance alone gives such a correlation, of any key and margin, in less than one campaign
-            in a hundred.
+        chance: Probability with which chance alone lets the parts differ as much, by the test of Kruskal and
+            Wallis [-].
+        clear: Whether chance alone lets the parts of any key and margin differ as much in less than one
+            campaign in a hundred.
         values: Median of the key in every part, in rising order.
         margins: Median of the margin in every part, relative to that of all runs.
     """
 
     key: str
     measure: str
-    correlation: float
+    chance: float
     clear: bool
     values: tuple[float, ...]
     margins: tuple[float, ...]
@@ -80,19 +81,23 @@ def influences(runs: Runs) -> tuple[Influence, ...]:
 
 
 def _influence(
-    key: str, measure: str, values: FloatArray, margins: FloatArray, chance: float
+    key: str, measure: str, values: FloatArray, margins: FloatArray, largest: float
 ) -> Influence | None:
-    from scipy.stats import spearmanr
+    """Return how a margin depends on a key, clearly if chance is below the largest; None if it is not known.
+
+    The parts are compared, not the ranks of key and margin, so that a margin that falls to both sides counts.
+    """
+    from scipy.stats import kruskal
 
     if values.size < _FEWEST or np.ptp(values) == 0.0 or np.ptp(margins) == 0.0:
         return None
-    correlation, by_chance = spearmanr(values, margins)
     parts = np.array_split(np.argsort(values, kind="stable"), _PARTS)
+    chance = float(kruskal(*(margins[part] for part in parts)).pvalue)
     return Influence(
         key,
         measure,
-        float(correlation),
-        bool(by_chance < chance),
+        chance,
+        chance < largest,
         tuple(float(np.median(values[part])) for part in parts),
         tuple(float(np.median(margins[part])) for part in parts),
     )
