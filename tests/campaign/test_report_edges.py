@@ -5,9 +5,12 @@ from math import inf, nan
 
 import numpy as np
 import pyarrow as pa
+import pytest
 
 from coop_drake.campaign.records import QuestionRecord, RunRecord, table_of
 from coop_drake.campaign.report import make_report
+from coop_drake.campaign.report.distributions import distribution
+from coop_drake.campaign.report.figures import distributions_svg
 from coop_drake.campaign.report.page import headline, render_page, verdict
 from coop_drake.campaign.report.rates import loss_rate
 from coop_drake.campaign.search import BreakingPoint
@@ -119,3 +122,13 @@ def test_noise_is_no_clear_effect():
     table = table_of_margins(generator.uniform(-0.2, 0.2, 200), generator.normal(9e-3, 2e-4, 200))
     (found,) = make_report("noise", table).influences
     assert not found.clear
+
+
+@pytest.mark.parametrize("steps", [0, 1, 3, 31, 119])
+def test_values_that_differ_by_rounding_fill_one_bin(steps):
+    value = 0.0123
+    values = np.array([value, value + steps * np.spacing(value), value])
+    found = distribution(values)
+    assert max(found.heights) == sum(found.heights) == 3
+    assert "svg" in distributions_svg(make_report("equal", table_of_margins(values, values)).groups)
+    assert max(distribution(np.array([value, 1.001 * value])).heights) == 1

@@ -15,6 +15,9 @@ from coop_drake.tree.pose import FloatArray
 _BINS = 30
 """Bins of a histogram [-]: a hill of a figure is some hundred points wide."""
 
+_ROUNDING = 4 * _BINS
+"""Values whose range is at most this many units in the last place count as one value [-]."""
+
 _REASONS = 5
 """Reasons for losses that are listed, the most frequent ones."""
 
@@ -73,11 +76,16 @@ def distribution(values: FloatArray) -> Distribution | None:
         return None
     low, median, high = np.quantile(numbers, (0.05, 0.5, 0.95))
     ends = float(numbers.min()), float(numbers.max())
-    heights = np.histogram(numbers, bins=_BINS, range=ends if ends[0] < ends[1] else None)[0]
     return Distribution(
-        int(numbers.size), ends[0], float(low), float(median), float(high), ends[1],
-        tuple(int(height) for height in heights),
+        int(numbers.size), ends[0], float(low), float(median), float(high), ends[1], _heights(numbers, ends)
     )  # fmt: skip
+
+
+def _heights(numbers: FloatArray, ends: tuple[float, float]) -> tuple[int, ...]:
+    """Return the counts in bins between the ends; all in the middle one if the bins would be mere rounding."""
+    if ends[1] - ends[0] <= _ROUNDING * np.spacing(max(map(abs, ends))):
+        return tuple(numbers.size if place == _BINS // 2 else 0 for place in range(_BINS))
+    return tuple(int(height) for height in np.histogram(numbers, bins=_BINS, range=ends)[0])
 
 
 def summarise(runs: Runs, confidence: float) -> tuple[Group, ...]:
