@@ -132,3 +132,12 @@ def test_values_that_differ_by_rounding_fill_one_bin(steps):
     assert max(found.heights) == sum(found.heights) == 3
     assert "svg" in distributions_svg(make_report("equal", table_of_margins(values, values)).groups)
     assert max(distribution(np.array([value, 1.001 * value])).heights) == 1
+
+
+def test_a_clear_influence_that_moves_no_median_makes_a_page():
+    values = np.linspace(0.0, 1.0, 500)
+    spread = np.where(np.arange(500) % 100 < 45, np.where(values < 0.2, -1e-3, 1e-3), 0.0)
+    report = make_report("medians", table_of_margins(values, 9e-3 + spread))
+    (found,) = report.influences
+    assert (found.clear, found.taken) == (True, 0.0)
+    assert "--depth: 0%" in render_page(report, replay)

@@ -177,7 +177,7 @@ def _influence_table(found: tuple[Influence, ...]) -> list[tuple[str, list[dict[
                 {
                     "taken": measure.shown(one.taken),
                     "worst": f"{one.worst:.3g}",
-                    "depth": round(100.0 * one.taken / largest[measure.name]),
+                    "depth": round(100.0 * one.taken / (largest[measure.name] or 1.0)),
                 }
             )  # fmt: skip
         rows.append((key, cells))
