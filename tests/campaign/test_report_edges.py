@@ -9,8 +9,10 @@ import pytest
 
 from coop_drake.campaign.records import QuestionRecord, RunRecord, table_of
 from coop_drake.campaign.report import make_report
+from coop_drake.campaign.report.columns import Runs
 from coop_drake.campaign.report.distributions import distribution
 from coop_drake.campaign.report.figures import distributions_svg
+from coop_drake.campaign.report.influences import influences
 from coop_drake.campaign.report.page import headline, render_page, verdict
 from coop_drake.campaign.report.rates import loss_rate
 from coop_drake.campaign.search import BreakingPoint
@@ -141,3 +143,11 @@ def test_a_clear_influence_that_moves_no_median_makes_a_page():
     (found,) = report.influences
     assert (found.clear, found.taken) == (True, 0.0)
     assert "--depth: 0%" in render_page(report, replay)
+
+
+def test_one_array_is_made_for_each_key_that_varies(monkeypatch):
+    made, full = [], np.full
+    monkeypatch.setattr(np, "full", lambda *args, **named: made.append(args) or full(*args, **named))
+    influences(Runs(run_table(100)))
+    keys, margins = 2, 4
+    assert sum(args[0] == 100 for args in made) == keys + margins

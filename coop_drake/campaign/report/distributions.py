@@ -82,7 +82,7 @@ def distribution(values: FloatArray) -> Distribution | None:
 
 
 def _heights(numbers: FloatArray, ends: tuple[float, float]) -> tuple[int, ...]:
-    """Return the counts in bins between the ends; all in the middle one if the bins would be mere rounding."""
+    """Return the counts in bins between the ends; all in the middle one where these would be rounding."""
     if ends[1] - ends[0] <= _ROUNDING * np.spacing(max(map(abs, ends))):
         return tuple(numbers.size if place == _BINS // 2 else 0 for place in range(_BINS))
     return tuple(int(height) for height in np.histogram(numbers, bins=_BINS, range=ends)[0])

@@ -110,5 +110,7 @@ def _varied(runs: Runs) -> dict[str, FloatArray]:
         chosen: dict[str, Any] = json.loads(text) if text else {}
         for key, value in chosen.items():
             if isinstance(value, int | float) and not isinstance(value, bool):
-                columns.setdefault(key, np.full(runs.count, np.nan))[row] = value
+                if key not in columns:
+                    columns[key] = np.full(runs.count, np.nan)
+                columns[key][row] = value
     return columns
