@@ -6,12 +6,12 @@ from math import inf, isnan
 import numpy as np
 import pyarrow as pa
 import pytest
-from scipy.stats import beta
+from scipy.stats import beta, binom
 
 from coop_drake.campaign.records import QuestionRecord, table_of
 from coop_drake.campaign.report import make_report, write_report
 from coop_drake.campaign.report.page import headline, render_page, verdict
-from coop_drake.campaign.report.rates import loss_rate
+from coop_drake.campaign.report.rates import loss_rate, percent_up
 from coop_drake.campaign.report.searches import summarise_searches
 from coop_drake.campaign.search import BreakingPoint, Finding
 from tests.support.campaign_table import run_table
@@ -28,22 +28,38 @@ def both_tiers():
 
 def test_no_loss_gives_an_upper_bound_with_all_of_the_error_on_one_side():
     rate = loss_rate(0, 10_000)
-    assert (rate.lower, rate.upper) == (0.0, pytest.approx(1.0 - 0.05**1e-4))
-    assert rate.sentence.startswith("None of 10,000 runs was lost. With 95 % confidence, at most 0.03 %")
+    assert rate.upper == pytest.approx(1.0 - 0.05**1e-4)
+    assert rate.sentence == "None of 10,000 runs was lost. With 95 % confidence, at most 0.03 % of them are."
 
 
-@pytest.mark.parametrize(("lost", "runs", "confidence"), [(1, 20, 0.95), (7, 50, 0.99), (19, 20, 0.9)])
+@pytest.mark.parametrize(("lost", "runs", "confidence"), [(0, 9, 0.9), (1, 20, 0.95), (7, 50, 0.99)])
 def test_bounds_of_a_rate_are_those_of_clopper_and_pearson(lost, runs, confidence):
-    rate, tail = loss_rate(lost, runs, confidence), (1.0 - confidence) / 2.0
-    assert rate.lower == pytest.approx(beta.ppf(tail, lost, runs - lost + 1), rel=1e-6)
-    assert rate.upper == pytest.approx(beta.ppf(1.0 - tail, lost + 1, runs - lost), rel=1e-6)
+    rate = loss_rate(lost, runs, confidence)
+    assert rate.upper == pytest.approx(beta.ppf(confidence, lost + 1, runs - lost), rel=1e-6)
 
 
-def test_the_intervals_contain_the_true_share_as_often_as_they_say():
-    generator, share, runs = np.random.default_rng(3), 0.1, 40
-    counts = np.bincount(generator.binomial(runs, share, 2000), minlength=runs + 1)
-    inside = [loss_rate(lost, runs).lower <= share <= loss_rate(lost, runs).upper for lost in range(20)]
-    assert counts[:20] @ inside / 2000 >= 0.95
+def test_lost_runs_are_told_with_the_share_counted_and_the_bound():
+    assert loss_rate(7, 50).sentence.startswith(
+        "7 of 50 runs were lost, 14 %. With 95 % confidence, at most 25 %"
+    )
+    assert loss_rate(1, 20).sentence.startswith("1 of 20 runs was lost, 5 %.")
+    assert loss_rate(20, 20).upper == 1.0
+
+
+@pytest.mark.parametrize("share", [0.002, 0.01, 0.05, 0.0735, 0.1, 0.3, 0.9])
+def test_the_true_share_is_not_above_the_bound_as_often_as_it_says(share):
+    runs = 40
+    bounds = np.array([loss_rate(lost, runs).upper for lost in range(runs + 1)])
+    assert binom.pmf(np.arange(runs + 1), runs, share) @ (share <= bounds) >= 0.95
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [(0.0002995, "0.03 %"), (0.0003001, "0.031 %"), (0.1, "10 %"), (0.07, "7 %"), (0.2801, "29 %"),
+     (0.985, "99 %"), (0.9901, "99.1 %"), (0.9999, "100 %"), (1.0, "100 %"), (3e-7, "3e-05 %")],
+)  # fmt: skip
+def test_bounds_are_rounded_up(share, text):
+    assert percent_up(share) == text
 
 
 def test_distributions_are_those_of_the_columns(both_tiers):

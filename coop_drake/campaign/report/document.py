@@ -78,7 +78,7 @@ def make_report(
         facts: What was asked for: name and value.
         findings: What searches for lost runs found.
         breaking: Multiples of what is certified at which runs are lost.
-        confidence: Probability with which the interval of a rate contains the true one, at least [-].
+        confidence: Probability with which a true rate is not above its bound, at least [-].
     """
     known = None if runs is None or runs.num_rows == 0 else Runs(runs)
     asked = questions is not None and questions.num_rows > 0

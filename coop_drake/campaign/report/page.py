@@ -14,7 +14,7 @@ from coop_drake.campaign.report.document import Report
 from coop_drake.campaign.report.figures import breaking_svg, distributions_svg, growth_svg, searches_svg
 from coop_drake.campaign.report.influences import Influence
 from coop_drake.campaign.report.questions import seconds_shown
-from coop_drake.campaign.report.rates import percent
+from coop_drake.campaign.report.rates import percent, percent_up
 from coop_drake.campaign.report.searches import summarise_searches
 from coop_drake.campaign.report.worst import WorstRun
 from coop_drake.campaign.search.findings import BreakingPoint
@@ -70,6 +70,7 @@ def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
         seconds=seconds_shown,
         shown=_shown,
         percent=percent,
+        percent_up=percent_up,
         figures={
             "margins": distributions_svg(report.groups, MARGINS),
             "costs": distributions_svg(report.groups, COSTS),
