@@ -15,7 +15,8 @@ from coop_drake.campaign.report.figures import distributions_svg
 from coop_drake.campaign.report.influences import influences
 from coop_drake.campaign.report.page import headline, render_page, verdict
 from coop_drake.campaign.report.rates import loss_rate
-from coop_drake.campaign.search import BreakingPoint
+from coop_drake.campaign.report.searches import summarise_searches
+from coop_drake.campaign.search import BreakingPoint, Finding
 from tests.support.campaign_table import run_table
 
 
@@ -151,3 +152,36 @@ def test_one_array_is_made_for_each_key_that_varies(monkeypatch):
     influences(Runs(run_table(100)))
     keys, margins = 2, 4
     assert sum(args[0] == 100 for args in made) == keys + margins
+
+
+def find(seed, before, worst, arrived=True, reason="", margin="funnel_margin"):
+    runs = 0 if np.isnan(worst) else 10
+    return Finding("base", "compiled", seed, runs, margin, before, worst, arrived, reason)
+
+
+def test_searches_that_could_not_be_made_hide_no_loss():
+    crashed = find(1, nan, nan, arrived=False, reason="no result within 60 s")
+    lost = find(2, 9e-3, -1e-3, arrived=False, reason="left the funnel")
+    kept = find(3, 7e-3, 5e-3)
+    (row,) = summarise_searches([crashed, lost, kept])
+    assert (row.searches, row.failed, row.lost, row.worst) == (3, 1, 1, lost)
+    assert (row.before, row.typical) == (pytest.approx(8e-3), pytest.approx(2e-3))
+    report = make_report("searches", findings=[crashed, lost, kept])
+    assert headline(report) == (
+        "1 of 2 searches, with 20 runs, found a run that is lost. 1 search could not be made."
+    )
+    assert verdict(report) == "bad"
+    assert "lost: left the funnel" in render_page(report, replay)
+
+
+@pytest.mark.parametrize("margin", ["funnel_margin", "budget_share"])
+def test_searches_of_which_none_could_be_made_make_a_page(margin):
+    crashed = [find(k, nan, nan, arrived=False, reason="ended", margin=margin) for k in range(2)]
+    (row,) = summarise_searches(crashed)
+    assert (row.failed, row.lost) == (2, 0)
+    report = make_report("searches", findings=crashed)
+    assert headline(report) == "2 searches could not be made."
+    assert verdict(report) == "bad"
+    page = render_page(report, replay)
+    assert "could not be made: ended" in page
+    assert ">nan" not in page

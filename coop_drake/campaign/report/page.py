@@ -15,9 +15,9 @@ from coop_drake.campaign.report.figures import breaking_svg, distributions_svg, 
 from coop_drake.campaign.report.influences import Influence
 from coop_drake.campaign.report.questions import seconds_shown
 from coop_drake.campaign.report.rates import percent, percent_up
-from coop_drake.campaign.report.searches import summarise_searches
+from coop_drake.campaign.report.searches import found_loss, is_made, summarise_searches
 from coop_drake.campaign.report.worst import WorstRun
-from coop_drake.campaign.search.findings import BreakingPoint
+from coop_drake.campaign.search.findings import BreakingPoint, Finding
 from coop_drake.drawing import colours
 from coop_drake.files import write_atomically
 from coop_drake.templates import rendered
@@ -99,13 +99,26 @@ def _main_sentence(report: Report) -> str:
         wrong = "1 wrong answer" if every.wrong == 1 else f"{every.wrong:,} wrong answers"
         return f"{every.count:,} questions: {wrong}, {every.undecided:,} undecided."
     if report.findings:
-        lost = sum(not one.arrived for one in report.findings)
-        runs = sum(one.evaluations for one in report.findings)
-        found = "None" if lost == 0 else f"{lost:,}"
-        told = f"{found} of {len(report.findings):,} searches, with {runs:,} runs, found a run that is lost."
-        used = [one.worst for one in report.findings if one.margin == SHARE]
-        return told + _beyond(sum(one > 1.0 for one in used), max(used, default=nan), "search")
+        return _searches_sentence(report.findings)
     return ""
+
+
+def _searches_sentence(findings: tuple[Finding, ...]) -> str:
+    """Say how many searches found a lost run, and how many could not be made."""
+    made = [one for one in findings if is_made(one)]
+    lost, runs = sum(map(found_loss, made)), sum(one.evaluations for one in made)
+    several = "1 search" if len(made) == 1 else f"{len(made):,} searches"
+    told = (
+        [
+            f"{format(lost, ',') if lost else 'None'} of {several}, with {runs:,} runs, found a run that is lost."
+        ]
+        if made
+        else []
+    )
+    if failed := len(findings) - len(made):
+        told.append(f"{failed:,} search{'es' if failed > 1 else ''} could not be made.")
+    used = [one.worst for one in made if one.margin == SHARE]
+    return " ".join(told) + _beyond(sum(one > 1.0 for one in used), max(used, default=nan), "search")
 
 
 def verdict(report: Report) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isnan, nan
 
 import numpy as np
 
@@ -18,23 +19,36 @@ class Searched:
         scenario: Name of the scenario.
         tier: Which loop simulated the runs.
         margin: Name of the column that was driven down, or up if it is ``budget_share``.
-        searches: Number of searches.
+        searches: Number of searches, those that could not be made with them.
+        failed: Searches that could not be made, for their processes were lost.
         runs: Runs of all of them.
         lost: Searches that found a lost run.
-        before: Median of the first runs' values [unit of the column].
-        typical: Median of the worst values [unit of the column].
-        worst: The finding with the worst value of all; a lost run if there is one.
+        before: Median of the first runs' values; NaN if no search could be made [unit of the column].
+        typical: Median of the worst values; NaN if no search could be made [unit of the column].
+        worst: The finding with the worst value of all; a lost run if there is one, and a search that could
+            not be made if there is no other.
     """
 
     scenario: str
     tier: str
     margin: str
     searches: int
+    failed: int
     runs: int
     lost: int
     before: float
     typical: float
     worst: Finding
+
+
+def is_made(one: Finding) -> bool:
+    """Whether a search came to an end; it did not where its process was lost."""
+    return not isnan(one.worst)
+
+
+def found_loss(one: Finding) -> bool:
+    """Whether a search found a lost run."""
+    return is_made(one) and not one.arrived
 
 
 def summarise_searches(findings: Sequence[Finding]) -> tuple[Searched, ...]:
@@ -46,13 +60,15 @@ def summarise_searches(findings: Sequence[Finding]) -> tuple[Searched, ...]:
 
 
 def _summary(key: tuple[str, str, str], group: Sequence[Finding]) -> Searched:
+    made = [one for one in group if is_made(one)]
     sign = -1.0 if key[2] == "budget_share" else 1.0
     return Searched(
         *key,
         searches=len(group),
         runs=sum(one.evaluations for one in group),
-        lost=sum(not one.arrived for one in group),
-        before=float(np.median([one.before for one in group])),
-        typical=float(np.median([one.worst for one in group])),
-        worst=min(group, key=lambda one: (one.arrived, sign * one.worst)),
+        failed=len(group) - len(made),
+        lost=sum(map(found_loss, group)),
+        before=float(np.median([one.before for one in made])) if made else nan,
+        typical=float(np.median([one.worst for one in made])) if made else nan,
+        worst=min(made or group, key=lambda one: (one.arrived, sign * one.worst)),
     )
