@@ -11,7 +11,7 @@ from coop_drake.campaign.records import QuestionRecord, RunRecord, table_of
 from coop_drake.campaign.report import make_report
 from coop_drake.campaign.report.columns import Runs
 from coop_drake.campaign.report.distributions import distribution
-from coop_drake.campaign.report.figures import distributions_svg
+from coop_drake.campaign.report.figures import breaking_svg, distributions_svg, growth_svg, searches_svg
 from coop_drake.campaign.report.influences import influences
 from coop_drake.campaign.report.page import headline, render_page, verdict
 from coop_drake.campaign.report.rates import loss_rate
@@ -185,3 +185,20 @@ def test_searches_of_which_none_could_be_made_make_a_page(margin):
     page = render_page(report, replay)
     assert "could not be made: ended" in page
     assert ">nan" not in page
+
+
+def test_names_with_dollars_are_no_formulas():
+    name = r"cost $\frac$"
+    point = BreakingPoint(name, "drake", "lag", 0.1, 4.0, 4.5, 5, "left")
+    found = Finding(name, "drake", 1, 10, "funnel_margin", 9e-3, 5e-3, True)
+    asked = QuestionRecord(0, 0, name, 2, 2, "bar", "plan", 1.5, verified=True)
+    runs = run_table(10, scenarios=(name,))
+    questions = table_of([asked], QuestionRecord)
+    report = make_report(name, runs, questions, findings=[found], breaking=[point])
+    for figure in (
+        distributions_svg(report.groups),
+        breaking_svg(report.breaking),
+        searches_svg(summarise_searches(report.findings)),
+        growth_svg(report.questions),
+    ):
+        assert name in figure

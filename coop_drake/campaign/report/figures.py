@@ -113,7 +113,9 @@ def breaking_svg(points: Sequence[BreakingPoint]) -> str:
         ax.plot(ends, [place] * len(ends), "o", color=BLUE, markersize=4.5)
         beyond = "" if np.isfinite(own[0].lost) else " or more"
         text = f"{own[0].kept:.3g}{beyond}, {own[0].scenario}"
-        ax.annotate(text, (ends[-1], place), (8.0, 0.0), textcoords="offset points", va="center")
+        ax.annotate(
+            text, (ends[-1], place), (8.0, 0.0), textcoords="offset points", va="center", parse_math=False
+        )
     ax.axvline(1.0, color=INK, linewidth=1.5)
     most = max(point.kept for point in points)
     largest = int(np.ceil(np.log2(max(2.0, most)))) + 1
@@ -161,7 +163,7 @@ def _panels(
         axes = list(figure.subplots(1, count, sharey=True, squeeze=False)[0])
         edges = _LABELS / size[0], _BELOW / size[1], 0.99, 1.0 - top / size[1]
         figure.subplots_adjust(*edges, wspace=0.12)
-        axes[0].set_yticks(np.arange(rows)[::-1] + 0.35, names)
+        axes[0].set_yticks(np.arange(rows)[::-1] + 0.35, names, parse_math=False)
         for ax in axes:
             ax.set_ylim(-0.1, rows)
             ax.tick_params(axis="y", length=0)

@@ -108,13 +108,10 @@ def _searches_sentence(findings: tuple[Finding, ...]) -> str:
     made = [one for one in findings if is_made(one)]
     lost, runs = sum(map(found_loss, made)), sum(one.evaluations for one in made)
     several = "1 search" if len(made) == 1 else f"{len(made):,} searches"
-    told = (
-        [
-            f"{format(lost, ',') if lost else 'None'} of {several}, with {runs:,} runs, found a run that is lost."
-        ]
-        if made
-        else []
-    )
+    told = []
+    if made:
+        number = f"{lost:,}" if lost else "None"
+        told.append(f"{number} of {several}, with {runs:,} runs, found a run that is lost.")
     if failed := len(findings) - len(made):
         told.append(f"{failed:,} search{'es' if failed > 1 else ''} could not be made.")
     used = [one.worst for one in made if one.margin == SHARE]
