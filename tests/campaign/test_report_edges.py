@@ -154,13 +154,12 @@ def test_one_array_is_made_for_each_key_that_varies(monkeypatch):
     assert sum(args[0] == 100 for args in made) == keys + margins
 
 
-def find(seed, before, worst, arrived=True, reason="", margin="funnel_margin"):
-    runs = 0 if np.isnan(worst) else 10
+def find(seed, before, worst, arrived=True, reason="", margin="funnel_margin", runs=10):
     return Finding("base", "compiled", seed, runs, margin, before, worst, arrived, reason)
 
 
 def test_searches_that_could_not_be_made_hide_no_loss():
-    crashed = find(1, nan, nan, arrived=False, reason="no result within 60 s")
+    crashed = find(1, nan, nan, arrived=False, reason="no result within 60 s", runs=0)
     lost = find(2, 9e-3, -1e-3, arrived=False, reason="left the funnel")
     kept = find(3, 7e-3, 5e-3)
     (row,) = summarise_searches([crashed, lost, kept])
@@ -174,9 +173,23 @@ def test_searches_that_could_not_be_made_hide_no_loss():
     assert "lost: left the funnel" in render_page(report, replay)
 
 
+def test_a_lost_run_that_does_not_tell_its_margin_is_a_loss():
+    lost = find(1, 0.4, nan, arrived=False, reason="left the funnel", margin="budget_share")
+    beyond = find(2, nan, 1.2, margin="budget_share")
+    unknown = find(3, nan, nan, margin="budget_share")
+    for order in ([lost, beyond, unknown], [unknown, beyond, lost]):
+        (row,) = summarise_searches(order)
+        assert (row.failed, row.lost, row.worst, row.before, row.typical) == (0, 1, lost, 0.4, 1.2)
+        assert headline(make_report("lost", findings=order)) == (
+            "1 of 3 searches, with 30 runs, found a run that is lost. "
+            "1 search used more than the budget states, up to 120 % of it."
+        )
+    assert summarise_searches([unknown, beyond])[0].worst == beyond
+
+
 @pytest.mark.parametrize("margin", ["funnel_margin", "budget_share"])
 def test_searches_of_which_none_could_be_made_make_a_page(margin):
-    crashed = [find(k, nan, nan, arrived=False, reason="ended", margin=margin) for k in range(2)]
+    crashed = [find(k, nan, nan, arrived=False, reason="ended", margin=margin, runs=0) for k in range(2)]
     (row,) = summarise_searches(crashed)
     assert (row.failed, row.lost) == (2, 0)
     report = make_report("searches", findings=crashed)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import isnan, nan
+from math import isfinite, isnan, nan
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +114,7 @@ def _searches_sentence(findings: tuple[Finding, ...]) -> str:
         told.append(f"{number} of {several}, with {runs:,} runs, found a run that is lost.")
     if failed := len(findings) - len(made):
         told.append(f"{failed:,} search{'es' if failed > 1 else ''} could not be made.")
-    used = [one.worst for one in made if one.margin == SHARE]
+    used = [one.worst for one in made if one.margin == SHARE and isfinite(one.worst)]
     return " ".join(told) + _beyond(sum(one > 1.0 for one in used), max(used, default=nan), "search")
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import isnan, nan
+from math import isfinite, isnan, nan
 
 import numpy as np
 
@@ -23,8 +23,8 @@ class Searched:
         failed: Searches that could not be made, for their processes were lost.
         runs: Runs of all of them.
         lost: Searches that found a lost run.
-        before: Median of the first runs' values; NaN if no search could be made [unit of the column].
-        typical: Median of the worst values; NaN if no search could be made [unit of the column].
+        before: Median of the first runs' values that are known; NaN if none is [unit of the column].
+        typical: Median of the worst values that are known; NaN if none is [unit of the column].
         worst: The finding with the worst value of all; a lost run if there is one, and a search that could
             not be made if there is no other.
     """
@@ -43,7 +43,7 @@ class Searched:
 
 def is_made(one: Finding) -> bool:
     """Whether a search came to an end; it did not where its process was lost."""
-    return not isnan(one.worst)
+    return one.evaluations > 0
 
 
 def found_loss(one: Finding) -> bool:
@@ -68,7 +68,13 @@ def _summary(key: tuple[str, str, str], group: Sequence[Finding]) -> Searched:
         runs=sum(one.evaluations for one in group),
         failed=len(group) - len(made),
         lost=sum(map(found_loss, group)),
-        before=float(np.median([one.before for one in made])) if made else nan,
-        typical=float(np.median([one.worst for one in made])) if made else nan,
-        worst=min(made or group, key=lambda one: (one.arrived, sign * one.worst)),
+        before=_median([one.before for one in made]),
+        typical=_median([one.worst for one in made]),
+        worst=min(made or group, key=lambda one: (one.arrived, isnan(one.worst), sign * one.worst)),
     )
+
+
+def _median(values: Sequence[float]) -> float:
+    """The median of the values that are numbers; NaN if there are none."""
+    known = [value for value in values if isfinite(value)]
+    return float(np.median(known)) if known else nan
