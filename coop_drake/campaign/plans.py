@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import re
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -17,6 +19,7 @@ from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of
 from coop_drake.plant.kept_problem import file_digest, source_files
 from coop_drake.progress import Progress
+from coop_drake.scenario.budget_file import ALL, POSITION
 from coop_drake.scenario.model import Scenario
 from coop_drake.simulation import build_maps
 from coop_drake.typed_data import to_plain
@@ -27,6 +30,9 @@ Maps = tuple[HarmonicMap, ...]
 _KEPT = 4
 """Plans with their maps that a process keeps in memory; runs of one batch mostly have one."""
 
+_PACKAGE_NAME = re.compile(r"<name>\s*([^<]*?)\s*</name>")
+"""The name of a package in its package.xml."""
+
 
 @cache
 def versions() -> dict[str, str]:
@@ -36,13 +42,32 @@ def versions() -> dict[str, str]:
 
 def scenario_content(scenario: Scenario) -> dict[str, Any]:
     """Return all that a scenario says, with the digests of its models' files, as plain data."""
-    sources = source_files(scenario)
-    files = sorted(sources.paths - {scenario.path.resolve()}) if sources else []
+    sources, beside = source_files(scenario), scenario.path.resolve()
+    files = sources.paths - {beside} if sources else frozenset()
     return {
         "scenario": to_plain(scenario, Scenario),
-        "files": sorted(file_digest(path) for path in files if path.is_file()),
+        "files": sorted(
+            [_stable_name(path, beside.parent), file_digest(path)] for path in files if path.is_file()
+        ),
         "versions": versions(),
     }
+
+
+def _stable_name(path: Path, beside: Path) -> str:
+    """Return the name of a model's file that is the same wherever packages are installed.
+
+    Args:
+        path: The file.
+        beside: The folder of the scenario.
+    """
+    path = path.resolve()
+    if path.is_relative_to(beside):
+        return path.relative_to(beside).as_posix()
+    for folder in path.parents:
+        if (package := folder / "package.xml").is_file():
+            name = _PACKAGE_NAME.search(package.read_text(encoding="utf-8", errors="replace"))
+            return f"package://{name[1] if name else ''}/{path.relative_to(folder).as_posix()}"
+    return Path(os.path.relpath(path, beside)).as_posix()
 
 
 class Plans:
@@ -58,9 +83,16 @@ class Plans:
         self._ready: dict[str, tuple[Plan, Maps]] = {}
 
     def digest_of(self, run: Run) -> str:
-        """Return the digest of what a run's plan is made from."""
-        scenario = self.variation.scenario_to_plan(run)
-        return content_digest({**scenario_content(scenario), "budget": self.variation.runs.budget})
+        """Return the digest of what a run's plan is made from; of a budget's file by its content.
+
+        Raises:
+            ScenarioError: There is no file of the budget.
+        """
+        scenario, budget = self.variation.scenario_to_plan(run), self.variation.budget
+        said: Any = budget
+        if budget is not None and budget not in (ALL, POSITION):
+            said = {"file": file_digest(Path(budget))}
+        return content_digest({**scenario_content(scenario), "budget": said})
 
     def plan_of(self, run: Run, progress: Progress | None = None) -> Plan:
         """Return the plan that a run follows, from the folder if it is there.
@@ -71,7 +103,7 @@ class Plans:
         path = self._folder / f"{self.digest_of(run)}.json"
         if path.exists():
             return load_plan(path)
-        found = _planned(self.variation.scenario_to_plan(run), self.variation.runs.budget, progress)
+        found = _planned(self.variation.scenario_to_plan(run), self.variation.budget, progress)
         save_plan(found, path)
         return load_plan(path)  # Runs follow what the file says, to the last bit.
 

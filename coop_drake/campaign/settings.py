@@ -35,8 +35,8 @@ class Runs:
             every run in each of them.
         paired: With ``compiled``, how many of the first runs of every scenario are made by Drake's loop,
             too, so that the report can say how far the tiers differ.
-        budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it; null for what
-            every scenario requires.
+        budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it, a file
+            relative to the campaign file if it is there; null for what every scenario requires.
         batch: Runs that one process makes, and one file holds; null for 20 of Drake's loop, and 2000 of the
             compiled one.
         time_limit: Longest that a process may take for each of its runs; for the first one ten minutes more,

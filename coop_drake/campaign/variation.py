@@ -9,6 +9,7 @@ import re
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from coop_drake.campaign.distributions import Distribution, Gaussian
 from coop_drake.campaign.settings import Campaign, Runs, Tier
 from coop_drake.errors import ScenarioError
+from coop_drake.scenario.budget_file import ALL, POSITION
 from coop_drake.scenario.document import parse
 from coop_drake.scenario.floor import with_floor
 from coop_drake.scenario.load import load_scenario
@@ -69,14 +71,15 @@ class Variation:
 
     Args:
         campaign: A campaign with a section ``runs``.
+        section: The section of the file that asks for the runs, for messages.
 
     Raises:
         ScenarioError: A scenario cannot be read, or a key or a value is not allowed in it.
     """
 
-    def __init__(self, campaign: Campaign) -> None:
+    def __init__(self, campaign: Campaign, section: str = "runs") -> None:
         assert campaign.runs is not None  # the caller has looked
-        self.campaign = campaign
+        self.campaign, self._section = campaign, section
         self.runs: Runs = campaign.runs
         self.files = [self._file(name) for name in self.runs.scenarios]
         self._points = list(itertools.product(*self.runs.grid.values()))
@@ -99,6 +102,23 @@ class Variation:
             ScenarioError: A scenario cannot be read, or a key or a value of ``set`` is not allowed in it.
         """
         return tuple(self._checked(k, {}) for k in range(len(self.files)))
+
+    @cached_property
+    def budget(self) -> str | None:
+        """The choice of the budget; a file stands beside the campaign file, or where the command works.
+
+        Raises:
+            ScenarioError: There is no such file.
+        """
+        choice = self.runs.budget
+        if choice is None or choice in (ALL, POSITION):
+            return choice
+        beside = self.campaign.path.parent / choice
+        found = beside if beside.is_file() else Path(choice)
+        if not found.is_file():
+            allowed = f"all, position, or a file with a budget (looked for {beside} and {found.absolute()})"
+            raise ScenarioError(str(self.campaign.path), f"{self._section}.budget", choice, allowed)
+        return str(found)
 
     def _file(self, name: str) -> Any:
         beside = self.campaign.path.parent / name
@@ -201,7 +221,7 @@ class Variation:
             validate(changed)
         except (DataError, ScenarioError) as error:
             sections = [name for name in ("set", "vary", "grid") if error.key in getattr(self.runs, name)]
-            place = ".".join(["runs", *sections[-1:], error.key])
+            place = ".".join([self._section, *sections[-1:], error.key])
             allowed = f"{error.allowed} (in {self.files[scenario].name})"
             raise ScenarioError(str(self.campaign.path), place, error.value, allowed) from error
         return changed

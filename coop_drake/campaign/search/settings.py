@@ -29,8 +29,8 @@ class Searches:
         count: Searches for every scenario, each with a seed of its own.
         evaluations: Largest number of runs of a search; a lost run ends it.
         set: Values of keys of the scenario in every run and in the plan, by their dotted keys.
-        budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it; null for what
-            every scenario requires.
+        budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it, a file
+            relative to the campaign file if it is there; null for what every scenario requires.
         factor: How many times the budget departures may be; 1 for departures inside it [-].
         margin: The margin that is driven down; ``budget_share`` is driven up.
         seed: Seed of the first search; the others have those after it.
@@ -79,8 +79,8 @@ class Breaking:
         halvings: How often the interval between a multiple that loses runs and one that does not is halved.
         largest: Multiples beyond this are not tried [-].
         set: Values of keys of the scenario in every run and in the plan, by their dotted keys.
-        budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it; null for what
-            every scenario requires.
+        budget: Under which budget the plans must provably hold, as ``plan --budget`` takes it, a file
+            relative to the campaign file if it is there; null for what every scenario requires.
         seed: Seed of periods and signs.
         tier: Which loop simulates the runs.
         time_limit: As for searches [s].

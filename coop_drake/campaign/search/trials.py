@@ -43,13 +43,15 @@ class Trials:
     ) -> None:
         from coop_drake.campaign.plans import Plans
         from coop_drake.campaign.running.making import RunMaker
+        from coop_drake.campaign.search.settings import Searches
         from coop_drake.campaign.settings import Campaign as File
         from coop_drake.campaign.settings import Runs
         from coop_drake.campaign.variation import Variation
 
         self._section = Runs((scenario,), 1, set=asked.set, budget=asked.budget, tier=asked.tier)
         self._campaign, self._name, self._made = campaign, scenario, made
-        self.variation = Variation(File(runs=self._section, path=campaign.path))
+        section = "searches" if isinstance(asked, Searches) else "breaking"
+        self.variation = Variation(File(runs=self._section, path=campaign.path), section)
         self._plans = Plans(self.variation, folder.plans)
         self._maker = RunMaker(self.variation, self._plans, asked.tier, folder.path / "logs")
 
@@ -96,13 +98,15 @@ class Trials:
 
     def write_found(self, values: Mapping[str, Any], file: Path, seed: int = 0) -> Path:
         """Write a campaign file whose run 0 is the run with these departures, for ``campaign replay``."""
-        beside = self._campaign.path.parent / self._name
+        beside, budget = self._campaign.path.parent / self._name, self.variation.budget
         name = os.path.relpath(beside, file.parent) if beside.exists() else self._name
+        if budget is not None and Path(budget).is_file():
+            budget = os.path.relpath(budget, file.parent)
         section: dict[str, Any] = {
             "scenarios": [name],
             "count": 1,
             "set": dict(self._section.set),
-            "budget": self._section.budget,
+            "budget": budget,
             "tier": self._section.tier,
             "grid": {key: [value] for key, value in {**values, "deployment.seed": seed}.items()},
         }

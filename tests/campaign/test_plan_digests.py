@@ -1,0 +1,89 @@
+"""What the digest of a plan sees: which model file says what, and what the file of a budget says."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+
+from coop_drake.campaign.plans import Plans, scenario_content
+from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.search.searching import Searching
+from coop_drake.campaign.settings import load_campaign
+from coop_drake.campaign.variation import Variation
+from coop_drake.scenario.load import load_scenario
+from tests.support.cli import invoke
+from tests.support.scenarios import MODELS, ROOM, write_scenario
+
+OWN = ("long_blue.sdf", "long_orange.sdf")
+
+
+def team(folder):
+    """A scenario whose robots have models of their own, in a folder beside it."""
+    (folder / "own").mkdir(parents=True)
+    directives = [dict(one) for one in ROOM["directives"]]
+    for index, name in enumerate(OWN):
+        shutil.copy(MODELS / name, folder / "own" / name)
+        model = directives[1 + index]["add_model"]
+        directives[1 + index] = {"add_model": {**model, "file": f"own/{name}"}}
+    return write_scenario(folder / "room.scenario.yaml", directives=directives)
+
+
+def test_files_that_change_places_change_the_digest_and_another_folder_does_not(tmp_path):
+    here, there = (scenario_content(load_scenario(team(tmp_path / name))) for name in ("here", "there"))
+    assert here == there
+    names = [name for name, _ in here["files"]]
+    assert {"own/long_blue.sdf", "package://coop_drake_models/object.sdf"} <= set(names)
+    first, second = (tmp_path / "there" / "own" / name for name in OWN)
+    one, other = first.read_bytes(), second.read_bytes()
+    first.write_bytes(other)
+    second.write_bytes(one)
+    swapped = scenario_content(load_scenario(tmp_path / "there" / "room.scenario.yaml"))
+    assert [name for name, _ in swapped["files"]] == names
+    assert swapped != here
+
+
+def test_an_edited_budget_asks_for_another_plan(tmp_path):
+    write_scenario(tmp_path / "room.scenario.yaml")
+    asked = {"scenarios": ["room.scenario.yaml"], "budget": "own.budget.yaml"}
+    file, budget = tmp_path / "room.campaign.yaml", tmp_path / "own.budget.yaml"
+    file.write_text(yaml.safe_dump({"runs": {**asked, "count": 1}, "searches": asked}))
+    campaign, folder = load_campaign(file), CampaignFolder(tmp_path)
+
+    def digests():
+        variation = Variation(campaign)
+        searching = Searching(campaign, folder, "search", 0)
+        return Plans(variation, tmp_path).digest_of(variation.run(0)), searching.trials.digest
+
+    budget.write_text("{delay: 0.0}")
+    before = digests()
+    assert before == digests()
+    assert before[0] == before[1]
+    budget.write_text("{delay: 0.001}")
+    assert before[0] not in digests()
+    assert before[1] not in digests()
+
+
+@pytest.mark.parametrize("section", ["runs", "searches", "breaking"])
+def test_a_budget_without_a_file_is_refused_with_its_key(section, tmp_path):
+    write_scenario(tmp_path / "room.scenario.yaml")
+    asked = {"scenarios": ["room.scenario.yaml"], "budget": "nowhere.yaml"}
+    file = tmp_path / "room.campaign.yaml"
+    file.write_text(yaml.safe_dump({section: {**asked, "count": 1} if section == "runs" else asked}))
+    result = invoke("campaign", "status", file, "--out", tmp_path / "out")
+    assert result.exit_code == 2
+    assert f"{section}.budget: 'nowhere.yaml' is not allowed" in result.stderr
+
+
+def test_what_a_search_finds_names_the_budget_from_its_own_folder(tmp_path):
+    write_scenario(tmp_path / "room.scenario.yaml")
+    (tmp_path / "own.budget.yaml").write_text("{}")
+    asked = {"scenarios": ["room.scenario.yaml"], "budget": "own.budget.yaml"}
+    (tmp_path / "room.campaign.yaml").write_text(yaml.safe_dump({"searches": asked}))
+    campaign = load_campaign(tmp_path / "room.campaign.yaml")
+    trials = Searching(campaign, CampaignFolder(tmp_path), "search", 0).trials
+    found = load_campaign(trials.write_found({}, tmp_path / "found" / "room_0.campaign.yaml"))
+    assert found.runs.budget == "../own.budget.yaml"
+    assert Path(Variation(found).budget).resolve() == (tmp_path / "own.budget.yaml").resolve()
