@@ -6,6 +6,7 @@ import dataclasses
 import itertools
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from math import prod
@@ -207,12 +208,33 @@ class Variation:
         Raises:
             ScenarioError: With file, key, value and what is allowed there.
         """
-        choices = {**self.runs.grid, **{key: one.extremes() for key, one in self.runs.vary.items()}}
-        usual = {key: values[0] for key, values in choices.items()}
+        usual = {key: values[0] for key, values in self._choices.items()}
         for scenario in range(len(self.scenarios)):
-            for key, values in choices.items():
+            for key, values in self._choices.items():
                 for value in values:
                     self._checked(scenario, {**usual, key: value})
+
+    @cached_property
+    def _choices(self) -> dict[str, tuple[Any, ...]]:
+        """Every value of the grid and the ends of every distribution, by their keys."""
+        return {**self.runs.grid, **{key: one.extremes() for key, one in self.runs.vary.items()}}
+
+    def trials(self, scenario: int, *, numbers: bool) -> Iterator[Run]:
+        """Yield runs along the plan of a scenario's first run that show whether a loop knows what varies.
+
+        They are that run, and others of which each has another value at one of the keys.
+
+        Args:
+            scenario: Index of the scenario.
+            numbers: Whether numbers are tried as other values, too.
+        """
+        first = self.run(scenario * self.runs_of_scenario)
+        yield first
+        planned = self.planned_values(first)
+        for key, values in self._choices.items():
+            for value in () if key in planned else values:
+                if numbers or not isinstance(value, int | float):
+                    yield dataclasses.replace(first, values={**first.values, key: value})
 
     def _checked(self, scenario: int, values: dict[str, Any]) -> Scenario:
         """Return a scenario with other values when it was checked; errors name the campaign file."""
@@ -220,11 +242,15 @@ class Variation:
             changed = self._changed(scenario, values)
             validate(changed)
         except (DataError, ScenarioError) as error:
-            sections = [name for name in ("set", "vary", "grid") if error.key in getattr(self.runs, name)]
-            place = ".".join([self._section, *sections[-1:], error.key])
-            allowed = f"{error.allowed} (in {self.files[scenario].name})"
-            raise ScenarioError(str(self.campaign.path), place, error.value, allowed) from error
+            raise self.refusal(scenario, error) from error
         return changed
+
+    def refusal(self, scenario: int, error: DataError | ScenarioError) -> ScenarioError:
+        """Return what a scenario does not allow as an error that names the campaign file and its key."""
+        sections = [name for name in ("set", "vary", "grid") if error.key in getattr(self.runs, name)]
+        place = ".".join([self._section, *sections[-1:], error.key])
+        allowed = f"{error.allowed} (in {self.files[scenario].name})"
+        return ScenarioError(str(self.campaign.path), place, error.value, allowed)
 
     def _changed(self, scenario: int, values: dict[str, Any]) -> Scenario:
         """Return a scenario as if its file had what ``set`` says, and other values at dotted keys.

@@ -15,6 +15,7 @@ from coop_drake.campaign.plans import Plans
 from coop_drake.campaign.questions.settings import QuestionSettings
 from coop_drake.campaign.records import RunRecord
 from coop_drake.campaign.results import CampaignFolder
+from coop_drake.campaign.running.making import RunMaker
 from coop_drake.campaign.running.placing import place
 from coop_drake.campaign.running.supervising import Order
 from coop_drake.campaign.search.searching import Searching, search_batches, section_of
@@ -103,15 +104,21 @@ def run_campaign(
 def _plan(
     campaign: Campaign, folder: CampaignFolder, missing: Iterable[Batch], progress: Progress | None
 ) -> None:
-    """Make the plans of batches that are not there; processes find them in the folder."""
+    """Make the plans of batches that are not there, which processes find in the folder, and check the runs.
+
+    Raises:
+        ScenarioError: A loop does not know what it shall simulate.
+        PlanError: There is no plan for a scenario.
+    """
     asked = {(batch.tier, batch.scenario): batch.record for batch in missing if batch.tier != PLANNER}
     variation = Variation(campaign) if RunRecord in asked.values() else None
     for kind, scenario in asked:
         if kind == "search" or kind == "breaking":
-            _ = Searching(campaign, folder, kind, scenario).trials.budget
-        elif variation is not None:
-            first = variation.run(scenario * variation.runs_of_scenario)
-            Plans(variation, folder.plans).with_maps(first, progress)
+            Searching(campaign, folder, kind, scenario).trials.check()
+        elif kind != PLANNER and variation is not None:
+            plans = Plans(variation, folder.plans)
+            plans.with_maps(variation.run(scenario * variation.runs_of_scenario), progress)
+            RunMaker(variation, plans, kind, folder.path / "logs").check(scenario)
 
 
 def _time_limit(campaign: Campaign, batch: Batch) -> float:

@@ -19,6 +19,7 @@ from coop_drake.campaign.variation import Run, Variation
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.digest import scenario_digest
 from coop_drake.scenario.model import Scenario
+from coop_drake.typed_data import DataError
 
 if TYPE_CHECKING:
     from coop_drake.compiled_loop import CompiledTransport, RunOutcome
@@ -44,6 +45,41 @@ class RunMaker:
         """Return the record of a run that has not ended."""
         name = self._variation.scenarios[run.scenario].name
         return RunRecord(run.index, name, self._tier, run.seed, run.text, arrived=False)
+
+    def check(self, scenario: int) -> None:
+        """Refuse what a scenario or the campaign wants of a loop that does not know it.
+
+        Raises:
+            ScenarioError: The loop refuses a run before it begins.
+            PlanError: There is no plan.
+            FieldError: A cell cannot be mapped.
+        """
+        plan = self._plans.with_maps(self._variation.run(scenario * self._variation.runs_of_scenario))
+        for run in self._variation.trials(scenario, numbers=self._tier == "compiled"):
+            self._check(run, *plan)
+
+    def check_run(self, run: Run) -> None:
+        """Refuse a single run; errors are those of ``check``."""
+        self._check(run, *self._plans.with_maps(run))
+
+    def _check(self, run: Run, plan: Plan, maps: Maps) -> None:
+        """Refuse a run that its loop refuses before it begins; other errors are those of the run alone."""
+        try:
+            scenario = self._variation.scenario_of(run)
+            if self._tier == "compiled":
+                from coop_drake.compiled_loop.departing import departures_of
+
+                departures_of(self._prepared(scenario, plan, maps), scenario.deployment)
+            else:  # Where fused blocks refuse a run, named ones make it.
+                from coop_drake.diagram.closed_loop import build_closed_loop
+
+                build_closed_loop(scenario, plan, maps).release()
+        except DataError as error:
+            raise self._variation.refusal(run.scenario, error) from error
+        except ScenarioError:
+            raise
+        except Exception:
+            return
 
     def record(self, run: Run) -> RunRecord:
         """Make a run; one that cannot be made is lost for the reason that its error names.

@@ -12,9 +12,11 @@ import yaml
 
 from coop_drake.answers.budget import Budget
 from coop_drake.campaign.records import RunRecord
+from coop_drake.campaign.search.bounds import BoundedDepartures
 from coop_drake.errors import ScenarioError
 from coop_drake.files import write_atomically
 from coop_drake.tree import ComponentTree
+from coop_drake.typed_data import DataError
 
 if TYPE_CHECKING:
     from coop_drake.campaign.results import CampaignFolder
@@ -50,10 +52,36 @@ class Trials:
 
         self._section = Runs((scenario,), 1, set=asked.set, budget=asked.budget, tier=asked.tier)
         self._campaign, self._name, self._made = campaign, scenario, made
-        section = "searches" if isinstance(asked, Searches) else "breaking"
-        self.variation = Variation(File(runs=self._section, path=campaign.path), section)
+        self._where = "searches" if isinstance(asked, Searches) else "breaking"
+        self._asked = asked
+        self.variation = Variation(File(runs=self._section, path=campaign.path), self._where)
+        _ = self.variation.scenarios  # What set says is checked.
         self._plans = Plans(self.variation, folder.plans)
         self._maker = RunMaker(self.variation, self._plans, asked.tier, folder.path / "logs")
+
+    def check(self) -> None:
+        """Refuse departures that the scenario does not allow, and what the loop does not know.
+
+        Raises:
+            PlanError: There is no plan.
+            ScenarioError: The plan has no budget, a factor is too large, or the loop does not know the runs.
+        """
+        from coop_drake.campaign.search.settings import Searches
+        from coop_drake.campaign.variation import Run
+
+        self._maker.check_run(self.variation.run(0))
+        bounded, factor = BoundedDepartures(self.budget, self.tree), 1.0
+        if isinstance(self._asked, Searches):
+            factor = self._asked.factor
+        for fractions in (0.0 * bounded.middle, 0.0 * bounded.middle + 1.0):
+            try:
+                self.variation.scenario_of(Run(0, 0, 0, bounded.values(fractions, factor)))
+            except DataError as error:
+                said = f"{error.key} would be {error.value:.6g}, expected {error.allowed}"
+                allowed = f"a factor with which the budget's departures are allowed: {said}"
+                raise ScenarioError(
+                    str(self._campaign.path), f"{self._where}.factor", factor, allowed
+                ) from error
 
     @property
     def name(self) -> str:
@@ -71,7 +99,7 @@ class Trials:
         plan, _ = self._plans.with_maps(self.variation.run(0))
         if plan.budget is None:
             allowed = "position, all or a file with a budget: searches need to know what is certified"
-            raise ScenarioError(str(self._campaign.path), "budget", None, allowed)
+            raise ScenarioError(str(self._campaign.path), f"{self._where}.budget", None, allowed)
         return plan.budget
 
     @cached_property
