@@ -10,7 +10,7 @@ from coop_drake.cli.reporter import ExitCode, Reporter
 from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.run import carry_out, simulation_of
 from coop_drake.cli.task import Task
-from coop_drake.errors import ProcessError
+from coop_drake.errors import ProcessError, ScenarioError
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ def replay(
     A run of the compiled tier is made again by the compiled loop, too.
 
     Raises:
-        ScenarioError: There is no such run.
+        ScenarioError: There is no such run, or the file has no section of runs.
         ProcessError: The run differs from the one that was counted.
     """
     from coop_drake.answers.log import SimulationLog
@@ -51,7 +51,10 @@ def replay(
     from coop_drake.campaign.variation import Variation
     from coop_drake.plant import planning_problem
 
-    assert campaign.runs is not None  # or there would be no batches
+    if campaign.runs is None:
+        raise ScenarioError(
+            str(campaign.path), "runs", None, "a section of runs: none is replayed without it"
+        )
     variation = Variation(campaign)
     run = variation.run(index)
     scenario = variation.scenario_of(run)

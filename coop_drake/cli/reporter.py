@@ -198,7 +198,11 @@ def _processor_seconds() -> float:
 
 
 def _plain(value: Any) -> Any:
-    """JSON knows neither infinities nor numpy's numbers."""
+    """JSON knows neither infinities nor numpy's numbers, however deep they stand."""
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
     if hasattr(value, "item"):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):
