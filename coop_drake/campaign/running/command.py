@@ -16,7 +16,7 @@ from coop_drake.campaign.questions.settings import QuestionSettings
 from coop_drake.campaign.records import RunRecord
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.campaign.running.making import RunMaker
-from coop_drake.campaign.running.placing import place
+from coop_drake.campaign.running.placing import check_scheduler, place
 from coop_drake.campaign.running.supervising import Order
 from coop_drake.campaign.search.searching import Searching, search_batches, section_of
 from coop_drake.campaign.settings import Campaign
@@ -80,6 +80,8 @@ def run_campaign(
         OSError: Results cannot be written.
     """
     advance = progress or (lambda doing, fraction: None)
+    if scheduler is not None:
+        check_scheduler(scheduler)
     folder = CampaignFolder(out.absolute())
     batches = batches_of(campaign, folder)
     with _locked(folder):

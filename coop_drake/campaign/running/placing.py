@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from coop_drake.campaign.batches import Batch
 from coop_drake.campaign.running.supervising import Order, make_batch
-from coop_drake.errors import ProcessError
+from coop_drake.errors import ProcessError, ScenarioError
 from coop_drake.interrupts import ended_by_signals, uninterrupted
 
 if TYPE_CHECKING:
@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 
 _WAITING = 1000
 """Batches that the scheduler holds at a time: it keeps some kilobytes of each."""
+
+_PORTS = 2**16
+"""Ports have smaller numbers."""
 
 _SETTINGS = {
     "distributed": {
@@ -47,6 +50,7 @@ def place(
         done: Called with every batch whose file is there.
 
     Raises:
+        ScenarioError: The address is none that a scheduler can have.
         ProcessError: Workers or the scheduler were lost for good.
         OSError: Records cannot be written.
     """
@@ -73,6 +77,27 @@ def place(
                 futures.add(submit(order))
 
 
+def check_scheduler(address: str) -> None:
+    """Refuse an address that no scheduler can have.
+
+    Raises:
+        ScenarioError: It has no host, no port, or begins with what Dask does not know.
+    """
+    from distributed.comm import parse_address, parse_host_port
+    from distributed.comm.registry import get_backend
+
+    allowed = "the address of a Dask scheduler, such as tcp://192.168.0.1:8786"
+    try:
+        scheme, location = parse_address(address)
+        host, port = parse_host_port(location)
+        get_backend(scheme)
+    except (ValueError, AssertionError) as error:
+        said = f"{allowed} ({error})" if str(error) else allowed
+        raise ScenarioError("the options", "--scheduler", address, said) from error
+    if not host or not 0 < int(port) < _PORTS:
+        raise ScenarioError("the options", "--scheduler", address, allowed)
+
+
 @contextmanager
 def client_of(workers: int | None, scheduler: str | None) -> Iterator[Client]:
     """Connect to a scheduler, or start one with workers that end with the block."""
@@ -80,6 +105,7 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Client]:
     import distributed
 
     if scheduler is not None:
+        check_scheduler(scheduler)
         with distributed.Client(scheduler) as client:
             yield client
         return
