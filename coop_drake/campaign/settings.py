@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from coop_drake.campaign.distributions import Count, Distribution
-from coop_drake.campaign.keys import Plain, Seed
+from coop_drake.campaign.keys import Plain, Seed, check_keys
 from coop_drake.campaign.questions.settings import QuestionSettings
 from coop_drake.campaign.search.settings import Breaking, Searches
 from coop_drake.errors import ScenarioError
@@ -73,6 +73,7 @@ class Runs:
                 raise DataError(f"grid.{key}", [], "at least one value")
             if key in self.vary:
                 raise DataError(f"grid.{key}", list(values), "a key that vary does not have, too")
+        check_keys(self.set, vary=self.vary, grid=self.grid)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import itertools
 import json
 import re
 from collections.abc import Iterator
@@ -16,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from coop_drake.campaign.distributions import Distribution, Gaussian
+from coop_drake.campaign.keys import SEED_KEY
 from coop_drake.campaign.settings import Campaign, Runs, Tier
 from coop_drake.errors import ScenarioError
 from coop_drake.scenario.budget_file import ALL, POSITION
@@ -26,9 +26,6 @@ from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.validation import validate
 from coop_drake.shipped import scenario_file
 from coop_drake.typed_data import DataError, convert, field_types
-
-_SEED = "deployment.seed"
-"""The key of the seed of noise and losses, which every run has of its own."""
 
 _SEEDS = 1_000_000
 """Number of seeds that a deployment may have; no two of so many runs have the same."""
@@ -83,7 +80,6 @@ class Variation:
         self.campaign, self._section = campaign, section
         self.runs: Runs = campaign.runs
         self.files = [self._file(name) for name in self.runs.scenarios]
-        self._points = list(itertools.product(*self.runs.grid.values()))
 
     @cached_property
     def _read(self) -> tuple[Scenario, ...]:
@@ -154,12 +150,19 @@ class Variation:
             allowed = f"the index of a run, 0 to {self.count - 1}"
             raise ScenarioError(str(self.campaign.path), "run", index, allowed)
         scenario, inside = divmod(index, self.runs_of_scenario)
-        point = self._points[inside // self.runs.count]
-        values = dict(zip(self.runs.grid, point, strict=True))
+        values = self._point(inside // self.runs.count)
         for key, distribution in self.runs.vary.items():
             values[key] = self._draw(key, distribution, index, scenario)
         seed = (self._first_seed + index) % _SEEDS
-        return Run(index, scenario, int(values.get(_SEED, seed)), values)
+        return Run(index, scenario, int(values.get(SEED_KEY, seed)), values)
+
+    def _point(self, number: int) -> dict[str, Any]:
+        """Return a combination of the grid by its number; the last key changes fastest."""
+        point = {}
+        for key, values in reversed(self.runs.grid.items()):
+            number, place = divmod(number, len(values))
+            point[key] = values[place]
+        return {key: point[key] for key in self.runs.grid}
 
     @cached_property
     def _first_seed(self) -> int:
@@ -186,7 +189,7 @@ class Variation:
 
     def scenario_of(self, run: Run) -> Scenario:
         """Return the scenario that a run simulates."""
-        return self._changed(run.scenario, {**run.values, _SEED: run.seed})
+        return self._changed(run.scenario, {**run.values, SEED_KEY: run.seed})
 
     def planned_values(self, run: Run) -> dict[str, Any]:
         """Return those of a run's values that its plan depends on; often none."""

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+import json
+import tracemalloc
+from math import inf, nan
+
+import numpy as np
 import pytest
 import yaml
 
+from coop_drake.campaign.settings import load_campaign
+from coop_drake.campaign.variation import Variation
+from coop_drake.cli.reporter import Reporter
 from tests.support.cli import invoke
 from tests.support.scenarios import write_scenario
 
@@ -16,7 +24,7 @@ def file_of(folder, **sections):
     """A campaign file beside its scenario."""
     write_scenario(folder / "room.scenario.yaml")
     file = folder / "room.campaign.yaml"
-    file.write_text(yaml.safe_dump(sections))
+    file.write_text(yaml.safe_dump(sections, sort_keys=False))
     return file
 
 
@@ -79,3 +87,103 @@ def test_a_factor_beyond_what_the_model_may_err_is_refused(tmp_path):
     assert "searches.factor: 6.0 is not allowed" in said
     assert "model_error" in said
     assert "mass_error" in refused(tmp_path, searches={**CERTIFIED, "factor": 4.9})
+
+
+def test_a_file_without_runs_has_none_to_replay(tmp_path):
+    said = refused(tmp_path, "replay", 0, questions={"count": 1})
+    assert "runs: None is not allowed; expected a section of runs" in said
+
+
+@pytest.mark.parametrize(
+    ("sections", "key"),
+    [
+        ({"runs": {**ROOM, "count": 1, "seed": 2**63}}, "runs.seed"),
+        ({"searches": {**ROOM, "seed": 2**63}}, "searches.seed"),
+        ({"searches": {**ROOM, "seed": 2**32 - 2, "count": 3}}, "searches.seed"),
+        ({"questions": {"count": 1, "seeds": [0, 2**63]}}, "questions.seeds[1]"),
+        ({"breaking": {**ROOM, "seed": 999_999, "runs": 3}}, "breaking.seed"),
+    ],
+)
+def test_seeds_that_do_not_fit_are_refused_at_once(sections, key, tmp_path):
+    assert f"{key}: " in refused(tmp_path, "status", **sections)
+
+
+@pytest.mark.parametrize("name", ["runs", "searches", "breaking"])
+@pytest.mark.parametrize(
+    ("said", "key"),
+    [
+        ({"deployment.seed": 5}, "set.deployment.seed"),
+        ({"deployment": {"seed": 5}}, "set.deployment.seed"),
+        ({"deployment": {}, "deployment.mass_error": 0.1}, "set.deployment"),
+    ],
+)
+def test_what_set_says_is_neither_ignored_nor_overwritten(name, said, key, tmp_path):
+    section = {**ROOM, "set": said} | ({"count": 1} if name == "runs" else {})
+    assert f"{name}.{key}: " in refused(tmp_path, "status", **{name: section})
+
+
+@pytest.mark.parametrize(
+    ("section", "key"),
+    [
+        (
+            {"set": {"deployment.mass_error": 0.1}, "grid": {"deployment": [{}, {"preset": "mobile_base"}]}},
+            "runs.grid.deployment: ",
+        ),
+        (
+            {
+                "vary": {"goal.object.x": {"_tag": "!Uniform", "min": 3.0, "max": 3.1}},
+                "grid": {"goal.object": [{"x": 3.0, "y": 2.0, "theta": 0.0}]},
+            },
+            "runs.grid.goal.object: ",
+        ),
+        (
+            {"grid": {"workspace.outer[0]": [[0, 0]], "workspace.outer[0][1]": [0]}},
+            "grid.workspace.outer[0]: ",
+        ),
+    ],
+)
+def test_keys_around_one_another_are_refused(section, key, tmp_path):
+    said = refused(tmp_path, "status", runs={**ROOM, "count": 1, **section})
+    assert key in said
+    assert "overwrite" in said
+
+
+def test_a_section_that_is_set_may_vary_in_parts(tmp_path):
+    grid = {"deployment.mass_error": [0.0, 0.1]}
+    section = {**ROOM, "count": 1, "set": {"deployment": {"preset": "mobile_base"}}, "grid": grid}
+    variation = Variation(load_campaign(file_of(tmp_path, runs=section)))
+    deployment = variation.scenario_of(variation.run(1)).deployment
+    assert (deployment.mass_error, deployment.actuators.base_force) == (0.1, 300.0)
+
+
+@pytest.mark.parametrize(
+    "address", ["foo", "", "http://127.0.0.1:8786", "tcp://127.0.0.1", "tcp://127.0.0.1:x", "127.0.0.1:99999"]
+)
+def test_an_address_that_no_scheduler_has_is_refused(address, tmp_path):
+    said = refused(tmp_path, "run", "--scheduler", address, runs={**ROOM, "count": 1})
+    assert f"--scheduler: {address!r} is not allowed; expected the address of a Dask scheduler" in said
+
+
+def test_a_large_grid_takes_no_memory(tmp_path):
+    keys = ("mass_error", "measurements.position_noise", "measurements.angle_noise", "actuators.lag")
+    sizes = (7, 1000, 900, 1100)
+    grid = {
+        f"deployment.{key}": [1e-5 * i for i in range(size)] for key, size in zip(keys, sizes, strict=True)
+    }
+    tracemalloc.start()
+    variation = Variation(load_campaign(file_of(tmp_path, runs={**ROOM, "count": 2, "grid": grid})))
+    index = 2 * (((5 * 1000 + 999) * 900 + 3) * 1100 + 17) + 1
+    values = variation.run(index).values
+    assert tracemalloc.get_traced_memory()[1] < 1e8
+    tracemalloc.stop()
+    assert list(values) == list(grid)
+    assert [round(1e5 * value) for value in values.values()] == [5, 999, 3, 17]
+    assert variation.count == 2 * 7 * 1000 * 900 * 1100
+
+
+def test_what_is_not_finite_is_null_at_any_depth(capsys):
+    reporter = Reporter(machine=True, quiet=True)
+    reporter.facts["rows"] = [{"least": nan, "all": (inf, np.float64(1.5))}, [-inf]]
+    reporter.close()
+    said = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
+    assert said == {"rows": [{"least": None, "all": [None, 1.5]}, [None]]}

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from coop_drake.typed_data import EXACT, DataError, Limits, NotNegative, Positive
+from coop_drake.campaign.keys import Seed
+from coop_drake.typed_data import DataError, Limits, NotNegative, Positive
 
 FloorKind = Literal["room", "corridor", "door", "warehouse", "rooms"]
 
 Count = Annotated[int, Limits(above=0)]
-
-Seed = Annotated[int, Limits(at_least=0), EXACT]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from coop_drake.campaign.distributions import Count
-from coop_drake.campaign.keys import Plain, Seed
-from coop_drake.typed_data import DataError, Limits, Positive
+from coop_drake.campaign.keys import LARGEST_SEED, Plain, Seed, check_keys
+from coop_drake.typed_data import LARGEST, DataError, Limits, Positive
 
 Margin = Literal["funnel_margin", "cell_margin", "wall_clearance", "body_clearance", "budget_share"]
 """A column of the runs that a search drives down; the share of what the budget states it drives up."""
@@ -61,6 +61,10 @@ class Searches:
     def __post_init__(self) -> None:
         if not self.scenarios:
             raise DataError("scenarios", [], "at least one scenario")
+        if self.seed + self.count > LARGEST_SEED + 1:
+            allowed = f"a seed of at most {LARGEST_SEED + 1 - self.count}, so that every search has one"
+            raise DataError("seed", self.seed, allowed)
+        check_keys(self.set)
 
 
 @dataclass(frozen=True)
@@ -108,3 +112,7 @@ class Breaking:
         for name, values in (("scenarios", self.scenarios), ("departures", self.departures)):
             if not values:
                 raise DataError(name, [], f"at least one of the {name}")
+        if self.seed + self.runs > LARGEST + 1:
+            allowed = f"a seed of at most {LARGEST + 1 - self.runs:.0f}, so that every run has one"
+            raise DataError("seed", self.seed, allowed)
+        check_keys(self.set)
