@@ -84,9 +84,15 @@ def test_a_wrong_key_or_value_of_set_is_named_with_its_section(name, key, value,
 
 def test_a_factor_beyond_what_the_model_may_err_is_refused(tmp_path):
     said = refused(tmp_path, searches={**CERTIFIED, "factor": 6.0})
-    assert "searches.factor: 6.0 is not allowed" in said
+    assert "searches.factor: '6' is not allowed" in said
     assert "model_error" in said
     assert "mass_error" in refused(tmp_path, searches={**CERTIFIED, "factor": 4.9})
+
+
+def test_a_budget_with_more_than_can_be_simulated_has_no_breaking_points(tmp_path):
+    (tmp_path / "own.budget.yaml").write_text("{axes: false, report_age: 11.0}")
+    section = {**CERTIFIED, "budget": "own.budget.yaml"}
+    assert "breaking.budget: " in refused(tmp_path, breaking=section)
 
 
 def test_a_file_without_runs_has_none_to_replay(tmp_path):

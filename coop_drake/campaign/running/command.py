@@ -117,7 +117,7 @@ def _plan(
     for kind, scenario in asked:
         if kind == "search" or kind == "breaking":
             Searching(campaign, folder, kind, scenario).trials.check()
-        elif kind != PLANNER and variation is not None:
+        elif variation is not None:
             plans = Plans(variation, folder.plans)
             plans.with_maps(variation.run(scenario * variation.runs_of_scenario), progress)
             RunMaker(variation, plans, kind, folder.path / "logs").check(scenario)

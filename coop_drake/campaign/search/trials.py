@@ -8,6 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import yaml
 
 from coop_drake.answers.budget import Budget
@@ -71,17 +72,17 @@ class Trials:
 
         self._maker.check_run(self.variation.run(0))
         bounded, factor = BoundedDepartures(self.budget, self.tree), 1.0
+        key, value, what = "breaking.budget", self._asked.budget, "a budget whose"
         if isinstance(self._asked, Searches):
             factor = self._asked.factor
-        for fractions in (0.0 * bounded.middle, 0.0 * bounded.middle + 1.0):
+            key, value, what = "searches.factor", f"{factor:g}", "a number of times the budget at which all"
+        for share in (0.0, 1.0):
             try:
-                self.variation.scenario_of(Run(0, 0, 0, bounded.values(fractions, factor)))
+                chosen = bounded.values(np.full(len(bounded.names), share), factor)
+                self.variation.scenario_of(Run(0, 0, 0, chosen))
             except DataError as error:
-                said = f"{error.key} would be {error.value:.6g}, expected {error.allowed}"
-                allowed = f"a factor with which the budget's departures are allowed: {said}"
-                raise ScenarioError(
-                    str(self._campaign.path), f"{self._where}.factor", factor, allowed
-                ) from error
+                allowed = f"{what} departures can be simulated ({error})"
+                raise ScenarioError(str(self._campaign.path), key, value, allowed) from error
 
     @property
     def name(self) -> str:
