@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import yaml
 
+from coop_drake.campaign.plans import Plans
+from coop_drake.campaign.running.making import RunMaker
 from coop_drake.campaign.settings import load_campaign
 from coop_drake.campaign.variation import Variation
 from coop_drake.cli.reporter import Reporter
@@ -63,6 +65,18 @@ def test_a_plan_with_a_budget_is_not_followed_in_continuous_time(tmp_path):
     budget.write_text("{}")
     said = refused(tmp_path, runs={**ROOM, "count": 2, "budget": budget.name})
     assert "deployment.control_rate: None is not allowed" in said
+
+
+@pytest.mark.parametrize("tier", ["drake", "compiled"])
+def test_a_start_in_the_wall_is_a_lost_run_and_not_refused(tier, tmp_path):
+    section = {**ROOM, "count": 1, "tier": tier, "set": {"deployment.control_rate": 200}}
+    varied = {**section, "grid": {"deployment.start_offset.y": [0.0, 1.9]}}
+    variation = Variation(load_campaign(file_of(tmp_path, runs=varied)))
+    maker = RunMaker(variation, Plans(variation, tmp_path / "plans"), tier, tmp_path)
+    maker.check(0)
+    record = maker.record(variation.run(1))
+    assert not record.arrived
+    assert record.reason
 
 
 def test_searches_and_bisections_of_what_a_loop_does_not_know_are_refused(tmp_path):
