@@ -17,8 +17,10 @@ import typer
 
 from coop_drake.campaign import Campaign, load_campaign
 from coop_drake.campaign.report import Report, make_report
-from coop_drake.campaign.report.columns import MARGINS, SHARE, significant
-from coop_drake.campaign.report.rates import percent
+from coop_drake.campaign.report.bisections import multiple_shown
+from coop_drake.campaign.report.columns import MARGINS, SHARE
+from coop_drake.campaign.report.questions import seconds_shown
+from coop_drake.campaign.report.rates import percent, percent_up
 from coop_drake.campaign.report.searches import summarise_searches
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.campaign.running.command import batches_of
@@ -103,7 +105,7 @@ def _runs(report: Report) -> Iterator[Line]:
         used = percent(group.measures[SHARE].largest) if SHARE in group.measures else ""
         margins = (m.shown(least[m.name]) if m.name in least else "" for m in MARGINS)
         rate = group.rate
-        yield group.scenario, group.tier, rate.runs, rate.lost, percent(rate.upper), *margins, used
+        yield group.scenario, group.tier, rate.runs, rate.lost, percent_up(rate.upper), *margins, used
 
 
 def _searches(report: Report) -> Iterator[Line]:
@@ -118,8 +120,7 @@ def _breaking(report: Report) -> Iterator[Line]:
     yield "largest multiple of what is certified without a loss", *names
     for departure in dict.fromkeys(point.departure for point in report.breaking):
         own = {point.scenario: point for point in report.breaking if point.departure == departure}
-        points = [own.get(name) for name in names]
-        yield departure, *("" if p is None else f"{'' if p.beyond else '≥ '}{p.kept:.3g}" for p in points)
+        yield departure, *(multiple_shown(own.get(name)) for name in names)
 
 
 def _questions(report: Report) -> Iterator[Line]:
@@ -137,9 +138,7 @@ def _questions(report: Report) -> Iterator[Line]:
     )
     for row in report.questions:
         name = row.group if row.axis == row.group else f"{row.axis} {row.group}"
-        times = (
-            f"{significant(t, 2)} s" for t in (row.seconds.median, row.seconds.high, row.seconds.largest)
-        )
+        times = map(seconds_shown, (row.seconds.median, row.seconds.high, row.seconds.largest))
         counts = row.count, row.plans, row.infeasible, row.undecided, row.wrong, row.peer_found
         yield name, *counts, *times
 

@@ -263,9 +263,10 @@ def _show_questions(
 
 
 def _show_searches(folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter) -> None:
-    """Show what searches and bisections have found; a run lost inside the budget makes the command fail."""
+    """Show what searches and bisections have found; a loss inside the budget makes the command fail."""
     from dataclasses import asdict
 
+    from coop_drake.campaign.report.bisections import is_good, multiple_shown
     from coop_drake.campaign.report.searches import summarise_searches
 
     findings, points = folder.findings(batches)
@@ -275,24 +276,24 @@ def _show_searches(folder: CampaignFolder, batches: tuple[Batch, ...], reporter:
         rows = [
             (
                 f"{row.scenario}, {row.margin.replace('_', ' ')}",
-                *map(str, (row.searches, row.runs, row.lost)),
+                *map(str, (row.searches, row.runs, row.lost, row.failed)),
                 *(f"{number:.4f}" for number in (row.before, row.typical, row.worst.worst)),
             )
             for row in summarise_searches(findings)
         ]
-        heads = ("searches", "runs", "found a loss", "random", "usual find", "worst find")
+        heads = "searches", "runs", "found a loss", "not made", "random", "usual find", "worst find"
         reporter.table("searches", rows, heads, "scenario, driven")
     if points:
         rows = [
             (
                 f"{one.scenario}, {one.departure}",
                 f"{one.certified:g}",
-                f"{one.kept:.3g}",
+                multiple_shown(one),
                 one.reason or "none",
             )
             for one in points
         ]
         headings = ("certified", "largest multiple without a loss", "the loss")
         reporter.table("breaking points", rows, headings, "departure")
-    if any(not one.arrived for one in findings):
+    if not all(one.arrived for one in findings) or not all(map(is_good, points)):
         reporter.code = ExitCode.FAILED_RUN

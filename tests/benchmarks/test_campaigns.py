@@ -35,7 +35,7 @@ def test_what_is_there_is_shown_as_a_table(tmp_path, capsys):
     assert lines[-4:-1] == [
         "| largest multiple of what is certified without a loss | base | warehouse |",
         "| --- | --- | --- |",
-        "| delay | 2 | ≥ 64 |",
+        "| delay | 2 | 64 or more |",
     ]
 
 

@@ -96,6 +96,18 @@ def test_a_breaking_point_is_where_the_first_run_is_lost(campaign, searched, mon
     assert searched[1].folder.findings(batches) == ([], [model])
 
 
+@pytest.mark.parametrize(("kept", "code"), [(2.0, 0), (0.5, 1)])
+def test_a_loss_inside_what_is_certified_makes_the_command_fail(campaign, tmp_path, kept, code):
+    file = campaign.path.with_name("breaking.campaign.yaml")
+    file.write_text(yaml.safe_dump({"breaking": {**BROKEN, "departures": ["angles"]}}))
+    folder = CampaignFolder(tmp_path)
+    (batch,) = search_batches(load_campaign(file), folder)
+    folder.write(batch, [BreakingPoint("room", "drake", "angles", 0.0015, kept, kept + 0.1, 2, "left")])
+    result = invoke("campaign", "run", file, "--out", tmp_path)
+    assert (result.exit_code, result.stderr) == (code, "")
+    assert "angles" in result.stdout
+
+
 def test_further_searches_leave_the_results_of_earlier_ones_valid(campaign, tmp_path):
     more = replace(campaign, searches=replace(campaign.searches, count=3), breaking=None)
     folder = CampaignFolder(tmp_path)
