@@ -114,6 +114,14 @@ class QuestionRecord:
     corners: int = 0
     width_ratio: float = nan
 
+    @property
+    def is_wrong(self) -> bool:
+        """Whether the answer is shown to be wrong: refused, refuted by a path, in contact, or an error."""
+        if self.verdict == "undecided":
+            return False
+        refuted = self.verdict == "infeasible" and self.peer_found
+        return not self.verified or refuted or self.sampled_margin <= 0.0
+
 
 Record = RunRecord | QuestionRecord | Finding | BreakingPoint
 """A row of a campaign's results."""

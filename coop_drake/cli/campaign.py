@@ -244,7 +244,7 @@ def _show_questions(
 
     table = folder.questions(batches)
     rows = summarise_questions(table) if table.num_rows else ()
-    reporter.facts["questions"] = [{**asdict(row), "wrong": row.wrong} for row in rows]
+    reporter.facts["questions"] = [asdict(row) for row in rows]
     headings = (
         "asked",
         "plans",

@@ -13,7 +13,7 @@ from coop_drake.answers import Found, Infeasible, Undecided
 from coop_drake.answers.problem import at_goal
 from coop_drake.answers.search_report import SearchReport
 from coop_drake.campaign.questions import answering
-from coop_drake.campaign.questions.answering import answer, ask, is_wrong
+from coop_drake.campaign.questions.answering import answer, ask
 from coop_drake.campaign.questions.floors import FLOORS, random_floor
 from coop_drake.campaign.questions.narrowest import narrowest_corridor
 from coop_drake.campaign.questions.path_check import fault_of
@@ -152,7 +152,7 @@ def test_an_answer_is_checked_and_sampled(question, planned, monkeypatch):
     assert record.first_plan_seconds == planned.report.first_plan_cpu_seconds
     assert record.sampled_margin > 0.0
     assert found == Searched()
-    assert not is_wrong(record)
+    assert not record.is_wrong
 
 
 def test_a_plan_for_another_question_is_wrong(question, planned, monkeypatch):
@@ -161,7 +161,7 @@ def test_a_plan_for_another_question_is_wrong(question, planned, monkeypatch):
     record, _ = answer(question, SMALL)
     assert not record.verified
     assert record.reason
-    assert is_wrong(record)
+    assert record.is_wrong
 
 
 def test_a_no_is_searched_against(question, monkeypatch):
@@ -174,7 +174,7 @@ def test_a_no_is_searched_against(question, monkeypatch):
         True,
     )
     assert fault_of(question.problem, found.path) == ""
-    assert is_wrong(record)
+    assert record.is_wrong
 
 
 def test_an_error_of_the_planner_is_wrong_and_kept(monkeypatch, tmp_path):
@@ -184,7 +184,7 @@ def test_an_error_of_the_planner_is_wrong_and_kept(monkeypatch, tmp_path):
     monkeypatch.setattr(answering, "plan", broken)
     record = ask(5, SMALL, tmp_path)
     assert (record.verdict, record.reason) == ("failed", "ZeroDivisionError: no luck")
-    assert is_wrong(record)
+    assert record.is_wrong
     kept = tmp_path / "3_5"
     assert load_scenario(kept).path.name == "question_3_5.scenario.yaml"
     assert "no luck" in (kept / "found.json").read_text()
@@ -194,7 +194,7 @@ def test_an_answer_takes_no_longer_than_the_limit(question):
     record, _ = answer(question, replace(SMALL, time_limit=1e-6, patient_peer_time=0.0))
     assert record.verdict == "undecided"
     assert record.reason.startswith("not answered within 1e-06 s, when it was ")
-    assert not is_wrong(record)
+    assert not record.is_wrong
 
 
 def test_a_plan_whose_way_was_certified_within_the_limit_counts(question, monkeypatch):
@@ -211,7 +211,7 @@ def test_a_plan_whose_way_was_certified_within_the_limit_counts(question, monkey
     assert (record.verdict, record.verified, found) == ("plan", True, Searched())
     assert record.reason.startswith(f"{answering.LATE} after {SMALL.time_limit:g} s, when it was searching")
     assert record.sampled_margin > 0.0
-    assert not is_wrong(record)
+    assert not record.is_wrong
 
 
 def test_an_undecided_question_for_which_a_peer_finds_a_way_is_kept(monkeypatch, tmp_path):
@@ -239,7 +239,7 @@ def test_an_undecided_question_for_which_a_peer_finds_a_way_is_kept(monkeypatch,
 )
 def test_what_makes_an_answer_wrong(changes, wrong):
     record = QuestionRecord(0, 1, "room", 2, 2, "bar", "plan", verified=True, sampled_margin=1e-6)
-    assert is_wrong(replace(record, **changes)) is wrong
+    assert replace(record, **changes).is_wrong is wrong
 
 
 def answered(monkeypatch, result):

@@ -36,6 +36,12 @@ def test_a_question_whose_process_was_lost_counts_and_has_no_time():
     assert (headline(report), verdict(report)) == ("2 questions: 1 wrong answer, 0 undecided.", "bad")
 
 
+def test_an_answer_that_is_wrong_for_two_reasons_counts_once():
+    record = QuestionRecord(0, 0, "room", 2, 2, "bar", "plan", 1.5, verified=False, sampled_margin=-0.1)
+    every = make_report("questions", questions=table_of([record], QuestionRecord)).questions[-1]
+    assert (every.refused, every.contact, every.wrong) == (1, 1, 1)
+
+
 def test_questions_whose_processes_were_all_lost_make_a_page_without_times():
     lost = [QuestionRecord(k, k, "", 0, 0, "", "failed") for k in range(2)]
     report = make_report("questions", questions=table_of(lost, QuestionRecord))

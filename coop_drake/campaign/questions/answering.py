@@ -49,7 +49,7 @@ def ask(number: int, settings: QuestionSettings, cases: Path | None = None) -> Q
     with TemporaryDirectory() as folder:
         question = random_question(settings, number, Path(folder))
         record, found = answer(question, settings)
-        if cases is not None and (is_wrong(record) or record.verdict == "undecided"):
+        if cases is not None and (record.is_wrong or record.verdict == "undecided"):
             _keep(question, record, found, cases / f"{question.seed}_{number}")
     return record
 
@@ -88,14 +88,6 @@ def answer(question: Question, settings: QuestionSettings) -> tuple[QuestionReco
         record, peer=", ".join(found.planners), peer_found=found.path is not None, peer_seconds=found.seconds
     )
     return searched, found
-
-
-def is_wrong(record: QuestionRecord) -> bool:
-    """Whether an answer is shown to be wrong: refused, refuted by a path, in contact, or an error."""
-    if record.verdict == "undecided":
-        return False
-    refuted = record.verdict == "infeasible" and record.peer_found
-    return not record.verified or refuted or record.sampled_margin <= 0.0
 
 
 def _planned(question: Question, limit: float) -> tuple[PlanningResult, str, bool]:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coop_drake.campaign.records import QuestionRecord
 from coop_drake.campaign.report.columns import significant
 from coop_drake.campaign.report.distributions import NOTHING, Distribution, distribution
 
@@ -42,6 +43,7 @@ class Questions:
         refused: Answers that the exact checker refused, and errors of the planner.
         contact: Plans with a sampled configuration at which something touches.
         contradicted: Proofs of infeasibility although another planner found a way.
+        wrong: Answers that are wrong for any of these three reasons.
         peer_found: Undecided questions for which another planner found a way.
         seconds: CPU time of the answers; questions that failed have none [s].
     """
@@ -56,13 +58,9 @@ class Questions:
     refused: int
     contact: int
     contradicted: int
+    wrong: int
     peer_found: int
     seconds: Distribution
-
-    @property
-    def wrong(self) -> int:
-        """Answers that are wrong or not proved; one may count twice."""
-        return self.refused + self.contact + self.contradicted
 
     def cells(self) -> tuple[str, ...]:
         """Return a row of a table."""
@@ -87,6 +85,7 @@ def summarise_questions(table: Any) -> tuple[Questions, ...]:
         table: A pyarrow table with the columns of ``QuestionRecord``.
     """
     columns = {name: np.asarray(table[name].to_pylist()) for name in table.schema.names}
+    columns["wrong"] = np.array([QuestionRecord(**row).is_wrong for row in table.to_pylist()])
     return tuple(
         _count(axis, group, {name: column[own] for name, column in columns.items()})
         for axis, group, own in _groups(columns)
@@ -130,6 +129,7 @@ def _count(axis: str, group: str, columns: dict[str, NDArray[Any]]) -> Questions
         refused=int(refused.sum()),
         contact=int(contact.sum()),
         contradicted=int((infeasible & found).sum()),
+        wrong=int(columns["wrong"].sum()),
         peer_found=int((undecided & found).sum()),
         seconds=seconds,
     )
