@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -19,7 +18,7 @@ from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of
 from coop_drake.plant.kept_problem import file_digest, source_files
 from coop_drake.progress import Progress
-from coop_drake.scenario.budget_file import ALL, POSITION
+from coop_drake.scenario.budget_file import names_file
 from coop_drake.scenario.model import Scenario
 from coop_drake.simulation import build_maps
 from coop_drake.typed_data import to_plain
@@ -29,9 +28,6 @@ Maps = tuple[HarmonicMap, ...]
 
 _KEPT = 4
 """Plans with their maps that a process keeps in memory; runs of one batch mostly have one."""
-
-_PACKAGE_NAME = re.compile(r"<name>\s*([^<]*?)\s*</name>")
-"""The name of a package in its package.xml."""
 
 
 @cache
@@ -54,7 +50,9 @@ def scenario_content(scenario: Scenario) -> dict[str, Any]:
 
 
 def _stable_name(path: Path, beside: Path) -> str:
-    """Return the name of a model's file that is the same wherever packages are installed.
+    """Return a name of a model's file that is the same wherever the scenario and the packages are.
+
+    It is the path from the scenario's folder, or else from the folder that holds the file's package.
 
     Args:
         path: The file.
@@ -64,9 +62,8 @@ def _stable_name(path: Path, beside: Path) -> str:
     if path.is_relative_to(beside):
         return path.relative_to(beside).as_posix()
     for folder in path.parents:
-        if (package := folder / "package.xml").is_file():
-            name = _PACKAGE_NAME.search(package.read_text(encoding="utf-8", errors="replace"))
-            return f"package://{name[1] if name else ''}/{path.relative_to(folder).as_posix()}"
+        if (folder / "package.xml").is_file():
+            return path.relative_to(folder.parent).as_posix()
     return Path(os.path.relpath(path, beside)).as_posix()
 
 
@@ -90,7 +87,7 @@ class Plans:
         """
         scenario, budget = self.variation.scenario_to_plan(run), self.variation.budget
         said: Any = budget
-        if budget is not None and budget not in (ALL, POSITION):
+        if budget is not None and names_file(budget):
             said = {"file": file_digest(Path(budget))}
         return content_digest({**scenario_content(scenario), "budget": said})
 

@@ -18,7 +18,7 @@ from coop_drake.campaign.distributions import Distribution, Gaussian
 from coop_drake.campaign.keys import SEED_KEY
 from coop_drake.campaign.settings import Campaign, Runs, Tier
 from coop_drake.errors import ScenarioError
-from coop_drake.scenario.budget_file import ALL, POSITION
+from coop_drake.scenario.budget_file import names_file
 from coop_drake.scenario.document import parse
 from coop_drake.scenario.floor import with_floor
 from coop_drake.scenario.load import load_scenario
@@ -108,7 +108,7 @@ class Variation:
             ScenarioError: There is no such file.
         """
         choice = self.runs.budget
-        if choice is None or choice in (ALL, POSITION):
+        if choice is None or not names_file(choice):
             return choice
         beside = self.campaign.path.parent / choice
         found = beside if beside.is_file() else Path(choice)

@@ -59,6 +59,11 @@ class TeamMasses(NamedTuple):
     disagreement: float
 
 
+def names_file(choice: str) -> bool:
+    """Whether a choice of a budget names a file."""
+    return choice not in (ALL, POSITION)
+
+
 def read_budget(
     choice: str, scenario: Scenario, tree: ComponentTree, masses: Callable[[], TeamMasses]
 ) -> Budget:
@@ -75,7 +80,7 @@ def read_budget(
         ScenarioError: There is no such file, it is wrong, or the scenario has no control rate or has
             departures that no budget counts.
     """
-    if choice in (ALL, POSITION):
+    if not names_file(choice):
         return _of_deployment(scenario, tree, masses(), axes=choice == ALL)
     if not Path(choice).is_file():
         allowed = "all, position, or a file with a budget"

@@ -35,7 +35,7 @@ def test_files_that_change_places_change_the_digest_and_another_folder_does_not(
     here, there = (scenario_content(load_scenario(team(tmp_path / name))) for name in ("here", "there"))
     assert here == there
     names = [name for name, _ in here["files"]]
-    assert {"own/long_blue.sdf", "package://coop_drake_models/object.sdf"} <= set(names)
+    assert {"own/long_blue.sdf", "models/object.sdf"} <= set(names)
     first, second = (tmp_path / "there" / "own" / name for name in OWN)
     one, other = first.read_bytes(), second.read_bytes()
     first.write_bytes(other)

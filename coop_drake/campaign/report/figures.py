@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from coop_drake.campaign.report.bisections import is_determined, is_good
+from coop_drake.campaign.report.bisections import is_determined, is_good, multiple_shown
 from coop_drake.campaign.report.columns import MEASURES, SHARE, Measure
 from coop_drake.campaign.report.distributions import Distribution, Group
 from coop_drake.campaign.report.questions import ALL, Questions
@@ -111,8 +111,7 @@ def breaking_svg(points: Sequence[BreakingPoint]) -> str:
         ends = [max(point.kept, _LEAST) for point in own]
         ax.barh(place, ends[0], height=0.5, color=GREEN if is_good(own[0]) else VERMILLION)
         ax.plot(ends, [place] * len(ends), "o", color=BLUE, markersize=4.5)
-        beyond = "" if np.isfinite(own[0].lost) else " or more"
-        text = f"{own[0].kept:.3g}{beyond}, {own[0].scenario}"
+        text = f"{multiple_shown(own[0])}, {own[0].scenario}"
         ax.annotate(
             text, (ends[-1], place), (8.0, 0.0), textcoords="offset points", va="center", parse_math=False
         )
