@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -107,13 +108,11 @@ def report_command(
             facts=_facts(campaign),
             findings=findings,
             breaking=breaking,
+            missing=len(folder.missing(batches)),
         )
-        at = "" if out is None else f" --out {out}"
-        written = write_report(
-            report,
-            folder.path,
-            lambda run: f"coop-drake campaign replay {file} {run.run}{at}",
-        )
+        at = [] if out is None else ["--out", str(out)]
+        command = ["coop-drake", "campaign", "replay", str(file)]
+        written = write_report(report, folder.path, lambda run: shlex.join([*command, str(run.run), *at]))
         reporter.facts["files"] = [str(path) for path in written]
         reporter.say(f"The report is {escape(str(written[0]))}; open it in a browser")
 

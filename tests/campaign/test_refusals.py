@@ -168,6 +168,14 @@ def test_keys_around_one_another_are_refused(section, key, tmp_path):
     assert "overwrite" in said
 
 
+def test_names_that_come_twice_are_refused(tmp_path):
+    twice = {"scenarios": 2 * ROOM["scenarios"]}
+    assert "searches.scenarios: " in refused(tmp_path, "status", searches=twice)
+    assert "breaking.scenarios: " in refused(tmp_path, "status", breaking=twice)
+    departures = {**ROOM, "departures": ["lag", "lag"]}
+    assert "breaking.departures: " in refused(tmp_path, "status", breaking=departures)
+
+
 def test_a_section_that_is_set_may_vary_in_parts(tmp_path):
     grid = {"deployment.mass_error": [0.0, 0.1]}
     section = {**ROOM, "count": 1, "set": {"deployment": {"preset": "mobile_base"}}, "grid": grid}

@@ -36,6 +36,17 @@ def test_a_question_whose_process_was_lost_counts_and_has_no_time():
     assert (headline(report), verdict(report)) == ("2 questions: 1 wrong answer, 0 undecided.", "bad")
 
 
+def test_a_report_says_that_results_are_missing():
+    report = make_report("begun", run_table(20), missing=3)
+    assert headline(report).endswith("The campaign is not complete: 3 batches are missing.")
+    assert verdict(report) == "some"
+    assert verdict(make_report("lost", run_table(20, lost=(1,)), missing=3)) == "bad"
+    nothing = make_report("nothing", missing=1)
+    assert (headline(nothing), verdict(nothing)) == (
+        "The campaign is not complete: 1 batch is missing.", "some",
+    )  # fmt: skip
+
+
 def test_an_answer_that_is_wrong_for_two_reasons_counts_once():
     record = QuestionRecord(0, 0, "room", 2, 2, "bar", "plan", 1.5, verified=False, sampled_margin=-0.1)
     every = make_report("questions", questions=table_of([record], QuestionRecord)).questions[-1]

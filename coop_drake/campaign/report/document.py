@@ -39,6 +39,8 @@ class Report:
         questions: How the planner answered; empty without questions.
         findings: What searches for lost runs found.
         breaking: Multiples of what is certified at which runs are lost.
+        missing: Batches of the campaign that are not made yet. Slow ones come last: what is there is not a
+            random sample of what was asked for.
     """
 
     title: str
@@ -53,6 +55,7 @@ class Report:
     questions: tuple[Questions, ...]
     findings: tuple[Finding, ...]
     breaking: tuple[BreakingPoint, ...]
+    missing: int
 
     def to_json(self) -> str:
         """Return all numbers as JSON; numbers that are not finite are null."""
@@ -67,6 +70,7 @@ def make_report(
     facts: Sequence[tuple[str, str]] = (),
     findings: Sequence[Finding] = (),
     breaking: Sequence[BreakingPoint] = (),
+    missing: int = 0,
     confidence: float = CONFIDENCE,
 ) -> Report:
     """Compute a report from the tables of a campaign.
@@ -78,6 +82,7 @@ def make_report(
         facts: What was asked for: name and value.
         findings: What searches for lost runs found.
         breaking: Multiples of what is certified at which runs are lost.
+        missing: Batches of the campaign that are not made yet.
         confidence: Probability with which a true rate is not above its bound, at least [-].
     """
     known = None if runs is None or runs.num_rows == 0 else Runs(runs)
@@ -98,6 +103,7 @@ def make_report(
         summarise_questions(questions) if asked else (),
         tuple(findings),
         tuple(breaking),
+        missing,
     )
 
 

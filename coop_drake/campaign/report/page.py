@@ -83,11 +83,15 @@ def render_page(report: Report, replay: Callable[[WorstRun], str]) -> str:
 
 
 def headline(report: Report) -> str:
-    """The most important sentence of a report, and what is bad of its bisections."""
+    """The most important sentence of a report, what is bad of its bisections, and whether it is complete."""
     main, broken = _main_sentence(report), sentences(report.breaking)
-    if not main:
-        return " ".join(broken) or "There are no results yet."
-    return main if all(map(is_good, report.breaking)) else " ".join((main, *broken))
+    told = [main] if main else []
+    if not main or not all(map(is_good, report.breaking)):
+        told += broken
+    if report.missing:
+        several = "1 batch is" if report.missing == 1 else f"{report.missing:,} batches are"
+        told.append(f"The campaign is not complete: {several} missing.")
+    return " ".join(told) or "There are no results yet."
 
 
 def _main_sentence(report: Report) -> str:
@@ -119,12 +123,15 @@ def _searches_sentence(findings: tuple[Finding, ...]) -> str:
 
 
 def verdict(report: Report) -> str:
-    """``bad`` where something was lost, wrong or not known, ``some`` where more was used than is budgeted."""
+    """``bad`` where something was lost, wrong or not known.
+
+    ``some`` where more was used than is budgeted, or where results are missing.
+    """
     lost = (report.rate is not None and report.rate.lost) or not all(one.arrived for one in report.findings)
     if lost or any(row.wrong for row in report.questions) or not all(map(is_good, report.breaking)):
         return "bad"
     found = any(one.margin == SHARE and one.worst > 1.0 for one in report.findings)
-    return "some" if report.exceeded or found else "good"
+    return "some" if report.exceeded or found or report.missing else "good"
 
 
 def _beyond(count: int, most: float, what: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
@@ -14,6 +15,16 @@ Margin = Literal["funnel_margin", "cell_margin", "wall_clearance", "body_clearan
 
 DepartureName = Literal["delay", "lag", "angles", "rates", "position", "model", "reports", "all"]
 """A departure that is multiplied."""
+
+
+def _check_names(key: str, names: Sequence[str]) -> None:
+    """Refuse a list without names, or with one twice, whose results could not be told apart.
+
+    Raises:
+        DataError: With the key and what is allowed there.
+    """
+    if not names or len(set(names)) < len(names):
+        raise DataError(key, list(names), f"at least one of the {key}, each of them once")
 
 
 @dataclass(frozen=True)
@@ -59,8 +70,7 @@ class Searches:
         return self.batch or {"drake": 1, "compiled": 10}[self.tier]
 
     def __post_init__(self) -> None:
-        if not self.scenarios:
-            raise DataError("scenarios", [], "at least one scenario")
+        _check_names("scenarios", self.scenarios)
         if self.seed + self.count > LARGEST_SEED + 1:
             allowed = f"a seed of at most {LARGEST_SEED + 1 - self.count}, so that every search has one"
             raise DataError("seed", self.seed, allowed)
@@ -109,9 +119,8 @@ class Breaking:
         return 1
 
     def __post_init__(self) -> None:
-        for name, values in (("scenarios", self.scenarios), ("departures", self.departures)):
-            if not values:
-                raise DataError(name, [], f"at least one of the {name}")
+        _check_names("scenarios", self.scenarios)
+        _check_names("departures", self.departures)
         if self.seed + self.runs > LARGEST + 1:
             allowed = f"a seed of at most {LARGEST + 1 - self.runs:.0f}, so that every run has one"
             raise DataError("seed", self.seed, allowed)
