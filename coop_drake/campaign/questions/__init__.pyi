@@ -1,4 +1,4 @@
-from .answering import answer, ask, begun_question, is_wrong
+from .answering import answer, ask, begun_question
 from .peers import Searched, search_by_peers
 from .question import Question, random_question
 from .settings import QuestionSettings
@@ -10,7 +10,6 @@ __all__ = [
     "answer",
     "ask",
     "begun_question",
-    "is_wrong",
     "random_question",
     "search_by_peers",
 ]
