@@ -8,6 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+import coop_drake
 from coop_drake.answers import Found, Plan, load_plan, save_plan
 from coop_drake.answers.digest import content_digest
 from coop_drake.campaign.variation import Run, Variation
@@ -34,6 +35,18 @@ _KEPT = 4
 def versions() -> dict[str, str]:
     """Return the versions that a result depends on."""
     return {name: version(name) for name in ("coop-drake", "drake", "numpy")}
+
+
+@cache
+def source_digest() -> str:
+    """Return the SHA-256 of this package's modules, by their names and contents when this is called first.
+
+    Someone who changes the package tells his results apart by it; the version stays the same meanwhile.
+    """
+    root = Path(coop_drake.__file__).parent
+    return content_digest(
+        {path.relative_to(root).as_posix(): file_digest(path) for path in root.rglob("*.py")}
+    )
 
 
 def scenario_content(scenario: Scenario) -> dict[str, Any]:

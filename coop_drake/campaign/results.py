@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coop_drake.campaign.batches import Batch
+from coop_drake.campaign.plans import source_digest
 from coop_drake.campaign.records import QuestionRecord, Record, RunRecord, schema_of, table_of
 from coop_drake.campaign.search.findings import BreakingPoint, Finding
 from coop_drake.errors import CoopDrakeError
@@ -115,6 +116,10 @@ class CampaignFolder:
         costs = self.costs(batches)
         counted = sum(entry["runs"] for entry in costs)
         return sum(entry["cpu_seconds"] for entry in costs) / counted if counted else nan
+
+    def by_other_sources(self, batches: Iterable[Batch]) -> int:
+        """Return how many batches were made while the sources of this package were other ones than now."""
+        return sum(entry.get("sources") != source_digest() for entry in self.costs(batches))
 
     def note(self, batch: Batch, costs: dict[str, Any]) -> None:
         """Write what a batch took."""

@@ -10,8 +10,9 @@ import typer
 from rich.markup import escape
 from typer.core import TyperGroup
 
+from coop_drake.cli.campaign_state import show_state
 from coop_drake.cli.options import Machine, NoFigures, Quiet, out_folder
-from coop_drake.cli.reporter import ExitCode, Reporter, reporting
+from coop_drake.cli.reporter import ExitCode, reporting
 
 if TYPE_CHECKING:
     from coop_drake.campaign import Campaign
@@ -77,7 +78,7 @@ def run_command(
                 campaign, folder.path, workers=workers, scheduler=scheduler, progress=progress
             )
         reporter.facts["batches_made"] = outcome.made
-        _show(campaign, folder, outcome.batches, reporter)
+        show_state(campaign, folder, outcome.batches, reporter)
 
 
 @campaign_app.command("status")
@@ -87,7 +88,7 @@ def status_command(
     """Show how far a campaign is, and what it has found so far."""
     with reporting(machine=machine, quiet=quiet) as reporter:
         campaign, folder, batches = _with_batches(file, out)
-        _show(campaign, folder, batches, reporter)
+        show_state(campaign, folder, batches, reporter)
         reporter.code = ExitCode.DONE
 
 
@@ -105,7 +106,7 @@ def report_command(
             campaign.name,
             folder.table(batches),
             folder.questions(batches),
-            facts=_facts(campaign),
+            facts=_facts(campaign, folder.by_other_sources(batches)),
             findings=findings,
             breaking=breaking,
             missing=len(folder.missing(batches)),
@@ -167,14 +168,16 @@ def _read(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolder]:
     return campaign, CampaignFolder((out or Path("out") / "campaigns" / campaign.name).absolute())
 
 
-def _facts(campaign: Campaign) -> list[tuple[str, str]]:
-    """Return what a report says of what was asked for."""
+def _facts(campaign: Campaign, by_other_sources: int) -> list[tuple[str, str]]:
+    """Return what a report says of what was asked for, and of batches that other sources have made."""
     from importlib.metadata import version
 
     facts = [("file", campaign.path.name), ("coop_drake", version("coop-drake")), ("Drake", version("drake"))]
     if campaign.runs is not None:
         facts += [("seed", str(campaign.runs.seed)), ("varied keys", str(len(campaign.runs.vary)))]
         facts += [("budget", campaign.runs.budget)] if campaign.runs.budget else []
+    if by_other_sources:
+        facts += [("batches by other sources of coop_drake", str(by_other_sources))]
     return facts
 
 
@@ -183,116 +186,3 @@ def _with_batches(file: Path, out: Path | None) -> tuple[Campaign, CampaignFolde
 
     campaign, folder = _read(file, out)
     return campaign, folder, batches_of(campaign, folder)
-
-
-def _show(campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter) -> None:
-    """Show what a campaign has come to so far; a lost run or a wrong answer makes the command fail."""
-    reporter.facts["folder"] = str(folder.path)
-    if campaign.questions is not None:
-        _show_questions(campaign, folder, batches, reporter)
-    if campaign.runs is not None:
-        _show_runs(campaign, folder, batches, reporter)
-    if campaign.searches is not None or campaign.breaking is not None:
-        _show_searches(folder, batches, reporter)
-    for kind in ("planner", "search", "breaking"):
-        _show_cost(folder, [one for one in batches if one.tier == kind], kind, reporter)
-    reporter.say(f"All results are in {escape(str(folder.path))}")
-
-
-def _show_cost(folder: CampaignFolder, batches: list[Batch], kind: str, reporter: Reporter) -> None:
-    """Say how much processor time what is no run has taken, where this is known."""
-    from math import isnan
-
-    if not isnan(seconds := folder.cpu_seconds(batches)):
-        name = {"planner": "question", "search": "search", "breaking": "bisection"}[kind]
-        reporter.facts[f"cpu_seconds_of_a_{name}"] = seconds
-        reporter.say(
-            f"A {name} took {seconds:.2f} s of processor time in the mean, with all its checks and runs"
-        )
-
-
-def _show_runs(
-    campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter
-) -> None:
-    """Show the state of every scenario in every tier; a lost run makes the command fail."""
-    from coop_drake.campaign.state import state_of
-
-    rows = state_of(campaign, folder, batches)
-    reporter.facts.update(
-        runs=sum(row.runs for row in rows),
-        done=sum(row.done for row in rows),
-        lost=sum(row.lost for row in rows),
-        rows=[row.facts() for row in rows],
-    )
-    headings = (
-        "runs", "done", "lost", "least funnel margin", "least clearance", "used of budget",
-        "CPU time of a run",
-    )  # fmt: skip
-    reporter.table(campaign.name, [row.cells() for row in rows], headings, "scenario, tier")
-    if reporter.facts["lost"]:
-        reporter.code = ExitCode.FAILED_RUN
-
-
-def _show_questions(
-    campaign: Campaign, folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter
-) -> None:
-    """Show how questions were answered, by what makes them hard; a wrong answer makes the command fail."""
-    from dataclasses import asdict
-
-    from coop_drake.campaign.report.questions import summarise_questions
-
-    table = folder.questions(batches)
-    rows = summarise_questions(table) if table.num_rows else ()
-    reporter.facts["questions"] = [asdict(row) for row in rows]
-    headings = (
-        "asked",
-        "plans",
-        "beyond limits",
-        "no way",
-        "undecided",
-        "wrong",
-        "CPU time",
-        "95 %",
-        "largest",
-    )
-    if rows:
-        reporter.table(campaign.name, [row.cells() for row in rows], headings, "questions by")
-    if rows and rows[-1].wrong:
-        reporter.code = ExitCode.FAILED_RUN
-
-
-def _show_searches(folder: CampaignFolder, batches: tuple[Batch, ...], reporter: Reporter) -> None:
-    """Show what searches and bisections have found; a loss inside the budget makes the command fail."""
-    from dataclasses import asdict
-
-    from coop_drake.campaign.report.bisections import is_good, multiple_shown
-    from coop_drake.campaign.report.searches import summarise_searches
-
-    findings, points = folder.findings(batches)
-    reporter.facts["searches"] = [asdict(one) for one in findings]
-    reporter.facts["breaking"] = [{**asdict(one), "lost": one.beyond} for one in points]
-    if findings:
-        rows = [
-            (
-                f"{row.scenario}, {row.margin.replace('_', ' ')}",
-                *map(str, (row.searches, row.runs, row.lost, row.failed)),
-                *(f"{number:.4f}" for number in (row.before, row.typical, row.worst.worst)),
-            )
-            for row in summarise_searches(findings)
-        ]
-        heads = "searches", "runs", "found a loss", "not made", "random", "usual find", "worst find"
-        reporter.table("searches", rows, heads, "scenario, driven")
-    if points:
-        rows = [
-            (
-                f"{one.scenario}, {one.departure}",
-                f"{one.certified:g}",
-                multiple_shown(one),
-                one.reason or "none",
-            )
-            for one in points
-        ]
-        headings = ("certified", "largest multiple without a loss", "the loss")
-        reporter.table("breaking points", rows, headings, "departure")
-    if not all(one.arrived for one in findings) or not all(map(is_good, points)):
-        reporter.code = ExitCode.FAILED_RUN

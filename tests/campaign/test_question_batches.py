@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from coop_drake.campaign import Campaign, QuestionRecord, load_campaign
 from coop_drake.campaign.batches import PLANNER, question_batches
+from coop_drake.campaign.plans import source_digest
 from coop_drake.campaign.questions import QuestionSettings, ask
 from coop_drake.campaign.records import MEASURED
 from coop_drake.campaign.results import CampaignFolder
@@ -48,6 +49,8 @@ def test_a_process_answers_as_this_one_does(campaign, tmp_path):
     last = batches[LAST // 2]
     assert make_batch(Order(str(campaign.path), str(tmp_path), last, 600.0))
     assert folder.missing(batches) == list(batches[:-1])
+    assert folder.costs(batches)[0]["sources"] == source_digest()
+    assert folder.by_other_sources(batches) == 0
     (row,) = folder.questions(batches).to_pylist()
     here = asdict(ask(LAST, campaign.questions))
     differing = {name for name in row if str(row[name]) != str(here[name])}
@@ -69,6 +72,20 @@ def test_a_wrong_answer_is_counted_and_fails_the_command(campaign, tmp_path):
     assert failed.exit_code == 1
     every = json.loads(failed.stdout)["questions"][-1]
     assert (every["count"], every["plans"], every["wrong"]) == (5, 5, 1)
+
+
+def test_batches_that_other_sources_made_are_counted(campaign, tmp_path):
+    folder, options = CampaignFolder(tmp_path), [str(campaign.path), "--out", str(tmp_path), "--json"]
+    made = QuestionRecord(0, 3, "room", 2, 2, "bar", "plan", 1.0, verified=True, sampled_margin=1e-6)
+    first, second, *_ = batches_of(campaign, folder)
+    for batch, sources in ((first, source_digest()), (second, "0" * 64)):
+        folder.write(batch, [replace(made, question=number) for number in range(batch.first, batch.stop)])
+        folder.note(batch, {"runs": 1, "cpu_seconds": 1.0, "sources": sources})
+    status = CliRunner().invoke(app, ["campaign", "status", *options])
+    assert json.loads(status.stdout)["batches_by_other_sources"] == 1
+    assert CliRunner().invoke(app, ["campaign", "report", *options]).exit_code == 0
+    facts = json.loads((tmp_path / "report.json").read_text())["facts"]
+    assert ["batches by other sources of coop_drake", "1"] in facts
 
 
 def test_a_question_is_written_as_a_scenario(campaign, tmp_path):

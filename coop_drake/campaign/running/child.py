@@ -42,10 +42,12 @@ def main(order: dict[str, Any]) -> int:
 
 
 def _make(order: dict[str, Any]) -> None:
+    from coop_drake.campaign.plans import source_digest
     from coop_drake.campaign.results import CampaignFolder
     from coop_drake.campaign.settings import load_campaign
     from coop_drake.memory import peak_memory_mb
 
+    sources = source_digest()  # Before runs are made, because somebody may edit the sources meanwhile.
     folder = CampaignFolder(Path(order["folder"]))
     campaign = load_campaign(folder.campaign, Path(order["campaign"]))
     kinds = {"planner": _questions, "search": _searches, "breaking": _searches}
@@ -53,7 +55,7 @@ def _make(order: dict[str, Any]) -> None:
     for begun, record in made(campaign, folder, order):
         _say("begun", asdict(begun))
         _say("ended", asdict(record()))
-    _say("costs", {"cpu_seconds": process_time(), "peak_memory_mb": peak_memory_mb()})
+    _say("costs", {"cpu_seconds": process_time(), "peak_memory_mb": peak_memory_mb(), "sources": sources})
 
 
 def _runs(campaign: Campaign, folder: CampaignFolder, order: dict[str, Any]) -> Iterator[Task]:

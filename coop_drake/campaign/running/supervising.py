@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from coop_drake.campaign.batches import Batch
+from coop_drake.campaign.plans import source_digest
 from coop_drake.campaign.records import Record
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.errors import ProcessError
@@ -65,7 +66,8 @@ def make_batch(order: Order) -> bool:
     if folder.has(batch):
         return False
     records: list[Record] = []
-    costs = {"runs": batch.stop - batch.first, "cpu_seconds": 0.0, "peak_memory_mb": 0.0, "lost_processes": 0}
+    costs: dict[str, Any] = {"runs": batch.stop - batch.first, "cpu_seconds": 0.0, "peak_memory_mb": 0.0}
+    costs |= {"lost_processes": 0, "sources": source_digest()}
     failures = 0
     while len(records) < batch.stop - batch.first:
         try:
@@ -76,6 +78,7 @@ def make_batch(order: Order) -> bool:
                 else:
                     costs["cpu_seconds"] += content["cpu_seconds"]
                     costs["peak_memory_mb"] = max(costs["peak_memory_mb"], content["peak_memory_mb"])
+                    costs["sources"] = content["sources"]
         except _LostError as lost:
             failures += 1
             costs["lost_processes"] += 1
