@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Annotated
@@ -35,15 +36,20 @@ class DirectiveEntry:
 
         return read_directive(self.data, self.key)
 
+    @cached_property
+    def plain(self) -> object:
+        """Plain data of Drake's type with all its defaults, which the many runs of one scenario share."""
+        from coop_drake.scenario.drake_types import write_directive
+
+        return write_directive(self.drake)
+
     def __reduce__(self) -> tuple[type[DirectiveEntry], tuple[object, str]]:
         """Pickle without Drake's type, which cannot be."""
         return type(self), (self.data, self.key)
 
 
 def _write(entry: DirectiveEntry) -> object:
-    from coop_drake.scenario.drake_types import write_directive
-
-    return write_directive(entry.drake)
+    return deepcopy(entry.plain)
 
 
 Directive = Annotated[DirectiveEntry, Codec(DirectiveEntry, _write)]
