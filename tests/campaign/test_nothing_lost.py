@@ -9,9 +9,10 @@ import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
@@ -221,6 +222,8 @@ def test_a_scheduler_of_the_users_own_may_be_killed(undisturbed, begun, tmp_path
 def test_a_process_that_hangs_is_ended_and_another_goes_on(undisturbed, tmp_path, monkeypatch):
     timely, limits = supervising._timely, iter([2.0])
     monkeypatch.setattr(supervising, "_START", 0.0)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
     monkeypatch.setattr(supervising, "_timely", lambda stream, limit: timely(stream, next(limits, limit)))
     order = undisturbed.order(tmp_path / "hanging", time_limit=PATIENCE)  # of all processes but the first
     stopping = threading.Thread(target=lambda: kill(child_of(order.folder).pid, signal.SIGSTOP))
@@ -229,9 +232,20 @@ def test_a_process_that_hangs_is_ended_and_another_goes_on(undisturbed, tmp_path
     stopping.join()
     folder = CampaignFolder(Path(order.folder))
     assert folder.costs([order.batch])[0]["lost_processes"] >= 1
+    assert list((tmp_path / "temporary").iterdir()) == []
     assert (folder.path / order.batch.file).read_bytes() == (
         undisturbed.folder.path / order.batch.file
     ).read_bytes()
+
+
+def test_a_process_removes_its_files_when_what_started_it_has_ended(undisturbed, tmp_path):
+    (scratch := tmp_path / "scratch").mkdir()
+    told = {**asdict(undisturbed.order(tmp_path / "left")), "begin": 0, "scratch": str(scratch)}
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.DEVNULL}
+    with subprocess.Popen([sys.executable, "-m", CHILD, json.dumps(told)], **pipes) as process:
+        process.stdin.close()
+        assert process.wait(PATIENCE) == 1
+    assert not scratch.exists()
 
 
 def test_a_run_that_ends_every_process_is_recorded_as_lost_and_the_others_are_made(

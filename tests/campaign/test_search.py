@@ -157,3 +157,11 @@ def test_bisection_encloses_the_multiple_at_which_runs_are_lost(edge):
 
 def test_where_nothing_is_lost_bisection_says_how_far_it_looked():
     assert first_lost(lambda multiple: "", halvings=5, largest=16.0) == (16.0, inf, "")
+
+
+def test_multiples_that_cannot_be_simulated_are_not_tried():
+    def lost(multiple):
+        assert multiple <= 10.0
+        return ""
+
+    assert first_lost(lost, 5, 64.0, lambda multiple: multiple <= 10.0) == (8.0, inf, "")

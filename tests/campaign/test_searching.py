@@ -91,6 +91,10 @@ def test_a_breaking_point_is_where_the_first_run_is_lost(campaign, searched, mon
     assert (angles.reason, angles.runs, angles.beyond) == ("left", 2, angles.lost)
     assert (model.departure, model.kept, model.lost, model.beyond) == ("model", 4.0, inf, None)
     assert isinstance(model, BreakingPoint)
+    delay = {"departures": ("delay",), "largest": 4096.0}  # A delay of more than 10 s is not allowed.
+    asked = replace(campaign, breaking=replace(campaign.breaking, **delay))
+    (point,) = map(Searching(asked, searched[1].folder, "breaking", 0).record, range(1))
+    assert (point.kept, point.lost, point.reason) == (512.0, inf, "")
     batches = list(searching.batches())
     searched[1].folder.write(batches[1], [model])
     assert searched[1].folder.findings(batches) == ([], [model])

@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
+import tempfile
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
@@ -31,8 +33,14 @@ if TYPE_CHECKING:
 
 
 def main(order: dict[str, Any]) -> int:
-    """Make the runs of an order, the fields of `Order`; return the exit code."""
-    threading.Thread(target=_end_with_supervisor, daemon=True).start()
+    """Make the runs of an order; return the exit code.
+
+    Args:
+        order: The fields of `Order`, ``begin`` for the index of the first one to be made, and ``scratch`` for
+            a folder of this process alone, which is removed after it.
+    """
+    tempfile.tempdir = order["scratch"]
+    threading.Thread(target=_end_with_supervisor, args=(order["scratch"],), daemon=True).start()
     try:
         _make(order)
     except (CoopDrakeError, OSError) as error:  # A full disk is no fault of the run that met it.
@@ -110,9 +118,10 @@ def _say(kind: str, content: object) -> None:
     sys.stdout.flush()
 
 
-def _end_with_supervisor() -> None:
-    """End this process when the one that started it has ended, however that was."""
+def _end_with_supervisor(scratch: str) -> None:
+    """End this process, and remove its files, when the one that started it has ended, however that was."""
     os.read(sys.stdin.fileno(), 1)  # It returns when no process can write any more.
+    shutil.rmtree(scratch, ignore_errors=True)
     os._exit(1)
 
 

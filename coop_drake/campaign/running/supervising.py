@@ -28,6 +28,10 @@ _START = 600.0
 have to compile all kernels, on a busy machine."""
 
 
+_COMMAND = (sys.executable, "-m", "coop_drake.campaign.running.child")
+"""Starts a process that makes runs; what it shall make is one more argument."""
+
+
 @dataclass(frozen=True)
 class Order:
     """A batch that is to be made.
@@ -100,13 +104,17 @@ def _lines(order: Order, begin: int) -> Iterator[tuple[str, Any]]:
         _LostError: It ended before it was done, or took too long, and was ended.
         ProcessError: It says that it cannot run what it was told.
     """
-    told = json.dumps({**asdict(order), "begin": begin})
-    command = [sys.executable, "-m", "coop_drake.campaign.running.child", told]
     begun: Record | None = None
     pipe = subprocess.PIPE
     with (
         tempfile.TemporaryFile() as errors,
-        subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=errors) as process,
+        tempfile.TemporaryDirectory() as scratch,  # A process that is killed leaves files in it.
+        subprocess.Popen(
+            [*_COMMAND, json.dumps({**asdict(order), "begin": begin, "scratch": scratch})],
+            stdin=pipe,
+            stdout=pipe,
+            stderr=errors,
+        ) as process,
     ):
         assert process.stdout is not None  # it is a pipe
         try:

@@ -10,7 +10,10 @@ LARGEST = 64.0
 
 
 def first_lost(
-    lost: Callable[[float], str], halvings: int, largest: float = LARGEST
+    lost: Callable[[float], str],
+    halvings: int,
+    largest: float = LARGEST,
+    allowed: Callable[[float], bool] = lambda multiple: True,
 ) -> tuple[float, float, str]:
     """Return the largest multiple tried at which no run was lost, the smallest one at which one was, and why.
 
@@ -22,9 +25,10 @@ def first_lost(
         lost: Simulates runs at a multiple, and returns why the first of them was lost; empty if none was.
         halvings: How often the interval is halved.
         largest: Multiples beyond this are not tried [-].
+        allowed: Whether a multiple can be simulated; from the first one on that cannot none is tried.
     """
     kept, upper, reason, multiple = 0.0, inf, "", 1.0
-    while upper == inf and multiple <= largest:
+    while upper == inf and multiple <= largest and allowed(multiple):
         if why := lost(multiple):
             upper, reason = multiple, why
         else:

@@ -135,9 +135,11 @@ class Searching:
                     return record.reason
             return ""
 
-        kept, upper, reason = first_lost(
-            lost, asked.halvings, largest_multiple(budget, departure, asked.largest)
-        )
+        def allowed(multiple: float) -> bool:
+            return trials.allows(departures_at(budget, tree, departure, multiple, asked.seed))
+
+        largest = largest_multiple(budget, departure, asked.largest)
+        kept, upper, reason = first_lost(lost, asked.halvings, largest, allowed)
         certified = 1.0 if departure == "all" else getattr(budget, SCALED[departure][0])
         point = self.begun(index)
         assert isinstance(point, BreakingPoint)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -114,6 +115,15 @@ class Trials:
     def digest(self) -> str:
         """Digest of what the plan is made from."""
         return self._plans.digest_of(self.variation.run(0))
+
+    def allows(self, values: Mapping[str, Any]) -> bool:
+        """Whether the scenario allows these values of its keys."""
+        from coop_drake.campaign.variation import Run
+
+        with suppress(DataError):
+            self.variation.scenario_of(Run(0, 0, 0, dict(values)))
+            return True
+        return False
 
     def run_all(self, chosen: Sequence[Mapping[str, Any]], seed: int = 0) -> list[RunRecord]:
         """Make one run for each choice of departures, with a seed for what is still drawn."""
