@@ -109,10 +109,20 @@ def _runs(report: Report) -> Iterator[Line]:
 
 
 def _searches(report: Report) -> Iterator[Line]:
-    yield "searches", "driven", "number", "runs", "found a loss", "random", "usual find", "worst find"
+    yield (
+        "searches",
+        "driven",
+        "number",
+        "runs",
+        "found a loss",
+        "not made",
+        "random",
+        "usual find",
+        "worst find",
+    )
     for row in summarise_searches(report.findings):
         ends = (f"{number:.4g}" for number in (row.before, row.typical, row.worst.worst))
-        yield row.scenario, row.margin, row.searches, row.runs, row.lost, *ends
+        yield row.scenario, row.margin, row.searches, row.runs, row.lost, row.failed, *ends
 
 
 def _breaking(report: Report) -> Iterator[Line]:
