@@ -156,14 +156,18 @@ class _Lowering(NativeLowering):  # type: ignore[misc]
 
 
 def _held_by_caller(function: Any, kinds: Mapping[str, types.Type]) -> set[str]:
-    """Names of variables that are assigned once: arguments, constants, or parts and views of these."""
+    """Names of variables that are assigned once: arguments, constants, parts, views and tuples of these."""
     blocks = [block for _, block in sorted(function.blocks.items())]
     assigned = [statement for block in blocks for statement in block.find_insts(ir.Assign)]
     times = Counter(statement.target.name for statement in assigned)
     held: set[str] = set()
     for statement in assigned:
         value = statement.value
-        if isinstance(value, ir.Expr):
+        if isinstance(value, ir.Expr) and value.op == "build_tuple":
+            of_caller = all(item.name in held or _is_number(kinds[item.name]) for item in value.items)
+        elif isinstance(value, ir.Expr) and value.op == "exhaust_iter":  # A tuple that is to be unpacked.
+            of_caller = value.value.name in held
+        elif isinstance(value, ir.Expr):
             of_caller = value.op in _VIEWS and value.value.name in held and _is_view(value, kinds)
         elif isinstance(value, ir.Var):
             of_caller = value.name in held
@@ -172,6 +176,10 @@ def _held_by_caller(function: Any, kinds: Mapping[str, types.Type]) -> set[str]:
         if of_caller and times[statement.target.name] == 1:
             held.add(statement.target.name)
     return held
+
+
+def _is_number(kind: types.Type) -> bool:
+    return isinstance(kind, types.Number | types.Boolean)
 
 
 def _is_view(taken: Any, kinds: Mapping[str, types.Type]) -> bool:

@@ -252,13 +252,18 @@ class Pair(NamedTuple):
 
 @compiled
 def inner(pair, row, chosen):
-    part = pair.first[row]
-    part[0] += 1.0
-    kept = pair.second if chosen else pair.first[0]
+    wide, part, narrow, twice = pair.first, pair.first[row], pair.second, 2 * row
+    part[0] += 0.5 * twice
+    kept = narrow if chosen else wide[0]
     last = kept
     for k in range(2):
         last, kept = kept, pair.first[k]
     return last, kept[1:], pair, part
+
+@compiled
+def both(pair):
+    parts = pair.second, pair.first
+    return parts
 
 @compiled(inlined=True)
 def doubled(pair):
@@ -268,9 +273,9 @@ def doubled(pair):
 def outer(pair, rows, chosen):
     last, rest, same, part = inner(pair, 1, chosen)
     for k in rows:
-        part = same.first[k]
-        new = doubled(same)
-        if new[0, 0] < 0.0:
+        narrow, wide = both(same)
+        begin, part, new, sign = k, wide[k], doubled(same), narrow
+        if sign[0] * new[0, 0] < 0.0:
             part = new[0]
     return last, rest, part, new, same.first[rows], same, rows
 

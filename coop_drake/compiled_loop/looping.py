@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal, LoopPlant
-from coop_drake.compiled_loop.motion import advance, motion_room
+from coop_drake.compiled_loop.motion import MotionRoom, advance, motion_room
 from coop_drake.compiled_loop.robots import (
     RobotRoom,
     follow_axes,
@@ -15,7 +15,15 @@ from coop_drake.compiled_loop.robots import (
     robot_room,
 )
 from coop_drake.compiled_loop.sensing import measure, receive
-from coop_drake.compiled_loop.watching import ENDED, RUNS, begin_figures, left_by_all, watch, watch_room
+from coop_drake.compiled_loop.watching import (
+    ENDED,
+    RUNS,
+    WatchRoom,
+    begin_figures,
+    left_by_all,
+    watch,
+    watch_room,
+)
 from coop_drake.laws.channels import carry_reports
 from coop_drake.laws.nominal_axes import carry_axes
 from coop_drake.laws.random_draws import uniform_pair
@@ -43,15 +51,25 @@ def run_loop(
         departures: What departs from the ideal team.
         memory: The state at the start; it is changed.
     """
-    figures, seen = begin_figures(), watch_room(plant)
-    room, motion, sample = robot_room(memory), motion_room(team.yaws.size, plant), 0
+    room, motion, seen = robot_room(memory), motion_room(team.yaws.size, plant), watch_room(plant)
+    figures = begin_figures()
+    _run_on(cells, team, plant, nominal, departures, memory, room, motion, seen, figures)
+    return figures
+
+
+@compiled
+def _run_on(
+    cells: LoopCells, team: FusedTeam, plant: LoopPlant, nominal: LoopNominal, departures: LoopDepartures,
+    memory: LoopMemory, room: RobotRoom, motion: MotionRoom, seen: WatchRoom, figures: FloatArray,
+) -> None:  # fmt: skip
+    """Write the figures of a run; what has been allocated is given, so that nobody counts its users."""
+    sample = 0
     watch(sample, cells, team, plant, nominal, departures, memory, seen, figures)
     while figures[ENDED] == RUNS:
         update(cells, team, nominal, departures, room, memory, sample)
         advance(sample, team, plant, departures, memory, motion)
         sample += 1
         watch(sample, cells, team, plant, nominal, departures, memory, seen, figures)
-    return figures
 
 
 @compiled
@@ -100,19 +118,23 @@ def compute(
         room: Receives the accelerations of the law of its axes, and what the robot tells the log.
         memory: What changes.
     """
-    seen, governed, begin = room.seen[0], room.governed, k + team.first[2, k]
-    pose, robot = receive(k, sample, number, team, departures, memory)
+    governed, begin, joints = room.governed, k + team.first[2, k], team.first[2, k + 1] - team.first[2, k]
+    measured = room.robots[0, : 2 * (3 + joints)]
+    receive(k, sample, number, team, departures, memory, room.pose, measured)
     chain = team.chains[team.first[0, k] : team.first[0, k + 1]]
-    estimate_object(chain, team.loads[k, :2], robot, pose, seen)
+    estimate_object(chain, team.loads[k, :2], measured, room.pose, room.seen[0])
     cell, time = heard_cell(k, sample, now, departures, memory)
     lead(k, sample, cell, time, cells, team, nominal, departures, memory, room)
-    led, led_robot = follow_axes(k, sample, cell, time, robot, cells, team, nominal, departures, memory, room)
-    judged, judged_robot = led, led_robot
+    row = follow_axes(k, sample, cell, time, cells, team, nominal, departures, memory, room)
+    led, led_robot, judged = room.seen[row], room.robots[row, : measured.size], row
     if departures.periods[3] > 0 and cell + 1 == cells.rows.shape[0]:
-        judged, judged_robot = _averaged(sample, 3 * begin - 2 * team.first[2, k], led, led_robot, memory)
+        judged = 3
+        own = 3 * begin - 2 * team.first[2, k]
+        _average(sample, own, led, led_robot, memory, room.seen[judged], room.robots[judged, : measured.size])
     margin = report(
-        k, sample, cell, time, judged, judged_robot, cells, nominal, departures, memory, begin, whole
-    )
+        k, sample, cell, time, room.seen[judged], room.robots[judged, : measured.size], cells, nominal,
+        departures, memory, begin, whole,
+    )  # fmt: skip
     memory.reports[0, k, 0], memory.reports[0, k, 1] = cell, margin
     if margin >= 0.0:
         remember_switch(k, cell, time, led, led_robot, cells, memory, begin)
@@ -121,11 +143,16 @@ def compute(
 
 
 @compiled
-def _averaged(
-    sample: int, at: int, led: FloatArray, robot: FloatArray, memory: LoopMemory
-) -> tuple[FloatArray, FloatArray]:
-    """Return both states with the means of the last rates, and remember those of now."""
-    judged, judged_robot, n = led.copy(), robot.copy(), robot.size // 2
+def _average(
+    sample: int, at: int, led: FloatArray, robot: FloatArray, memory: LoopMemory, judged: FloatArray,
+    judged_robot: FloatArray,
+) -> None:  # fmt: skip
+    """Write both states with the means of the last rates, and remember those of now."""
+    n = robot.size // 2
+    for i in range(6):
+        judged[i] = led[i]
+    for i in range(2 * n):
+        judged_robot[i] = robot[i]
     for i in range(n):
         mean = memory.rates[:, at + i].mean()
         if i < 3:
@@ -133,7 +160,6 @@ def _averaged(
         else:
             judged_robot[n + i] = mean
         memory.rates[sample % memory.rates.shape[0], at + i] = led[3 + i] if i < 3 else robot[n + i]
-    return judged, judged_robot
 
 
 @compiled

@@ -30,20 +30,22 @@ class RobotRoom(NamedTuple):
     """Room for what one robot computes at a sample, given so that it need not be made every time.
 
     Attributes:
+        pose: The object's pose as the robot knows it, shape (3,).
         seen: The object's state as the robot knows it, then on the nominal axes of now, and of when efforts
-            act, shape (3, 6).
-        robots: The robot's own state on the latter two, shape (2, 2 (3 + n)).
+            act, and with means of the last rates, shape (4, 6).
+        robots: The robot's own state in the same four ways, shape (4, 2 (3 + n)).
         governed: What ``lead`` writes, shape (4,) [m/s, m/s^2].
         told: What the robot tells the log, see ``TOLD``.
         law: What the law of all axes asks for, shape (M,).
         pulled: That of the robot's with the pull to the nominal motion, shape (M,).
         later: Nominal axes when efforts act, shape (3, M).
-        none: Jumps that are zero, shape (M,).
+        fading: The jumps of the robot's axes that fade in the cell, shape (M,).
         held: Efforts before the sample, shape (3 N + n,) [N, N m].
         errors: Of one measurement, shape (2 (3 + n),).
         arrivals: What a channel of reports holds next, of its shape.
     """
 
+    pose: FloatArray
     seen: FloatArray
     robots: FloatArray
     governed: FloatArray
@@ -51,7 +53,7 @@ class RobotRoom(NamedTuple):
     law: FloatArray
     pulled: FloatArray
     later: FloatArray
-    none: FloatArray
+    fading: FloatArray
     held: FloatArray
     errors: FloatArray
     arrivals: FloatArray
@@ -61,10 +63,10 @@ class RobotRoom(NamedTuple):
 def robot_room(memory: LoopMemory) -> RobotRoom:
     """Return room for a team."""
     axes, state, channel = memory.jumps.size, memory.state.size, memory.channels.shape
-    seen, robots, later = np.empty((3, 6)), np.empty((2, state)), np.empty((3, axes))
+    seen, robots, later, efforts = np.empty((4, 6)), np.empty((4, state)), np.empty((3, axes)), memory.efforts
     return RobotRoom(
-        seen, robots, np.empty(4), np.empty(TOLD), np.empty(axes), np.empty(axes), later, np.zeros(axes),
-        np.empty(memory.efforts.shape[1]), np.empty(state), np.empty((channel[1], channel[2])),
+        np.empty(3), seen, robots, np.empty(4), np.empty(TOLD), np.empty(axes), np.empty(axes), later,
+        np.empty(axes), np.empty(efforts.shape[1]), np.empty(state), np.empty((channel[1], channel[2])),
     )  # fmt: skip
 
 
@@ -148,9 +150,9 @@ def command(
 
 @compiled
 def follow_axes(
-    k: int, sample: int, cell: int, time: float, robot: FloatArray, cells: LoopCells, team: FusedTeam,
-    nominal: LoopNominal, departures: LoopDepartures, memory: LoopMemory, room: RobotRoom,
-) -> tuple[FloatArray, FloatArray]:  # fmt: skip
+    k: int, sample: int, cell: int, time: float, cells: LoopCells, team: FusedTeam, nominal: LoopNominal,
+    departures: LoopDepartures, memory: LoopMemory, room: RobotRoom,
+) -> int:  # fmt: skip
     """Write the effort of robot k and what the law of its axes asks for.
 
     Args:
@@ -158,44 +160,47 @@ def follow_axes(
         sample: Number of the sample.
         cell: The cell.
         time: Time since its entry [s].
-        robot: Its own state as measured, shape (2 (3 + n_k),).
         cells: This and the next four arguments are those of ``lead``.
         team: The robots' models.
         nominal: The nominal motions.
         departures: What departs.
         memory: What changes.
-        room: Holds the object's state as the robot knows it, and the desired acceleration of the object's
-            origin; receives the accelerations of the law, and what ``command`` tells.
+        room: Holds the states of object and robot as the robot knows them, and the desired acceleration of
+            the object's origin; receives the accelerations of the law, and what ``command`` tells.
 
     Returns:
-        The states of object and robot on which the law acts, and by which the robot is ready.
+        The row of ``room.seen`` and of ``room.robots`` with the states on which the law acts, and by which
+        the robot is ready.
     """
     begin, end = k + team.first[2, k], k + 1 + team.first[2, k + 1]
-    rows, law, seen, linear = (
+    size, fades = 2 * (2 + end - begin), memory.jumped[k] == cell
+    rows, law, seen, robot = (
         cells.tables[cell, begin:end],
         room.law[begin:end],
         room.seen[0],
-        room.governed[2:],
+        room.robots[0, :size],
     )
-    jumps = memory.jumps[begin:end] if memory.jumped[k] == cell else room.none[begin:end]
+    linear, jumps = room.governed[2:], room.fading[begin:end]
+    for i in range(begin, end):
+        room.fading[i] = memory.jumps[i] if fades else 0.0
     if not nominal.axis_gains.size:
         track_axes(rows, time, ON_TIME, jumps, seen, robot, law)
         command(k, linear, law, seen, robot, team, memory.efforts[0], room.told)
-        return seen, robot
+        return 0
     ring, mounting = memory.axes.shape[0], nominal.mountings[begin:end]
     now = memory.axes[sample % ring, :, begin:end]
     then = memory.axes[max(sample - departures.periods[0], 0) % ring, :2, begin:end]
-    led, led_robot = room.seen[1], room.robots[0, : robot.size]
+    led, led_robot = room.seen[1], room.robots[1, :size]
     _place(now, mounting, seen, robot, led, led_robot)
     track_axes(rows, time, ON_TIME, jumps, led, led_robot, law)
     pulled, later = room.pulled[begin:end], room.later[:, begin:end]
     gains, lag = nominal.axis_gains, nominal.axis_gains[2]
     pull_axes(law, seen, robot, then, (gains[0], gains[1]), pulled)
     carry_axes(now, law, 0.5 * departures.times[0] + lag, lag, later)
-    ahead, robot_ahead = room.seen[2], room.robots[1, : robot.size]
+    ahead, robot_ahead = room.seen[2], room.robots[2, :size]
     _place(later, mounting, seen, robot, ahead, robot_ahead)
     command(k, linear, pulled, ahead, robot_ahead, team, memory.efforts[0], room.told)
-    return led, led_robot
+    return 1
 
 
 @compiled

@@ -62,23 +62,24 @@ def _err(seed: int, sample: int, sizes: FloatArray, values: FloatArray, room: Fl
 
 @compiled
 def receive(
-    k: int, sample: int, number: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory
-) -> tuple[FloatArray, FloatArray]:
-    """Return the pose and the state that robot k has, and carry its lines over a period.
+    k: int, sample: int, number: int, team: FusedTeam, departures: LoopDepartures, memory: LoopMemory,
+    pose: FloatArray, robot: FloatArray,
+) -> None:  # fmt: skip
+    """Write the pose and the state that robot k has, and carry its lines over a period.
 
-    Arguments are those of ``measure``, and the robot.
+    Arguments are those of ``measure``, the robot, and room for its pose and its state.
     """
     own = 2 * (3 * k + team.first[2, k])
-    end = own + 2 * (3 + team.first[2, k + 1] - team.first[2, k])
     seen = max(sample - departures.periods[0], 0) % memory.poses.shape[0]
-    pose, robot = memory.poses[seen, k], memory.states[seen, own:end]
+    for i in range(3):
+        pose[i] = memory.poses[seen, k, i]
+    for i in range(robot.size):
+        robot[i] = memory.states[seen, own + i]
     if departures.probabilities[0] > 0.0 or departures.probabilities[1] > 0.0:
-        pose, robot = pose.copy(), robot.copy()
         for kind, values in ((0, pose), (1, robot)):
             if sample == 0:
                 _fill(memory.lines[k, kind], values)
             _pass(departures.seeds[k, LOST_POSE + kind], number, departures, memory.lines[k, kind], values)
-    return pose, robot
 
 
 @compiled
