@@ -48,12 +48,12 @@ class State:
         return {key: None if isinstance(v, float) and isnan(v) else v for key, v in content.items()}
 
     def cells(self) -> tuple[str, ...]:
-        """Return a row of a table."""
+        """Return a row of a table: distances in rad and m, and seconds."""
         margins = (
-            f"{self.funnel_margin:.4f} rad",
-            f"{self.clearance:.4f} m",
+            f"{self.funnel_margin:.4f}",
+            f"{self.clearance:.4f}",
             f"{100.0 * self.budget_share:.1f} %",
-            f"{self.cpu_seconds:.3f} s",
+            f"{self.cpu_seconds:.3f}",
         )
         shown = ("" if text.startswith("nan") else text for text in margins)
         return f"{self.scenario}, {self.tier}", str(self.runs), str(self.done), str(self.lost), *shown

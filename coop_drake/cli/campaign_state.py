@@ -61,11 +61,10 @@ def _show_runs(
         lost=sum(row.lost for row in rows),
         rows=[row.facts() for row in rows],
     )
-    headings = (
-        "runs", "done", "lost", "least funnel margin", "least clearance", "used of budget",
-        "CPU time of a run",
-    )  # fmt: skip
-    reporter.table(campaign.name, [row.cells() for row in rows], headings, "scenario, tier")
+    margins = "funnel\n(rad)", "clearance\n(m)", "of\nbudget"
+    headings = ("runs", "done", "lost", *margins, "CPU\n(s)")  # Rows fit into 80 columns.
+    title = f"{campaign.name}: least margins, largest share of the budget"
+    reporter.table(title, [row.cells() for row in rows], headings, "scenario, tier")
     if reporter.facts["lost"]:
         reporter.code = ExitCode.FAILED_RUN
 
