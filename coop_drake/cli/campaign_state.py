@@ -83,16 +83,16 @@ def _show_questions(
     headings = (
         "asked",
         "plans",
-        "beyond limits",
-        "no way",
-        "undecided",
+        "beyond\nlimits",
+        "no\nway",
+        "un-\ndecided",
         "wrong",
-        "CPU time",
+        "CPU\ntime",
         "95 %",
         "largest",
     )
     if rows:
-        reporter.table(campaign.name, [row.cells() for row in rows], headings, "questions by")
+        reporter.table(campaign.name, [row.cells() for row in rows], headings, "questions by", padding=0)
     if rows and rows[-1].wrong:
         reporter.code = ExitCode.FAILED_RUN
 
@@ -116,8 +116,8 @@ def _show_searches(folder: CampaignFolder, batches: tuple[Batch, ...], reporter:
             )
             for row in summarise_searches(findings)
         ]
-        heads = "searches", "runs", "found a loss", "not made", "random", "usual find", "worst find"
-        reporter.table("searches", rows, heads, "scenario, driven")
+        heads = "searches", "runs", "found\na loss", "not\nmade", "random", "usual\nfind", "worst\nfind"
+        reporter.table("searches", rows, heads, "scenario, driven", padding=0)
     if points:
         rows = [
             (

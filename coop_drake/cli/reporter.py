@@ -163,14 +163,28 @@ class Reporter:
         self._console.print(text, soft_wrap=True)
 
     def table(
-        self, title: str, rows: Sequence[tuple[str, ...]], headings: Sequence[str] = ("",), first: str = ""
+        self,
+        title: str,
+        rows: Sequence[tuple[str, ...]],
+        headings: Sequence[str] = ("",),
+        first: str = "",
+        *,
+        padding: int = 1,
     ) -> None:
-        """Show a table: of every row the label, under the first heading, then a value for each other one."""
+        """Show a table: of every row the label, under the first heading, then a value for each other one.
+
+        Args:
+            title: What stands above.
+            rows: The rows.
+            headings: Of the values.
+            first: Heading of the labels.
+            padding: Spaces on both sides of every value; none for tables of many columns.
+        """
         if self._console.quiet:
             return
         from rich.table import Table
 
-        table = Table(title=title, title_justify="left", show_header=any(headings))
+        table = Table(title=title, title_justify="left", show_header=any(headings), padding=(0, padding))
         table.add_column(first, style="bold")
         for heading in headings:
             table.add_column(heading, justify="right")

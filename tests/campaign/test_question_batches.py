@@ -83,6 +83,9 @@ def test_batches_that_other_sources_made_are_counted(campaign, tmp_path):
         folder.note(batch, {"runs": 1, "cpu_seconds": 1.0, "sources": sources})
     status = CliRunner().invoke(app, ["campaign", "status", *options])
     assert json.loads(status.stdout)["batches_by_other_sources"] == 1
+    shown = CliRunner().invoke(app, ["campaign", "status", *options[:-1]], terminal_width=80).stdout
+    assert "corners 0 to 12" in shown
+    assert "…" not in shown  # All columns fit.
     assert CliRunner().invoke(app, ["campaign", "report", *options]).exit_code == 0
     facts = json.loads((tmp_path / "report.json").read_text())["facts"]
     assert ["batches by other sources of coop_drake", "1"] in facts
