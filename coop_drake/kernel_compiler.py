@@ -165,8 +165,8 @@ def _held_by_caller(function: Any, kinds: Mapping[str, types.Type]) -> set[str]:
         value = statement.value
         if isinstance(value, ir.Expr) and value.op == "build_tuple":
             of_caller = all(item.name in held or _is_number(kinds[item.name]) for item in value.items)
-        elif isinstance(value, ir.Expr) and value.op == "exhaust_iter":  # A tuple that is to be unpacked.
-            of_caller = value.value.name in held
+        elif isinstance(value, ir.Expr) and value.op == "exhaust_iter":  # What is to be unpacked.
+            of_caller = value.value.name in held and isinstance(kinds[value.value.name], types.BaseTuple)
         elif isinstance(value, ir.Expr):
             of_caller = value.op in _VIEWS and value.value.name in held and _is_view(value, kinds)
         elif isinstance(value, ir.Var):

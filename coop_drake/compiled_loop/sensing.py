@@ -67,7 +67,15 @@ def receive(
 ) -> None:  # fmt: skip
     """Write the pose and the state that robot k has, and carry its lines over a period.
 
-    Arguments are those of ``measure``, the robot, and room for its pose and its state.
+    Args:
+        k: The robot.
+        sample: This and the next four arguments are those of ``measure``.
+        number: Number of the control period.
+        team: The robots' models.
+        departures: What departs.
+        memory: What changes.
+        pose: Receives the object's pose, shape (3,) [m, m, rad].
+        robot: Receives the robot's own state (z_k, z_k'), shape (2 (3 + n_k),).
     """
     own = 2 * (3 * k + team.first[2, k])
     seen = max(sample - departures.periods[0], 0) % memory.poses.shape[0]
