@@ -23,7 +23,7 @@ def check_plan(question: Question, answer: Any, progress: plane.Progress) -> lis
     room, nearest = numbers([transitions[-1]["inradius"], transitions[-1]["goal_lower"][0]], 2)
     ends = zip(question.goal_box, question.rooms, strict=True)
     angles, *joints = [(low - tolerance, high + tolerance) for (low, high), tolerance in ends]
-    boxes.append([unwrapped(angles, (nearest, nearest)), *joints])
+    boxes.append([unwrapped(angles, (nearest, nearest), outwards=-1), *joints])
     for k, value in enumerate(transitions):
         demand(holds(question.limits, boxes[k][1:]), f"cells[{k}]", "leaves the limits of a joint")
         entry = _leads_on(value, f"transitions[{k}]", entry, boxes[k : k + 2], regions[k : k + 2])

@@ -72,7 +72,9 @@ def check_proof(question: Question, answer: Any, progress: plane.Progress) -> li
 def _meets(wide: list[Interval], box: list[Interval], carrier: list[Step]) -> bool:
     """Whether a slice, whose first axis is the carrier's angle, may hold configurations of a box."""
     turns = [sorted(step.sign * end + step.angle for end in box[step.axis]) for step in carrier]
-    angles = team.unwrapped((sum(low for low, _ in turns), sum(high for _, high in turns)), wide[0])
+    angles = team.unwrapped(
+        (sum(low for low, _ in turns), sum(high for _, high in turns)), wide[0], outwards=1
+    )
     return all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(wide, [angles, *box[1:]], strict=True))
 
 
@@ -82,7 +84,8 @@ def _forbidden(question: Question, frame: list[Step], box: list[Interval], witne
     A witness is a convex polygon K inside one piece, relative to the position p that the proof is about and
     in directions of W, or inside both pieces of a pair, in a component's frame. A position p is forbidden if
     the mean of K's corners, a point of the piece, is off the floor, and if p + K meets a wall e: p is in the
-    interior of the Minkowski sum of e and -K.
+    interior of the Minkowski sum of e and -K. K lies at least 2 units inside the piece: the mean, rounded by
+    less than that, lies in the piece as well.
     """
     polygons = list[list[Point]]()
     for witness in witnesses:
@@ -130,7 +133,7 @@ def _squeezed(question: Question, frame: list[Step], box: list[Interval], value:
     apart, spread = team.swept(plane.difference(b, a), s + t, turns, box, COPIES)
     ring = plane.difference(second, first)
     for (x, y), (p, q) in pairwise([ring[-1], *ring]):
-        u, v = q - y, x - p  # The outward normal.
+        u, v = q - y, x - p  # The outward normal; the growth is multiplied by its length, rounded up.
         bound = u * x + v * y + (isqrt(u * u + v * v) + 1) * (gap + more)
         apart, spread = plane.below(apart, spread, (u, v), bound) if apart else (apart, spread)
     room, origin = sum(piece.radius for piece in pieces) - spread, ((0, 0), (0, 0))
@@ -231,7 +234,7 @@ def _check_cover(
         edges = left.pop()
         if len(edges) > regions.MANY:
             low_x, low_y, high_x, high_y = plane.box_of([corner for edge in edges for corner in edge])
-            around = [(low_x, low_y), (high_x, low_y), (high_x, high_y), (low_x, high_y)]
+            around = hull(product((low_x, high_x), (low_y, high_y)))  # Edges on one line have a flat box.
             if any(cell.side(around, 0) > 0 for cell in cells):
                 count += len(edges)
                 continue

@@ -1,7 +1,8 @@
 """Exact plane geometry: lengths and angles are integers in units of 2^-80 m and rad.
 
-A point is a pair of integers; a convex set is the list of its hull's corners, counter-clockwise. Only sines,
-cosines, and places on a segment are rounded, with stated bounds.
+A point is a pair of integers; a convex set is the list of its hull's corners, counter-clockwise, no three of
+them on a line. Only sines, cosines, and places on a segment are rounded, with stated bounds. What is rounded
+encloses: the text of each function says on which side it errs.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -98,10 +99,11 @@ def hull(corners: Iterable[Point]) -> list[Point]:
 
 
 def difference(first: Sequence[Point], second: Sequence[Point]) -> list[Point]:
-    """Corners of all a - b of two convex sets, counter-clockwise; three may lie on a line.
+    """Corners of all a - b of two convex sets, counter-clockwise, no three on a line; exact.
 
     Edges of both sets, of the second one turned by pi, follow each other by their directions from that of +x.
     Edges of both that come next differ by less than pi, so that the sign of their cross product orders them.
+    All of this holds for strictly convex rings alone; others are refused.
     """
     spend(10 + 5 * (len(first) + len(second)))
     (x, y), one = _edges(first)
@@ -120,10 +122,24 @@ def difference(first: Sequence[Point], second: Sequence[Point]) -> list[Point]:
 
 
 def _edges(ring: Sequence[Point]) -> tuple[Point, list[Point]]:
-    """The lowest corner, of several the one furthest to the left, and the edges from there."""
+    """The lowest corner, of several the one furthest to the left, and the edges from there; of a point none.
+
+    Refuses a ring that is not strictly convex. In one that is, each edge turns to the left of the one before;
+    from the lowest corner on, edges first have directions from 0 to less than pi, then the others: the ring
+    goes round once. A segment has two edges. One whose ends are the same is a point.
+    """
+    if len(ring) <= 2 and ring[0] == ring[-1]:
+        return ring[0], []
     lowest = min(range(len(ring)), key=lambda k: (ring[k][1], ring[k][0]))
     turned = [*ring[lowest:], *ring[: lowest + 1]]
-    return turned[0], [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(turned)]
+    edges = [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(turned)]
+    convex = rising = True
+    for (a, b), (c, d) in pairwise(edges):
+        rises = d > 0 or (d == 0 and c > 0)
+        convex = convex and (a * d > b * c or len(edges) == 2) and rising >= rises
+        rising = rises
+    demand(convex, "convex set", "has corners that repeat, lie on a line, or are not in a convex order")
+    return turned[0], edges
 
 
 def box_of(corners: Iterable[Point]) -> tuple[int, int, int, int]:
@@ -151,7 +167,8 @@ def boxes_apart(a: Bounds, b: Bounds, gap: int) -> bool:
 def apart(first: Sequence[Point], second: Sequence[Point], gap: int) -> bool:
     """Whether the distance of two convex sets is larger than a gap [2^-80 m]: the origin's from a - b.
 
-    The set of all a - b is tested at the lines of its edges, and at its corner nearest to the origin.
+    The set of all a - b is tested at the lines of its edges, and at its corner nearest to the origin. Exact.
+    Sets that are not strictly convex are refused, unless their boxes are apart.
     """
     if boxes_apart(box_of(first), box_of(second), gap):
         return True
@@ -166,7 +183,7 @@ def apart(first: Sequence[Point], second: Sequence[Point], gap: int) -> bool:
 
 
 def nearer(point: Point, segment: Sequence[Point], gap: int) -> bool:
-    """Whether a point is nearer to a segment than a gap [2^-80 m]."""
+    """Whether a point is nearer to a segment than a gap [2^-80 m]; exact."""
     (x, y), ((ax, ay), (bx, by)) = point, segment
     x, y, dx, dy = x - ax, y - ay, bx - ax, by - ay
     along, square = x * dx + y * dy, dx * dx + dy * dy
@@ -178,7 +195,11 @@ def nearer(point: Point, segment: Sequence[Point], gap: int) -> bool:
 def below(corners: Sequence[Point], grown: int, direction: Point, bound: int) -> tuple[list[Point], int]:
     """Enclose the part of a grown convex set where u . x <= bound [2^-160], by its corners and growth.
 
-    Where an edge crosses the line that is further by the growth, the corner is rounded by less than 2 units.
+    Of a point that is in the part, the point of the ungrown set that is nearest to it lies where u . x is
+    larger by the growth times |u| at most: there the ungrown set is cut, at a line that errs outwards.
+    Where an edge crosses that line, the corner is rounded by less than 2 units to any side, by which the
+    result grows. Such a corner may make its neighbours lie inside, so that the hull is taken again: its edges
+    are the lines that bound it, however short they are.
     """
     (u, v), found = direction, list[Point]()
     bound += (isqrt(u * u + v * v) + 1) * grown
@@ -187,4 +208,4 @@ def below(corners: Sequence[Point], grown: int, direction: Point, bound: int) ->
         if (s <= 0) != (t <= 0):
             found.append(((b[0] * s - a[0] * t) // (s - t), (b[1] * s - a[1] * t) // (s - t)))
         found += [b] if t <= 0 else []
-    return found, grown + 2
+    return hull(found), grown + 2

@@ -44,8 +44,9 @@ def swept(
     An interval of angles stands for so many turned copies and one more. Between two that differ by an angle
     b, a point at the distance r from the pivot is nowhere further than r (1 - cos(b / 2)) <= r b^2 / 8 from
     the segment of its two places. More than a turn fills a disc. A slide lies in the hull of its ends. Each
-    copy is rounded by less than 4 r / 2^80 + 3 units, each place by less than 2. Returns a hull, and its
-    growth [2^-80 m].
+    copy is rounded by less than 4 r / 2^80 + 2 units, its r b^2 / 8 by less than one, each place by less than
+    2: the growth, which counts all of it, makes the result larger than what is enclosed, never smaller.
+    Returns a hull, and its growth [2^-80 m].
     """
     for axis, sign, angle, (u, v), (x, y) in steps:
         demand(len(corners) <= 10**4, "corners", "are too many for a convex set that moves")
@@ -82,10 +83,16 @@ def free(corners: list[Point], grown: int, steps: list[Step], box: plane.Box, it
     return True
 
 
-def unwrapped(angles: Interval, about: Interval) -> Interval:
-    """Angles moved by whole turns to be nearest to others; rounded inwards by less than 2^20 [2^-80 rad]."""
+def unwrapped(angles: Interval, about: Interval, *, outwards: int) -> Interval:
+    """Angles moved by whole turns to be nearest to others: an enclosure (outwards 1), or a part of them (-1).
+
+    ``TURN`` is less than a turn by less than a unit, so that each end is off by less than a unit a turn.
+    If angles that are moved otherwise meet the others, those that are enclosed here do, too: the distance of
+    the middles is half of ``TURN`` at most here, and that less a unit a turn at least there.
+    """
     turns = (sum(about) - sum(angles) + TURN) // (2 * TURN)
-    return angles[0] + turns * TURN + abs(turns), angles[1] + turns * TURN - abs(turns)
+    off = outwards * abs(turns)
+    return angles[0] + turns * TURN - off, angles[1] + turns * TURN + off
 
 
 def holds(outer: list[Interval], inner: list[Interval]) -> bool:

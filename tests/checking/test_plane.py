@@ -173,7 +173,7 @@ def test_a_point_beside_a_slanted_edge_lies_inside_though_it_is_in_the_edges_box
 
 
 @given(
-    st.lists(st.tuples(st.integers(1, 40), st.integers(-9, 9)), min_size=60, max_size=90),
+    st.lists(st.tuples(st.integers(20, 60), st.integers(-9, 9)), min_size=60, max_size=90),
     st.tuples(st.integers(-50, 50), st.integers(-60, 60), st.integers(0, 30), st.integers(0, 30)),
     st.integers(0, 12),
 )
