@@ -28,7 +28,7 @@ _REASSOCIATED = {"contract", "reassoc"}
 """LLVM's flags for sums in any order: vector units are used; NaN and infinity keep their meaning."""
 
 
-_MAKERS = "compiled", "kernel_compiler", "kernel_kinds", "machine_code"
+MAKERS = "compiled", "kernel_compiler", "kernel_kinds", "machine_code"
 """Files of this package on whose text all machine code depends."""
 
 
@@ -227,9 +227,9 @@ def kernel_stamp(function: FunctionType, options: Mapping[str, object]) -> str:
 
 @cache
 def _makers() -> str:
-    """Return a digest of the files that decide how machine code is made and kept."""
-    files = [Path(__file__).with_name(f"{name}.py").read_bytes() for name in _MAKERS]
-    return hashlib.sha256(b"".join(files)).hexdigest()
+    """Return a digest of what decides how machine code is made and kept: files, and numpy's version."""
+    files = [Path(__file__).with_name(f"{name}.py").read_bytes() for name in MAKERS]
+    return hashlib.sha256(b"".join([np.__version__.encode(), *files])).hexdigest()
 
 
 def _digest(*parts: str) -> str:
@@ -265,4 +265,8 @@ def _description(value: object) -> str | None:
         return f"({', '.join(str(_description(item)) for item in value)})"
     if isinstance(value, np.ndarray):
         return f"{value.dtype} {value.shape} {hashlib.sha256(value.tobytes()).hexdigest()}"
-    return repr(value) if isinstance(value, (bool, int, float, complex, str, np.generic)) else None
+    if isinstance(value, (bool, int, float, complex, str, np.generic)):
+        return repr(value)
+    # Of what numba itself compiles, such as hypot of math or of numpy, the place is enough.
+    name = getattr(value, "__name__", None) if callable(value) else None
+    return None if name is None else f"{type(value).__name__} {getattr(value, '__module__', '')}.{name}"

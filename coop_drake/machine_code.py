@@ -62,12 +62,18 @@ class MachineCode(NamedTuple):
 
 @cache
 def platform_stamp() -> str:
-    """Say for what machine code is compiled: processor, versions, and what numba's settings change."""
+    """Say for what machine code is compiled: versions, processor, and what numba's settings change."""
     version = _version_of_numba()
     status = version.stat()
-    settings = {k: v for k, v in os.environ.items() if k.startswith("NUMBA_") and k != "NUMBA_CACHE_DIR"}
     package = str(version), status.st_size, status.st_mtime_ns
-    return repr((sys.version, _processor(), *package, sorted(settings.items())))
+    return repr((sys.version, llvm.llvm_version_info, *package, processor_stamp()))
+
+
+@cache
+def processor_stamp() -> str:
+    """Say what the last bits of compiled sums depend on: the processor, and numba's settings."""
+    settings = {k: v for k, v in os.environ.items() if k.startswith("NUMBA_") and k != "NUMBA_CACHE_DIR"}
+    return repr((*_processor(), sorted(settings.items())))
 
 
 @cache

@@ -1,14 +1,17 @@
 """Compiled functions: editing one compiles its callers anew, and each way of calling gives the same."""
 
+import math
 import os
 import subprocess
 import sys
 from itertools import permutations
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from coop_drake import kernel_compiler
+from coop_drake.compiled import kernel_stamp
 
 CALLEE = """
 from typing import NamedTuple
@@ -309,3 +312,12 @@ def test_arrays_of_callers_live_as_long_as_results_hold_them_and_no_longer(tmp_p
     held, freed = ["True"] * 3, ["0", "0", "0", "True"]
     for _ in range(2):
         assert run(tmp_path) == [*map(str, results[0]), *held, *freed, *map(str, results[1])]
+
+
+def test_another_function_of_the_same_name_changes_the_stamp():
+    stamps = set()
+    for module in (math, np):
+        known = {"rounded": module.trunc, "m": module}
+        exec("def apart(x):\n    return rounded(x) + m.floor(x)", known)
+        stamps.add(kernel_stamp(known["apart"], {}))
+    assert len(stamps) == 2

@@ -30,7 +30,7 @@ def problem_digest(problem: PlanningProblem) -> str:
     return _digest(
         {
             "workspace": [_rounded(shapely.get_coordinates(ring).tolist()) for ring in rings],
-            "team": _tree(problem.tree),
+            "team": tree_document(problem.tree),
             "start": _rounded(problem.start.tolist()),
             "goal_pose": _rounded(problem.goal_pose.tolist()),
             "goal_joints": _rounded(list(problem.goal_joints)),
@@ -40,6 +40,14 @@ def problem_digest(problem: PlanningProblem) -> str:
             **_limits(problem.limits),
         }
     )
+
+
+def tree_document(tree: ComponentTree) -> dict[str, Any]:
+    """A component tree as plain data with rounded numbers."""
+    return {
+        "components": [_component(component) for component in tree.components],
+        "sharing_joint": sorted(sorted(pair) for pair in tree.unchecked_pairs),
+    }
 
 
 def _limits(limits: TeamLimits) -> dict[str, Any]:
@@ -64,13 +72,6 @@ def _rounded(value: Any) -> Any:
     if isinstance(value, list):
         return [_rounded(entry) for entry in value]
     return None if value is None else round(float(value), DECIMALS) + 0.0
-
-
-def _tree(tree: ComponentTree) -> dict[str, Any]:
-    return {
-        "components": [_component(component) for component in tree.components],
-        "sharing_joint": sorted(sorted(pair) for pair in tree.unchecked_pairs),
-    }
 
 
 def _component(component: Component) -> dict[str, Any]:

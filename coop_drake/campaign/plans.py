@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from functools import cache
+from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from coop_drake.fields import HarmonicMap, MapStore
 from coop_drake.files import cache_folder
 from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of
-from coop_drake.plant.kept_problem import file_digest, source_files
+from coop_drake.plant.scenario_digest import models_digest
 from coop_drake.progress import Progress
 from coop_drake.scenario.budget_file import names_file
 from coop_drake.scenario.model import Scenario
@@ -34,7 +34,18 @@ _KEPT = 4
 @cache
 def versions() -> dict[str, str]:
     """Return the versions that a result depends on."""
-    return {name: version(name) for name in ("coop-drake", "drake", "numpy")}
+    names = (
+        "coop-drake",
+        "drake",
+        "numpy",
+        "scipy",
+        "shapely",
+        "networkx",
+        "manifold3d",
+        "numba",
+        "llvmlite",
+    )
+    return {name: version(name) for name in names}
 
 
 @cache
@@ -45,39 +56,18 @@ def source_digest() -> str:
     """
     root = Path(coop_drake.__file__).parent
     return content_digest(
-        {path.relative_to(root).as_posix(): file_digest(path) for path in root.rglob("*.py")}
+        {path.relative_to(root).as_posix(): _file_digest(path) for path in root.rglob("*.py")}
     )
 
 
 def scenario_content(scenario: Scenario) -> dict[str, Any]:
-    """Return all that a scenario says, with the digests of its models' files, as plain data."""
-    sources, beside = source_files(scenario), scenario.path.resolve()
-    files = sources.paths - {beside} if sources else frozenset()
-    return {
-        "scenario": to_plain(scenario, Scenario),
-        "files": sorted(
-            [_stable_name(path, beside.parent), file_digest(path)] for path in files if path.is_file()
-        ),
-        "versions": versions(),
-    }
+    """Return all that a scenario says, and the digest of what Drake reads from its models, as plain data."""
+    said = to_plain(scenario, Scenario)
+    return {"scenario": said, "models": models_digest(scenario), "versions": versions()}
 
 
-def _stable_name(path: Path, beside: Path) -> str:
-    """Return a name of a model's file that is the same wherever the scenario and the packages are.
-
-    It is the path from the scenario's folder, or else from the folder that holds the file's package.
-
-    Args:
-        path: The file.
-        beside: The folder of the scenario.
-    """
-    path = path.resolve()
-    if path.is_relative_to(beside):
-        return path.relative_to(beside).as_posix()
-    for folder in path.parents:
-        if (folder / "package.xml").is_file():
-            return path.relative_to(folder.parent).as_posix()
-    return Path(os.path.relpath(path, beside)).as_posix()
+def _file_digest(path: Path) -> str:
+    return sha256(path.read_bytes()).hexdigest()
 
 
 class Plans:
@@ -101,16 +91,17 @@ class Plans:
         scenario, budget = self.variation.scenario_to_plan(run), self.variation.budget
         said: Any = budget
         if budget is not None and names_file(budget):
-            said = {"file": file_digest(Path(budget))}
+            said = {"file": _file_digest(Path(budget))}
         return content_digest({**scenario_content(scenario), "budget": said})
 
     def plan_of(self, run: Run, progress: Progress | None = None) -> Plan:
-        """Return the plan that a run follows, from the folder if it is there.
+        """Return the plan that a run follows, from the folder if these sources have made it there.
 
         Raises:
             PlanError: There is none; the message says why.
         """
-        path = self._folder / f"{self.digest_of(run)}.json"
+        key = content_digest({"asked": self.digest_of(run), "sources": source_digest()})
+        path = self._folder / f"{key}.json"
         if path.exists():
             return load_plan(path)
         found = _planned(self.variation.scenario_to_plan(run), self.variation.budget, progress)

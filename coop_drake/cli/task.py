@@ -36,20 +36,9 @@ def read_task(path: Path, gains: str | None = None) -> Task:
     Raises:
         ScenarioError: The file, a model or the gain set is wrong.
     """
-    from coop_drake.files import cache_folder
-    from coop_drake.plant.kept_problem import keep_problem, kept_problem
-    from coop_drake.scenario.gain_file import with_gains
-    from coop_drake.scenario.load import read_scenario
-
-    read, folder = read_scenario(path), cache_folder("problems")
-    problem = kept_problem(read, folder)
-    if problem is not None:
-        return Task(with_gains(read, gains), problem)
     from coop_drake.plant import planning_problem
-    from coop_drake.scenario.validation import validate
+    from coop_drake.scenario import load_scenario
+    from coop_drake.scenario.gain_file import with_gains
 
-    validate(read)
-    scenario = with_gains(read, gains)
-    problem = planning_problem(scenario)
-    keep_problem(scenario, problem, folder)
-    return Task(scenario, problem)
+    scenario = with_gains(load_scenario(path), gains)
+    return Task(scenario, planning_problem(scenario))

@@ -16,13 +16,14 @@ from typing import Any
 
 import numpy as np
 import shapely
-from llvmlite.binding import get_host_cpu_name  # type: ignore[import-untyped]
 from shapely import Point, Polygon
 
+from coop_drake.compiled import MAKERS
 from coop_drake.fields.certificate import MapCertificate
 from coop_drake.fields.harmonic_map import HarmonicMap
 from coop_drake.fields.solving import Solution
 from coop_drake.files import write_atomically
+from coop_drake.machine_code import processor_stamp
 
 _SUFFIX = ".map.npz"
 _DAMAGE = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile, zlib.error)
@@ -113,12 +114,13 @@ def _code() -> bytes:
     """Digest of everything that the numbers in a map depend on except domain, goal and tolerance."""
     digest = hashlib.sha256()
     here = Path(__file__).parent
-    for path in sorted([*here.glob("*.py"), *here.with_name("geometry").glob("*.py")]):
+    compiling = [here.with_name(f"{name}.py") for name in MAKERS]
+    for path in sorted([*here.glob("*.py"), *here.with_name("geometry").glob("*.py"), *compiling]):
         digest.update(path.name.encode() + b"\0" + path.read_bytes())
-    for name in ("numpy", "scipy", "numba", "shapely"):
+    for name in ("numpy", "scipy", "numba", "llvmlite", "shapely"):
         digest.update(f"{name} {version(name)}".encode())
-    # Compiled sums and BLAS use what the processor has, which changes the last bits.
-    digest.update(f"{platform.system()} {platform.machine()} {get_host_cpu_name()}".encode())
+    # Compiled sums and BLAS use what the processor has, and what their settings say, which changes last bits.
+    digest.update(f"{platform.system()} {platform.machine()} {processor_stamp()}".encode())
     return digest.digest()
 
 

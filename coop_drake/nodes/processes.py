@@ -38,8 +38,8 @@ from coop_drake.nodes.robot_server import RobotServer
 from coop_drake.nodes.supervisor_node import SupervisorNode
 from coop_drake.nodes.supervisor_server import SupervisorServer
 from coop_drake.plant import build_team_plant
+from coop_drake.plant.scenario_digest import scenario_digest
 from coop_drake.scenario import Scenario
-from coop_drake.scenario.digest import scenario_digest
 
 _CONTEXT = get_context("fork") if sys.platform == "linux" else get_context("spawn")
 """A copy has imported already what this process has; libraries of macOS may not be used in one."""

@@ -10,9 +10,9 @@ from coop_drake.plant.component_tree import read_component_tree
 from coop_drake.plant.configuration import displacement
 from coop_drake.plant.parsing import bodies_of
 from coop_drake.plant.planar_chain import bodies_inertia, rotor_inertia
+from coop_drake.plant.scenario_digest import scenario_digest
 from coop_drake.plant.team import TeamPlant, build_team_plant
 from coop_drake.scenario import Floor, Messages, Scenario
-from coop_drake.scenario.digest import scenario_digest
 from coop_drake.tree.bodies import Bodies
 from coop_drake.tree.component_tree import ComponentTree
 from coop_drake.tree.pose import FloatArray

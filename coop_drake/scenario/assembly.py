@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import dataclass
-from pathlib import Path
 
 from pydrake.common.schema import Transform
 from pydrake.math import RigidTransform
@@ -49,7 +48,6 @@ class Assembly:
         object_model: Name of the object's model.
         robots: The robots in the order of their base models in the directives.
         owners: For each directive the models that it adds or connects.
-        nested: Files with directives that other directives name.
     """
 
     packages: PackageMap
@@ -58,7 +56,6 @@ class Assembly:
     object_model: str
     robots: tuple[RobotAssembly, ...]
     owners: tuple[frozenset[str], ...]
-    nested: tuple[Path, ...]
 
     def of_robot(self, index: int) -> tuple[int, ...]:
         """Indices of the directives that add one robot alone, without its grasp."""
@@ -84,10 +81,7 @@ class _Reader:
         self.file = str(scenario.path)
         self.packages = package_map(scenario.path)
         directives = checked_directives(self.file, scenario.directives)
-        self.nested: list[Path] = []
-        entries = list(
-            flat(directives, (scenario.path,), self.packages, self.file, "directives", self.nested)
-        )
+        entries = list(flat(directives, (scenario.path,), self.packages, self.file, "directives"))
         self.keys = tuple(key for key, _ in entries)
         self.directives = tuple(directive for _, directive in entries)
         self.models: dict[str, str] = {}
@@ -155,7 +149,6 @@ class _Reader:
             object_model,
             self._in_order(robots),
             self._all_owners(),
-            tuple(self.nested),
         )
 
     def _turn_grasps(self, object_model: str) -> None:

@@ -113,7 +113,6 @@ def flat(
     packages: PackageMap,
     file: str,
     key: str,
-    nested: list[Path],
 ) -> Iterator[tuple[str, ModelDirective]]:
     """Yield ``(key, directive)``, with nested files opened and file addresses resolved.
 
@@ -123,7 +122,6 @@ def flat(
         packages: Folders of the packages that ``package://`` addresses name.
         file: The scenario file, for messages.
         key: Key of the directives in the scenario file.
-        nested: Receives the files that are opened.
 
     Raises:
         ScenarioError: A file is missing, is wrong, or includes itself.
@@ -140,8 +138,7 @@ def flat(
             opened = Path(resolve(name, trail[-1], packages, file, nested_key).removeprefix("file://"))
             if opened in trail:
                 raise ScenarioError(file, nested_key, name, "a file that does not include itself")
-            nested.append(opened)
             inner = checked_directives(str(opened), read_file(DirectivesFile, opened).directives)
-            yield from flat(inner, (*trail, opened), packages, file, f"{here}.add_directives", nested)
+            yield from flat(inner, (*trail, opened), packages, file, f"{here}.add_directives")
         else:
             yield here, directive

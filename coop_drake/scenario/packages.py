@@ -24,15 +24,10 @@ def package_map(scenario_path: Path) -> PackageMap:
     from pydrake.multibody.parsing import PackageMap
 
     packages = PackageMap()
-    for file in reversed(package_files(scenario_path)):
-        if file.is_file():
-            _add(packages, file)
+    for folder in (SHIPPED, *reversed(scenario_path.resolve().parents)):
+        if (folder / "package.xml").is_file():
+            _add(packages, folder / "package.xml")
     return packages
-
-
-def package_files(scenario_path: Path) -> list[Path]:
-    """Where a package.xml is looked for, the nearest place first; most of these files do not exist."""
-    return [folder / "package.xml" for folder in (*scenario_path.resolve().parents, SHIPPED)]
 
 
 def _add(packages: PackageMap, file: Path) -> None:

@@ -15,9 +15,9 @@ from coop_drake.answers.plan_file import plan_digest
 from coop_drake.diagram import Replacements, build_closed_loop
 from coop_drake.fields import HarmonicMap
 from coop_drake.plant import read_component_tree
+from coop_drake.plant.scenario_digest import scenario_digest
 from coop_drake.progress import Progress
 from coop_drake.scenario import Scenario
-from coop_drake.scenario.digest import scenario_digest
 from coop_drake.simulation.clearance import TeamClearance
 from coop_drake.simulation.invariants import Invariants
 from coop_drake.simulation.joint_limits import joint_limits_kept_by_funnels

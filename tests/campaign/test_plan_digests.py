@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import shutil
 from pathlib import Path
 
 import pytest
 import yaml
 
-from coop_drake.campaign.plans import Plans, scenario_content
+from coop_drake.answers.plan_file import plan_digest
+from coop_drake.campaign import plans
+from coop_drake.campaign.plans import Plans, _planned, scenario_content
 from coop_drake.campaign.results import CampaignFolder
 from coop_drake.campaign.search.searching import Searching
 from coop_drake.campaign.settings import load_campaign
 from coop_drake.campaign.variation import Variation
 from coop_drake.scenario.load import load_scenario
 from tests.support.cli import invoke
+from tests.support.edited_scenario import exchanged
 from tests.support.scenarios import MODELS, ROOM, write_scenario
 
 OWN = ("long_blue.sdf", "long_orange.sdf")
@@ -25,7 +27,8 @@ def team(folder):
     (folder / "own").mkdir(parents=True)
     directives = [dict(one) for one in ROOM["directives"]]
     for index, name in enumerate(OWN):
-        shutil.copy(MODELS / name, folder / "own" / name)
+        model = exchanged((MODELS / name).read_text(), ("<mass>6</mass>", f"<mass>{6 + index}</mass>"))
+        (folder / "own" / name).write_text(model)
         model = directives[1 + index]["add_model"]
         directives[1 + index] = {"add_model": {**model, "file": f"own/{name}"}}
     return write_scenario(folder / "room.scenario.yaml", directives=directives)
@@ -34,15 +37,41 @@ def team(folder):
 def test_files_that_change_places_change_the_digest_and_another_folder_does_not(tmp_path):
     here, there = (scenario_content(load_scenario(team(tmp_path / name))) for name in ("here", "there"))
     assert here == there
-    names = [name for name, _ in here["files"]]
-    assert {"own/long_blue.sdf", "models/object.sdf"} <= set(names)
     first, second = (tmp_path / "there" / "own" / name for name in OWN)
     one, other = first.read_bytes(), second.read_bytes()
     first.write_bytes(other)
     second.write_bytes(one)
     swapped = scenario_content(load_scenario(tmp_path / "there" / "room.scenario.yaml"))
-    assert [name for name, _ in swapped["files"]] == names
-    assert swapped != here
+    assert swapped["scenario"] == here["scenario"]
+    assert swapped["models"] != here["models"]
+
+
+def test_a_plan_of_other_sources_or_models_is_made_anew(tmp_path, monkeypatch):
+    team(tmp_path)
+    file = tmp_path / "room.campaign.yaml"
+    file.write_text(yaml.safe_dump({"runs": {"scenarios": ["room.scenario.yaml"], "count": 1}}))
+    made = []
+
+    def planned(scenario, *_):
+        made.append(scenario)
+        return plan
+
+    plan = _planned(load_scenario(tmp_path / "room.scenario.yaml"), None, None)
+    monkeypatch.setattr(plans, "_planned", planned)
+
+    def ask():
+        variation = Variation(load_campaign(file))
+        assert plan_digest(Plans(variation, tmp_path / "plans").plan_of(variation.run(0))) == plan_digest(
+            plan
+        )
+        return len(made)
+
+    assert [ask(), ask()] == [1, 1]
+    monkeypatch.setattr(plans, "source_digest", lambda: "other sources")
+    assert ask() == 2
+    model = tmp_path / "own" / OWN[0]
+    model.write_text(exchanged(model.read_text(), ("<mass>6</mass>", "<mass>8</mass>")))
+    assert ask() == 3
 
 
 def test_an_edited_budget_asks_for_another_plan(tmp_path):

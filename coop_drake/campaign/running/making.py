@@ -17,7 +17,7 @@ from coop_drake.campaign.records import RunRecord
 from coop_drake.campaign.settings import Tier
 from coop_drake.campaign.variation import Run, Variation
 from coop_drake.errors import ScenarioError
-from coop_drake.scenario.digest import scenario_digest
+from coop_drake.plant.scenario_digest import models_digest, scenario_digest
 from coop_drake.scenario.model import Scenario
 from coop_drake.typed_data import DataError
 
@@ -40,6 +40,7 @@ class RunMaker:
         self._variation, self._plans, self._tier, self._logs = variation, plans, tier, logs
         self._transport: CompiledTransport | None = None
         self._digest: tuple[Plan, str] | None = None
+        self._models: tuple[object, str] | None = None
 
     def begun(self, run: Run) -> RunRecord:
         """Return the record of a run that has not ended."""
@@ -92,7 +93,7 @@ class RunMaker:
         try:
             plan, maps = self._plans.with_maps(run)
             scenario = self._variation.scenario_of(run)
-            digest = run_digest(scenario, self._digest_of(plan), self._tier)
+            digest = run_digest(scenario, self._digest_of(plan), self._tier, self._models_of(scenario))
             if self._tier == "compiled":
                 return replace(begun, digest=digest, **vars(self._compiled(scenario, plan, maps)))
             log, blocks = self._simulated(scenario, plan, maps)
@@ -111,6 +112,13 @@ class RunMaker:
         if self._digest is None or self._digest[0] is not plan:
             self._digest = plan, plan_digest(plan)
         return self._digest[1]
+
+    def _models_of(self, scenario: Scenario) -> str:
+        """Return the digest of a run's models; to read them takes longer than a run, so the last is kept."""
+        named = scenario.path, scenario.object, scenario.directives, scenario.fixed_joints
+        if self._models is None or self._models[0] != named:
+            self._models = named, models_digest(scenario)
+        return self._models[1]
 
     def _simulated(self, scenario: Scenario, plan: Plan, maps: Maps) -> tuple[SimulationLog, Blocks]:
         """Make a run by Drake's loop, and say with which blocks."""
@@ -142,13 +150,14 @@ class RunMaker:
         return known
 
 
-def run_digest(scenario: Scenario, plan: str, tier: Tier) -> str:
+def run_digest(scenario: Scenario, plan: str, tier: Tier, models: str | None = None) -> str:
     """Return the digest of what a run of a scenario along a plan depends on.
 
     Args:
         scenario: The scenario.
         plan: Digest of the plan.
         tier: By which loop the run is made.
+        models: Digest of the scenario's models; None to read them.
     """
-    parts = {"scenario": scenario_digest(scenario), "plan": plan, "tier": tier}
+    parts = {"scenario": scenario_digest(scenario, models), "plan": plan, "tier": tier}
     return content_digest({**parts, "versions": versions()})
