@@ -96,6 +96,12 @@ CASES: Mapping[str, Case] = {
         _first(silence={"begin": 3.0, "duration": 0.02, "motors": "limp"}),
         _first(silence={"begin": 3.0, "duration": 1.0, "motors": "limp"}),
     ),
+    "blocked wheels": Case(
+        _first(blocked={"begin": 3.0, "duration": 0.02}), _first(blocked={"begin": 3.0, "duration": None})
+    ),
+    "wheels that slip": Case(
+        _first(slip={"begin": 3.0, "share": 0.3}), _first(slip={"begin": 3.0, "share": 1.0})
+    ),
     "Coulomb friction": Case({"floor": {"coulomb_friction": 10.0}}, {"floor": {"coulomb_friction": 50.0}}),
     "viscous friction": Case({"floor": {"viscous_friction": 20.0}}, {"floor": {"viscous_friction": 300.0}}),
     "slope": Case({"floor": {"slope": 0.01745}}, {"floor": {"slope": 0.2}}),

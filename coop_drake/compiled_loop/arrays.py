@@ -107,6 +107,8 @@ class LoopDepartures(NamedTuple):
         pushes: Place in ``LoopPlant.bases``, force [N], torque [N m], begin and end [s], shape (., 6).
         hearing: Errors of the clocks [s], and how late switches are heard [periods], shape (2, N).
         silences: Begin and end [s], and 0 for motors that work, 1 for held ones, 2 for limp ones, (3, N).
+        blocked: Begin and end of the time in which wheels are blocked, shape (2, N) [s].
+        slips: Begin and end of the time in which wheels slip [s], and the share that is lost [-], (3, N).
     """
 
     times: FloatArray
@@ -121,6 +123,8 @@ class LoopDepartures(NamedTuple):
     pushes: FloatArray
     hearing: FloatArray
     silences: FloatArray
+    blocked: FloatArray
+    slips: FloatArray
 
 
 class LoopMemory(NamedTuple):

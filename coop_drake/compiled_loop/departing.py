@@ -9,7 +9,7 @@ import numpy as np
 
 from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory, LoopNominal
 from coop_drake.compiled_loop.preparing import CompiledTransport
-from coop_drake.diagram.disturbances import downhill
+from coop_drake.diagram.disturbances import blocked_times, downhill, wheel_slips
 from coop_drake.diagram.knowledge import report_periods, rest_samples
 from coop_drake.diagram.radio import seed_of
 from coop_drake.diagram.wrapping import effort_limits, measurement_deviations, measurement_waves
@@ -96,6 +96,8 @@ def departures_of(transport: CompiledTransport, deployment: Deployment) -> LoopD
         pushes=np.array(pushes, dtype=float).reshape(-1, 6),
         hearing=np.array(hearing, dtype=float),
         silences=_silences(deployment, names),
+        blocked=blocked_times(deployment, names),
+        slips=wheel_slips(deployment, names),
     )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopCells, LoopDepartures, LoopMemory, LoopNominal, LoopPlant
-from coop_drake.compiled_loop.motion import MotionRoom, advance, motion_room
+from coop_drake.compiled_loop.motion import EARLY, MotionRoom, advance, motion_room
 from coop_drake.compiled_loop.robots import (
     RobotRoom,
     follow_axes,
@@ -31,9 +31,6 @@ from coop_drake.laws.robot_dynamics import estimate_object
 from coop_drake.systems.nominal_kernels import step_nominal
 from coop_drake.systems.team_kernels import FusedTeam
 from coop_drake.tree.pose import FloatArray
-
-EARLY = 1e-6
-"""Share of a period by which an interval that begins at a sample may seem to begin later [-], by rounding."""
 
 
 @compiled(whole_program=True)

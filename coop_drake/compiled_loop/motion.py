@@ -9,6 +9,7 @@ import numpy as np
 from coop_drake.compiled import compiled
 from coop_drake.compiled_loop.arrays import LoopDepartures, LoopMemory, LoopPlant
 from coop_drake.laws.actuators import lag_behind
+from coop_drake.laws.blocked_wheels import BlockedRoom, blocked_room, hold_blocked
 from coop_drake.laws.friction import base_friction
 from coop_drake.laws.team_dynamics import TeamWork, team_accelerations, team_work
 from coop_drake.systems.team_kernels import FusedTeam, read_own
@@ -16,6 +17,9 @@ from coop_drake.tree.pose import FloatArray
 
 BEGIN, END = 4, 5
 """Columns of the times of a push."""
+
+EARLY = 1e-6
+"""Share of a period by which an interval that begins at a sample may seem to begin later [-], by rounding."""
 
 
 class MotionRoom(NamedTuple):
@@ -29,6 +33,8 @@ class MotionRoom(NamedTuple):
         efforts: Of the joints, at the places of their rates, shape (3 + n,) [N m or N].
         robot: State of a robot with the most joints that there can be, shape (2 (3 + n),).
         work: Of the equations of motion.
+        floor: Of the floor's wrenches on blocked bases.
+        blocked: 1 for bases with blocked wheels, else 0, shape (N,).
     """
 
     acting: FloatArray
@@ -38,6 +44,8 @@ class MotionRoom(NamedTuple):
     efforts: FloatArray
     robot: FloatArray
     work: TeamWork
+    floor: BlockedRoom
+    blocked: FloatArray
 
 
 @compiled
@@ -45,9 +53,11 @@ def motion_room(robots: int, plant: LoopPlant) -> MotionRoom:
     """Return room for a team of so many robots."""
     n = plant.tree.shape[0] + 2
     acting, states, wrenches = np.empty(3 * robots + n - 3), np.empty((3, 2 * n)), np.empty((robots + 1, 3))
+    floor, blocked = blocked_room(plant.tree.shape[0], robots), np.zeros(robots)
     return MotionRoom(
-        acting, states, np.empty(n), wrenches, np.zeros(n), np.empty(2 * n), team_work(plant.tree)
-    )
+        acting, states, np.empty(n), wrenches, np.zeros(n), np.empty(2 * n), team_work(plant.tree), floor,
+        blocked,
+    )  # fmt: skip
 
 
 @compiled
@@ -59,21 +69,30 @@ def advance(
 
     Efforts follow what is held as exponentials, exactly. A step of 5 ms errs by 1e-8 of the distances moved.
     """
-    period, n = departures.times[0], memory.state.size // 2
+    period, n, any_blocked = departures.times[0], memory.state.size // 2, False
     state, start, change, slopes = room.states[0], room.states[1], room.states[2], room.slopes
     for i in range(room.acting.size):
         room.acting[i] = memory.efforts[1, i]
     for i in range(2 * n):
         state[i], start[i], change[i] = memory.state[i], memory.state[i], 0.0
+    for k in range(room.blocked.size):
+        room.blocked[k] = 1.0 if _within(departures.blocked[:, k], sample, period) else 0.0
+        any_blocked = any_blocked or room.blocked[k] > 0.0
     for stage in range(4):
         ahead = 0.0 if stage == 0 else period if stage == 3 else 0.5 * period
         if stage != 2:  # Efforts are those of stage 1.
             lag_behind(departures.times[2], ahead, memory.efforts[0], room.acting, memory.efforts[1])
-        _drive(sample * period + ahead, state, team, plant, departures, memory, room)
-        team_accelerations(
-            plant.tree, plant.bases, plant.places, room.wrenches, room.efforts, departures.floor[2], state,
-            room.work, slopes,
-        )  # fmt: skip
+        _drive(sample, sample * period + ahead, state, team, plant, departures, memory, room)
+        if any_blocked:
+            hold_blocked(
+                plant.tree, plant.bases, plant.places, room.blocked, room.efforts, departures.floor[2], state,
+                room.work, room.floor, slopes, room.wrenches,
+            )  # fmt: skip
+        else:
+            team_accelerations(
+                plant.tree, plant.bases, plant.places, room.wrenches, room.efforts, departures.floor[2],
+                state, room.work, slopes,
+            )  # fmt: skip
         weight = period / 6.0 if stage in (0, 3) else period / 3.0
         further = 0.0 if stage == 3 else period if stage == 2 else 0.5 * period
         for i in range(n):
@@ -86,13 +105,21 @@ def advance(
 
 
 @compiled
+def _within(times: FloatArray, sample: int, period: float) -> bool:
+    """Whether a period begins in an interval of time [s]."""
+    early = EARLY * period
+    return bool(times[0] - early <= sample * period < times[1] - early)
+
+
+@compiled
 def _drive(
-    time: float, state: FloatArray, team: FusedTeam, plant: LoopPlant, departures: LoopDepartures,
-    memory: LoopMemory, room: MotionRoom,
+    sample: int, time: float, state: FloatArray, team: FusedTeam, plant: LoopPlant,
+    departures: LoopDepartures, memory: LoopMemory, room: MotionRoom,
 ) -> None:  # fmt: skip
     """Write the wrenches on bases and object, and the efforts of all joints.
 
     Args:
+        sample: Number of the sample that began the period.
         time: Now [s].
         state: The team's, in the order of the plant, shape (2 (3 + n),).
         team: Where joints stand in it.
@@ -106,8 +133,11 @@ def _drive(
         wrenches[robots, i] = 0.0
     for k in range(robots):
         first, own = team.first[2, k], 3 * k + team.first[2, k]
+        left = 1.0
+        if _within(departures.slips[:2, k], sample, departures.times[0]):
+            left -= departures.slips[2, k]
         for i in range(3):
-            wrenches[k, i] = memory.efforts[1, own + i]
+            wrenches[k, i] = left * memory.efforts[1, own + i]
         for i in range(team.first[2, k + 1] - first):
             limit, effort = plant.strongest[first + i], memory.efforts[1, own + 3 + i]
             efforts[team.places[1, 3 + first + i] - n] = min(max(effort, -limit), limit)

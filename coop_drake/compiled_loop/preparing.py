@@ -149,9 +149,6 @@ def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, fused: Fuse
     for k, robot in enumerate(team.robots):
         begin = k + int(fused.first[2, k])
         rows.extend((begin + 1 + i, k) for i in range(robot.q_slice.stop - robot.q_slice.start))
-    drives = [team.plant.get_joint_actuator(index) for index in team.plant.GetJointActuatorIndices()]
-    limit_of = {int(drive.joint().index()): drive.effort_limit() for drive in drives}
-    strongest = [limit_of.get(int(joint.index()), np.inf) for joint in team.joints]
     return LoopPlant(
         whole.tree,
         whole.bases,
@@ -160,7 +157,7 @@ def _plant(scenario: Scenario, team: TeamPlant, tree: ComponentTree, fused: Fuse
         walls,
         _reach(tree),
         np.array(rows, dtype=np.int64).T.copy(),
-        np.array(strongest, dtype=float),
+        whole.strongest,
     )
 
 

@@ -1,18 +1,20 @@
-"""Forces on a team that are not its own: friction and slope of the floor, pushes from outside."""
+"""Forces on a team that are not its own: floor, failing wheels, pushes from outside."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sin
+from math import inf, sin
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder, OutputPort
 from pydrake.systems.primitives import Adder, MatrixGain, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
-from coop_drake.plant import TeamPlant
+from coop_drake.errors import ScenarioError
+from coop_drake.plant import TeamPlant, read_component_tree, read_team_tree
 from coop_drake.scenario import Deployment, Floor, Push
-from coop_drake.systems import FloorFriction
+from coop_drake.systems import BlockedBases, FloorFriction, WheelSlips
+from coop_drake.tree.pose import FloatArray
 
 _GRAVITY = 9.80665
 """Standard acceleration of gravity [m/s^2]."""
@@ -35,8 +37,11 @@ def add_disturbances(
     deployment: Deployment,
     states: Sequence[OutputPort],
     wrenches: OutputPort,
+    torques: OutputPort,
 ) -> OutputPort:
     """Add friction and pushes to the wrenches on all bases, and pushes on the object behind them.
+
+    Slipping wheels take their share off what the actuators give; blocked ones act on the sum of all.
 
     Args:
         builder: Receives the blocks.
@@ -44,11 +49,20 @@ def add_disturbances(
         deployment: What is switched on.
         states: True state of every robot.
         wrenches: Wrenches on all bases in W, of size 3 N.
+        torques: Torques of all joints, of size n.
 
     Returns:
         Wrenches on all bases, and where there are pushes, the one on the object at L: size 3 N or 3 N + 3.
+
+    Raises:
+        ScenarioError: Wheels are blocked in a team with springs.
     """
-    floor, size = deployment.floor, wrenches.size()
+    floor, size, own = deployment.floor, wrenches.size(), [robot.name for robot in team.robots]
+    slips, blocked = wheel_slips(deployment, own), blocked_times(deployment, own)
+    if np.isfinite(slips[0]).any():
+        slipping = builder.AddNamedSystem("wheel_slips", WheelSlips(slips))
+        builder.Connect(wrenches, slipping.get_input_port())
+        wrenches = slipping.get_output_port()
     if floor.coulomb_friction or floor.viscous_friction:
         joints = [len(robot.joints) for robot in team.robots]
         friction = builder.AddNamedSystem(
@@ -58,12 +72,56 @@ def add_disturbances(
             builder.Connect(state, friction.get_input_port(k))
         wrenches = _sum(builder, "wrenches_less_friction", wrenches, friction.get_output_port())
     if deployment.pushes:
-        names = [*(robot.name for robot in team.robots), team.scenario.object]
+        names = [*own, team.scenario.object]
         on_object = builder.AddNamedSystem("wrenches_with_object", MatrixGain(np.eye(size + 3, size)))
         builder.Connect(wrenches, on_object.get_input_port())
         pushes = builder.AddNamedSystem("pushes", TrajectorySource(_pushes(deployment.pushes, names)))
         wrenches = _sum(builder, "pushed", on_object.get_output_port(), pushes.get_output_port())
+    if np.isfinite(blocked[0]).any():
+        wrenches = _block(builder, team, blocked, wrenches, torques)
     return wrenches
+
+
+def blocked_times(deployment: Deployment, names: Sequence[str]) -> FloatArray:
+    """Return when the wheels of every robot are blocked from and until, inf for never, shape (2, N) [s]."""
+    found = [deployment.of_robot(name).blocked for name in names]
+    return np.array([
+        (inf, inf) if one is None else (one.begin, inf if one.duration is None else one.begin + one.duration)
+        for one in found
+    ]).T.copy()  # fmt: skip
+
+
+def wheel_slips(deployment: Deployment, names: Sequence[str]) -> FloatArray:
+    """Return when the wheels of every robot slip from and until [s], and the share [-], shape (3, N)."""
+    found = [deployment.of_robot(name).slip for name in names]
+    return np.array([
+        (inf, inf, 0.0)
+        if one is None
+        else (one.begin, inf if one.duration is None else one.begin + one.duration, one.share)
+        for one in found
+    ]).T.copy()  # fmt: skip
+
+
+def _block(
+    builder: DiagramBuilder, team: TeamPlant, times: FloatArray, wrenches: OutputPort, torques: OutputPort
+) -> OutputPort:
+    """Add the wrenches of the floor on bases with blocked wheels.
+
+    Raises:
+        ScenarioError: The team has springs.
+    """
+    if team.plant.num_force_elements() > 1:  # every plant has gravity
+        allowed = "null: blocked wheels are simulated for models without springs alone"
+        raise ScenarioError(str(team.scenario.path), "deployment.robots", "blocked", allowed)
+    whole = read_team_tree(team, read_component_tree(team))
+    gravity = downhill(team.scenario.deployment.floor.slope)
+    block = BlockedBases(whole, team.velocity_index[3:], times, gravity, wrenches.size())
+    builder.AddNamedSystem("blocked_bases", block)
+    builder.Connect(team.plant.get_state_output_port(), block.GetInputPort("team_state"))
+    if team.joints:
+        builder.Connect(torques, block.GetInputPort("joint_torques"))
+    builder.Connect(wrenches, block.GetInputPort("asked"))
+    return block.get_output_port()
 
 
 def _sum(builder: DiagramBuilder, name: str, first: OutputPort, second: OutputPort) -> OutputPort:

@@ -108,7 +108,12 @@ def _drive_robots(builder: DiagramBuilder, team: TeamPlant, states: Sequence[Out
     for i in range(efforts.num_input_ports()):
         builder.ExportInput(efforts.get_input_port(i), efforts.get_input_port(i).get_name())
     wrenches = add_disturbances(
-        builder, team, team.scenario.deployment, states, efforts.GetOutputPort("base_wrenches")
+        builder,
+        team,
+        team.scenario.deployment,
+        states,
+        efforts.GetOutputPort("base_wrenches"),
+        efforts.GetOutputPort("joint_torques"),
     )
     thrusters = _add_thrusters(builder, team, with_object=wrenches.size() > 3 * len(team.robots))
     # Thrusters push along the axes of the poses that they receive. These are the identity, so that they push

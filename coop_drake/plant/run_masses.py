@@ -41,7 +41,8 @@ def run_setup(scenario: Scenario) -> RunSetup:
         mechanics=scenario.plant.ideal
         and not springs
         and deployment.floor == Floor()
-        and not deployment.pushes,
+        and not deployment.pushes
+        and all(robot.counted == robot for robot in deployment.robots.values()),
         one_hold=one_hold,
         one_clock=one_hold
         and all(robot.clock_error == robot.switch_delay == 0.0 for robot in deployment.robots.values()),

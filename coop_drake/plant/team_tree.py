@@ -40,11 +40,14 @@ class TeamTree:
         bases: Row of every robot's base, then that of the object, shape (N + 1,).
         places: Where wrenches act on these, in the object's frame with all joints at zero: the origins of the
             bases and of the object, shape (N + 1, 2) [m].
+        strongest: Largest effort of every joint that its model allows, in the order of q, shape (n,) [N m or
+            N].
     """
 
     tree: FloatArray
     bases: IntArray
     places: FloatArray
+    strongest: FloatArray
 
 
 def read_team_tree(team: TeamPlant, components: ComponentTree) -> TeamTree:
@@ -75,4 +78,7 @@ def read_team_tree(team: TeamPlant, components: ComponentTree) -> TeamTree:
     places = [body.EvalPoseInWorld(context).translation()[:2] for body in bases]
     numbers = [int(body.index()) for body in bases]
     found = [next(i for i, group in enumerate(groups) if number in group) for number in numbers]
-    return TeamTree(rows, np.array([*found, 0], dtype=np.int64), np.array([*places, np.zeros(2)]))
+    drives = [plant.get_joint_actuator(index) for index in plant.GetJointActuatorIndices()]
+    limit_of = {int(drive.joint().index()): drive.effort_limit() for drive in drives}
+    strongest = np.array([limit_of.get(int(joint.index()), np.inf) for joint in team.joints], dtype=float)
+    return TeamTree(rows, np.array([*found, 0], dtype=np.int64), np.array([*places, np.zeros(2)]), strongest)

@@ -2,6 +2,7 @@ from .assembly import Assembly, RobotAssembly, assemble
 from .control import Control, Hold
 from .deployment import (
     ActuatorLimits,
+    BlockedWheels,
     Deafness,
     Deployment,
     Floor,
@@ -12,6 +13,7 @@ from .deployment import (
     RobotDepartures,
     Silence,
     StartOffset,
+    WheelSlip,
 )
 from .gain_file import dump_gains, with_gains
 from .load import dump_scenario, load_scenario
@@ -34,6 +36,7 @@ from .waves import Wave, Waves
 __all__ = [
     "ActuatorLimits",
     "Assembly",
+    "BlockedWheels",
     "Control",
     "Deafness",
     "Deployment",
@@ -59,6 +62,7 @@ __all__ = [
     "VisualizationSettings",
     "Wave",
     "Waves",
+    "WheelSlip",
     "Workspace",
     "assemble",
     "dump_gains",

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from coop_drake.answers.budget import Budget
 from coop_drake.errors import ScenarioError
-from coop_drake.scenario.deployment import Floor
+from coop_drake.scenario.deployment import Floor, RobotDepartures
 from coop_drake.scenario.measured_bounds import rate_levers, wave_bounds
 from coop_drake.scenario.model import Scenario
 from coop_drake.scenario.reading import read_file
@@ -131,7 +131,11 @@ def _of_deployment(scenario: Scenario, tree: ComponentTree, masses: TeamMasses, 
 
 
 def _refuse_uncounted(scenario: Scenario) -> None:
-    """Refuse departures for which no budget provides, so that no plan is called tolerant of them."""
+    """Refuse departures for which no budget provides, so that no plan is called tolerant of them.
+
+    Wheels that are blocked or slip are faults, of which nobody calls a plan tolerant: they are simulated to
+    see that the team stops.
+    """
     deployment = scenario.deployment
     measured, actuators = deployment.measurements, deployment.actuators
     uncounted = {
@@ -140,7 +144,7 @@ def _refuse_uncounted(scenario: Scenario) -> None:
         "actuators.base_torque": actuators.base_torque,
         "actuators.joint_effort": actuators.joint_effort,
         "messages.repeat": deployment.messages.repeat,
-        "robots": deployment.robots,
+        "robots": {name: own for name, own in deployment.robots.items() if own.counted != RobotDepartures()},
         "floor": None if deployment.floor == Floor() else deployment.floor,
         "pushes": deployment.pushes,
     }

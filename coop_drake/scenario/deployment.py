@@ -11,7 +11,7 @@ docs.generate`` writes. The compiled loop, and with it fused blocks of sampled t
 ``coop_drake/compiled_loop/departing.py``, and refuses those that it does not know.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import sqrt
 from typing import Annotated, Literal
 
@@ -144,6 +144,39 @@ class Deafness:
 
 
 @dataclass(frozen=True)
+class BlockedWheels:
+    """Wheels that block: they stop their base within some tenths of a second, and it then stands still.
+
+    The floor holds it, whatever pulls at it; what the robot asks of its base has no effect, and its joints go
+    on. No budget counts this.
+
+    Attributes:
+        begin: When the wheels block [s].
+        duration: For how long; null for the rest of the run [s].
+    """
+
+    begin: NotNegative
+    duration: Positive | None = None
+
+
+@dataclass(frozen=True)
+class WheelSlip:
+    """Wheels that slip: a share of the base's force and torque does not reach the floor.
+
+    No budget counts this.
+
+    Attributes:
+        begin: When they begin to slip [s].
+        share: The share that is lost, 1 for wheels without any grip [-].
+        duration: For how long; null for the rest of the run [s].
+    """
+
+    begin: NotNegative
+    share: Probability
+    duration: Positive | None = None
+
+
+@dataclass(frozen=True)
 class RobotDepartures:
     """What is wrong with a single robot.
 
@@ -158,6 +191,8 @@ class RobotDepartures:
             control periods; needs a control rate [s].
         silence: When it sends no reports, null for never.
         deaf: When it hears nothing of the hold supervisor, null for never.
+        blocked: When the wheels of its base are blocked, null for never.
+        slip: When they slip, null for never.
     """
 
     pose_bias: PoseBias = field(default_factory=PoseBias)
@@ -167,6 +202,13 @@ class RobotDepartures:
     switch_delay: Delay = 0.0
     silence: Silence | None = None
     deaf: Deafness | None = None
+    blocked: BlockedWheels | None = None
+    slip: WheelSlip | None = None
+
+    @property
+    def counted(self) -> "RobotDepartures":
+        """The same without wheels that are blocked or slip: faults, beyond every budget."""
+        return replace(self, blocked=None, slip=None)
 
 
 @dataclass(frozen=True)

@@ -56,6 +56,9 @@ def _sizes(scenario: Scenario) -> Iterator[tuple[str, object, str]]:
         if deployment.period is not None and not departures.sample_offset < deployment.period:
             allowed = f"a time shorter than the control period of {deployment.period:g} s"
             yield f"robots.{robot}.sample_offset", departures.sample_offset, allowed
+        if departures.blocked is not None and not scenario.plant.ideal:
+            allowed = "null with plant.grasps: constraints: blocked wheels are simulated in one tree alone"
+            yield f"robots.{robot}.blocked", departures.blocked, allowed
     for i, push in enumerate(deployment.pushes):
         if push.duration < step:
             allowed = f"at least simulator.max_step_size, {step:g} s: a step might miss a shorter one"

@@ -3,6 +3,7 @@
 from coop_drake.systems.axis_laws import AxisLaw, axis_laws
 from coop_drake.systems.axis_ppc import AxisPpc
 from coop_drake.systems.block import Block
+from coop_drake.systems.blocked_bases import BlockedBases
 from coop_drake.systems.cell_planner import CellPlanner
 from coop_drake.systems.current_cell import CURRENT_CELL_SIZE, READY_SIZE
 from coop_drake.systems.disturbance_observer import DisturbanceObserver
@@ -28,6 +29,7 @@ from coop_drake.systems.state_predictor import StatePredictor
 from coop_drake.systems.team_controller import TeamController
 from coop_drake.systems.team_kernels import FusedCell, FusedTeam
 from coop_drake.systems.team_link import Exchange, TeamLink, robot_record, supervisor_record
+from coop_drake.systems.wheel_slips import WheelSlips
 from coop_drake.systems.wrench_law import WrenchLaw
 
 __all__ = [
@@ -39,6 +41,7 @@ __all__ = [
     "AxisMotion",
     "AxisPpc",
     "Block",
+    "BlockedBases",
     "CellPlanner",
     "DisturbanceObserver",
     "Exchange",
@@ -66,6 +69,7 @@ __all__ = [
     "TeamController",
     "TeamLink",
     "TeamSensor",
+    "WheelSlips",
     "WrenchLaw",
     "axis_laws",
     "build_selector",

@@ -11,6 +11,7 @@ from coop_drake.compiled_loop import simulate_fused
 from coop_drake.laws import FixedGains, ScheduledGains
 from coop_drake.scenario import (
     ActuatorLimits,
+    BlockedWheels,
     Deployment,
     Floor,
     Measurements,
@@ -22,6 +23,7 @@ from coop_drake.scenario import (
     StartOffset,
     Wave,
     Waves,
+    WheelSlip,
 )
 from coop_drake.simulation import configure_simulator, simulate
 from coop_drake.typed_data import convert_class
@@ -67,6 +69,8 @@ MILD = {
     "a clock": in_one(clock_error=0.05),
     "a late switch": in_one(switch_delay=0.05),
     "silence": in_one(silence=Silence(0.5, 0.5)),
+    "blocked wheels": in_one(blocked=BlockedWheels(0.5, 0.02)),
+    "wheels that slip": in_one(slip=WheelSlip(0.5, 0.5, 0.2)),
     "friction": at_200_hz(floor=Floor(coulomb_friction=20.0, viscous_friction=5.0)),
     "slope": at_200_hz(floor=Floor(slope=0.01)),
     "push": pushed(20.0),
@@ -116,6 +120,8 @@ HARSH = {
     "a clock": (in_one(clock_error=0.5), "to its funnel is"),
     "a late switch": (in_one(switch_delay=0.3), "to its funnel is"),
     "silence": (in_one(silence=Silence(0.5, None, "limp")), "to its funnel is"),
+    "blocked wheels": (in_one(blocked=BlockedWheels(0.5)), "to its funnel is"),
+    "wheels that slip": (in_one(slip=WheelSlip(0.5, 1.0)), "to its funnel is"),
     "friction": (
         at_200_hz(floor=Floor(coulomb_friction=50.0)),
         "waits until the object reaches its goal position",

@@ -11,6 +11,7 @@ from coop_drake.errors import RefusalError, ScenarioError
 from coop_drake.plant.configuration import displacement
 from coop_drake.scenario import (
     ActuatorLimits,
+    BlockedWheels,
     Control,
     Deployment,
     Floor,
@@ -25,6 +26,7 @@ from coop_drake.scenario import (
     StartOffset,
     Wave,
     Waves,
+    WheelSlip,
 )
 from coop_drake.simulation import build_maps, simulate
 from coop_drake.verification.runs import Rows, budget_share
@@ -63,6 +65,8 @@ CASES = {
     "clock": of_one(clock_error=0.03, switch_delay=0.02),
     "silence": of_one(silence=Silence(0.5, 0.02, motors="limp")),
     "silence from the start": of_one(silence=Silence(0.0, 1.2)),
+    "blocked wheels": of_one(blocked=BlockedWheels(0.5, 0.02)),
+    "wheels that slip": of_one(slip=WheelSlip(0.5, 0.5, 0.2)),
     "held motors": of_one(silence=Silence(0.5, 0.02, motors="held")),
     "floor": at_200_hz(floor=Floor(coulomb_friction=5.0, viscous_friction=5.0, slope=0.01)),
     "start": at_200_hz(start_offset=StartOffset(2e-3, -1e-3, 1e-3, (1e-3, -5e-4))),

@@ -11,6 +11,7 @@ from coop_drake.answers.log import SimulationLog
 from coop_drake.compiled_loop import build_sampled_loop, drakes_loop, prepare, simulate_sampled
 from coop_drake.scenario import (
     ActuatorLimits,
+    BlockedWheels,
     Deployment,
     Floor,
     Measurements,
@@ -22,6 +23,7 @@ from coop_drake.scenario import (
     StartOffset,
     Wave,
     Waves,
+    WheelSlip,
 )
 from coop_drake.simulation import build_maps, simulate
 from tests.support.small_loop import small_maps, small_problem
@@ -37,8 +39,9 @@ EVERYTHING = Deployment(
     messages=Messages(loss=0.3, repeat=0.3, delay=0.01),
     robots={
         "robot_0": RobotDepartures(pose_bias=PoseBias(0.002, -0.001, 0.001), odometry_scale=0.05,
-                                   clock_error=0.02, switch_delay=0.01),
-        "robot_1": RobotDepartures(silence=Silence(0.3, 0.02, motors="held")),
+                                   clock_error=0.02, switch_delay=0.01, slip=WheelSlip(0.1, 0.3, 0.1)),
+        "robot_1": RobotDepartures(silence=Silence(0.3, 0.02, motors="held"),
+                                   blocked=BlockedWheels(0.45, 0.02)),
     },
     floor=Floor(coulomb_friction=2.0, viscous_friction=2.0, slope=0.01),
     pushes=(Push("robot_1", (15.0, 5.0), 0.2, 0.2, torque=1.0),),

@@ -6,6 +6,7 @@ from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.systems.framework import DiagramBuilder
 
+from coop_drake.laws.blocked_wheels import BRAKING_TIME, blocked_room, hold_blocked
 from coop_drake.laws.chain_motion import DAMPING
 from coop_drake.laws.team_dynamics import solve_tree, team_accelerations, team_work
 from coop_drake.plant import build_team_plant, read_component_tree, read_team_tree
@@ -52,6 +53,42 @@ def test_the_team_accelerates_as_in_drake(tmp_path):
         forces = tree.bases, tree.places, wrenches, efforts, GRAVITY
         team_accelerations(tree.tree, *forces, state, work, found)
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("blocked", [[0], [1, 2], [0, 1, 2, 3]])
+def test_bases_with_blocked_wheels_are_braked_in_drake_whatever_else_acts(tmp_path, blocked):
+    """Also where so many are blocked that the floor's wrenches are not unique."""
+    builder, generator = DiagramBuilder(), np.random.default_rng(2)
+    team = build_team_plant(ring_team(tmp_path, ARMS), builder)
+    plant, diagram = team.plant, builder.Build()
+    tree = read_team_tree(team, read_component_tree(team))
+    context = plant.GetMyMutableContextFromRoot(diagram.CreateDefaultContext())
+    size, work, room = plant.num_velocities(), team_work(tree.tree), blocked_room(len(tree.tree), len(ARMS))
+    flags = np.zeros(len(ARMS))
+    flags[blocked] = 1.0
+    for _ in range(10):
+        state, wrenches = generator.normal(size=2 * size), 100.0 * generator.normal(size=(len(ARMS) + 1, 3))
+        state[team.position_index[3:]] *= 0.1
+        # Where all are blocked, no motion of the team brakes all of them alike while it turns.
+        state[size:] *= 0.0 if len(blocked) == len(ARMS) else 1.0
+        torques, efforts = generator.normal(size=len(team.joints)), np.zeros(size)
+        efforts[team.velocity_index[3:]] = torques
+        found, asked = np.empty(size), wrenches.copy()
+        forces = tree.bases, tree.places, flags, efforts, 0.0
+        hold_blocked(tree.tree, *forces, state, work, room, found, wrenches)
+        free = [k for k in range(len(ARMS) + 1) if k not in blocked]
+        np.testing.assert_array_equal(wrenches[free], asked[free])
+        plant.SetPositionsAndVelocities(context, state)
+        plant.get_actuation_input_port().FixValue(context, torques)
+        plant.get_applied_spatial_force_input_port().FixValue(context, applied(team, wrenches))
+        accelerated = plant.get_generalized_acceleration_output_port().Eval(context)
+        np.testing.assert_allclose(found, accelerated, rtol=1e-9, atol=1e-7)
+        for robot in (team.robots[k] for k in blocked):
+            moving = robot.base_body.EvalSpatialVelocityInWorld(context)
+            braked = robot.base_body.EvalSpatialAccelerationInWorld(context)
+            expected = -np.array([*moving.translational()[:2], moving.rotational()[2]]) / BRAKING_TIME
+            seen = [*braked.translational()[:2], braked.rotational()[2]]
+            np.testing.assert_allclose(seen, expected, rtol=1e-6, atol=1e-6)
 
 
 @pytest.mark.parametrize("parents", [[-1], [-1, 0], [-1, 0, 1, 2, 3, 2, 5], [-1, 0, 0, 1, 1, 3]])

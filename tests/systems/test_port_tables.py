@@ -12,6 +12,7 @@ from coop_drake.diagram import build_closed_loop, build_world
 from coop_drake.nodes import DirectExchange
 from coop_drake.scenario import (
     ActuatorLimits,
+    BlockedWheels,
     Control,
     Deployment,
     Floor,
@@ -21,6 +22,7 @@ from coop_drake.scenario import (
     PlantSettings,
     RobotDepartures,
     Silence,
+    WheelSlip,
 )
 from coop_drake.simulation import build_maps
 from tests.support.small_loop import small_maps, small_problem
@@ -38,7 +40,7 @@ EVERYTHING = Deployment(
     control_rate=100.0,
     measurements=Measurements(loss=0.1, delay=0.02, angle_noise=1e-3),
     messages=Messages(loss=0.1),
-    robots={"*": RobotDepartures(silence=Silence(1.0))},
+    robots={"*": RobotDepartures(silence=Silence(1.0), blocked=BlockedWheels(1.0), slip=WheelSlip(1.0, 0.5))},
     floor=Floor(coulomb_friction=1.0),
     actuators=ActuatorLimits(lag=0.01),
 )

@@ -116,6 +116,8 @@ _OF_ROBOT = {
     "clock_error": (100.0, "no clock is minutes ahead"),
     "switch_delay": (-0.1, "nothing is heard before it is said"),
     "silence": ({"duration": 1.0}, "it begins at some time"),
+    "blocked": ({"begin": 1.0, "duration": -1.0}, "it lasts for a while"),
+    "slip": ({"begin": 1.0, "share": 1.5}, "no more than all can be lost"),
 }
 _PUSH = {"body": "object", "force": [1.0, 2.0], "time": 1.0, "duration": 1.0}
 _OF_PUSH = {
