@@ -95,12 +95,17 @@ def verify(
     from coop_drake.verification import verify_file, verify_plan, verify_proof
 
     problem, gain_sets = _problem_and_gains(question)
+    budgets = None
+    if not isinstance(question, PlanningProblem):
+        from coop_drake.plant.budgets import scenario_budgets
+
+        budgets = scenario_budgets(question, problem)
     if isinstance(answer, Path | str):
-        return verify_file(answer, problem, gain_sets, progress)
+        return verify_file(answer, problem, gain_sets, progress, budgets=budgets)
     if isinstance(answer, Found | BeyondLimits):
         answer = answer.plan
     if isinstance(answer, Plan):
-        return verify_plan(answer, problem, gain_sets, progress)
+        return verify_plan(answer, problem, gain_sets, progress, budgets=budgets)
     proof = answer.proof if isinstance(answer, Infeasible) else answer
     if proof is None or isinstance(proof, Undecided):
         raise PlanError("an undecided answer proves nothing; expected a plan or a proof of infeasibility")
@@ -134,13 +139,15 @@ def verify_run(
     from coop_drake.answers.log import SimulationLog
     from coop_drake.answers.plan_file import load_plan
     from coop_drake.plant import planning_problem, run_setup
+    from coop_drake.plant.budgets import scenario_budgets
     from coop_drake.verification import verify_plan
     from coop_drake.verification.runs import verify_log
 
     log = log if isinstance(log, SimulationLog) else SimulationLog.load(log)
     plan = plan if isinstance(plan, Plan) else load_plan(plan)
     problem = planning_problem(scenario)
-    of_plan = verify_plan(plan, problem, scenario.gain_sets, progress)
+    budgets = scenario_budgets(scenario, problem)
+    of_plan = verify_plan(plan, problem, scenario.gain_sets, progress, budgets=budgets)
     verified = verify_log(log, plan, problem, run_setup(scenario), progress, braked=braked)
     return replace(verified, checks=(*of_plan.checks, *verified.checks))
 

@@ -74,9 +74,16 @@ def _verify(
                     certificate, plan or beside, task.scenario, braked=braked, progress=progress
                 )
             else:
+                from coop_drake.plant.budgets import scenario_budgets
                 from coop_drake.verification import verify_file
 
-                verified = verify_file(certificate, task.problem, task.scenario.gain_sets, progress)
+                verified = verify_file(
+                    certificate,
+                    task.problem,
+                    task.scenario.gain_sets,
+                    progress,
+                    budgets=scenario_budgets(task.scenario, task.problem),
+                )
     except RefusalError as error:
         reporter.facts["valid"] = False
         reporter.complain(f"{certificate}: {error}", where=error.where, finding=error.finding)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from pydrake.systems.framework import DiagramBuilder
 
 from coop_drake.answers.budget import Budget
@@ -13,7 +15,8 @@ from coop_drake.plant.disagreement import largest_disagreement
 from coop_drake.plant.run_masses import bodies_of_team, joint_inertias, moved_masses
 from coop_drake.plant.team import build_team_plant
 from coop_drake.scenario import Scenario
-from coop_drake.scenario.budget_file import TeamMasses, read_budget
+from coop_drake.scenario.budget_file import ALL, POSITION, TeamMasses, read_budget
+from coop_drake.verification.budgets import OwnBudgets, ScenarioBudgets, wrong_masses
 
 
 def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) -> Budget | None:
@@ -34,7 +37,33 @@ def budget_of(choice: str | None, scenario: Scenario, problem: PlanningProblem) 
     if not isinstance(scenario.gain_sets[name], ScheduledGains):
         allowed = "a gain set of scheduled gains: the funnels of others never close, so that no budget holds"
         raise ScenarioError(str(scenario.path), "gains.selected", name, allowed)
-    return read_budget(choice or required, scenario, problem.tree, lambda: _of_models(scenario))
+    choice, masses = choice or required, _of_models(scenario)
+    budget = read_budget(choice, scenario, problem.tree, masses)
+    if wrong := wrong_masses(budget, masses.bodies, masses.rotors, max(masses.moved)):
+        raise ScenarioError(choice, wrong[0], getattr(budget, wrong[0]), wrong[1])
+    return budget
+
+
+def scenario_budgets(scenario: Scenario, problem: PlanningProblem) -> ScenarioBudgets:
+    """Return what a scenario says about budgets, with which ``verify`` compares that of a plan."""
+    return ScenarioBudgets(scenario.deployment.budget, partial(_own_budgets, scenario, problem))
+
+
+def _own_budgets(scenario: Scenario, problem: PlanningProblem) -> OwnBudgets:
+    """Return the budgets of a scenario's deployment, and the masses that belong into every budget.
+
+    Raises:
+        ScenarioError: The scenario requires a budget, but has departures that none counts.
+    """
+    masses, own, missing = _of_models(scenario), dict[str, Budget](), ""
+    try:
+        for choice in (ALL, POSITION):
+            own[choice] = read_budget(choice, scenario, problem.tree, masses)
+    except ScenarioError as error:
+        if scenario.deployment.budget != "none":
+            raise
+        missing = f"{error.key} is {error.shown}"
+    return OwnBudgets(own, missing, masses.bodies, masses.rotors, max(masses.moved))
 
 
 def _of_models(scenario: Scenario) -> TeamMasses:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from math import hypot
 from pathlib import Path
 from typing import NamedTuple
@@ -64,9 +64,7 @@ def names_file(choice: str) -> bool:
     return choice not in (ALL, POSITION)
 
 
-def read_budget(
-    choice: str, scenario: Scenario, tree: ComponentTree, masses: Callable[[], TeamMasses]
-) -> Budget:
+def read_budget(choice: str, scenario: Scenario, tree: ComponentTree, masses: TeamMasses) -> Budget:
     """Return the budget that ``plan --budget`` names.
 
     Args:
@@ -74,24 +72,18 @@ def read_budget(
             ``position`` for the same without the axes, or a file with the keys of ``Budget``.
         scenario: The scenario.
         tree: The team.
-        masses: Returns what follows from the masses of the models.
+        masses: What follows from the masses of the models.
 
     Raises:
         ScenarioError: There is no such file, it is wrong, or the scenario has no control rate or has
             departures that no budget counts.
     """
     if not names_file(choice):
-        return _of_deployment(scenario, tree, masses(), axes=choice == ALL)
+        return _of_deployment(scenario, tree, masses, axes=choice == ALL)
     if not Path(choice).is_file():
         allowed = "all, position, or a file with a budget"
         raise ScenarioError(str(scenario.path), "--budget", choice, allowed)
     budget: Budget = read_file(Budget, Path(choice))
-    components, joints = len(tree.components), len(tree.joints)
-    if budget.bodies and (
-        max(body[0] for body in budget.bodies) >= components or len(budget.rotors) not in (0, joints)
-    ):
-        team = f"the team's own, with {components} components and {joints} joints"
-        raise ScenarioError(choice, "bodies, rotors", f"{len(budget.bodies)}, {len(budget.rotors)}", team)
     return budget
 
 

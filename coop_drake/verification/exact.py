@@ -14,7 +14,12 @@ from coop_drake.checking import RefusedError, check
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
 from coop_drake.progress import Progress
-from coop_drake.verification.budgets import check_budget, check_position
+from coop_drake.verification.budgets import (
+    ScenarioBudgets,
+    check_budget,
+    check_origin,
+    check_position,
+)
 from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.gains import check_gains
 from coop_drake.verification.problem_match import check_problem
@@ -28,6 +33,8 @@ def verify_plan(
     problem: PlanningProblem,
     gain_sets: Mapping[str, GainSet],
     progress: Progress | None = None,
+    *,
+    budgets: ScenarioBudgets | None = None,
 ) -> Verified:
     """Check everything that a plan states, but for its estimated times.
 
@@ -36,6 +43,7 @@ def verify_plan(
         problem: The problem that it should solve.
         gain_sets: The scenario's gain sets by name.
         progress: Called with a phase and the fraction of it that is done.
+        budgets: What the scenario says about budgets; None for a problem without a scenario.
 
     Raises:
         RefusalError: Names the first statement that does not hold.
@@ -45,19 +53,19 @@ def verify_plan(
     if plan.refused_by:
         return _verified_way(plan, (same, *exact, check_refusals(plan, problem)))
     checks = [same, *exact, check_gains(plan, gain_sets)]
+    origin = None if budgets is None else check_origin(plan.budget, budgets)
     checks += [
         further
-        for further in (
-            check_speeds(plan, problem),
-            check_accelerations(plan, problem),
-            check_budget(plan, problem.tree),
-        )
+        for further in (check_speeds(plan, problem), check_accelerations(plan, problem), origin)
         if further is not None
     ]
     checks += check_position(plan, problem.position_tolerance)
+    axes = check_budget(plan, problem.tree)
+    checks += [] if axes is None else [axes]
+    whose = f", {origin.name}" if origin is not None else ""
     return Verified(
         "found",
-        f"plan of {len(plan.cells)} cells",
+        f"plan of {len(plan.cells)} cells{whose}",
         tuple(checks),
         "no body touches a wall or another body in any state of the cells, which lead from start to goal",
         f"{_unproved_of_control(plan)}; the estimated times; that the robots are as in their models",

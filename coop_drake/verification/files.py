@@ -13,6 +13,7 @@ from coop_drake.answers.problem import PlanningProblem
 from coop_drake.errors import RefusalError
 from coop_drake.laws import GainSet
 from coop_drake.progress import Progress
+from coop_drake.verification.budgets import ScenarioBudgets
 from coop_drake.verification.checks import Check, Verified
 from coop_drake.verification.exact import verify_plan, verify_proof
 from coop_drake.verification.problem_match import check_digest
@@ -23,6 +24,8 @@ def verify_file(
     problem: PlanningProblem,
     gain_sets: Mapping[str, GainSet],
     progress: Progress | None = None,
+    *,
+    budgets: ScenarioBudgets | None = None,
 ) -> Verified:
     """Verify a file that ``save_plan`` or ``save_proof`` wrote.
 
@@ -31,6 +34,7 @@ def verify_file(
         problem: The problem that it should solve or refute.
         gain_sets: The scenario's gain sets by name.
         progress: Called with a phase and the fraction of it that is done.
+        budgets: As ``verify_plan`` takes it.
 
     Returns:
         What was checked.
@@ -44,7 +48,7 @@ def verify_file(
     if form == plan_file.FORMAT:
         plan = plan_file.read_plan(document)
         unaltered = _check_unaltered(document)
-        verified = verify_plan(plan, problem, gain_sets, progress)
+        verified = verify_plan(plan, problem, gain_sets, progress, budgets=budgets)
     else:
         saved = proof_file.read_proof(document)
         unaltered = _check_unaltered(document)

@@ -23,6 +23,9 @@ from coop_drake.verification.solids import component_stages
 ROUNDING = 1e-9
 """Relative difference of bounds that are computed twice, in another order [-]."""
 
+KEPT = 0.95
+"""Share of a joint's limit of acceleration that is commanded at most [-]; the rest is for noise."""
+
 
 def check_speeds(plan: Plan, problem: PlanningProblem) -> Check | None:
     """Check the limits of speed in a plan and its gains; None where neither models nor scenario state any.
@@ -67,6 +70,7 @@ def check_accelerations(plan: Plan, problem: PlanningProblem) -> Check | None:
     """
     limits = problem.limits.joint_accelerations
     known, least = np.isfinite(limits), 1.0
+    commanded = np.array([np.inf, *(KEPT * limits)])
     for k, transition in enumerate(plan.transitions):
         where, stated = f"transitions[{k}].gains.acceleration_limit", transition.gains.acceleration_limit
         if stated is None and known.any():
@@ -74,6 +78,9 @@ def check_accelerations(plan: Plan, problem: PlanningProblem) -> Check | None:
         if stated is not None and not known.any():
             raise RefusalError(where, "is there, but neither models nor scenario state a limit")
         if stated is not None:
+            if not np.allclose(stated, commanded, rtol=ROUNDING, atol=0.0):
+                text = f"is {stated.tolist()}; {KEPT:g} of the limits is {commanded.tolist()}"
+                raise RefusalError(where, text)
             least = min(least, _require_below(where, stated[1:], limits))
     name = "limits of acceleration are kept by the commands"
     return Check(name, int(known.sum()), least, "of one left") if known.any() else None

@@ -195,8 +195,10 @@ def _check_motion(plan: Plan, k: int, stated: Tolerance, where: str) -> tuple[_M
         _require(getattr(stated, name), found, False, f"{where}.{name}")
     if rest is None:
         raise RefusalError(f"transitions[{k}].gains.rest", "is missing, but the plan has a budget")
-    within = np.minimum(rest.reach, 2.0 * (0.5 - EROSION) * half)
-    if not ((stated.settled <= within).all() and (stated.settled_rate <= rest.rate).all()):
+    if not (rest.reach <= 2.0 * (0.5 - EROSION) * half * (1.0 + ROUNDING)).all():
+        finding = f"is {rest.reach.tolist()}: an axis may count as at rest outside of its goal interval"
+        raise RefusalError(f"transitions[{k}].gains.rest.reach", finding)
+    if not ((stated.settled <= rest.reach).all() and (stated.settled_rate <= rest.rate).all()):
         raise RefusalError(where, "an axis may never count as arrived")
     ends = half[members] - x - 0.125 * T * T * last
     leaving = first_rest(plan.transitions[k], T, made, samples, members, rest)

@@ -1,0 +1,271 @@
+"""Every number of a plan is compared with something: altered ones are refused, but for free choices.
+
+Each leaf of the plans' documents is altered: numbers up and down, truths, texts, lengths of lists, and
+entries that are left out. What is refused nowhere stands in ``FREE``, with the inequality that it satisfies.
+"""
+
+import json
+from copy import deepcopy
+from dataclasses import replace
+from functools import cache
+from typing import NamedTuple
+
+import pytest
+
+from coop_drake.answers.document import Document
+from coop_drake.answers.plan_file import plan_document, read_plan
+from coop_drake.errors import PlanError, RefusalError
+from coop_drake.planning.planner import plan as make
+from coop_drake.plant import planning_problem
+from coop_drake.plant.budgets import budget_of, scenario_budgets
+from coop_drake.scenario import Deployment, load_scenario
+from coop_drake.typed_data import convert_class
+from coop_drake.verification import exact, verify_plan
+from tests.support.last_cells import last_cells
+from tests.support.scenarios import MODELS
+
+SCENARIOS = ("base", "warehouse", "three", "tight", "elbow")
+"""The shipped scenarios that have a plan."""
+
+CELLS = 2
+"""So many cells of every plan are verified: the first and the last one are special."""
+
+OUT = "left out"
+"""What is altered of an entry that is not there any more."""
+
+STATES_NOTHING = "states nothing that a team rests on; `verify` names it among what is not proved"
+
+
+class Free(NamedTuple):
+    """A free choice.
+
+    Attributes:
+        inequality: What it has to satisfy, in words.
+        beyond: Factors with which it does not; each has to be refused.
+        at: Index of the transition in which that is tried.
+        shifts: What is added to it, likewise.
+    """
+
+    inequality: str
+    beyond: tuple[float, ...] = ()
+    at: int = -1
+    shifts: tuple[float, ...] = ()
+
+
+SAFE, HELD = "at least what the budget gives", "so that the tube that the plan states holds with it"
+
+FREE = {
+    **dict.fromkeys(
+        ("cells[].tidied.outer", "cells[].tidied.outer[]", "cells[].tidied.outer[][]"),
+        Free("a region whose configurations are free, which holds path and target"),
+    ),
+    **dict.fromkeys(
+        ("transitions[].path", "transitions[].path[]", "transitions[].path[][]"),
+        Free("a line from the entry to the target inside the cell, that keeps the stated clearance"),
+    ),
+    **dict.fromkeys(
+        (
+            "transitions[].governed.outer",
+            "transitions[].governed.outer[]",
+            "transitions[].governed.outer[][]",
+        ),
+        Free("a region at least the tube's radius inside the cell, which holds path and target"),
+    ),
+    "transitions[].inradius": Free("at most the target's distance from both cells' boundaries", (1.1,)),
+    "transitions[].neck": Free("at most the path's distance from the cell's boundary", (1.1,)),
+    "transitions[].estimated_time": Free(STATES_NOTHING),
+    "transitions[].gains.rest.reach[]": Free(
+        "between what is settled and 0.4 of the goal interval; next cell's entry set", (1e-6, 100.0), 0
+    ),
+    "transitions[].gains.rest.rate[]": Free("at least what is settled; next entry set", (1e-6, 30.0), 0),
+    "transitions[].tolerance.entry_lower[]": Free("at most " + SAFE[9:], shifts=(0.05,)),
+    "transitions[].tolerance.entry_upper[]": Free(SAFE, shifts=(-0.05,)),
+    "transitions[].tolerance.entry_rate_lower[]": Free("at most " + SAFE[9:], (-1.0,)),
+    "transitions[].tolerance.entry_rate_upper[]": Free(SAFE, (-1.0,)),
+    "transitions[].tolerance.entry_acceleration[]": Free(SAFE, (0.9,)),
+    "transitions[].tolerance.distance[]": Free("above zero, and at most what the budget leaves", (1.2,)),
+    "transitions[].tolerance.acceleration[]": Free(SAFE, (0.9,)),
+    "transitions[].tolerance.settled[]": Free(SAFE + ", and within the condition of rest", (0.9, 1e9)),
+    "transitions[].tolerance.settled_rate[]": Free(SAFE + ", and within the condition of rest", (0.9, 1e9)),
+    "transitions[].tolerance.departure[]": Free(SAFE + ", less than what its distance leaves", (0.9,)),
+    "transitions[].tolerance.rate_departure[]": Free(SAFE, (0.9,)),
+    "transitions[].tolerance.entry_parts[]": Free("parts with which the sets follow; more follow closer"),
+    "axis_tracking.stiffness": Free(HELD, (0.5, 3.0)),
+    "axis_tracking.damping": Free(HELD, (0.5, 3.0)),
+    "tube.tracking_stiffness": Free(HELD, (0.5, 3.0)),
+    "tube.tracking_damping": Free(HELD, (0.5, 3.0)),
+    "tube.speed": Free("at most the speed with which the tube holds", (1.1,)),
+    "tube.radius": Free(SAFE + ", and at most what the governed regions leave", (0.99, 1.5)),
+    "tube.rate": Free(SAFE, (0.99,)),
+    "tube.velocity": Free(SAFE + ", and at most the limit of the object's speed", (0.99, 100.0)),
+    "tube.rest": Free(SAFE + ", and less than the goal's tolerance", (0.99, 2.0)),
+    "tube.acceleration": Free(SAFE + ", and at most what the bases' forces give", (0.99, 2.0)),
+}
+"""All that may be altered in a plan without making a statement false."""
+
+ADVICE = (
+    "nothing refuses it. Let `verify` derive the number and compare it (coop_drake/verification: gains.py, "
+    "speeds.py, budgets/), or, if it is a free choice, check its inequality there and add it to FREE with "
+    "factors that break the inequality"
+)
+
+
+class Case(NamedTuple):
+    document: dict
+    problem: object
+    gains: dict
+    budgets: object
+
+
+@cache
+def case(name, required):
+    """The last cells of a shipped scenario's plan, with and without a budget that it requires."""
+    scenario = load_scenario(MODELS / f"{name}.scenario.yaml")
+    if required:
+        deployed = Deployment.completed({"preset": "mobile_base", "budget": "all"}, "deployment")
+        scenario = replace(scenario, deployment=convert_class(deployed, Deployment))
+    problem, gains = planning_problem(scenario), scenario.gain_sets
+    budget = budget_of(None, scenario, problem)
+    found = make(problem, gains["scheduled"], gain_set_name="scheduled", budget=budget).plan
+    plan, asked = last_cells(found, problem, CELLS)
+    document = json.loads(json.dumps(plan_document(plan) | {"digest": ""}))
+    budgets = scenario_budgets(scenario, problem)
+    own = budgets.derive()
+    return Case(document, asked, gains, replace(budgets, derive=lambda: own))
+
+
+@pytest.fixture(autouse=True)
+def once_each(monkeypatch):
+    """Ask the exact checker once about every geometry; most alterations leave it alone."""
+    known, ask = {}, exact.check
+
+    def check(question, answer, progress):
+        read = {"cells": answer["cells"], "start": question["start"]}
+        read["transitions"] = [{key: one[key] for key in READ if key in one} for one in answer["transitions"]]
+        key = json.dumps(read)
+        if key not in known:
+            try:
+                known[key] = ask(question, answer, progress)
+            except exact.RefusedError as error:
+                known[key] = error
+        if isinstance(known[key], Exception):
+            raise known[key]
+        return known[key]
+
+    monkeypatch.setattr(exact, "check", check)
+
+
+READ = ("target", "goal_lower", "goal_upper", "path", "neck", "length", "inradius")
+"""Entries of a transition that the exact checker reads."""
+
+
+def refusal(document, case):
+    """Why a document is refused, None where it is accepted."""
+    try:
+        plan = read_plan(Document("altered", document))
+        verify_plan(plan, case.problem, case.gains, budgets=case.budgets)
+    except (RefusalError, PlanError) as error:
+        return str(error)
+    return None
+
+
+def ways_of(value, way=()):
+    """Ways to every entry of a document, leaves and what holds them."""
+    entries = (
+        value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    )
+    own = [way] if way and way != ("digest",) else []  # the digest belongs to the file, not to the plan
+    return [*own, *(place for key, one in entries for place in ways_of(one, (*way, key)))]
+
+
+def kind_of(way):
+    """A way without its numbers."""
+    return "".join("[]" if isinstance(step, int) else f".{step}" for step in way).removeprefix(".")
+
+
+def places(document):
+    """The ways to every kind of entry that is not null."""
+    found = {}
+    for way in ways_of(document):
+        found.setdefault(kind_of(way), []).append(way)
+    return found
+
+
+def alterations(value, key):
+    """Other values of an entry: numbers up and down, truths, texts, lengths, and nothing at all."""
+    others = [] if isinstance(key, int) else [OUT]
+    if isinstance(value, bool):
+        return [*others, not value]
+    if isinstance(value, int):
+        return [*others, value + 1, value - 1]
+    if isinstance(value, float):
+        step = max(0.1 * abs(value), 1e-3)
+        return [*others, value + step, value - step]
+    if isinstance(value, str):
+        return [*others, f"{value}x"]
+    if isinstance(value, list) and value:
+        return [*others, value[:-1], [*value, value[-1]]]
+    return [1.0] if value is None else others
+
+
+def altered(document, way, value):
+    """The document with another value at the end of a way, or without it."""
+    changed = deepcopy(document)
+    entry = value_at(changed, way[:-1])
+    if value == OUT:
+        del entry[way[-1]]
+    else:
+        entry[way[-1]] = value
+    return changed
+
+
+def value_at(document, way):
+    for step in way:
+        document = document[step]
+    return document
+
+
+@pytest.mark.parametrize("required", [False, True])
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_every_entry_of_a_plan_is_compared_or_a_free_choice(name, required):
+    """Each scenario's plan has a part of the kinds altered, all of them together all kinds."""
+    one = case(name, required)
+    assert refusal(one.document, one) is None
+    kinds, turn = places(one.document), SCENARIOS.index(name)
+    for kind in sorted(kinds)[turn :: len(SCENARIOS)]:
+        if kind in FREE:
+            check_beyond(one, kind, kinds[kind])
+            continue
+        way = kinds[kind][len(kind) % len(kinds[kind])]
+        for other in alterations(value_at(one.document, way), way[-1]):
+            changed = altered(one.document, way, other)
+            if not says_the_same(changed, one.document):
+                assert refusal(changed, one), (
+                    f"{kind}: {other} instead of {value_at(one.document, way)}: {ADVICE}"
+                )
+
+
+def check_beyond(one, kind, ways):
+    """A free choice beyond its inequality is refused, for the first axis of a transition."""
+    free = FREE[kind]
+    cells = len(one.document["cells"])
+    way = next(way for way in ways if way[0] != "transitions" or way[1] == free.at % cells)
+    value = value_at(one.document, way)
+    others = [factor * value for factor in free.beyond] + [value + shift for shift in free.shifts]
+    for other in others:
+        assert refusal(altered(one.document, way, other), one), f"{kind}: {other} instead of {value}"
+
+
+def says_the_same(document, other):
+    """Whether two documents hold the same plan: entries that are left out have values, too."""
+    try:
+        return plan_document(read_plan(Document("", document))) == plan_document(
+            read_plan(Document("", other))
+        )
+    except PlanError:
+        return False
+
+
+def test_every_free_choice_is_one_of_a_shipped_plan():
+    kinds = {kind for name in SCENARIOS for kind in places(case(name, True).document)}
+    assert set(FREE) <= kinds
