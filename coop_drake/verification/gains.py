@@ -43,7 +43,7 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
         raise RefusalError("gain_set", f"{plan.gain_set!r} is none of {', '.join(sorted(gain_sets))}")
     if other := other_age(plan, gain_sets[plan.gain_set]):
         raise RefusalError("transitions[0].gains.rate_gain", other)
-    _check_ages(plan, gain_sets[plan.gain_set])
+    check_ages(plan, gain_sets[plan.gain_set])
     resting = plan.start[2:]
     for k, transition in enumerate(plan.transitions):
         where = f"transitions[{k}]"
@@ -74,10 +74,13 @@ def check_gains(plan: Plan, gain_sets: Mapping[str, GainSet]) -> Check:
     return Check("gains are those that the gain set gives for the cells", len(plan.transitions))
 
 
-def _check_ages(plan: Plan, gain_set: GainSet) -> None:
+def check_ages(plan: Plan, gain_set: GainSet) -> None:
     """Refuse gains for commands that are younger than the team's.
 
     Nominal motions of axes rest on no measurement: their commands are as old as half a period and the lag.
+
+    Raises:
+        RefusalError: Names the factor.
     """
     if not isinstance(gain_set, ScheduledGains):
         ages = {"age_factor": plan.age_factor}

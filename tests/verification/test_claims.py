@@ -15,12 +15,15 @@ import pytest
 from coop_drake.answers.document import Document
 from coop_drake.answers.plan_file import plan_document, read_plan
 from coop_drake.errors import PlanError, RefusalError
+from coop_drake.planning.execution.transitions import with_gains
 from coop_drake.planning.planner import plan as make
 from coop_drake.plant import planning_problem
 from coop_drake.plant.budgets import budget_of, scenario_budgets
 from coop_drake.scenario import Deployment, load_scenario
 from coop_drake.typed_data import convert_class
 from coop_drake.verification import exact, verify_plan
+from coop_drake.verification.budgets import check_origin
+from coop_drake.verification.gains import check_ages
 from tests.support.last_cells import last_cells
 from tests.support.scenarios import MODELS
 
@@ -269,3 +272,82 @@ def says_the_same(document, other):
 def test_every_free_choice_is_one_of_a_shipped_plan():
     kinds = {kind for name in SCENARIOS for kind in places(case(name, True).document)}
     assert set(FREE) <= kinds
+
+
+def stated(name="base", required=True):
+    """The plan of a case, as it was made."""
+    return read_plan(Document("", case(name, required).document))
+
+
+def refused(plan, one, budgets=None):
+    with pytest.raises(RefusalError) as error:
+        verify_plan(plan, one.problem, one.gains, budgets=budgets or one.budgets)
+    return error.value.where
+
+
+def test_a_plan_without_the_required_budget_and_with_a_part_of_it_are_refused():
+    one, plan = case("base", True), stated()
+    position = one.budgets.derive().by_name["position"]
+    for budget, where in ((None, "budget"), (position, "budget.axes")):
+        with pytest.raises(RefusalError) as error:
+            check_origin(budget, one.budgets)
+        assert error.value.where == where
+    assert refused(replace(plan, budget=plan.budget.scaled(0.9)), one) == "budget.delay"
+
+
+def test_a_budget_that_is_not_required_is_the_scenarios_own_or_said_not_to_be():
+    one, plan = case("base", True), stated()
+    free = replace(one.budgets, required="none")
+    own = verify_plan(plan, one.problem, one.gains, budgets=free)
+    assert own.subject.endswith("the budget is that of the scenario's deployment, all")
+    for smaller, said in (
+        (
+            {"model_error": 0.1},
+            "the budget is not the scenario's: model_error is 0.1; the scenario gives 0.2",
+        ),
+        ({"bodies": (), "rotors": ()}, "; it leaves out the masses of the team"),
+    ):
+        other = replace(plan, budget=replace(plan.budget, **smaller))
+        assert said in verify_plan(other, one.problem, one.gains, budgets=free).subject
+
+
+@pytest.mark.parametrize(
+    ("changes", "where"),
+    [
+        ({"rotors": (100.0, 100.0)}, "budget.rotors"),
+        ({"bodies": (), "rotors": (1.0, 0.0)}, "budget.rotors"),
+        ({"bodies": ((0.0, 1.0, 0.0, 0.0, 1.0),)}, "budget.bodies"),
+        ({"moved_mass": 4.0}, "budget.moved_mass"),
+    ],
+)
+def test_other_masses_than_the_teams_are_refused_in_any_budget(changes, where):
+    one, plan = case("base", True), stated()
+    other = replace(plan, budget=replace(plan.budget, model_error=0.1, **changes))
+    assert refused(other, one, replace(one.budgets, required="none")) == where
+
+
+def test_gains_for_commands_that_are_younger_than_the_teams_are_refused():
+    """Twenty times younger, with all gains that follow from that."""
+    one, plan = case("base", False), stated("base", False)
+    quick = replace(plan, age_factor=0.05)
+    assert refused(with_gains(quick, one.gains["scheduled"], plan.gain_set), one) == "age_factor"
+    one, plan = case("base", True), stated()
+    parts = [replace(part.tolerance, age_factor=0.5) for part in plan.transitions]
+    quick = [replace(part, tolerance=own) for part, own in zip(plan.transitions, parts, strict=True)]
+    with pytest.raises(RefusalError, match="those of nominal motions are"):
+        check_ages(replace(plan, transitions=tuple(quick)), one.gains["scheduled"])
+
+
+def test_a_stiffer_governor_than_the_gain_set_allows_is_refused():
+    """With the damping and the gain that follow from its K, in all transitions."""
+    one, plan = case("base", True), stated()
+    own = plan.transitions[0].gains
+    stiffer = own.with_governor(4.0 * own.stiffness, 2.0 * own.damping, 2.0 * own.governor_gain)
+    assert one.gains["scheduled"].max_stiffness < stiffer.stiffness
+    parts = [
+        replace(
+            part, gains=part.gains.with_governor(stiffer.stiffness, stiffer.damping, stiffer.governor_gain)
+        )
+        for part in plan.transitions
+    ]
+    assert refused(replace(plan, transitions=tuple(parts)), one) == "transitions[0].gains.stiffness"
