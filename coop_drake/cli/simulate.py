@@ -31,6 +31,7 @@ from coop_drake.cli.results import ResultFolder
 from coop_drake.cli.run import carry_out, simulation_of
 from coop_drake.cli.summary import plan_facts
 from coop_drake.cli.task import Task, read_task
+from coop_drake.errors import RefusalError
 from coop_drake.nodes.states import REJOIN, RESTARTS
 from coop_drake.viz.drawing_processes import DrawingProcesses
 
@@ -98,6 +99,8 @@ def read_plan(task: Task, path: Path, reporter: Reporter, *, new_gains: bool = F
     from coop_drake.answers import load_plan
     from coop_drake.answers.belonging import check_plan_belongs, other_age
     from coop_drake.planning import reschedule
+    from coop_drake.plant.budgets import scenario_budgets
+    from coop_drake.verification.budgets import check_origin
 
     found = load_plan(path)
     check_plan_belongs(found, task.problem, path)
@@ -106,6 +109,10 @@ def read_plan(task: Task, path: Path, reporter: Reporter, *, new_gains: bool = F
         found = reschedule(found, task.scenario.gain_sets[name], name)
     elif other := other_age(found, task.scenario.gain_sets.get(found.gain_set)):
         reporter.say(f"[yellow]{escape(str(path))}: {escape(other)}; `verify` will refuse the run[/]")
+    try:
+        check_origin(found.budget, scenario_budgets(task.scenario, task.problem))
+    except RefusalError as error:
+        reporter.say(f"[yellow]{escape(str(path))}: {escape(str(error))}; `verify` will refuse the run[/]")
     reporter.facts.update(
         answer="found", slices=0, first_plan_cpu_seconds=0.0, planning_cpu_seconds=0.0, **plan_facts(found)
     )

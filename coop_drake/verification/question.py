@@ -21,6 +21,7 @@ TRUSTED = (
     "how Drake parses the models (coop_drake/plant)",
     "the convex pieces, joints and pairs of bodies left aside that are read there, and their question "
     "(coop_drake/verification/question.py; --question FILE writes it)",
+    "how a budget follows from the section deployment and the models (coop_drake/scenario, coop_drake/plant)",
     "the rule by which a plan's gains follow from its cells, which the planner uses too (coop_drake/laws)",
     "Python's integers, and the checker (coop_drake/checking)",
 )

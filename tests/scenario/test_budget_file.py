@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 from math import sqrt
+from types import SimpleNamespace
 
 import pytest
 from pydrake.systems.framework import DiagramBuilder
 
 import coop_drake
 from coop_drake.answers import Found, Undecided, load_plan
+from coop_drake.cli.simulate import read_plan
+from coop_drake.cli.task import read_task
 from coop_drake.errors import ScenarioError
 from coop_drake.plant import build_team_plant, planning_problem
 from coop_drake.plant.budgets import budget_of
@@ -67,6 +70,31 @@ def test_a_required_budget_is_planned_for_without_an_option(tmp_path):
     assert "the object stays in its cells under the budget" in shown
     assert "angles and joints are not part of the budget" in shown
     assert isinstance(coop_drake.plan(coop_drake.load_scenario(file)), Found)
+
+
+def test_a_plan_under_another_budget_than_the_required_one_is_refused(tmp_path):
+    """One without any budget, and one for the position alone where the axes are asked for, too."""
+    plan = tmp_path / "out" / "plan.json"
+    for made, asked, finding in (
+        ("none", "all", "budget: is missing; the scenario requires `deployment.budget: all`"),
+        ("position", "all", "budget.axes: is False; the scenario gives True"),
+    ):
+        assert invoke("plan", scenario(tmp_path, budget=made), "--out", plan.parent).exit_code == 0
+        file = scenario(tmp_path, budget=asked)
+        refused = invoke("verify", plan, file)
+        assert (refused.exit_code, finding in " ".join(refused.output.split())) == (1, True), refused.output
+        said = []
+        read_plan(read_task(file), plan, SimpleNamespace(say=said.append, facts={}))
+        assert ["`verify` will refuse the run" in line for line in said] == [True]
+
+
+def test_a_budget_of_a_file_is_said_not_to_be_the_scenarios(tmp_path):
+    (tmp_path / "budget.yaml").write_text("{position_noise: 0.001, axes: false}")
+    file = scenario(tmp_path, robots={"*": {"odometry_scale": 0.01}})
+    plan = tmp_path / "out" / "plan.json"
+    assert invoke("plan", file, "--budget", tmp_path / "budget.yaml", "--out", plan.parent).exit_code == 0
+    said = " ".join(invoke("verify", plan, file).output.split())
+    assert "the budget is not the scenario's: deployment.robots is" in said
 
 
 def test_a_required_budget_that_does_not_hold_is_a_negative_answer(tmp_path):
