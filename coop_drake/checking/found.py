@@ -20,10 +20,12 @@ def check_plan(question: Question, answer: Any, progress: plane.Progress) -> lis
     regions, count = [read_region(cell["tidied"]) for cell in cells], len(cells)
     demand(0 < count == len(transitions), "transitions", "are not as many as the cells")
     demand(holds(boxes[0], question.start_box), "cells[0]", "does not hold the start's angles")
-    room, nearest = numbers([transitions[-1]["inradius"], transitions[-1]["goal_lower"][0]], 2)
+    (room,) = numbers([transitions[-1]["inradius"]], 1)
+    near = numbers(transitions[-1]["goal_lower"], question.axes)
     ends = zip(question.goal_box, question.rooms, strict=True)
-    angles, *joints = [(low - tolerance, high + tolerance) for (low, high), tolerance in ends]
-    boxes.append([unwrapped(angles, (nearest, nearest), outwards=-1), *joints])
+    boxes.append([(low - tolerance, high + tolerance) for (low, high), tolerance in ends])
+    for axis in question.circles:
+        boxes[-1][axis] = unwrapped(boxes[-1][axis], (near[axis], near[axis]), outwards=-1)
     for k, value in enumerate(transitions):
         demand(holds(question.limits, boxes[k][1:]), f"cells[{k}]", "leaves the limits of a joint")
         entry = _leads_on(value, f"transitions[{k}]", entry, boxes[k : k + 2], regions[k : k + 2])

@@ -36,7 +36,7 @@ def check_proof(question: Question, answer: Any, progress: plane.Progress) -> li
     outside = Region(question.floor.rings, odd=False)
     chain = question.chains[index(answer["component"], len(question.chains))]
     boxes = [intervals(value["lower"], value["upper"], question.axes) for value in slices]
-    neighbours = _facets(boxes, question.limits) + [(k, k) for k in range(len(boxes))]
+    neighbours = _facets(boxes, question) + [(k, k) for k in range(len(boxes))]
     cells = [[(c["reached"], regions.read_region(c["polygon"])) for c in value["cells"]] for value in slices]
     for a, b in neighbours:
         spend(len(cells[a]) * len(cells[b]))
@@ -48,7 +48,7 @@ def check_proof(question: Question, answer: Any, progress: plane.Progress) -> li
         where, wide = f"slices[{k}]", [(low - WIDENING, high + WIDENING) for low, high in boxes[k]]
         demand(all(type(label) is bool for label, _ in cells[k]), where, "has labels that are no booleans")
         for place, box, label in (starts, goals):
-            wrong = [cell for its, cell in cells[k] if its == label and _meets(wide, box, chain)]
+            wrong = [cell for its, cell in cells[k] if its == label and _meets(wide, box, chain, question)]
             steps, name = [*chain, Step(offset=place)], "goal" if label else "start"
             clear = free([point], 0, steps, box, wrong, lambda cell, *at: cell.side(*at) < 0)
             demand(clear, where, f"cells may hold the {name} and have reached: {label}")
@@ -60,7 +60,7 @@ def check_proof(question: Question, answer: Any, progress: plane.Progress) -> li
             edges += _check_cover([cell for _, cell in cells[k]], pressed, forbidden, outside, where)
         progress("checking slices", (k + 1) / len(slices))
     return [
-        ("slices tile a turn and the limits of the joints", len(slices)),
+        ("slices tile a turn on circular axes and the limits of all others", len(slices)),
         ("pieces hold witnesses in all of a slice", sum(len(value["witnesses"]) for value in slices)),
         ("pieces are squeezed in all of a slice", sum(len(value.get("squeezes", [])) for value in slices)),
         ("edges of cells and of forbidden positions lie inside others: they are all positions", edges),
@@ -69,13 +69,13 @@ def check_proof(question: Question, answer: Any, progress: plane.Progress) -> li
     ]
 
 
-def _meets(wide: list[Interval], box: list[Interval], carrier: list[Step]) -> bool:
+def _meets(wide: list[Interval], box: list[Interval], carrier: list[Step], question: Question) -> bool:
     """Whether a slice, whose first axis is the carrier's angle, may hold configurations of a box."""
     turns = [sorted(step.sign * end + step.angle for end in box[step.axis]) for step in carrier]
-    angles = team.unwrapped(
-        (sum(low for low, _ in turns), sum(high for _, high in turns)), wide[0], outwards=1
-    )
-    return all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(wide, [angles, *box[1:]], strict=True))
+    there = [(sum(low for low, _ in turns), sum(high for _, high in turns)), *box[1:]]
+    for axis in question.circles:
+        there[axis] = team.unwrapped(there[axis], wide[axis], outwards=1)
+    return all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(wide, there, strict=True))
 
 
 def _forbidden(question: Question, frame: list[Step], box: list[Interval], witnesses: Any, where: str) -> Any:
@@ -265,21 +265,30 @@ def _chosen(stretches: list[tuple[int, int, int]]) -> set[int]:
     return chosen
 
 
-def _facets(boxes: list[list[Interval]], limits: list[Interval]) -> list[tuple[int, int]]:
-    """Check that boxes tile a turn and the joints' limits; returns pairs that share a facet, modulo a turn.
+def _facets(boxes: list[list[Interval]], question: Question) -> list[tuple[int, int]]:
+    """Check that boxes tile turns and limits; returns pairs that share a facet, modulo turns.
 
     Boxes within a range whose interiors are disjoint tile it if their volumes add up to its volume. An axis
-    on which the range is a single value does not count.
+    on which the range is a single value does not count. Boxes at the beginning of a circular axis are placed
+    again behind its end: what they share a facet with there is beside them on the circle. No box crosses the
+    end of an axis, so that a facet is shared across the end of one circular axis at a time.
     """
-    first, last = min([box[0][0] for box in boxes], default=0), max([box[0][1] for box in boxes], default=0)
-    demand(abs(last - first - plane.TURN) <= WIDENING, "slices", "are not about a whole turn")
-    whole, pairs = [(first, last), *limits], list[tuple[int, int]]()
+    whole = [(0, 0), *question.limits]
+    for a in sorted(question.circles):
+        first, last = (pick((box[a][end] for box in boxes), default=0) for end, pick in ((0, min), (1, max)))
+        whole[a] = first, last
+        where = f"slices, axis {a}" if a else "slices"
+        demand(abs(last - first - plane.TURN) <= WIDENING, where, "are not about a whole turn")
     wide = [axis for axis, (low, high) in enumerate(whole) if low < high]
     volume, *volumes = [prod(box[a][1] - box[a][0] for a in wide) for box in (whole, *boxes)]
     tiled = all(team.holds(whole, box) for box in boxes) and sum(volumes) == volume
     demand(tiled, "slices", "do not tile their range: they leave it, leave a gap or overlap")
-    again = [(k, [(last, last + b[0][1] - first), *b[1:]]) for k, b in enumerate(boxes) if b[0][0] == first]
-    placed = sorted([*enumerate(boxes), *again], key=lambda entry: entry[1])
+    placed, pairs = [*enumerate(boxes)], list[tuple[int, int]]()
+    for a in sorted(question.circles):
+        first, last = whole[a]
+        beyond = [(k, box, (last, last + box[a][1] - first)) for k, box in enumerate(boxes)]
+        placed += [(k, [*b[:a], end, *b[a + 1 :]]) for k, b, end in beyond if b[a][0] == first]
+    placed.sort(key=lambda entry: entry[1])
     for n, (i, one) in enumerate(placed):
         spend(4 * len(placed))
         for j, other in placed[n + 1 :]:

@@ -8,6 +8,10 @@ from coop_drake.checking.plane import BITS, ONE, TURN, Interval, Point, demand, 
 from coop_drake.checking.regions import read_region
 
 
+LARGEST = 1 << 20
+"""No number of a document is larger [m or rad]: a circle has these limits."""
+
+
 class Step(NamedTuple):
     """The motion p -> Rot(sign * value + angle) p + value * slide + offset, by the value of an axis."""
 
@@ -88,8 +92,11 @@ def unwrapped(angles: Interval, about: Interval, *, outwards: int) -> Interval:
 
     ``TURN`` is less than a turn by less than a unit, so that each end is off by less than a unit a turn.
     If angles that are moved otherwise meet the others, those that are enclosed here do, too: the distance of
-    the middles is half of ``TURN`` at most here, and that less a unit a turn at least there.
+    the middles is half of ``TURN`` at most here, and that less a unit a turn at least there. More than a turn
+    of angles are all angles.
     """
+    if angles[1] - angles[0] > TURN:
+        return -LARGEST * ONE, LARGEST * ONE
     turns = (sum(about) - sum(angles) + TURN) // (2 * TURN)
     off = outwards * abs(turns)
     return angles[0] + turns * TURN - off, angles[1] + turns * TURN + off
@@ -108,18 +115,26 @@ def intervals(lower: Any, upper: Any, axes: int, least: int = 0) -> list[Interva
 
 
 class Question:
-    """What is asked; the page on certificates in the documentation says what the document's entries mean."""
+    """What is asked; the page on certificates in the documentation says what the document's entries mean.
+
+    ``circles`` are the axes of (theta, q...) on which values that differ by whole turns are one.
+    """
 
     def __init__(self, value: Any) -> None:
         asked, parts = (value["format"], value["version"]), (value["components"], value["pieces"])
-        fit = asked == ("coop_drake question", 2) and max(map(len, parts)) <= 1000
-        demand(fit, "question", "is not of version 2, or has more than 1000 components or pieces")
+        fit = asked == ("coop_drake question", 3) and max(map(len, parts)) <= 1000
+        demand(fit, "question", "is not of version 3, or has more than 1000 components or pieces")
         self.floor, self.chains = read_region(value["floor"]), [[Step(0, 1)]]
-        self.limits = intervals(value["lower"], value["upper"], len(value["lower"]))
+        ends = list(zip(value["lower"], value["upper"], strict=True))
+        self.circles = {0, *(axis for axis, pair in enumerate(ends, 1) if pair == (None, None))}
+        pairs = [pair if pair != (None, None) else (-LARGEST, LARGEST) for pair in ends]
+        self.limits = [intervals([low], [high], 1)[0] for low, high in pairs]
         self.axes, self.pieces = 1 + len(self.limits), list[Piece]()
         for part in value["components"]:
             axis, sign = 1 + index(part["joint"], len(self.limits)), index(part["sign"] + 1, 3) - 1
             (angle,), (slide, offset) = numbers([part["angle"]], 1), points([part["slide"], part["offset"]])
+            turns = slide == (0, 0) or axis not in self.circles
+            demand(turns, "question.components", "slide by the value of a joint that is a circle")
             above = self.chains[index(part["parent"], len(self.chains))]
             self.chains.append([Step(axis, sign, angle, slide, offset), *above])
         for part in value["pieces"]:
@@ -136,5 +151,10 @@ class Question:
         (self.start, self.goal), angles = points([value["start"][:2], value["goal"]]), value["start"][2:]
         self.start_box = intervals(angles, angles, self.axes)
         demand(holds(self.limits, self.start_box[1:]), "question.start", "is beyond the limits of a joint")
-        self.goal_box = intervals(value["goal_lower"], value["goal_upper"], self.axes)
+        aims = list(zip(value["goal_lower"], value["goal_upper"], strict=True))
+        free = {axis for axis in self.circles if aims[axis] == (None, None)}
+        known = [(0, 0) if axis in free else aim for axis, aim in enumerate(aims)]
+        self.goal_box = intervals([low for low, _ in known], [high for _, high in known], self.axes)
+        for axis in free:  # A whole turn, rounded outwards.
+            self.goal_box[axis] = -(TURN // 2) - 1, TURN // 2 + 1
         self.room, *self.rooms = numbers(value["tolerances"], 1 + self.axes)

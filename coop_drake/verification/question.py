@@ -43,7 +43,7 @@ def question_of(problem: PlanningProblem) -> dict[str, Any]:
     angle, joints = float(problem.goal_pose[2]), len(tree.joints)
     return {
         "format": "coop_drake question",
-        "version": 2,
+        "version": 3,
         "floor": _region(problem.workspace),
         "lower": [joint.lower for joint in tree.joints],
         "upper": [joint.upper for joint in tree.joints],

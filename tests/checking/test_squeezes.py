@@ -18,7 +18,7 @@ def rectangle(x0, y0, x1, y1):
 
 
 QUESTION = {
-    "format": "coop_drake question", "version": 2,
+    "format": "coop_drake question", "version": 3,
     "floor": {"outer": rectangle(0, 0, LENGTH, 1), "holes": []},
     "lower": [SHORTEST], "upper": [LONGEST],
     "components": [{"parent": 0, "joint": 0, "sign": 0, "angle": 0, "slide": [1, 0], "offset": [0, 0]}],
